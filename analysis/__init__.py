@@ -1,0 +1,1 @@
+"""Analysis of closed loops: metrics, figures, reports."""

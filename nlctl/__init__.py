@@ -1,0 +1,9 @@
+"""nlctl: adaptive neural control of pure-feedback nonlinear systems with python-control.
+
+The names below are loaded when first used, so that ``import nlctl`` and ``nlctl --help`` are
+instant.  `__init__.pyi` lists them for readers, editors and type checkers alike.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

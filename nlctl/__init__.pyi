@@ -1,0 +1,64 @@
+from . import actuators, controllers, functions, paper, plants, references
+from ._block import Block, block
+from ._diagram import DiagramError, initial_state, interconnect, parameters, state_names
+from ._equation import equation
+from ._names import AmbiguousNameError, UnknownNameError
+from ._param import ParameterError, param, record
+from .actuators import Backlash, DeadZone
+from .controllers import (
+    AdaptiveWeights,
+    FilteredError,
+    GaussianBasis,
+    NussbaumLaw,
+    RobustTerm,
+    Zero,
+    adaptive_neural,
+    diagonal_centres,
+    grid_centres,
+    latin_hypercube_centres,
+)
+from .drawing import draw
+from .plants import ForcedDuffing, Genesio, PureFeedback
+from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
+
+__all__ = [
+    "AdaptiveWeights",
+    "AmbiguousNameError",
+    "Backlash",
+    "BandLimitedNoise",
+    "Block",
+    "DeadZone",
+    "DiagramError",
+    "FilteredError",
+    "FilteredStep",
+    "ForcedDuffing",
+    "FunctionReference",
+    "GaussianBasis",
+    "Genesio",
+    "NussbaumLaw",
+    "ParameterError",
+    "PureFeedback",
+    "RobustTerm",
+    "SumOfSines",
+    "UnknownNameError",
+    "Zero",
+    "actuators",
+    "adaptive_neural",
+    "block",
+    "controllers",
+    "diagonal_centres",
+    "draw",
+    "equation",
+    "functions",
+    "grid_centres",
+    "initial_state",
+    "interconnect",
+    "latin_hypercube_centres",
+    "paper",
+    "param",
+    "parameters",
+    "plants",
+    "record",
+    "references",
+    "state_names",
+]

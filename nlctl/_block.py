@@ -1,0 +1,232 @@
+"""The block contract: a record of parameters and its equations, as a python-control system."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import control as ct
+import numpy as np
+
+from ._names import Parameters, base_name, unknown
+from ._param import check_params, declared_params, equation_arguments, with_overrides
+
+
+class Spec(Protocol):
+    """What a record offers to be made a block.
+
+    ``inputs``, ``outputs`` and ``states`` name the signals.  ``output(t, x, u, p)`` and, where
+    there are states, ``update(t, x, u, p)`` are equations: `p` holds the record's parameters
+    (``p.b_r``), the result is a tuple or a 1-D array.  ``feedthrough`` says whether the outputs
+    depend on `u`.  ``initial`` (optional) maps state names to initial values other than 0,
+    ``vector = True`` (optional) declares that the equations want `x` and `u` as 1-D arrays and
+    do not unpack them, ``memory`` (optional) names states that no derivative governs.
+    """
+
+    inputs: Sequence[str]
+    outputs: Sequence[str]
+    states: Sequence[str]
+    feedthrough: bool
+
+    @property
+    def output(self) -> Any: ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterRow:
+    """One line of a parameter table."""
+
+    name: str
+    value: Any
+    unit: str
+    meaning: str
+    bounds: str
+
+    @property
+    def text(self) -> str:
+        """The value as short text; long vectors are summarised."""
+        array = np.asarray(self.value)
+        if array.size > 6:
+            return (
+                f"{' x '.join(map(str, array.shape))} values in [{array.min():g}, {array.max():g}]"
+            )
+        if isinstance(self.value, tuple):
+            return "(" + ", ".join(f"{v:g}" for v in array.ravel()) + ")"
+        return str(self.value) if isinstance(self.value, bool) else f"{self.value:g}"
+
+
+class Block(ct.NonlinearIOSystem):
+    """A python-control system made from a record; see `block`.
+
+    Attributes
+    ----------
+    spec : record
+        The record that the block was made from.
+    params : Parameters
+        Qualified names and values, ``{"actuator.b_r": 0.5}``.
+    """
+
+    def __init__(self, spec: Any, name: str, **kwargs: Any) -> None:
+        self.spec = spec
+        super().__init__(
+            spec.update if spec.states else None,
+            spec.output,
+            inputs=list(spec.inputs) or 0,
+            outputs=list(spec.outputs) or 0,
+            states=list(spec.states) or None,
+            name=name,
+            **kwargs,
+        )
+        self._update_params(None)
+
+    @property
+    def params(self) -> Parameters:
+        """Parameters by qualified name.  Assign a dict to change the block's own values."""
+        fields = declared_params(self.spec)
+        return Parameters({f"{self.name}.{k}": getattr(self.spec, k) for k in fields}, owner=self)
+
+    @params.setter
+    def params(self, values: Mapping[str, Any]) -> None:
+        if values:
+            self.spec = with_overrides(self.spec, self._own(values), self.name)
+
+    def _own(self, params: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the overrides among `params` that are this block's, by field name."""
+        prefix, fields = f"{self.name}.", declared_params(self.spec)
+        if isinstance(params, Parameters):  # the diagram has sorted the names
+            return {k.removeprefix(prefix): v for k, v in params.items() if k.startswith(prefix)}
+        own = {k.removeprefix(prefix): v for k, v in params.items()}
+        for name in own:
+            if base_name(name) not in fields:
+                raise unknown("parameter", name, fields, f"of block '{self.name}'")
+        return own
+
+    def _update_params(self, params: Mapping[str, Any] | None) -> None:
+        # python-control calls this before a run; its equations then get the result as `p`.
+        spec = with_overrides(self.spec, self._own(params or {}), self.name)
+        self._current_params = equation_arguments(spec)
+
+    def __repr__(self) -> str:
+        spec = type(self.spec).__name__
+        signals = f"{_names(self.input_labels)} -> {_names(self.output_labels)}"
+        states = f", states {_names(self.state_labels)}" if self.nstates else ""
+        lines = [f"{spec} block '{self.name}': {signals}{states}"]
+        rows = [("parameter", "value", "unit", "bounds", "meaning")]
+        rows += [(r.name, r.text, r.unit, r.bounds, r.meaning) for r in parameter_rows(self)]
+        widths = [max(len(row[i]) for row in rows) for i in range(5)]
+        if len(rows) > 1:
+            lines += ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+        return "\n".join(lines)
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        head = repr(self).splitlines()[0]
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in cells) + "</tr>"
+            for cells in (
+                (r.name, r.text, r.unit, r.bounds, r.meaning) for r in parameter_rows(self)
+            )
+        )
+        titles = "".join(
+            f"<th>{t}</th>" for t in ("parameter", "value", "unit", "bounds", "meaning")
+        )
+        return f"<p>{html.escape(head)}</p><table><tr>{titles}</tr>{rows}</table>"
+
+
+def _names(labels: Sequence[str]) -> str:
+    shown = list(labels) if len(labels) <= 6 else [*labels[:2], "...", labels[-1]]
+    return "(" + ", ".join(shown) + ")"
+
+
+def parameter_rows(block: Block, path: str = "") -> list[ParameterRow]:
+    """Return the parameter table of a block, with names that begin with `path`."""
+    return [
+        ParameterRow(
+            name=f"{path}{name}",
+            value=getattr(block.spec, name),
+            unit=p.unit,
+            meaning=p.meaning,
+            bounds=p.bounds,
+        )
+        for name, p in declared_params(block.spec).items()
+    ]
+
+
+def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
+    """Make a python-control system of a record.
+
+    Parameters
+    ----------
+    spec : record
+        Parameters and equations; see `Spec` for what is read.
+    name : str
+        Name of the block, and the first part of its parameters' names.
+    dt : float, bool or None, optional
+        Timebase as in python-control, where None leaves the choice to its rules.
+
+    Returns
+    -------
+    Block
+        A `control.NonlinearIOSystem` with qualified parameters: ``params={"actuator.b_r": 0.6}``
+        works wherever python-control takes ``params``.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of bounds.
+    TypeError
+        If `spec` lacks something that a block needs, or its equations return the wrong number
+        of values, or ``feedthrough = False`` is not true.
+    """
+    missing = [a for a in ("inputs", "outputs", "states", "feedthrough") if not hasattr(spec, a)]
+    missing += [] if hasattr(spec, "output") else ["output"]
+    missing += ["update"] if getattr(spec, "states", ()) and not hasattr(spec, "update") else []
+    if missing or isinstance(spec, type):
+        what = spec.__name__ if isinstance(spec, type) else type(spec).__name__
+        why = "is a class: make a record of it first" if isinstance(spec, type) else None
+        raise TypeError(f"{what} {why or 'is no block: it lacks ' + ', '.join(missing)}")
+    if not hasattr(type(spec), "__post_init__"):
+        check_params(spec)
+    made = Block(spec, name, **({} if dt is None else {"dt": dt}))
+    _probe(made)
+    return made
+
+
+def default_state(system: ct.InputOutputSystem) -> np.ndarray:
+    """Return the initial state of one block: what its record declares, otherwise 0."""
+    x = np.zeros(system.nstates or 0)
+    if isinstance(system, Block):
+        for name, value in getattr(system.spec, "initial", {}).items():
+            if name not in system.state_index:
+                raise unknown("state", name, system.state_labels, f"in initial of '{system.name}'")
+            x[system.state_index[name]] = value
+    return x
+
+
+def _probe(made: Block) -> None:
+    """Call the equations once: sizes must match, and feedthrough must be declared truly."""
+    spec, who = made.spec, f"{type(made.spec).__name__} (block '{made.name}')"
+    x, u, p = default_state(made), np.full(made.ninputs, 0.25), made._current_params
+    with np.errstate(all="ignore"):
+        results = [("output", spec.output, made.noutputs)]
+        if made.nstates:
+            results.append(("update", spec.update, made.nstates))
+        for what, function, wanted in results:
+            got = np.size(function(0.0, x, u, p))
+            if got != wanted:
+                names = made.output_labels if what == "output" else made.state_labels
+                raise TypeError(
+                    f"{who} returns {got} values from {what}, needs {wanted}: {', '.join(names)}"
+                )
+        # With NaN for an input, an output that it reaches turns NaN as well.
+        if not spec.feedthrough and made.ninputs:
+            before = np.asarray(spec.output(0.0, x, u, p), dtype=float)
+            after = np.asarray(spec.output(0.0, x, u * np.nan, p), dtype=float)
+            if not np.array_equal(before, after, equal_nan=True):
+                label = made.output_labels[int(np.argmax(before != after))]
+                raise TypeError(
+                    f"{who} declares feedthrough = False, but output '{label}' depends on the input"
+                )

@@ -1,0 +1,220 @@
+"""Diagrams: joining blocks by signal name, and addressing what is inside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import control as ct
+import numpy as np
+
+from ._block import Block, ParameterRow, block, default_state, parameter_rows
+from ._names import Parameters, find_name, unknown
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class DiagramError(ValueError):
+    """Blocks that cannot be joined: the message names block and signal."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leaf:
+    """One block of a flattened diagram: its path, the system, where its states begin."""
+
+    path: str
+    system: ct.InputOutputSystem
+    state_offset: int
+
+
+def leaves(system: ct.InputOutputSystem, path: str = "", offset: int = 0) -> Iterator[Leaf]:
+    """Yield the blocks of a diagram in the order of its state vector, nested ones flattened."""
+    if not isinstance(system, ct.InterconnectedSystem):
+        yield Leaf(path=path or system.name, system=system, state_offset=offset)
+        return
+    for sub in system.syslist:
+        yield from leaves(sub, f"{path}.{sub.name}" if path else sub.name, offset)
+        offset += sub.nstates or 0
+
+
+def as_system(thing: Any, name: str) -> ct.InputOutputSystem:
+    """Return a record as a block called `name`; a python-control system under that name."""
+    if isinstance(thing, ct.InputOutputSystem):
+        return thing if thing.name == name else thing.copy(name=name)
+    return block(thing, name)
+
+
+def interconnect(
+    blocks: Mapping[str, Any] | Sequence[ct.InputOutputSystem],
+    *,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] | None = None,
+    name: str | None = None,
+) -> ct.InterconnectedSystem:
+    """Join blocks by the names of their signals: `control.interconnect` that refuses mistakes.
+
+    An input is fed by the output of the same name.  The result is an ordinary
+    `control.InterconnectedSystem`; what is added are checks (a misspelt signal is an error, not
+    a warning) and, when the diagram is nested in another one, its name in front of the names of
+    its parameters.
+
+    Parameters
+    ----------
+    blocks : mapping or sequence
+        ``{"plant": record or python-control system, ...}``, or a list of systems.  List them in
+        the order of the signal flow: python-control then needs the fewest passes.
+    inputs : sequence of str, optional
+        Signals that come from outside.
+    outputs : sequence of str, optional
+        Signals that the diagram delivers; by default every output of every block.
+    name : str, optional
+        Name of the diagram.
+
+    Returns
+    -------
+    control.InterconnectedSystem
+
+    Raises
+    ------
+    DiagramError
+        If two blocks share a name, deliver the same signal, or an input is fed by nothing.
+    UnknownNameError
+        If `outputs` names a signal that no block delivers, or `inputs` one that none takes.
+    """
+    if isinstance(blocks, Mapping):
+        systems = [as_system(thing, key) for key, thing in blocks.items()]
+    else:
+        systems = list(blocks)
+    sources = _signal_sources(systems)
+    _check_inputs(systems, sources, inputs)
+    outputs = list(sources) if outputs is None else list(outputs)
+    for signal in outputs:
+        if signal not in sources:
+            raise unknown("output signal", signal, sources)
+    diagram = ct.interconnect(
+        systems,
+        inputs=list(inputs),
+        outputs=outputs,
+        outlist=[f"{sources[signal]}.{signal}" for signal in outputs],
+        name=name,
+        check_unused=False,  # our own checks above raise where python-control warns
+    )
+    if isinstance(diagram.params, Parameters):
+        diagram.params.scope = diagram
+    return diagram
+
+
+def _signal_sources(systems: Sequence[ct.InputOutputSystem]) -> dict[str, str]:
+    """Return ``{signal: name of the block that delivers it}``."""
+    sources: dict[str, str] = {}
+    names: set[str] = set()
+    for system in systems:
+        if system.name in names:
+            raise DiagramError(f"two blocks are called '{system.name}'; give each its own name")
+        names.add(system.name)
+        for signal in system.output_labels:
+            if signal in sources:
+                raise DiagramError(
+                    f"signal '{signal}' is delivered by '{sources[signal]}' and by "
+                    f"'{system.name}'; rename one, or add them in a ct.summing_junction"
+                )
+            sources[signal] = system.name
+    return sources
+
+
+def _check_inputs(
+    systems: Sequence[ct.InputOutputSystem], sources: Mapping[str, str], inputs: Sequence[str]
+) -> None:
+    taken = {signal for system in systems for signal in system.input_labels}
+    for signal in inputs:
+        if signal not in taken:
+            raise unknown("input signal", signal, taken)
+    for system in systems:
+        for signal in system.input_labels:
+            if signal not in sources and signal not in inputs:
+                error = unknown("signal", signal, [*sources, *inputs])
+                raise DiagramError(f"block '{system.name}' takes a signal nobody delivers: {error}")
+
+
+def state_names(system: ct.InputOutputSystem) -> list[str]:
+    """Return the qualified names of all states, ``"controller.law.zeta"``, in vector order."""
+    return [f"{leaf.path}.{s}" for leaf in leaves(system) for s in leaf.system.state_labels]
+
+
+def initial_state(
+    system: ct.InputOutputSystem, values: Mapping[str, float] | None = None
+) -> np.ndarray:
+    """Return the initial state of a block or diagram.
+
+    Every block starts from what its record declares (the paper's values), states of foreign
+    blocks start from 0; `values` replaces some of them.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        Block or diagram.
+    values : mapping, optional
+        ``{"plant.x1": 0.8}``.  A name is the path of blocks to the state, or the end of one.
+
+    Returns
+    -------
+    ndarray of shape (nstates,)
+        For ``ct.input_output_response(system, timepts, 0, initial_state(system))``.
+
+    Raises
+    ------
+    UnknownNameError, AmbiguousNameError
+        If a name is not that of exactly one state.
+    ValueError
+        If a value is not a finite number.
+    """
+    x = np.concatenate([default_state(leaf.system) for leaf in leaves(system)])
+    index = {name: i for i, name in enumerate(state_names(system))}
+    for name, value in (values or {}).items():
+        full = find_name("state", name, index)
+        if not np.isfinite(value):
+            raise ValueError(f"state '{full}' needs a finite initial value, got {value}")
+        x[index[full]] = value
+    return x
+
+
+def parameter_names(system: ct.InputOutputSystem) -> list[str]:
+    """Return the qualified names of all parameters of nlctl blocks in `system`."""
+    return [row.name for row in all_parameter_rows(system)]
+
+
+def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
+    """Return the parameter table of a diagram (values as the records hold them)."""
+    rows: list[ParameterRow] = []
+    for leaf in leaves(system):
+        if isinstance(leaf.system, Block):
+            rows += parameter_rows(leaf.system, f"{leaf.path}.")
+    return rows
+
+
+def parameters(system: ct.InputOutputSystem) -> pd.DataFrame:
+    """Return all parameters of a block or diagram as a table.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per parameter, indexed by qualified name; columns value, unit, bounds, meaning.
+    """
+    import pandas as pd
+
+    rows = all_parameter_rows(system)
+    return pd.DataFrame(
+        {
+            "value": [row.value for row in rows],
+            "unit": [row.unit for row in rows],
+            "bounds": [row.bounds for row in rows],
+            "meaning": [row.meaning for row in rows],
+        },
+        index=pd.Index([row.name for row in rows], name="parameter"),
+    )

@@ -1,0 +1,237 @@
+"""Parameters of records: declared once with unit, meaning and bounds; checked where they are born.
+
+This module and its bounds are the only validators of numbers in nlctl.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections import namedtuple
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeVar, dataclass_transform
+
+import numpy as np
+
+T = TypeVar("T")
+_KEY = "nlctl"
+
+
+class ParameterError(ValueError):
+    """A parameter breaks a rule: the message names record, rule, value and block."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Param:
+    """What `param` declares about one field: unit, meaning, bounds, number of axes."""
+
+    unit: str
+    meaning: str
+    above: float | None
+    below: float | None
+    at_least: float | None
+    at_most: float | None
+    ndim: int
+
+    def rules(self) -> Iterator[tuple[str, Callable[[float], bool]]]:
+        """Yield each bound as ``("> 0", test)``."""
+        limits = (
+            (">", self.above, float.__gt__),
+            ("<", self.below, float.__lt__),
+            (">=", self.at_least, float.__ge__),
+            ("<=", self.at_most, float.__le__),
+        )
+        for sign, limit, holds in limits:
+            if limit is not None:
+                yield f"{sign} {limit:g}", lambda v, h=holds, b=limit: bool(h(v, float(b)))
+
+    @property
+    def bounds(self) -> str:
+        """The bounds as text, for example ``> 0``; empty where there are none."""
+        return ", ".join(rule for rule, _ in self.rules())
+
+
+def param(
+    default: Any,
+    *,
+    unit: str,
+    meaning: str,
+    above: float | None = None,
+    below: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+) -> Any:
+    """Declare a parameter of a block record.
+
+    Parameters
+    ----------
+    default : float, int, bool or (nested) tuple of float
+        Value of the parameter when none is given.  The number of axes of the default is the
+        number of axes of the parameter: a tuple is a vector, a tuple of tuples a matrix.
+    unit, meaning : str
+        Unit (``"1"`` for a pure number) and meaning, shown in every table of parameters.
+    above, below : float, optional
+        Strict bounds of the value (of every element).
+    at_least, at_most : float, optional
+        Bounds that the value may attain.
+
+    Returns
+    -------
+    dataclasses.Field
+        To be assigned in the body of a class decorated with `record`.
+    """
+    declared = Param(
+        unit=unit,
+        meaning=meaning,
+        above=above,
+        below=below,
+        at_least=at_least,
+        at_most=at_most,
+        ndim=np.ndim(default),
+    )
+    return dataclasses.field(default=default, metadata={_KEY: declared})
+
+
+@dataclass_transform(
+    kw_only_default=True, frozen_default=True, field_specifiers=(param, dataclasses.field)
+)
+def record(cls: type[T]) -> type[T]:
+    """Make a class a frozen, keyword-only dataclass whose parameters are checked at birth.
+
+    Bounds come from `param`; a method ``check(self)``, where the class has one, looks at rules
+    that concern several fields and raises `ParameterError`.
+
+    Raises
+    ------
+    ParameterError
+        When a record is made with a value that breaks a rule.
+    """
+    if "__post_init__" not in cls.__dict__:
+        cls.__post_init__ = check_params  # type: ignore[attr-defined]
+    return dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+
+
+def declared_params(spec: Any) -> dict[str, Param]:
+    """Return ``{field name: Param}`` of a record or record class, in order of definition."""
+    return {f.name: f.metadata[_KEY] for f in dataclasses.fields(spec) if _KEY in f.metadata}
+
+
+def check_params(spec: Any) -> None:
+    """Normalise every parameter of `spec` (floats, nested tuples) and check its bounds.
+
+    Raises
+    ------
+    ParameterError
+        If a value is no finite number, has the wrong number of axes or leaves its bounds, or
+        if the record's own ``check`` refuses it.
+    """
+    who = type(spec).__name__
+    types = {f.name: f.type for f in dataclasses.fields(spec)}
+    for name, rule in declared_params(spec).items():
+        value = _normalised(who, name, getattr(spec, name), rule.ndim, types[name])
+        object.__setattr__(spec, name, value)  # the record is frozen for everybody else
+        _check_bounds(who, name, value, rule)
+    if hasattr(spec, "check"):
+        spec.check()
+
+
+def _normalised(who: str, name: str, value: Any, ndim: int, kind: Any) -> Any:
+    """Return `value` as bool, int, float or nested tuple of floats."""
+    if kind in (bool, "bool"):
+        if not isinstance(value, bool | np.bool_):
+            raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")
+        return bool(value)
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{who} needs numbers for {name}, got {value!r}") from None
+    if array.ndim == 0 and ndim == 1:
+        array = array.reshape(1)
+    if array.ndim != ndim:
+        shape = {0: "a number", 1: "a vector", 2: "a matrix"}[ndim]
+        raise ParameterError(f"{who} needs {name} to be {shape}, got shape {array.shape}")
+    if array.size == 0:
+        raise ParameterError(f"{who} needs at least one value in {name}, got none")
+    if kind in (int, "int"):
+        if float(array) != math.floor(float(array)):
+            raise ParameterError(f"{who} needs a whole number for {name}, got {value!r}")
+        return int(array)
+    return _nested_tuple(array.tolist())
+
+
+def _nested_tuple(value: Any) -> Any:
+    return tuple(map(_nested_tuple, value)) if isinstance(value, list) else value
+
+
+def _check_bounds(who: str, name: str, value: Any, rule: Param) -> None:
+    for index, element in np.ndenumerate(np.asarray(value, dtype=float)):
+        where = name + (f"[{', '.join(map(str, index))}]" if index else "")
+        if not math.isfinite(element):
+            raise ParameterError(f"{who} needs a finite {where}, got {element}")
+        for text, holds in rule.rules():
+            if not holds(float(element)):
+                raise ParameterError(f"{who} needs {where} {text}, got {element:g}")
+
+
+def with_overrides(spec: Any, overrides: Mapping[str, Any], block: str) -> Any:
+    """Return `spec` with parameters replaced, checked, and errors that name the block.
+
+    Parameters
+    ----------
+    spec : record
+    overrides : mapping
+        ``{"b_r": 0.6}``; an element of a vector as ``{"lambdas[0]": 2.0}``, of a matrix as
+        ``{"centres[3, 1]": 0.0}``.  Names must exist.
+    block : str
+        Name of the block, for messages.
+    """
+    whole = {k: v for k, v in overrides.items() if "[" not in k}
+    try:
+        changed = dataclasses.replace(spec, **whole)
+        for key, value in overrides.items():
+            if "[" in key:
+                changed = _replace_element(changed, key, value)
+        if not hasattr(type(spec), "__post_init__"):  # a plain dataclass: nobody checked it yet
+            check_params(changed)
+    except ParameterError as error:
+        raise ParameterError(f"{error} (block '{block}')") from None
+    return changed
+
+
+def _replace_element(spec: Any, key: str, value: Any) -> Any:
+    name, _, inside = key.partition("[")
+    array = np.array(getattr(spec, name), dtype=float)
+    try:
+        index = tuple(int(part) for part in inside.rstrip("]").split(","))
+        if len(index) != array.ndim:
+            raise IndexError
+        array[index] = value
+    except (ValueError, IndexError, TypeError):
+        raise ParameterError(
+            f"{type(spec).__name__} has {name} of shape {array.shape}; "
+            f"'{key}' = {value!r} is no element of it"
+        ) from None
+    return dataclasses.replace(spec, **{name: array})
+
+
+@functools.cache
+def _arguments_type(name: str, fields: tuple[str, ...]) -> type:
+    return namedtuple(name, fields)
+
+
+def equation_arguments(spec: Any) -> Any:
+    """Return what the equations of `spec` receive as ``p``: its numbers as a named tuple.
+
+    Vectors and matrices become read-only float arrays.  A record may add numbers that follow
+    from its parameters with a method ``derived(self) -> dict``.
+    """
+    values = {name: getattr(spec, name) for name in declared_params(spec)}
+    if hasattr(spec, "derived"):
+        values |= spec.derived()
+    for name, value in values.items():
+        if isinstance(value, tuple | np.ndarray):
+            array = np.array(value, dtype=float)
+            array.flags.writeable = False
+            values[name] = array
+    return _arguments_type(type(spec).__name__, tuple(values))(**values)

@@ -1,0 +1,130 @@
+"""Actuators with uncertain nonlinearity, v = k(u, t) u + eps_u (2): dead zone and backlash."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._equation import equation
+from ._param import ParameterError, param, record
+
+__all__ = ["Backlash", "DeadZone"]
+
+
+@record
+class DeadZone:
+    """Asymmetric dead zone with slopes that depend on the input (Lv et al. 2017, Example 1).
+
+    v = (1 + 0.3 sin u) (u - b_r)      u >= b_r
+        0                              b_l < u < b_r
+        (0.8 + 0.2 cos u) (u - b_l)    u <= b_l
+    """
+
+    slope_r: float = param(1.0, unit="1", meaning="mean slope on the right", above=0)
+    ripple_r: float = param(0.3, unit="1", meaning="ripple of the right slope, sin u")
+    slope_l: float = param(0.8, unit="1", meaning="mean slope on the left", above=0)
+    ripple_l: float = param(0.2, unit="1", meaning="ripple of the left slope, cos u")
+    b_r: float = param(0.5, unit="1", meaning="right break point", above=0)
+    b_l: float = param(-0.3, unit="1", meaning="left break point", below=0)
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ()
+    feedthrough = True
+
+    def check(self) -> None:
+        """Assumption 1 wants a positive slope everywhere."""
+        for side in ("r", "l"):
+            slope, ripple = getattr(self, f"slope_{side}"), getattr(self, f"ripple_{side}")
+            if abs(ripple) >= slope:
+                raise ParameterError(
+                    f"DeadZone needs |ripple_{side}| < slope_{side}, so that the slope stays "
+                    f"positive, got {ripple:g} and {slope:g}"
+                )
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The characteristic v(u)."""
+        (u1,) = u
+        if p.b_l < u1 < p.b_r:  # false for NaN, which then reaches v
+            return (0.0,)
+        if u1 > 0:
+            return ((p.slope_r + p.ripple_r * np.sin(u1)) * (u1 - p.b_r),)
+        return ((p.slope_l + p.ripple_l * np.cos(u1)) * (u1 - p.b_l),)
+
+
+@equation
+def play_band(u, p):
+    """Return the lower and upper output that the gap admits at input u.
+
+    The lines are m_r (u - c_r), taken when u rises, and m_l (u - c_l), taken when it falls.  With
+    unequal slopes they cross; sorting them keeps the operator defined and continuous there.
+    """
+    rising, falling = p.m_r * (u - p.c_r), p.m_l * (u - p.c_l)
+    return np.minimum(rising, falling), np.maximum(rising, falling)
+
+
+@equation
+def play(u, memory, p):
+    """The play operator: the memory, carried along by the nearer side of the gap."""
+    low, high = play_band(u, p)
+    return np.minimum(np.maximum(memory, low), high)
+
+
+@record
+class Backlash:
+    """Backlash as the play operator (Lv et al. 2017, Example 2).
+
+        v = m_r (u - c_r)    u rises and v touches the right side of the gap
+            m_l (u - c_l)    u falls and v touches the left side
+            v(t-)            otherwise
+
+    that is v(t) = min(max(v(t-), low(u)), high(u)): the memory clipped into the gap.  The paper's
+    phi(u) is read as v(t-); any other reading is ill-posed in a closed loop.  The output lies in
+    the gap from the first instant, whatever memory it starts from.
+
+    In python-control, which has no accepted-step hook, the memory is a state that relaxes onto
+    the play,  memory' = rate (v - memory), and v is the memory clipped.  On the sides of the gap v
+    is then exact.  Where it holds, it misses the turning value of the branch (1.2 (u - 0.5) at
+    the peak of u, say) by about |u''| / rate^2 times the slope, for smooth u.  The price is a
+    stiff state: use ``method="LSODA"``.
+    """
+
+    m_r: float = param(1.2, unit="1", meaning="slope of the right (rising) side", above=0)
+    m_l: float = param(1.2, unit="1", meaning="slope of the left (falling) side", above=0)
+    c_r: float = param(0.5, unit="1", meaning="right end of the gap, in u")
+    c_l: float = param(-0.6, unit="1", meaning="left end of the gap, in u")
+    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memory", above=0)
+    v0: float = param(0.0, unit="1", meaning="memory v(0-) at the start")
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ("memory",)
+    memory = ("memory",)
+    feedthrough = True
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The memory starts from v(0-)."""
+        return {"memory": self.v0}
+
+    def check(self) -> None:
+        """The gap has a left and a right end."""
+        if not self.c_l < self.c_r:
+            raise ParameterError(f"Backlash needs c_l < c_r, got {self.c_l:g} and {self.c_r:g}")
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Relaxation of the memory onto the play."""
+        (memory,) = x
+        (u1,) = u
+        return (p.rate * (play(u1, memory, p) - memory),)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The memory clipped into the gap."""
+        (memory,) = x
+        (u1,) = u
+        return (play(u1, memory, p),)

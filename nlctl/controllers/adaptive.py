@@ -1,0 +1,122 @@
+"""The paper's controller: its blocks, joined."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+
+from .._diagram import interconnect
+from .._equation import equation
+from .._param import ParameterError, record
+from .filtered_error import FilteredError, binomial_lambdas
+from .nussbaum import NussbaumLaw
+from .rbf import AdaptiveWeights, GaussianBasis, diagonal_centres
+from .robust import RobustTerm
+
+__all__ = ["Zero", "adaptive_neural"]
+
+
+@record
+class Zero:
+    """A block that delivers 0: put it in the place of a piece that is to be left out.
+
+    Parameters
+    ----------
+    outputs : tuple of str
+        The signals that are 0, for instance ``("W_psi", "W_norm")`` for no network.
+    """
+
+    outputs: tuple[str, ...]
+
+    inputs = ()
+    states = ()
+    feedthrough = False
+
+    @property
+    def output(self) -> Any:
+        """As many zeros as there are outputs."""
+        zeros = (0.0,) * len(self.outputs)
+
+        @equation
+        def output(t, x, u, p):
+            return zeros
+
+        return output
+
+
+def adaptive_neural(
+    order: int = 2,
+    *,
+    filter: Any = None,
+    basis: Any = None,
+    weights: Any = None,
+    robust: Any = None,
+    law: Any = None,
+    name: str = "controller",
+) -> ct.InterconnectedSystem:
+    """Join the adaptive neural controller of the paper, (14) and (23)-(25).
+
+        filter -> basis -> weights, robust -> law
+
+    It takes x1, ..., xn and yd, yd1, ..., ydn, and delivers e, r, u, zeta, delta_hat, W_norm.
+    It knows neither the plant nor the actuator: the same controller drives a dead zone and
+    backlash.
+
+    Parameters
+    ----------
+    order : int, optional
+        Order n >= 2 of the plant.
+    filter, basis, weights, robust, law : record or control.InputOutputSystem, optional
+        The pieces: `FilteredError`, `GaussianBasis`, `AdaptiveWeights`, `RobustTerm`,
+        `NussbaumLaw` with the values of Example 1 (lambdas of (s+1)^(n-1) for n > 2).  Replace
+        any by a block with the same signals, or by `Zero` to leave it out.
+    name : str, optional
+        Name of the joined controller; parameters are then ``"controller.law.beta"`` or, where
+        that is unambiguous, ``"law.beta"``.
+
+    Returns
+    -------
+    control.InterconnectedSystem
+
+    Raises
+    ------
+    ParameterError
+        If `order` is below 2 or does not fit to the filter or the basis.
+    DiagramError
+        If a replaced piece lacks a signal.
+    """
+    if not (isinstance(order, int) and order >= 2):
+        raise ParameterError(f"adaptive_neural needs an order >= 2, got {order!r}")
+    default_filter = (
+        FilteredError() if order == 2 else FilteredError(lambdas=binomial_lambdas(order))
+    )
+    filter = default_filter if filter is None else filter
+    basis = GaussianBasis(centres=diagonal_centres(27, order)) if basis is None else basis
+    if isinstance(filter, FilteredError) and filter.order != order:
+        raise ParameterError(
+            f"adaptive_neural of order {order} needs {order - 1} lambdas, got "
+            f"{len(filter.lambdas)} ({filter.lambdas})"
+        )
+    if isinstance(basis, GaussianBasis) and len(basis.inputs) > order:
+        raise ParameterError(
+            f"adaptive_neural of order {order} needs centres with at most {order} coordinates, "
+            f"got {len(basis.inputs)}"
+        )
+    nodes = len(basis.centres) if isinstance(basis, GaussianBasis) else 27
+    pieces = {
+        "filter": filter,
+        "basis": basis,
+        "weights": AdaptiveWeights(nodes=nodes) if weights is None else weights,
+        "robust": RobustTerm() if robust is None else robust,
+        "law": NussbaumLaw() if law is None else law,
+    }
+    signals = (
+        [f"x{i}" for i in range(1, order + 1)] + ["yd"] + [f"yd{i}" for i in range(1, order + 1)]
+    )
+    return interconnect(
+        pieces,
+        inputs=signals,
+        outputs=["e", "r", "u", "zeta", "delta_hat", "W_norm"],
+        name=name,
+    )

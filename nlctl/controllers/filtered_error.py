@@ -1,0 +1,69 @@
+"""Filtered tracking error (14) and the known part Y_d of its derivative (18)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._equation import equation
+from .._param import ParameterError, param, record
+from ..references import derivative_names
+
+__all__ = ["FilteredError", "binomial_lambdas"]
+
+
+def binomial_lambdas(order: int) -> tuple[float, ...]:
+    """Return lambda_1, ..., lambda_{n-1} of (s + 1)^(n-1); (2, 1) for order 3."""
+    return tuple(float(c) for c in np.poly(-np.ones(order - 1))[1:])
+
+
+@record
+class FilteredError:
+    """Filtered tracking error of a plant of order n (14).
+
+        e   = x - x_d,    x_d = (yd, yd', ..., yd^(n-1))
+        r   = lambda_{n-1} e_1 + ... + lambda_1 e_{n-1} + e_n
+        Y_d = -yd^(n) + lambda_{n-1} e_2 + ... + lambda_1 e_n
+
+    The polynomial s^(n-1) + lambda_1 s^(n-2) + ... + lambda_{n-1} must be Hurwitz.
+    """
+
+    lambdas: tuple[float, ...] = param(
+        (1.5,), unit="s^-i", meaning="lambda_1, ..., lambda_{n-1}; the order is their number + 1"
+    )
+
+    states = ()
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """The roots must lie in the open left half plane."""
+        roots = np.roots([1.0, *self.lambdas])
+        worst = roots[np.argmax(roots.real)]
+        if not worst.real < 0:
+            raise ParameterError(
+                "FilteredError needs a Hurwitz polynomial s^(n-1) + lambda_1 s^(n-2) + ... (14), "
+                f"got lambdas {self.lambdas} with a root at {worst:.4g}"
+            )
+
+    @property
+    def order(self) -> int:
+        """Order n of the plant."""
+        return len(self.lambdas) + 1
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names x1, ..., xn, yd, yd1, ..., ydn."""
+        return (*(f"x{i}" for i in range(1, self.order + 1)), *derivative_names(self.order))
+
+    outputs = ("e", "r", "Y_d")
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """Equations (14) and (18); e is the tracking error e_1."""
+        n = p.lambdas.size + 1
+        e = u[:n] - u[n : 2 * n]
+        A = p.lambdas[::-1]
+        r = np.sum(A * e[:-1]) + e[-1]
+        Y_d = -u[2 * n] + np.sum(A * e[1:])
+        return e[0], r, Y_d

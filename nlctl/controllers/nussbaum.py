@@ -1,0 +1,61 @@
+"""Nussbaum law (23), (24): it finds the sign of the input gain by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+from .._equation import equation
+from .._param import param, record
+from ..functions import nussbaum
+
+__all__ = ["NussbaumLaw"]
+
+
+@equation
+def control_base(u, p):
+    """The bracket of (23): eta = beta r + W_hat^T psi + delta_hat tanh(r/tau) + Y_d."""
+    r, W_psi, robust, Y_d = u
+    return p.beta * r + W_psi + robust + Y_d
+
+
+@record
+class NussbaumLaw:
+    """Nussbaum control law (23), (24).
+
+        u     = N(zeta) eta,   eta = beta r + W_hat^T psi + delta_hat tanh(r/tau) + Y_d
+        zeta' = r eta,         zeta(0) = 1
+
+    Parameters
+    ----------
+    N : equation, optional
+        Nussbaum function; by default the paper's `nlctl.functions.nussbaum`, which is 0 at
+        zeta = 1.
+    """
+
+    beta: float = param(2.5, unit="1", meaning="gain of the filtered error", above=0)
+    N: Callable[[float], float] = nussbaum
+
+    inputs = ("r", "W_psi", "robust", "Y_d")
+    outputs = ("u", "zeta")
+    states = ("zeta",)
+    initial = {"zeta": 1.0}
+    feedthrough = True
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Equation (24)."""
+        return (u[0] * control_base(u, p),)
+
+    @cached_property
+    def output(self) -> Callable:
+        """Equation (23)."""
+        N = equation(self.N)
+
+        @equation
+        def output(t, x, u, p):
+            (zeta,) = x
+            return N(zeta) * control_base(u, p), zeta
+
+        return output

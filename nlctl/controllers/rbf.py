@@ -1,0 +1,141 @@
+"""RBF network (10), (19): Gaussian basis, where its centres lie, and its weights (25)."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from .._equation import equation
+from .._param import ParameterError, param, record
+from ..functions import gaussian
+
+__all__ = [
+    "AdaptiveWeights",
+    "GaussianBasis",
+    "diagonal_centres",
+    "grid_centres",
+    "latin_hypercube_centres",
+]
+
+Matrix = tuple[tuple[float, ...], ...]
+
+
+def _rows(array: np.ndarray) -> Matrix:
+    return tuple(tuple(map(float, row)) for row in array)
+
+
+def diagonal_centres(count: int, inputs: int, low: float = -10, high: float = 10) -> Matrix:
+    """Return `count` centres evenly spaced on the diagonal of [low, high]^inputs.
+
+    The usual reading of "27 centres evenly distributed in [-10, 10] x [-10, 10]".
+    """
+    return _rows(np.tile(np.linspace(low, high, count)[:, None], (1, inputs)))
+
+
+def grid_centres(counts: Sequence[int], low: float = -10, high: float = 10) -> Matrix:
+    """Return a full grid on [low, high]^n with ``counts[i]`` points along axis i.
+
+    The last axis varies fastest.
+    """
+    axes = [np.linspace(low, high, count) for count in counts]
+    return _rows(np.array(list(itertools.product(*axes))))
+
+
+def latin_hypercube_centres(
+    count: int, inputs: int, low: float = -10, high: float = 10, *, seed: int
+) -> Matrix:
+    """Return `count` centres of a Latin hypercube on [low, high]^inputs (scipy.stats.qmc)."""
+    from scipy.stats import qmc
+
+    unit = qmc.LatinHypercube(inputs, rng=seed).random(count)
+    return _rows(low + (high - low) * unit)
+
+
+@record
+class GaussianBasis:
+    """Gaussian basis functions of the state (10), Example 1.
+
+        psi_i(x) = exp(-|x - mu_i|^2 / nu_i^2),   i = 1, ..., l
+
+    The number of columns of `centres` is the number of inputs x1, ..., xn.
+    """
+
+    centres: Matrix = param(diagonal_centres(27, 2), unit="1", meaning="centres mu_i, one per row")
+    widths: tuple[float, ...] = param(
+        (2.0,), unit="1", meaning="widths nu_i: one for all, or one each", above=0
+    )
+
+    states = ()
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """One width, or one per centre."""
+        if len(self.widths) not in (1, len(self.centres)):
+            raise ParameterError(
+                f"GaussianBasis needs 1 or {len(self.centres)} widths for its "
+                f"{len(self.centres)} centres, got {len(self.widths)}"
+            )
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names x1, ..., xn."""
+        return tuple(f"x{i}" for i in range(1, len(self.centres[0]) + 1))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names psi[0], ..., psi[l-1]."""
+        return tuple(f"psi[{i}]" for i in range(len(self.centres)))
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The basis at the state u = x."""
+        return gaussian(u, p.centres, p.widths)
+
+
+@record
+class AdaptiveWeights:
+    """Weights of the network with sigma-modification (25), and its output.
+
+    W_hat' = Gamma (r psi - sigma_1 W_hat),   W_psi = W_hat^T psi,   W_hat(0) = 0
+    """
+
+    nodes: int = 27
+    Gamma: float = param(0.5, unit="1", meaning="adaptation gain, Gamma I", above=0)
+    sigma_1: float = param(0.5, unit="1", meaning="sigma-modification of W_hat", at_least=0)
+
+    outputs = ("W_psi", "W_norm")
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """A network has nodes."""
+        if not (isinstance(self.nodes, int) and self.nodes >= 1):
+            raise ParameterError(f"AdaptiveWeights needs nodes >= 1, got {self.nodes!r}")
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names r, psi[0], ..., psi[l-1]."""
+        return ("r", *(f"psi[{i}]" for i in range(self.nodes)))
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names W_hat[0], ..., W_hat[l-1]."""
+        return tuple(f"W_hat[{i}]" for i in range(self.nodes))
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Adaptation law, first line of (25)."""
+        r, psi, W_hat = u[0], u[1:], x
+        return p.Gamma * (r * psi - p.sigma_1 * W_hat)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The network's output W_hat^T psi, and the norm of the weights."""
+        psi, W_hat = u[1:], x
+        return np.sum(W_hat * psi), np.sqrt(np.sum(W_hat * W_hat))

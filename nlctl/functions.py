@@ -1,0 +1,128 @@
+"""The scalar functions of the controller: Nussbaum functions, Gaussian basis, smooth sign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ._equation import equation
+
+__all__ = [
+    "band_limited",
+    "gaussian",
+    "nussbaum",
+    "nussbaum_derivative",
+    "nussbaum_integral",
+    "smooth_sign",
+]
+
+
+@equation
+def nussbaum(zeta):
+    """Nussbaum function of the paper, N(zeta) = exp(zeta^2) cos(pi zeta / 2).
+
+    It overflows at zeta = 26.64 and is zero at zeta = 1, where the paper starts.
+    """
+    return np.exp(zeta * zeta) * np.cos(np.pi / 2 * zeta)
+
+
+@equation
+def nussbaum_derivative(zeta):
+    """Derivative N'(zeta) of `nussbaum`."""
+    angle = np.pi / 2 * zeta
+    return np.exp(zeta * zeta) * (2 * zeta * np.cos(angle) - np.pi / 2 * np.sin(angle))
+
+
+def nussbaum_integral(zeta):
+    r"""Integral of `nussbaum` from 0 to zeta, for property (12).
+
+    .. math:: \int_0^s N = e^{\pi^2/16} \frac{\sqrt\pi}{2} \mathrm{Re}\,\mathrm{erfi}(s+i\pi/4)
+    """
+    from scipy.special import erfi
+
+    return np.exp(np.pi**2 / 16) * np.sqrt(np.pi) / 2 * erfi(np.asarray(zeta) + 0.25j * np.pi).real
+
+
+@equation
+def gaussian(Z, centres, widths):
+    """Gaussian basis of Example 1, psi_i(Z) = exp(-(Z - mu_i)^T (Z - mu_i) / nu_i^2).
+
+    Parameters
+    ----------
+    Z : ndarray of shape (n,)
+    centres : ndarray of shape (l, n)
+    widths : ndarray of shape (l,) or (1,)
+
+    Returns
+    -------
+    ndarray of shape (l,)
+    """
+    distance = centres - Z
+    return np.exp(-np.sum(distance * distance, axis=1) / (widths * widths))
+
+
+@equation
+def smooth_sign(r, tau):
+    """Smooth sign tanh(r / tau) of the robust term; |r| - r tanh(r/tau) <= 0.2785 tau, (29)."""
+    return np.tanh(r / tau)
+
+
+def band_limited(
+    rms: float, *, low: float, high: float, seed: int, components: int = 32
+) -> Callable[[float], float]:
+    """Make a band-limited noise signal: a fixed function of time, the same for every solver.
+
+    The signal is a sum of `components` sines with equal amplitudes, frequencies drawn one from
+    each of `components` equal parts of the band, and uniform phases.
+
+    Parameters
+    ----------
+    rms : float
+        Root mean square of the signal over long times, in the signal's unit; >= 0.
+    low, high : float
+        Band in rad/s, 0 <= low < high.
+    seed : int
+        Seed of the frequencies and phases.
+    components : int, optional
+        Number of sines, >= 1.
+
+    Returns
+    -------
+    equation
+        ``noise(t) -> float``, to be used in equations of one's own, for instance in the
+        disturbance d(x, t) of a plant.
+
+    Raises
+    ------
+    ValueError
+        If an argument breaks its rule.
+    """
+    omega, phase = noise_spectrum(low, high, seed, components)
+    if not (np.isfinite(rms) and rms >= 0):
+        raise ValueError(f"band_limited needs rms >= 0, got {rms}")
+    amplitude = float(rms)
+
+    @equation
+    def noise(t):
+        return noise_value(t, amplitude, omega, phase)
+
+    return noise
+
+
+def noise_spectrum(low: float, high: float, seed: int, components: int):
+    """Draw the frequencies (rad/s) and phases (rad) of `band_limited`, each of shape (m,)."""
+    if not (np.isfinite(high) and 0 <= low < high):
+        raise ValueError(f"band-limited noise needs 0 <= low < high, got low {low}, high {high}")
+    if components < 1:
+        raise ValueError(f"band-limited noise needs components >= 1, got {components}")
+    rng = np.random.default_rng(seed)
+    edges = np.linspace(low, high, components + 1)
+    omega = rng.uniform(edges[:-1], edges[1:])
+    return omega, rng.uniform(0, 2 * np.pi, components)
+
+
+@equation
+def noise_value(t, rms, omega, phase):
+    """Value at time t of the sum of equal sines with the given spectrum and rms."""
+    return rms * np.sqrt(2 / omega.size) * np.sum(np.sin(omega * t + phase))

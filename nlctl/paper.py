@@ -1,0 +1,218 @@
+"""The two examples of Lv et al. 2017 (doi 10.1007/978-3-319-70136-3_22) as diagrams.
+
+Every choice that the paper leaves open is an argument; the defaults are the readings that its
+other statements support.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import control as ct
+
+from ._diagram import as_system, interconnect
+from ._names import unknown
+from ._param import ParameterError
+from .actuators import Backlash, DeadZone
+from .controllers import (
+    AdaptiveWeights,
+    FilteredError,
+    GaussianBasis,
+    NussbaumLaw,
+    RobustTerm,
+    adaptive_neural,
+    diagonal_centres,
+    grid_centres,
+)
+from .plants import ForcedDuffing, Genesio
+from .references import SumOfSines
+
+__all__ = ["example_1", "example_2", "paper_centres"]
+
+_INTERNAL = ("r", "zeta", "delta_hat", "W_norm")  # a controller of another kind may lack these
+
+
+def paper_centres(layout: Any, order: int) -> Any:
+    """Return the centres that a layout name stands for, on [-10, 10]^n.
+
+    Parameters
+    ----------
+    layout : str or array_like
+        ``"diagonal"``: 27 centres on the diagonal.  ``"3x9"``, ``"3x3x3"``: a grid with that many
+        points along x1, x2, ...; fewer factors than states leave the last states out.  An array
+        of shape (l, n) is returned as it is.
+    order : int
+        Order n of the plant.
+
+    Raises
+    ------
+    ParameterError
+        If the name is none of these.
+    """
+    if not isinstance(layout, str):
+        return layout
+    if layout == "diagonal":
+        return diagonal_centres(27, order)
+    counts = layout.split("x")
+    if all(c.isdigit() and int(c) > 0 for c in counts) and 1 <= len(counts) <= order:
+        return grid_centres([int(c) for c in counts])
+    raise ParameterError(
+        f"centres must be 'diagonal', a grid such as '{'x'.join(['3'] * order)}' with at most "
+        f"{order} factors, or an array of shape (l, {order}); got {layout!r}"
+    )
+
+
+def example_1(
+    *,
+    plant: Any = None,
+    actuator: Any = None,
+    controller: Any = None,
+    reference: Any = None,
+    sensor: Any = None,
+    centres: Any = None,
+    p1: float | None = None,
+    phase: Literal["product", "integral"] | None = None,
+    name: str = "example_1",
+) -> ct.InterconnectedSystem:
+    """Example 1: forced oscillator with a dead zone, n = 2.
+
+    Parameters
+    ----------
+    plant, actuator, controller, reference : record or control.InputOutputSystem, optional
+        Replace a block by one with the same signals.  Defaults: `ForcedDuffing`, `DeadZone`,
+        the paper's controller, `SumOfSines`.
+    sensor : record or control.InputOutputSystem, optional
+        A block between the plant's x1, x2 and the controller, such as `BandLimitedNoise`.
+    centres : str or array_like, optional
+        Layout of the 27 centres, see `paper_centres`; ``"diagonal"`` by default.  The paper says
+        "evenly distributed in [-10, 10] x [-10, 10]", and 27 is no square.
+    p1 : float, optional
+        Stiffness; -0.2 as printed by default (which makes the term +0.2 x1).
+    phase : {"product", "integral"}, optional
+        Reading of cos(w t) with time-varying w: ``"product"`` is w(t) t as printed, a chirp;
+        ``"integral"`` is the integral of w.
+    name : str, optional
+        Name of the diagram.
+
+    Returns
+    -------
+    control.InterconnectedSystem
+        Outputs y, yd, e, r, u, v, zeta, delta_hat, W_norm, x1, x2.  Start it from
+        `nlctl.initial_state`.
+
+    Raises
+    ------
+    ParameterError, DiagramError
+        If a value or a block does not fit, or a choice is given together with the block that
+        it belongs to.
+    """
+    _exclusive("plant", plant, p1=p1, phase=phase)
+    _exclusive("controller", controller, centres=centres)
+    if phase not in (None, "product", "integral"):
+        raise unknown("phase", str(phase), ("product", "integral"))
+    if plant is None:
+        plant = ForcedDuffing(p1=-0.2 if p1 is None else p1, integrate_w=phase == "integral")
+    if controller is None:
+        basis = GaussianBasis(centres=paper_centres("diagonal" if centres is None else centres, 2))
+        controller = adaptive_neural(2, basis=basis)
+    actuator = DeadZone() if actuator is None else actuator
+    reference = SumOfSines(order=2) if reference is None else reference
+    return _closed_loop(2, plant, actuator, controller, reference, sensor, name)
+
+
+def example_2(
+    *,
+    plant: Any = None,
+    actuator: Any = None,
+    controller: Any = None,
+    reference: Any = None,
+    sensor: Any = None,
+    centres: Any = None,
+    lambdas: tuple[float, float] | None = None,
+    v0: float | None = None,
+    name: str = "example_2",
+) -> ct.InterconnectedSystem:
+    """Example 2: Genesio system with backlash, n = 3.
+
+    Parameters
+    ----------
+    plant, actuator, controller, reference, sensor, name
+        As in `example_1`.  Defaults: `Genesio`, `Backlash`, the paper's controller, `SumOfSines`.
+    centres : str or array_like, optional
+        Layout of the 27 centres, see `paper_centres`; ``"3x3x3"`` by default.
+    lambdas : tuple of 2 floats, optional
+        (lambda_1, lambda_2); (2, 1) as printed, so r = e1 + 2 e2 + e3.  (1, 2) is the other
+        reading, r = 2 e1 + e2 + e3.
+    v0 : float, optional
+        Memory v(0-) of the backlash, in [-0.6, 0.72]; not given in the paper, 0 by default.
+
+    Returns
+    -------
+    control.InterconnectedSystem
+        Outputs y, yd, e, r, u, v, zeta, delta_hat, W_norm, x1, x2, x3.
+
+    Raises
+    ------
+    ParameterError, DiagramError
+        As in `example_1`.
+    """
+    _exclusive("actuator", actuator, v0=v0)
+    _exclusive("controller", controller, centres=centres, lambdas=lambdas)
+    if controller is None:
+        basis = GaussianBasis(centres=paper_centres("3x3x3" if centres is None else centres, 3))
+        controller = adaptive_neural(
+            3,
+            filter=FilteredError(lambdas=(2.0, 1.0) if lambdas is None else lambdas),
+            basis=basis,
+            weights=AdaptiveWeights(nodes=len(basis.centres), sigma_1=0.3),
+            robust=RobustTerm(gamma=1.2, sigma_2=0.3, tau=0.5),
+            law=NussbaumLaw(beta=5.0),
+        )
+    if actuator is None:
+        actuator = Backlash(v0=0.0 if v0 is None else v0)
+    plant = Genesio() if plant is None else plant
+    reference = SumOfSines(order=3) if reference is None else reference
+    return _closed_loop(3, plant, actuator, controller, reference, sensor, name)
+
+
+def _exclusive(block: str, given: Any, **choices: Any) -> None:
+    """Refuse a choice that a replaced block would silently ignore."""
+    ignored = [name for name, value in choices.items() if value is not None]
+    if given is not None and ignored:
+        raise ParameterError(
+            f"{' and '.join(ignored)} would be ignored, since {block} is given: "
+            f"set it in the {block} instead"
+        )
+
+
+def _closed_loop(
+    order: int, plant: Any, actuator: Any, controller: Any, reference: Any, sensor: Any, name: str
+) -> ct.InterconnectedSystem:
+    blocks = {
+        "reference": as_system(reference, "reference"),
+        "plant": as_system(plant, "plant"),
+        "controller": as_system(controller, "controller"),
+        "actuator": as_system(actuator, "actuator"),
+    }
+    delivered = len([s for s in blocks["reference"].output_labels if s.startswith("yd")])
+    if delivered <= order:
+        raise ParameterError(
+            f"the reference delivers {delivered - 1} derivatives, a plant of order {order} needs "
+            f"{order}: make it with order={order}"
+        )
+    if sensor is not None:
+        blocks["sensor"] = as_system(sensor, "sensor")
+        blocks["controller"] = _behind(blocks["controller"], blocks["sensor"])
+    available = [s for system in blocks.values() for s in system.output_labels]
+    states = [f"x{i}" for i in range(1, order + 1)]
+    internal = [s for s in _INTERNAL if s in available]
+    outputs = ["y", "yd", "e", *internal[:1], "u", "v", *internal[1:], *states]
+    return interconnect(blocks, outputs=outputs, name=name)
+
+
+def _behind(controller: ct.InputOutputSystem, sensor: ct.InputOutputSystem) -> ct.InputOutputSystem:
+    """Return the controller with its inputs fed by the sensor: x_i becomes what measures x_i."""
+    measured = dict(zip(sensor.input_labels, sensor.output_labels, strict=True))
+    renamed = controller.copy(name=controller.name)
+    renamed.update_names(inputs=[measured.get(s, s) for s in controller.input_labels])
+    return renamed

@@ -1,0 +1,259 @@
+"""Desired trajectories with their derivatives, and noise.
+
+Each reference of order n delivers yd and its derivatives yd1, ..., ydn (yd', ..., yd^(n)).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ._equation import equation
+from ._param import ParameterError, param, record
+from .functions import noise_spectrum, noise_value
+
+__all__ = ["BandLimitedNoise", "FilteredStep", "FunctionReference", "SumOfSines"]
+
+
+def derivative_names(order: int) -> tuple[str, ...]:
+    """Return ("yd", "yd1", ..., "ydn")."""
+    return ("yd", *(f"yd{k}" for k in range(1, order + 1)))
+
+
+def _check_order(spec: Any) -> None:
+    if not (isinstance(spec.order, int) and spec.order >= 0):
+        raise ParameterError(f"{type(spec).__name__} needs an order >= 0, got {spec.order!r}")
+
+
+@record
+class SumOfSines:
+    """Sum of sines with all derivatives up to order n; by default the paper's.
+
+        yd = sum_i a_i sin(w_i t + phi_i) = 0.5 (sin t + sin 0.5 t)
+
+    Parameters
+    ----------
+    order : int, optional
+        Number n >= 0 of derivatives delivered.
+    """
+
+    order: int = 2
+    amplitudes: tuple[float, ...] = param((0.5, 0.5), unit="1", meaning="amplitudes a_i")
+    frequencies: tuple[float, ...] = param(
+        (1.0, 0.5), unit="rad/s", meaning="frequencies w_i", at_least=0
+    )
+    phases: tuple[float, ...] = param((0.0, 0.0), unit="rad", meaning="phases phi_i")
+
+    inputs = ()
+    states = ()
+    feedthrough = False
+
+    def derived(self) -> dict[str, Any]:
+        """The number of derivatives, for the equation."""
+        return {"order": self.order}
+
+    def check(self) -> None:
+        """One amplitude, frequency and phase per sine."""
+        _check_order(self)
+        sizes = len(self.amplitudes), len(self.frequencies), len(self.phases)
+        if len(set(sizes)) > 1:
+            raise ParameterError(
+                "SumOfSines needs as many amplitudes as frequencies and phases, got "
+                "{}, {} and {}".format(*sizes)
+            )
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names yd, yd1, ..., ydn."""
+        return derivative_names(self.order)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The k-th derivative of sin is a shift of the phase by k pi / 2."""
+        yd = np.zeros(p.order + 1)
+        for k in range(p.order + 1):
+            angle = p.frequencies * t + p.phases + k * np.pi / 2
+            yd[k] = np.sum(p.amplitudes * p.frequencies**k * np.sin(angle))
+        return yd
+
+
+@record
+class FilteredStep:
+    """A step through a reference filter of order n + 1, so that yd^(n) is continuous.
+
+        yd = [omega / (s + omega)]^(n+1) step,    step = height for t >= t_step, otherwise 0
+
+    Parameters
+    ----------
+    order : int, optional
+        Number n >= 0 of derivatives delivered.
+    """
+
+    order: int = 2
+    height: float = param(1.0, unit="1", meaning="height of the step")
+    t_step: float = param(0.0, unit="s", meaning="time of the step")
+    omega: float = param(2.0, unit="rad/s", meaning="corner frequency of the filter", above=0)
+
+    inputs = ()
+    feedthrough = False
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names yd, yd1, ..., ydn."""
+        return derivative_names(self.order)
+
+    states = outputs
+    vector = True
+
+    def check(self) -> None:
+        """A whole number of derivatives."""
+        _check_order(self)
+
+    def derived(self) -> dict[str, Any]:
+        """Coefficients of (s/omega + 1)^(n+1) at s^0, ..., s^n, times omega^(n+1)."""
+        m = self.order + 1
+        return {
+            "coefficients": np.array([math.comb(m, k) * self.omega ** (m - k) for k in range(m)])
+        }
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Filter in controller form; its states are yd and its derivatives."""
+        step = p.height * p.coefficients[0] if t >= p.t_step else 0.0
+        return np.append(x[1:], step - np.sum(p.coefficients * x))
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The filter's states."""
+        return x.copy()
+
+
+@record
+class FunctionReference:
+    """A reference given by a function of time that returns yd and its derivatives.
+
+    Parameters
+    ----------
+    order : int
+        Number of derivatives delivered, n >= 0.
+    function : equation
+        ``function(t) -> (yd, yd', ..., yd^(n))``.
+
+    Examples
+    --------
+    >>> @nlctl.equation
+    ... def ramp(t):
+    ...     return 0.1 * t, 0.1, 0.0
+    >>> reference = nlctl.FunctionReference(order=2, function=ramp)
+    """
+
+    order: int
+    function: Callable[[float], Sequence[float]]
+
+    inputs = ()
+    states = ()
+    feedthrough = False
+
+    def check(self) -> None:
+        """The function must deliver as many derivatives as promised."""
+        _check_order(self)
+        got = np.size(self.function(0.0))
+        if got != self.order + 1:
+            raise ParameterError(
+                f"FunctionReference of order {self.order} needs a function that returns "
+                f"{self.order + 1} values ({', '.join(self.outputs)}), got {got}"
+            )
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names yd, yd1, ..., ydn."""
+        return derivative_names(self.order)
+
+    @cached_property
+    def output(self) -> Callable:
+        """The user's function as an equation of the block."""
+        function = equation(self.function)
+
+        @equation
+        def output(t, x, u, p):
+            return function(t)
+
+        return output
+
+
+@record
+class BandLimitedNoise:
+    """Adds band-limited noise to signals: measurement noise, or a disturbance on the way.
+
+        out_i(t) = in_i(t) + n_i(t)
+
+    The noise is a fixed function of time, see `nlctl.functions.band_limited`; signal i uses the
+    seed (seed, i).  Between plant and controller it is measurement noise, between actuator and
+    plant a disturbance of the input.
+
+    Parameters
+    ----------
+    takes, delivers : tuple of str
+        Names of the signals before and after, pairwise.
+    """
+
+    takes: tuple[str, ...] = ("x1", "x2")
+    delivers: tuple[str, ...] = ("x1_measured", "x2_measured")
+    rms: float = param(0.01, unit="1", meaning="root mean square of each noise", at_least=0)
+    low: float = param(0.0, unit="rad/s", meaning="lower end of the band", at_least=0)
+    high: float = param(50.0, unit="rad/s", meaning="upper end of the band", above=0)
+    seed: int = param(0, unit="1", meaning="seed of frequencies and phases", at_least=0)
+    components: int = param(32, unit="1", meaning="number of sines", at_least=1)
+
+    states = ()
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """Signals come in pairs; a band has two ends."""
+        if len(self.takes) != len(self.delivers) or not self.takes:
+            raise ParameterError(
+                "BandLimitedNoise needs as many signals in takes as in delivers, got "
+                f"{self.takes} and {self.delivers}"
+            )
+        if not self.low < self.high:
+            raise ParameterError(
+                f"BandLimitedNoise needs low < high, got {self.low:g} and {self.high:g}"
+            )
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The signals before the noise."""
+        return self.takes
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The signals after it."""
+        return self.delivers
+
+    def derived(self) -> dict[str, Any]:
+        """Frequencies and phases, one row per signal."""
+        spectra = [
+            noise_spectrum(self.low, self.high, [self.seed, i], self.components)
+            for i in range(len(self.takes))
+        ]
+        return {
+            "spectrum": np.array([s[0] for s in spectra]),
+            "angles": np.array([s[1] for s in spectra]),
+        }
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """Each signal with its own noise."""
+        noisy = u.copy()
+        for i in range(u.size):
+            noisy[i] += noise_value(t, p.rms, p.spectrum[i], p.angles[i])
+        return noisy
