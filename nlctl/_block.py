@@ -209,7 +209,7 @@ def default_state(system: ct.InputOutputSystem) -> np.ndarray:
 def _probe(made: Block) -> None:
     """Call the equations once: sizes must match, and feedthrough must be declared truly."""
     spec, who = made.spec, f"{type(made.spec).__name__} (block '{made.name}')"
-    x, u, p = default_state(made), np.full(made.ninputs, 0.25), made._current_params
+    x, u, p = default_state(made), np.full(made.ninputs or 0, 0.25), made._current_params
     with np.errstate(all="ignore"):
         results = [("output", spec.output, made.noutputs)]
         if made.nstates:

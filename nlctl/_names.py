@@ -79,7 +79,7 @@ class Parameters(dict):
         The enclosing diagram's parameters, known while python-control hands overrides down.
     """
 
-    def __init__(self, values: Mapping[str, Any] = {}, owner: object = None) -> None:  # noqa: B006
+    def __init__(self, values: Mapping[str, Any], owner: object = None) -> None:
         super().__init__(values)
         self.owners: dict[str, object] = dict.fromkeys(values, owner)
         self.of_block = owner is not None

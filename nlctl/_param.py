@@ -94,7 +94,7 @@ def param(
 
 
 @dataclass_transform(
-    kw_only_default=True, frozen_default=True, field_specifiers=(param, dataclasses.field)
+    kw_only_default=True, frozen_default=True, field_specifiers=(dataclasses.field,)
 )
 def record(cls: type[T]) -> type[T]:
     """Make a class a frozen, keyword-only dataclass whose parameters are checked at birth.

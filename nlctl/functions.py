@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -110,7 +110,7 @@ def band_limited(
     return noise
 
 
-def noise_spectrum(low: float, high: float, seed: int, components: int):
+def noise_spectrum(low: float, high: float, seed: int | Sequence[int], components: int):
     """Draw the frequencies (rad/s) and phases (rad) of `band_limited`, each of shape (m,)."""
     if not (np.isfinite(high) and 0 <= low < high):
         raise ValueError(f"band-limited noise needs 0 <= low < high, got low {low}, high {high}")

@@ -162,7 +162,7 @@ def example_2(
         basis = GaussianBasis(centres=paper_centres("3x3x3" if centres is None else centres, 3))
         controller = adaptive_neural(
             3,
-            filter=FilteredError(lambdas=(2.0, 1.0) if lambdas is None else lambdas),
+            filtered_error=FilteredError(lambdas=(2.0, 1.0) if lambdas is None else lambdas),
             basis=basis,
             weights=AdaptiveWeights(nodes=len(basis.centres), sigma_1=0.3),
             robust=RobustTerm(gamma=1.2, sigma_2=0.3, tau=0.5),

@@ -48,7 +48,7 @@ class Zero:
 def adaptive_neural(
     order: int = 2,
     *,
-    filter: Any = None,
+    filtered_error: Any = None,
     basis: Any = None,
     weights: Any = None,
     robust: Any = None,
@@ -57,7 +57,7 @@ def adaptive_neural(
 ) -> ct.InterconnectedSystem:
     """Join the adaptive neural controller of the paper, (14) and (23)-(25).
 
-        filter -> basis -> weights, robust -> law
+        filtered_error -> basis -> weights, robust -> law
 
     It takes x1, ..., xn and yd, yd1, ..., ydn, and delivers e, r, u, zeta, delta_hat, W_norm.
     It knows neither the plant nor the actuator: the same controller drives a dead zone and
@@ -67,7 +67,7 @@ def adaptive_neural(
     ----------
     order : int, optional
         Order n >= 2 of the plant.
-    filter, basis, weights, robust, law : record or control.InputOutputSystem, optional
+    filtered_error, basis, weights, robust, law : record or control.InputOutputSystem, optional
         The pieces: `FilteredError`, `GaussianBasis`, `AdaptiveWeights`, `RobustTerm`,
         `NussbaumLaw` with the values of Example 1 (lambdas of (s+1)^(n-1) for n > 2).  Replace
         any by a block with the same signals, or by `Zero` to leave it out.
@@ -88,15 +88,14 @@ def adaptive_neural(
     """
     if not (isinstance(order, int) and order >= 2):
         raise ParameterError(f"adaptive_neural needs an order >= 2, got {order!r}")
-    default_filter = (
-        FilteredError() if order == 2 else FilteredError(lambdas=binomial_lambdas(order))
-    )
-    filter = default_filter if filter is None else filter
+    if filtered_error is None:
+        lambdas = FilteredError.lambdas if order == 2 else binomial_lambdas(order)
+        filtered_error = FilteredError(lambdas=lambdas)
     basis = GaussianBasis(centres=diagonal_centres(27, order)) if basis is None else basis
-    if isinstance(filter, FilteredError) and filter.order != order:
+    if isinstance(filtered_error, FilteredError) and filtered_error.order != order:
         raise ParameterError(
             f"adaptive_neural of order {order} needs {order - 1} lambdas, got "
-            f"{len(filter.lambdas)} ({filter.lambdas})"
+            f"{len(filtered_error.lambdas)} ({filtered_error.lambdas})"
         )
     if isinstance(basis, GaussianBasis) and len(basis.inputs) > order:
         raise ParameterError(
@@ -105,7 +104,7 @@ def adaptive_neural(
         )
     nodes = len(basis.centres) if isinstance(basis, GaussianBasis) else 27
     pieces = {
-        "filter": filter,
+        "filtered_error": filtered_error,
         "basis": basis,
         "weights": AdaptiveWeights(nodes=nodes) if weights is None else weights,
         "robust": RobustTerm() if robust is None else robust,
