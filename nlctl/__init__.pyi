@@ -1,9 +1,15 @@
 from . import actuators, controllers, functions, paper, plants, references
 from ._block import Block, block
-from ._diagram import DiagramError, initial_state, interconnect, parameters, state_names
+from ._diagram import initial_state, interconnect, parameters, state_names
 from ._equation import equation
-from ._names import AmbiguousNameError, UnknownNameError
-from ._param import ParameterError, param, record
+from ._errors import (
+    AmbiguousNameError,
+    DiagramError,
+    DivergedError,
+    ParameterError,
+    UnknownNameError,
+)
+from ._param import param, record
 from .actuators import Backlash, DeadZone
 from .controllers import (
     AdaptiveWeights,
@@ -20,6 +26,7 @@ from .controllers import (
 from .drawing import draw
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
+from .response import input_output_response
 
 __all__ = [
     "AdaptiveWeights",
@@ -29,6 +36,7 @@ __all__ = [
     "Block",
     "DeadZone",
     "DiagramError",
+    "DivergedError",
     "FilteredError",
     "FilteredStep",
     "ForcedDuffing",
@@ -52,6 +60,7 @@ __all__ = [
     "functions",
     "grid_centres",
     "initial_state",
+    "input_output_response",
     "interconnect",
     "latin_hypercube_centres",
     "paper",

@@ -10,14 +10,11 @@ import control as ct
 import numpy as np
 
 from ._block import Block, ParameterRow, block, default_state, parameter_rows
+from ._errors import DiagramError, ParameterError
 from ._names import Parameters, find_name, unknown
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-class DiagramError(ValueError):
-    """Blocks that cannot be joined: the message names block and signal."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,7 +164,7 @@ def initial_state(
     ------
     UnknownNameError, AmbiguousNameError
         If a name is not that of exactly one state.
-    ValueError
+    ParameterError
         If a value is not a finite number.
     """
     x = np.concatenate([default_state(leaf.system) for leaf in leaves(system)])
@@ -175,7 +172,7 @@ def initial_state(
     for name, value in (values or {}).items():
         full = find_name("state", name, index)
         if not np.isfinite(value):
-            raise ValueError(f"state '{full}' needs a finite initial value, got {value}")
+            raise ParameterError(f"state '{full}' needs a finite initial value, got {value}")
         x[index[full]] = value
     return x
 

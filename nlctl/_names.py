@@ -14,13 +14,7 @@ from typing import Any
 
 import control as ct
 
-
-class UnknownNameError(ValueError):
-    """A parameter, state, signal or block of that name does not exist."""
-
-
-class AmbiguousNameError(ValueError):
-    """A name that means more than one thing in this diagram."""
+from ._errors import AmbiguousNameError, UnknownNameError
 
 
 def unknown(kind: str, name: str, known: Iterable[str], where: str = "") -> UnknownNameError:

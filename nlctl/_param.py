@@ -14,12 +14,10 @@ from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 
+from ._errors import ParameterError
+
 T = TypeVar("T")
 _KEY = "nlctl"
-
-
-class ParameterError(ValueError):
-    """A parameter breaks a rule: the message names record, rule, value and block."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ._equation import equation
-from ._param import ParameterError, param, record
+from ._errors import ParameterError
+from ._param import param, record
 
 __all__ = ["Backlash", "DeadZone"]
 
@@ -84,10 +85,11 @@ class Backlash:
     the gap from the first instant, whatever memory it starts from.
 
     In python-control, which has no accepted-step hook, the memory is a state that relaxes onto
-    the play,  memory' = rate (v - memory), and v is the memory clipped.  On the sides of the gap v
-    is then exact.  Where it holds, it misses the turning value of the branch (1.2 (u - 0.5) at
-    the peak of u, say) by about |u''| / rate^2 times the slope, for smooth u.  The price is a
-    stiff state: use ``method="LSODA"``.
+    the play, memory' = rate (v - memory), and v is the memory clipped into the gap.  On the sides
+    of the gap v is then exact, whatever the rate; where it holds, it misses the turning value by
+    O(slope |u''| / rate^2).  In Example 2 over 20 s the states are off by at most 1.5e-2, 1.8e-4
+    and 1.8e-6 at rates of 100, 1000 and 10,000 1/s.  The price is a stiff state: simulate with
+    ``method="LSODA"`` and rtol <= 1e-8 (the default of `nlctl.input_output_response`).
     """
 
     m_r: float = param(1.2, unit="1", meaning="slope of the right (rising) side", above=0)

@@ -11,8 +11,8 @@ from typing import Any, Literal
 import control as ct
 
 from ._diagram import as_system, interconnect
+from ._errors import ParameterError
 from ._names import unknown
-from ._param import ParameterError
 from .actuators import Backlash, DeadZone
 from .controllers import (
     AdaptiveWeights,

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from ._equation import equation
+from ._errors import ParameterError
 from ._names import unknown
-from ._param import ParameterError, param, record
+from ._param import param, record
 
 __all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "integrator_chain"]
 

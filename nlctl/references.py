@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ._equation import equation
-from ._param import ParameterError, param, record
+from ._errors import ParameterError
+from ._param import param, record
 from .functions import noise_spectrum, noise_value
 
 __all__ = ["BandLimitedNoise", "FilteredStep", "FunctionReference", "SumOfSines"]

@@ -8,7 +8,8 @@ import control as ct
 
 from .._diagram import interconnect
 from .._equation import equation
-from .._param import ParameterError, record
+from .._errors import ParameterError
+from .._param import record
 from .filtered_error import FilteredError, binomial_lambdas
 from .nussbaum import NussbaumLaw
 from .rbf import AdaptiveWeights, GaussianBasis, diagonal_centres

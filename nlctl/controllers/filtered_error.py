@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .._equation import equation
-from .._param import ParameterError, param, record
+from .._errors import ParameterError
+from .._param import param, record
 from ..references import derivative_names
 
 __all__ = ["FilteredError", "binomial_lambdas"]

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._equation import equation
-from .._param import ParameterError, param, record
+from .._errors import ParameterError
+from .._param import param, record
 from ..functions import gaussian
 
 __all__ = [

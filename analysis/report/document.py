@@ -1,0 +1,107 @@
+"""What a report is made of: plain records, no HTML.
+
+A report is data until the last step; `analysis.report.render` turns it into a page and into
+``report.json``, so that every number on the page is also in the file beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from matplotlib.figure import Figure as MatplotlibFigure
+
+__all__ = ["Claim", "Equation", "Figure", "Item", "Paragraph", "Report", "Section", "Table"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paragraph:
+    """A paragraph of plain text."""
+
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equation:
+    """A formula in LaTeX, with the paper's number where it has one."""
+
+    latex: str
+    number: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A table: column titles, rows of text or numbers, and a caption.
+
+    Attributes
+    ----------
+    status : str
+        Title of a column that holds ``"pass"``, ``"fail"`` and the like, drawn as a badge.
+    """
+
+    caption: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+    status: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure:
+    """A matplotlib figure with its caption and a description for those who cannot see it."""
+
+    key: str
+    caption: str
+    description: str
+    figure: MatplotlibFigure
+
+
+Item = Paragraph | Equation | Table | Figure
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A headed part of a report; `key` is its anchor."""
+
+    key: str
+    title: str
+    items: Sequence[Item]
+    level: int = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """One line of the verdict: claim, what was measured, the limit, and where the evidence is."""
+
+    text: str
+    measured: str
+    limit: str
+    holds: bool
+    evidence: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """A whole report.
+
+    Attributes
+    ----------
+    title, verdict : str
+        The verdict is one sentence and comes first.
+    claims : sequence of Claim
+    sections : sequence of Section
+    command : str
+        Command that makes the report again.
+    provenance : mapping
+        Versions of what made it.
+    numbers : mapping
+        Every number of the report, for ``report.json``.
+    """
+
+    title: str
+    verdict: str
+    claims: Sequence[Claim]
+    sections: Sequence[Section]
+    command: str
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    numbers: Mapping[str, Any] = field(default_factory=dict)

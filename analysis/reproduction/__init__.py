@@ -1,0 +1,20 @@
+"""The reproduction of the paper: cases, runs, figures to reach."""
+
+from .cases import CASES, HORIZON, METRICS, TAIL, Case
+from .run import Check, Expectation, Run, checks, expectations, run, run_all, sample_times
+
+__all__ = [
+    "CASES",
+    "HORIZON",
+    "METRICS",
+    "TAIL",
+    "Case",
+    "Check",
+    "Expectation",
+    "Run",
+    "checks",
+    "expectations",
+    "run",
+    "run_all",
+    "sample_times",
+]

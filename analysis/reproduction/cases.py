@@ -1,0 +1,138 @@
+"""The closed loops that the reproduction runs, and the numbers it reads off them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from nlctl import actuators, paper
+
+from ..metrics import Metric, final, highest, lowest, peak, rms
+
+HORIZON = 20.0
+TAIL = HORIZON / 2
+EXAMPLES = {1: paper.example_1, 2: paper.example_2}
+
+METRICS = (
+    Metric(
+        key="tail_max_e",
+        signal="e",
+        unit="1",
+        meaning="max |e₁| for t ≥ 10 s",
+        function=peak,
+        start=TAIL,
+    ),
+    Metric(
+        key="tail_rms_e",
+        signal="e",
+        unit="1",
+        meaning="RMS of e₁ for t ≥ 10 s",
+        function=rms,
+        start=TAIL,
+    ),
+    Metric(key="rms_e", signal="e", unit="1", meaning="RMS of e₁", function=rms),
+    Metric(key="max_u", signal="u", unit="1", meaning="max |u|", function=peak),
+    Metric(key="zeta_min", signal="zeta", unit="1", meaning="min ζ", function=lowest),
+    Metric(key="zeta_max", signal="zeta", unit="1", meaning="max ζ", function=highest),
+    Metric(key="zeta_end", signal="zeta", unit="1", meaning="ζ(20 s)", function=final),
+    Metric(key="max_r", signal="r", unit="1", meaning="max |r|", function=peak),
+    Metric(
+        key="tail_max_r",
+        signal="r",
+        unit="1",
+        meaning="max |r| for t ≥ 10 s",
+        function=peak,
+        start=TAIL,
+    ),
+    Metric(key="max_delta_hat", signal="delta_hat", unit="1", meaning="max δ̂", function=highest),
+    Metric(key="max_W", signal="W_norm", unit="1", meaning="max ‖Ŵ‖", function=highest),
+    Metric(key="x1_end", signal="x1", unit="1", meaning="x₁(20 s)", function=final),
+    Metric(key="x2_end", signal="x2", unit="1", meaning="x₂(20 s)", function=final),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One closed loop of the paper, or of a choice that the paper leaves open.
+
+    Attributes
+    ----------
+    key, title : str
+    example : int
+        1 or 2.
+    arguments : mapping
+        Keyword arguments of `nlctl.paper.example_1` or `example_2`.
+    group : str
+        ``"published"``, ``"choice"`` or ``"exchange"``.
+    rtol : float
+        Relative tolerance of the integrator.
+    """
+
+    key: str
+    title: str
+    example: int
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    group: str = "choice"
+    rtol: float = 1e-7
+
+    @property
+    def diagram(self) -> Any:
+        """The diagram of this case."""
+        return EXAMPLES[self.example](**self.arguments)
+
+    @property
+    def call(self) -> str:
+        """The Python call that makes the diagram."""
+        arguments = ", ".join(f"{k}={v!r}" for k, v in self.arguments.items())
+        return f"nlctl.paper.example_{self.example}({arguments})"
+
+
+CASES = (
+    Case(key="1", title="as published, diagonal centres", example=1, group="published", rtol=1e-8),
+    Case(
+        key="1-3x9",
+        title="centres on a 3×9 grid",
+        example=1,
+        arguments={"centres": "3x9"},
+        rtol=1e-8,
+    ),
+    Case(key="1-9x3", title="centres on a 9×3 grid", example=1, arguments={"centres": "9x3"}),
+    Case(
+        key="1-integral",
+        title="forcing phase ∫w dt instead of w(t) t",
+        example=1,
+        arguments={"phase": "integral"},
+    ),
+    Case(key="1-p1", title="p₁ = +0.2 instead of −0.2", example=1, arguments={"p1": 0.2}),
+    Case(
+        key="1-backlash",
+        title="Example 2's backlash",
+        example=1,
+        arguments={"actuator": actuators.Backlash()},
+        group="exchange",
+    ),
+    Case(key="2", title="as published, 3×3×3 centres", example=2, group="published", rtol=1e-8),
+    Case(
+        key="2-diagonal",
+        title="diagonal centres",
+        example=2,
+        arguments={"centres": "diagonal"},
+        rtol=1e-8,
+    ),
+    Case(
+        key="2-lambdas",
+        title="r = 2e₁ + e₂ + e₃ instead of e₁ + 2e₂ + e₃",
+        example=2,
+        arguments={"lambdas": (1.0, 2.0)},
+    ),
+    Case(key="2-v0-low", title="v(0) = −0.6", example=2, arguments={"v0": -0.6}),
+    Case(key="2-v0-high", title="v(0) = 0.72", example=2, arguments={"v0": 0.72}),
+    Case(
+        key="2-dead-zone",
+        title="Example 1's dead zone",
+        example=2,
+        arguments={"actuator": actuators.DeadZone()},
+        group="exchange",
+    ),
+)

@@ -1,0 +1,35 @@
+"""What the user can put right.  Every message names the culprit, the rule and the value."""
+
+
+class UsageError(ValueError):
+    """Base of the errors that bad input causes; the command line shows them as one sentence."""
+
+
+class ParameterError(UsageError):
+    """A parameter breaks a rule: the message names record, rule, value and block."""
+
+
+class UnknownNameError(UsageError):
+    """A parameter, state, signal or block of that name does not exist."""
+
+
+class AmbiguousNameError(UsageError):
+    """A name that means more than one thing in this diagram."""
+
+
+class DiagramError(UsageError):
+    """Blocks that cannot be joined: the message names block and signal."""
+
+
+class DivergedError(RuntimeError):
+    """A run whose state left the finite numbers.
+
+    Attributes
+    ----------
+    time : float
+        Last accepted time of the integrator (s).
+    """
+
+    def __init__(self, message: str, time: float) -> None:
+        super().__init__(message)
+        self.time = time
