@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import control as ct
@@ -12,6 +13,8 @@ from . import _diagram
 from ._errors import DivergedError, ParameterError
 
 __all__ = ["input_output_response"]
+
+STANDSTILL = 200  # steps in a row that do not advance the time
 
 
 def input_output_response(
@@ -66,17 +69,7 @@ def input_output_response(
     times = _checked_times(timepts)
     given_by_name = initial_state is None or isinstance(initial_state, Mapping)
     x0: Any = _diagram.initial_state(system, initial_state) if given_by_name else initial_state
-    reached = [float(times[0])]
-
-    def watch(t: float, x: np.ndarray, *_: Any) -> float:
-        finite = bool(np.all(np.isfinite(x)))
-        if finite:
-            reached[0] = float(t)
-            if progress is not None:
-                progress(float(t))
-        return 1.0 if finite else -1.0
-
-    watch.terminal = True  # type: ignore[attr-defined]
+    watch = _Watch(system=system, reached=float(times[0]), progress=progress)
     settings = {"rtol": rtol, "atol": atol, "events": watch}
     with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
         try:
@@ -91,20 +84,55 @@ def input_output_response(
                 **kwargs,
             )
         except RuntimeError as error:
-            if reached[0] == times[0]:
-                raise  # nothing has moved yet: the error is about the diagram, not about the run
             # python-control takes a NaN signal for an algebraic loop: it never equals itself
-            raise _diverged(system, reached[0]) from error
-    if system.nstates and (response.time[-1] < times[-1] or not np.all(np.isfinite(response.y))):
-        raise _diverged(system, reached[0])
+            if watch.reached > times[0] or _overflows(system, times[0], x0, params):
+                raise _diverged(system, watch.reached) from error
+            raise
+    if not np.all(np.isfinite(response.y)):
+        raise _diverged(system, watch.reached)
     return response
+
+
+@dataclass
+class _Watch:
+    """An event for `solve_ivp` that never happens but sees every accepted step.
+
+    It stops a run whose state is not finite, and one whose time stands still: at a finite escape
+    time LSODA repeats a vanishing step for ever.
+    """
+
+    system: ct.InputOutputSystem
+    reached: float
+    progress: Callable[[float], object] | None
+    repeated: int = 0
+
+    def __call__(self, t: float, x: np.ndarray) -> float:
+        self.repeated = self.repeated + 1 if t <= self.reached else 0
+        if self.repeated > STANDSTILL or not np.all(np.isfinite(x)):
+            raise _diverged(self.system, self.reached)
+        self.reached = max(float(t), self.reached)
+        if self.progress is not None:
+            self.progress(float(t))
+        return 1.0
+
+
+def _overflows(system: ct.NonlinearIOSystem, t: float, x0: Any, params: Any) -> bool:
+    """Whether the right-hand side leaves the finite numbers at the start already."""
+    try:
+        with np.errstate(over="raise", invalid="raise"):
+            system.dynamics(t, x0, np.zeros(system.ninputs or 0), params)
+    except FloatingPointError:
+        return True
+    except RuntimeError:
+        return False
+    return False
 
 
 def _diverged(system: ct.InputOutputSystem, time: float) -> DivergedError:
     return DivergedError(
         f"'{system.name}' diverged: no finite state after t = {time:.6g} s; "
         "simulate up to then to see how",
-        time,
+        float(time),
     )
 
 

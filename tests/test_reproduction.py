@@ -1,0 +1,124 @@
+"""The figures to reach, by plain python-control at tight tolerance."""
+
+import control as ct
+import numpy as np
+import pytest
+
+import nlctl
+from analysis import metrics
+from analysis.reproduction import CASES, METRICS, checks, expectations, run, sample_times
+from analysis.reproduction.run import Run
+
+EXAMPLE_1 = {case.key: case for case in CASES if case.key in ("1", "1-3x9")}
+
+
+def plain_run(case, *, timepts=None, **solver):
+    """Run a case by ct.input_output_response alone, without nlctl's own call."""
+    diagram = case.diagram
+    timepts = sample_times() if timepts is None else timepts
+    with np.errstate(over="ignore", invalid="ignore"):  # rejected trial steps may overflow
+        response = ct.input_output_response(
+            diagram, timepts, 0, nlctl.initial_state(diagram), **solver
+        )
+    signals = {name: response.y[i] for name, i in diagram.output_index.items()}
+    return Run(case=case, time=response.time, signals=signals, metrics={})
+
+
+def measure(result):
+    numbers = {
+        m.key: m.function(*metrics.over(result.time, result.signals[m.signal], m.start, m.end))
+        for m in METRICS
+    }
+    return Run(case=result.case, time=result.time, signals=result.signals, metrics=numbers)
+
+
+@pytest.mark.parametrize("key", EXAMPLE_1)
+def test_example_1_holds_to_the_digits_given(key):
+    """States at the end agree in every digit given, peaks to 1e-6 (read between samples)."""
+    tight = {"method": "DOP853", "solve_ivp_kwargs": {"rtol": 1e-12, "atol": 1e-13}}
+    result = measure(plain_run(EXAMPLE_1[key], **tight))
+    for check in checks({key: result}):
+        digits = len(check.expectation.printed.partition(".")[2])
+        at_end = check.metric.key in ("zeta_end", "x1_end", "x2_end")
+        allowed = 1.01 * 0.5 * 10.0**-digits if at_end else check.expectation.tolerance
+        assert check.error <= max(allowed, 2e-12), (check.metric.key, check.value)
+
+
+@pytest.mark.parametrize("key", ["2", "2-diagonal", "1-backlash", "2-dead-zone"])
+def test_other_cases_reach_their_figures(key):
+    """With LSODA at rtol 1e-8 every other figure is within the tolerance of its method."""
+    (case,) = [c for c in CASES if c.key == key]
+    result = measure(
+        plain_run(case, method="LSODA", solve_ivp_kwargs={"rtol": 1e-8, "atol": 1e-10})
+    )
+    found = checks({key: result})
+    assert found
+    for check in found:
+        assert check.passed, (check.metric.key, check.value, check.expectation)
+
+
+@pytest.mark.parametrize(
+    ("example", "max_e", "rms_e", "max_u", "zeta", "tolerance"),
+    [
+        (1, 0.0963227014, 0.0543846010, 5.937481, 2.0892126, 1e-6),
+        (2, 0.0582407872, 0.0338259565, 2.116018, 1.9497874, 5e-6),
+    ],
+)
+def test_long_horizon_figures(example, max_e, rms_e, max_u, zeta, tolerance):
+    """The figures on [100, 200] s hold; with the relaxed play to 5e-6."""
+    (case,) = [c for c in CASES if c.key == str(example)]
+    timepts = np.concatenate([[0.0], np.linspace(100, 200, 10001)])
+    result = plain_run(
+        case,
+        timepts=timepts,
+        method="LSODA",
+        solve_ivp_kwargs={"rtol": 1e-8, "atol": 1e-10},
+    )
+    t, e = metrics.over(result.time, result.signals["e"], 100, 200)
+    assert metrics.peak(t, e) == pytest.approx(max_e, abs=tolerance)
+    assert metrics.rms(t, e) == pytest.approx(rms_e, abs=tolerance)
+    u = metrics.over(result.time, result.signals["u"], 100, 200)
+    assert metrics.peak(*u) == pytest.approx(max_u, abs=4e-4)  # read from samples 10 ms apart
+    assert result.signals["zeta"][-1] == pytest.approx(zeta, abs=tolerance)
+
+
+def test_nlctl_call_and_plain_call_agree():
+    """nlctl.input_output_response is python-control's integration, nothing else."""
+    (case,) = [c for c in CASES if c.key == "1"]
+    diagram, timepts = case.diagram, np.linspace(0, 1, 21)
+    ours = nlctl.input_output_response(diagram, timepts)
+    plain = plain_run(
+        case,
+        timepts=timepts,
+        method="LSODA",
+        solve_ivp_kwargs={"rtol": 1e-8, "atol": 1e-10},
+    )
+    np.testing.assert_array_equal(ours.y[diagram.output_index["u"]], plain.signals["u"])
+
+
+def test_every_expectation_names_a_case_and_a_metric():
+    """A figure to reach that no case produces would never be checked."""
+    cases, keys = {case.key for case in CASES}, {m.key for m in METRICS}
+    for expectation in expectations():
+        assert expectation.case in cases
+        assert expectation.metric in keys
+
+
+def test_a_wrong_figure_fails_and_nan_fails():
+    """A check can fail: a wrong value does, and so does NaN."""
+    (case,) = [c for c in CASES if c.key == "1"]
+    right = {e.metric: e.value for e in expectations() if e.case == "1"}
+    exact = Run(case=case, time=np.zeros(1), signals={}, metrics=right)
+    assert all(check.passed for check in checks({"1": exact}))
+    for wrong in (right["max_r"] + 1e-4, np.nan, np.inf):
+        spoiled = Run(case=case, time=np.zeros(1), signals={}, metrics=right | {"max_r": wrong})
+        failed = [c.metric.key for c in checks({"1": spoiled}) if not c.passed]
+        assert failed == ["max_r"]
+
+
+def test_variants_move_the_loop_and_processes_change_nothing():
+    """A run in this process equals the same run again, bit for bit."""
+    (case,) = [c for c in CASES if c.key == "1-p1"]
+    first, second = run(case), run(case)
+    assert first.metrics == second.metrics
+    assert first.metrics["tail_max_e"] != pytest.approx(0.11741705334, abs=1e-5)
