@@ -31,7 +31,7 @@ TIME = "time t (s)"
 
 
 def _axes(rows: int = 1, height: float = 2.6) -> tuple[Figure, list[Axes]]:
-    figure = Figure(figsize=(7.2, height * rows), layout="constrained")
+    figure = Figure(figsize=(9.0, height * rows), layout="constrained")
     axes = list(np.ravel(figure.subplots(rows, 1, sharex=rows > 1)))
     for ax in axes:
         ax.grid(True, alpha=0.25, linewidth=0.6)

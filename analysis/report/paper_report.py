@@ -149,7 +149,7 @@ def _parameter_table(number: int, diagram: ct.InterconnectedSystem) -> Table:
         caption="The paper's values, the values in use (read from the blocks), and open points.",
         columns=("parameter", "as printed", "as used", "remark"),
         rows=[
-            (name, printed, used.format(**specs), remark)
+            (name, printed, used.format(**specs).replace("-", "−"), remark)
             for name, printed, used, remark in text.PRINTED[number]
         ],
     )

@@ -30,14 +30,14 @@ CONTROLLER = (
     ),
     Equation(
         latex=r"u = N(\zeta)\,\eta,\quad \eta = \beta r + \hat W^T \psi(x)"
-        r" + \hat\delta \tanh\frac{r}{\tau} + Y_d,"
-        r"\quad N(\zeta) = e^{\zeta^2} \cos\frac{\pi\zeta}{2}",
+        r" + \hat\delta \tanh(r / \tau) + Y_d,"
+        r"\quad N(\zeta) = e^{\zeta^2} \cos(\pi\zeta / 2)",
         number="(23)",
     ),
     Equation(latex=r"\dot\zeta = r\,\eta", number="(24)"),
     Equation(
         latex=r"\dot{\hat W} = \Gamma\left(r\,\psi(x) - \sigma_1 \hat W\right),\quad "
-        r"\dot{\hat\delta} = \gamma\left(r \tanh\frac{r}{\tau} - \sigma_2 \hat\delta\right)",
+        r"\dot{\hat\delta} = \gamma\left(r \tanh(r / \tau) - \sigma_2 \hat\delta\right)",
         number="(25)",
     ),
 )
@@ -46,19 +46,19 @@ PLANTS = {
     1: (
         Equation(
             latex=r"\dot x_2 = -p_1 x_1 - p\,x_2 - x_1^3 + q\cos(w t)"
-            r" + (1 + 0.1\cos x_1)(1 + 0.2\cos v)\,v + 0.1\,(x_1^2 + x_2^2)\sin t",
+            r" + (1 + 0.1\cos(x_1))(1 + 0.2\cos(v))\,v + 0.1\,(x_1^2 + x_2^2)\sin(t)",
             number="Ex. 1",
         ),
         Equation(
-            latex=r"v(u) = \begin{cases} (1 + 0.3\sin u)(u - 0.5) & u \ge 0.5 \\"
-            r" 0 & -0.3 < u < 0.5 \\ (0.8 + 0.2\cos u)(u + 0.3) & u \le -0.3 \end{cases}",
+            latex=r"v(u) = \begin{cases} (1 + 0.3\sin(u))(u - 0.5) & u \ge 0.5 \\"
+            r" 0 & -0.3 < u < 0.5 \\ (0.8 + 0.2\cos(u))(u + 0.3) & u \le -0.3 \end{cases}",
             number="Ex. 1",
         ),
     ),
     2: (
         Equation(
             latex=r"\dot x_3 = -c x_1 - b x_2 - a x_3 + x_1^2"
-            r" + (2 + \cos x_1)(1 + 0.2\sin^2 v)\,v + \sin(0.1 t)",
+            r" + (2 + \cos(x_1))(1 + 0.2\sin^2(v))\,v + \sin(0.1 t)",
             number="Ex. 2",
         ),
         Equation(

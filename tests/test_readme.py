@@ -1,0 +1,45 @@
+"""The README's code runs, its figures are the tests' figures, and its example fits a screen."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from analysis.reproduction import expectations
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_loop_of_ones_own_runs_in_at_most_30_lines(tmp_path):
+    """The first block of Python prints the tracking error that its comment says."""
+    code = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)[0]
+    assert len(code.splitlines()) <= 30
+    script = tmp_path / "loop.py"
+    script.write_text(code, encoding="utf-8")
+    result = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, check=True, timeout=300
+    )
+    said = re.search(r"# ([\d.]+) after 10 s", code)
+    assert said is not None
+    digits = len(said[1].partition(".")[2])
+    assert abs(float(result.stdout) - float(said[1])) <= 0.51 * 10**-digits
+
+
+def test_the_table_of_figures_is_the_table_that_is_checked():
+    """Each rounded figure of the README is an expected figure."""
+    wanted = {(e.case, e.metric): e.value for e in expectations()}
+    for example, other in (("1", "1-backlash"), ("2", "2-dead-zone")):
+        row = re.search(rf"\| Example {example}, .*?\| ([\d.]+) \| ([\d.]+) \| ([\d.]+) ", README)
+        assert row is not None
+        keys = [(example, "tail_max_e"), (example, "max_u"), (other, "tail_max_e")]
+        for text, key in zip(row.groups(), keys, strict=True):
+            assert float(text) == round(wanted[key], len(text.partition(".")[2]))
+    assert f"compares {len(wanted)} figures" in README
+
+
+def test_commands_and_names_in_the_readme_exist():
+    """Every `nlctl.<name>` is public."""
+    import nlctl
+
+    for name in re.findall(r"nlctl\.([A-Za-z_]+)", re.sub(r"nlctl\.toml|`pip.*", "", README)):
+        assert hasattr(nlctl, name), name

@@ -1,0 +1,58 @@
+"""What a user installs: the wheel, in a fresh environment, from an empty folder."""
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def run(*command, cwd):
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "COV_"))}
+    return subprocess.run(
+        command, cwd=cwd, env=environment, capture_output=True, text=True, check=True, timeout=600
+    )
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel built from a copy of the sources, which stay as they are."""
+    folder = tmp_path_factory.mktemp("wheel")
+    source = folder / "source"
+    ignored = shutil.ignore_patterns(".git", ".venv*", "__pycache__", ".*_cache", "*.egg-info")
+    shutil.copytree(ROOT, source, ignore=ignored)
+    run(sys.executable, "-m", "build", "--wheel", "--outdir", str(folder), str(source), cwd=folder)
+    (made,) = folder.glob("*.whl")
+    return made
+
+
+def test_wheel_holds_both_packages_and_their_data(wheel):
+    """Templates, expected figures, type information, licence."""
+    names = set(zipfile.ZipFile(wheel).namelist())
+    for name in (
+        *("nlctl/__init__.py", "nlctl/__init__.pyi", "nlctl/py.typed", "nlctl/controllers/rbf.py"),
+        *("analysis/py.typed", "analysis/reproduction/expected.csv"),
+        *("analysis/report/templates/report.html", "analysis/report/templates/report.css"),
+    ):
+        assert name in names
+    assert any(name.endswith("LICENSE") for name in names)
+    assert not any(name.startswith(("tests", "reports")) for name in names)
+
+
+def test_wheel_runs_in_a_fresh_environment(wheel, tmp_path):
+    """The console script lists, simulates and draws from an empty folder."""
+    fresh, empty = tmp_path / "fresh", tmp_path / "empty"
+    empty.mkdir()
+    run(sys.executable, "-m", "venv", str(fresh), cwd=tmp_path)
+    scripts = fresh / ("Scripts" if os.name == "nt" else "bin")
+    run(str(scripts / "python"), "-m", "pip", "install", "-q", str(wheel), cwd=empty)
+    script = str(scripts / "nlctl")
+    assert "DeadZone" in run(script, "list", cwd=empty).stdout
+    run(script, "simulate", "example-2", "--until", "0.1", "--csv", "out.csv", cwd=empty)
+    run(script, "diagram", "example-1", "-o", "loop.svg", cwd=empty)
+    assert sorted(p.name for p in empty.iterdir()) == ["loop.svg", "out.csv"]
