@@ -276,5 +276,7 @@ def liar(**changes):
 def test_a_record_that_lies_is_refused(changes, told):
     """Missing attributes, wrong sizes, untrue feedthrough: a TypeError names the record."""
     nlctl.block(liar(), "honest")
+    undefined = staticmethod(lambda t, x, u, p: (np.log(x[0] - 1.0),))  # NaN at x = 0, honestly
+    nlctl.block(liar(output=undefined), "honest")
     with pytest.raises(TypeError, match=rf"^Liar .*{re.escape(told)}"):
         nlctl.block(liar(**changes), "b")

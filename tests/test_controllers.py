@@ -71,9 +71,7 @@ class TestFilteredError:
         if max(np.real(roots)) < 0:
             assert nlctl.FilteredError(lambdas=lambdas).lambdas == tuple(lambdas)
         else:
-            with pytest.raises(
-                nlctl.ParameterError, match=r"FilteredError needs a Hurwitz .* (14)"
-            ):
+            with pytest.raises(nlctl.ParameterError, match=r"^FilteredError needs a Hurwitz"):
                 nlctl.FilteredError(lambdas=lambdas)
 
     @given(st.tuples(*[st.integers(-2, 6)] * 3))
@@ -248,5 +246,5 @@ class TestJoined:
         weights = nlctl.AdaptiveWeights(nodes=28)
         with pytest.raises(nlctl.DiagramError, match=r"'weights' takes .* 'psi\[27\]'"):
             nlctl.adaptive_neural(2, weights=weights)
-        with pytest.raises((nlctl.DiagramError, nlctl.ParameterError), match="26|27"):
+        with pytest.raises((nlctl.DiagramError, nlctl.ParameterError), match=r"26|27"):
             nlctl.adaptive_neural(2, weights=nlctl.AdaptiveWeights(nodes=26))

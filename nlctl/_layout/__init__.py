@@ -1,0 +1,1 @@
+"""Geometry of block diagrams: `records` on paper, `order` of blocks, `heights`, `routes`."""

@@ -1,0 +1,73 @@
+"""Which outputs of a block depend on which of its inputs at the same instant."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import textwrap
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from .._block import Block
+
+
+def feedthrough(system: Any) -> np.ndarray:
+    """Return which outputs depend directly on which inputs.
+
+    nlctl's blocks declare it, linear systems have their D matrix.  The function of a foreign
+    nonlinear block depends on the inputs unless its source never mentions them, or unless
+    nothing changes at any of several points when the inputs are changed or made NaN.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A block, not a diagram.
+
+    Returns
+    -------
+    ndarray of bool, shape (noutputs, ninputs)
+    """
+    shape = (system.noutputs or 0, system.ninputs or 0)
+    if isinstance(system, Block):
+        return np.full(shape, bool(system.spec.feedthrough))
+    if isinstance(system, ct.StateSpace):
+        return np.not_equal(system.D, 0.0)
+    if 0 in shape or not _mentions_inputs(system.outfcn):
+        return np.zeros(shape, dtype=bool)
+    return np.full(shape, _responds(system))
+
+
+def _mentions_inputs(function: Any) -> bool:
+    """Whether the source of an output function uses its third argument (True if unreadable)."""
+    if function is None:
+        return False  # the outputs are the states
+    try:
+        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+        names = list(inspect.signature(function).parameters)
+    except (OSError, TypeError, SyntaxError, ValueError):
+        return True
+    if len(names) < 3:
+        return True
+    return any(isinstance(node, ast.Name) and node.id == names[2] for node in ast.walk(tree))
+
+
+def _responds(system: ct.NonlinearIOSystem) -> bool:
+    """Whether changing the inputs changes an output at any of several points.
+
+    A point at which the function raises says nothing, and then the answer is the safe one.
+    """
+    rng = np.random.default_rng(0)
+    for scale in (0.0, 1.0, 1.0, 10.0):
+        x = scale * rng.standard_normal(system.nstates or 0)
+        u = scale * rng.standard_normal(system.ninputs or 0)
+        others = (rng.standard_normal(u.size), 100 * rng.standard_normal(u.size), u * np.nan)
+        try:
+            with np.errstate(all="ignore"):
+                base = system._out(0.7, x, u)
+                if any(not np.array_equal(base, system._out(0.7, x, v), True) for v in others):
+                    return True
+        except Exception:
+            return True
+    return False

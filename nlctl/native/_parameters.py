@@ -1,0 +1,135 @@
+"""Where every parameter lies in the one flat vector that a program takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from .._block import Block
+from .._errors import UsageError
+from ._schedule import Node
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slot:
+    """One number, vector or matrix in the parameter vector.
+
+    Attributes
+    ----------
+    name : str
+        Qualified name for nlctl's blocks; path and key for foreign ones.
+    offset : int
+        Where it begins.
+    shape : tuple of int
+    kind : str
+        ``"f"`` float, ``"i"`` integer, ``"b"`` Boolean.
+    """
+
+    name: str
+    offset: int
+    shape: tuple[int, ...]
+    kind: str
+
+    @property
+    def size(self) -> int:
+        """How many entries of the vector it takes."""
+        return math.prod(self.shape)
+
+    @property
+    def expression(self) -> str:
+        """Source that reads it from the vector `p`."""
+        if self.shape:
+            whole = f"p[{self.offset}:{self.offset + self.size}]"
+            return whole if len(self.shape) == 1 else f"{whole}.reshape({self.shape})"
+        return {"f": "p[{}]", "i": "int(p[{}])", "b": "(p[{}] != 0.0)"}[self.kind].format(
+            self.offset
+        )
+
+
+def current_values(system: Any) -> Mapping[str, Any]:
+    """Return a block's parameters as python-control has resolved them.
+
+    A foreign block in a diagram with nlctl's blocks is handed their qualified names as well;
+    they are none of its business.
+    """
+    if isinstance(system, Block):
+        return system._current_params._asdict()
+    if isinstance(system, ct.StateSpace):
+        return {}
+    params = system._current_params
+    return {k: params[k] for k in params if k in system.params or "." not in str(k)}
+
+
+def is_numeric(value: Any) -> bool:
+    """Whether a parameter can vary between runs: a finite-shaped number or array of numbers."""
+    return not isinstance(value, str) and np.asarray(value).dtype.kind in "fib"
+
+
+def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
+    """Lay out the numeric parameters of all blocks.
+
+    Returns
+    -------
+    dict
+        For every block index the slots of its parameters by name.
+
+    Raises
+    ------
+    UsageError
+        If a foreign block's parameter name is no string.
+    """
+    found: dict[int, dict[str, Slot]] = {}
+    offset = 0
+    for i, node in enumerate(nodes):
+        found[i] = {}
+        for name, value in current_values(node.system).items():
+            if not isinstance(name, str):
+                raise UsageError(
+                    f"block '{node.path}' has a parameter called {name!r}; names must be strings"
+                )
+            if is_numeric(value):
+                array = np.asarray(value)
+                slot = Slot(
+                    name=f"{node.path}.{name}",
+                    offset=offset,
+                    shape=array.shape,
+                    kind=array.dtype.kind,
+                )
+                found[i][name] = slot
+                offset += slot.size
+    return found
+
+
+def packed(nodes: Sequence[Node], layout: Mapping[int, Mapping[str, Slot]]) -> np.ndarray:
+    """Return the parameter vector with the values that the blocks have now.
+
+    Raises
+    ------
+    UsageError
+        If an override has changed the shape of a parameter, or brings one that nobody declared.
+    """
+    size = sum(slot.size for block in layout.values() for slot in block.values())
+    p = np.empty(size)
+    for i, block in layout.items():
+        values = current_values(nodes[i].system)
+        for name in values:
+            if name not in block and is_numeric(values[name]):
+                raise UsageError(
+                    f"parameter '{name}' of block '{nodes[i].path}' was not known when the diagram "
+                    f"was compiled: declare it in the block's params, or compile with "
+                    f"params={{'{name}': ...}}"
+                )
+        for name, slot in block.items():
+            array = np.asarray(values[name], dtype=float)
+            if array.shape != slot.shape:
+                raise UsageError(
+                    f"parameter '{slot.name}' had shape {slot.shape} when the diagram was "
+                    f"compiled and cannot have shape {array.shape} now: compile again"
+                )
+            p[slot.offset : slot.offset + slot.size] = array.ravel()
+    return p

@@ -1,0 +1,148 @@
+"""The design's layers: imports go downwards only, modules and functions stay small."""
+
+import ast
+import subprocess
+import sys
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
+    ["nlctl._errors", "nlctl._files", "nlctl._equation", "nlctl._param", "nlctl._names"]
+    + ["nlctl._block", "nlctl._diagram", "nlctl.functions", "nlctl.response"]
+    + ["nlctl._layout", "nlctl.drawing"],
+    ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers"],
+    ["nlctl.paper"],
+    ["nlctl.native"],
+    ["analysis.metrics", "analysis.lyapunov", "analysis.robustness", "analysis.reproduction"],
+    ["analysis.figures", "analysis.report"],
+    ["analysis.studies"],
+    ["nlctl._terminal", "nlctl.cli"],
+]
+COMMAND_LINE = LAYERS[-1]
+BLOCK_MODULES = LAYERS[1]
+FILES = sorted(p for package in ("nlctl", "analysis") for p in (ROOT / package).rglob("*.py"))
+
+
+def module_name(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_name(path): ast.parse(path.read_text(encoding="utf-8")) for path in FILES}
+PACKAGES = {module_name(path) for path in FILES if path.name == "__init__.py"}
+MEMBERS = [name for name in MODULES if name not in ("nlctl", "analysis")]  # they only re-export
+
+
+def runtime_nodes(tree):
+    """Yield the nodes of a module, but not what stands under `if TYPE_CHECKING:`."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            continue
+        yield node
+        yield from runtime_nodes(node)
+
+
+def imports(name):
+    """Return the modules of this project that a module imports, also inside functions."""
+    found = set()
+    for node in runtime_nodes(MODULES[name]):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = name.split(".")
+            if name not in PACKAGES:
+                base = base[:-1]
+            base = base[: len(base) - node.level + 1] if node.level else []
+            source = ".".join([*base, *([node.module] if node.module else [])])
+            members = {f"{source}.{alias.name}" for alias in node.names}
+            found |= (members & set(MODULES)) or {source}
+    return {module for module in found if module.split(".")[0] in ("nlctl", "analysis")}
+
+
+def layer(name):
+    """Return the number of a module's layer."""
+    fits = [
+        (len(prefix), number)
+        for number, prefixes in enumerate(LAYERS)
+        for prefix in prefixes
+        if name == prefix or name.startswith(f"{prefix}.")
+    ]
+    assert fits, f"{name} belongs to no layer: give it a place in LAYERS"
+    return max(fits)[1]
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+def test_imports_go_downwards_only(name):
+    """No module imports one of a higher layer, not even lazily inside a function."""
+    upwards = {module for module in imports(name) if layer(module) > layer(name)}
+    assert not upwards
+
+
+def test_there_are_imports_to_look_at():
+    """The reader of imports sees relative, absolute and lazy ones."""
+    assert "nlctl._param" in imports("nlctl.plants")
+    assert "nlctl.functions" in imports("nlctl.controllers.rbf")
+    assert "nlctl.controllers" in imports("nlctl.paper")
+    assert layer("nlctl.controllers.rbf") == 1
+
+
+def test_no_module_imports_itself_in_a_ring():
+    """There is an order in which every module comes after those that it imports."""
+    packages_inside = {n: {m for m in imports(n) if m in MEMBERS and m != n} for n in MEMBERS}
+    order = list(TopologicalSorter(packages_inside).static_order())
+    assert set(order) == set(MEMBERS)
+
+
+def test_only_the_command_line_of_nlctl_imports_analysis():
+    """Blocks and diagrams can be used without the analysis package."""
+    users = set()
+    for name in MEMBERS:
+        if name.startswith("nlctl.") and any(m.startswith("analysis") for m in imports(name)):
+            users.add(name)
+    assert users <= set(COMMAND_LINE)
+
+
+@pytest.mark.parametrize("name", ["nlctl.drawing", "nlctl._layout", "nlctl.native"])
+def test_drawing_and_native_code_know_no_blocks(name):
+    """They treat any python-control diagram alike, with or without our blocks."""
+    modules = [m for m in MEMBERS if m == name or m.startswith(f"{name}.")]
+    if not modules:
+        pytest.skip(f"{name} does not exist yet")
+    known = {m for module in modules for m in imports(module)}
+    assert not {m for m in known if any(m.startswith(b) for b in [*BLOCK_MODULES, "nlctl.paper"])}
+
+
+def test_layout_is_independent_of_python_control():
+    """Geometry needs sizes and connections only."""
+    if "nlctl._layout" not in MODULES:
+        pytest.skip("nlctl/_layout.py does not exist yet")
+    assert imports("nlctl._layout") == set()
+    assert "import control" not in ast.unparse(MODULES["nlctl._layout"])
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_modules_and_functions_are_small(path):
+    """Under 300 lines a module, 40 lines of code a function (docstrings not counted)."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert len(lines) < 300
+    for node in ast.walk(MODULES[module_name(path)]):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+            if body:
+                code = [s.strip() for s in lines[body[0].lineno - 1 : node.end_lineno]]
+                code = [s for s in code if s and not s.startswith("#")]
+                assert len(code) <= 40, f"{node.name} has {len(code)} lines"
+
+
+@pytest.mark.parametrize("module", ["nlctl", "nlctl.cli"])
+def test_importing_is_cheap(module):
+    """`nlctl --help` and `import nlctl` load none of the heavy libraries."""
+    if module == "nlctl.cli" and "nlctl.cli" not in MODULES:
+        pytest.skip("nlctl/cli.py does not exist yet")
+    heavy = ["control", "scipy", "numba", "matplotlib", "pandas", "analysis"]
+    code = f"import {module}, sys; print(*(m for m in {heavy} if m in sys.modules))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == []
