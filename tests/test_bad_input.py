@@ -188,6 +188,27 @@ class TestNames:
         with refused(ParameterError, "'plant.x1' needs a finite initial value, got nan"):
             nlctl.initial_state(diagram, {"plant.x1": np.nan})
 
+    @pytest.mark.parametrize(
+        ("name", "value"),
+        [
+            ("filtered_error.lambdas", (1.0,)),
+            ("filtered_error.lambdas", (3.0, 3.0, 1.0)),
+            ("basis.centres", np.zeros((5, 3))),
+            ("basis.centres", np.zeros((27, 1))),
+        ],
+    )
+    def test_an_override_cannot_change_the_signals_of_a_block(self, name, value):
+        """A block made for three states does not silently read two of them."""
+        diagram = example_2()
+        with refused(ParameterError, f"block '{name.partition('.')[0]}'"):
+            diagram.output(0.3, nlctl.initial_state(diagram) + 0.1, [], params={name: value})
+
+    @pytest.mark.parametrize("bad", ["a", [1.0, 2.0], None, 1j])
+    def test_an_initial_value_is_one_number(self, bad):
+        """The state and the value are named."""
+        with refused(ParameterError, "'plant.x1'", str(bad)):
+            nlctl.initial_state(example_1(), {"plant.x1": bad})
+
     def test_parameters_of_two_controllers(self):
         """A name that two blocks share is answered with both."""
         inner = chain(nlctl.interconnect, name="one", middle="m1", delivers="y1")

@@ -68,6 +68,12 @@ class TestPureFeedback:
         plant = nlctl.PureFeedback(order=3, f=lambda x, v: v, initial={"x2": -0.5, "x3": 2})
         np.testing.assert_array_equal(nlctl.initial_state(nlctl.block(plant, "p")), [0, -0.5, 2])
 
+    def test_states_renamed_by_python_control_keep_their_initial_values(self):
+        """`update_names` changes labels, not where a plant starts from."""
+        plant = nlctl.block(nlctl.Genesio(), "plant")
+        plant.update_names(states=["position", "speed", "acceleration"])
+        np.testing.assert_array_equal(nlctl.initial_state(plant), [1, 0, 0])
+
     @pytest.mark.parametrize(
         ("changed", "error", "told"),
         [
