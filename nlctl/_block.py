@@ -10,8 +10,9 @@ from typing import Any, Protocol
 import control as ct
 import numpy as np
 
+from ._errors import ParameterError
 from ._names import Parameters, base_name, unknown
-from ._param import check_params, declared_params, equation_arguments, with_overrides
+from ._param import declared_params, ensure_checked, equation_arguments, with_overrides
 
 
 class Spec(Protocol):
@@ -64,6 +65,8 @@ class Block(ct.NonlinearIOSystem):
     ----------
     spec : record
         The record that the block was made from.
+    current_spec : record
+        The record with the overrides of the latest run.
     params : Parameters
         Qualified names and values, ``{"actuator.b_r": 0.5}``.
     """
@@ -85,7 +88,7 @@ class Block(ct.NonlinearIOSystem):
     def params(self) -> Parameters:
         """Parameters by qualified name.  Assign a dict to change the block's own values."""
         fields = declared_params(self.spec)
-        return Parameters({f"{self.name}.{k}": getattr(self.spec, k) for k in fields}, owner=self)
+        return Parameters({f"{self.name}.{k}": getattr(self.spec, k) for k in fields}, block=self)
 
     @params.setter
     def params(self, values: Mapping[str, Any]) -> None:
@@ -106,6 +109,14 @@ class Block(ct.NonlinearIOSystem):
     def _update_params(self, params: Mapping[str, Any] | None) -> None:
         # python-control calls this before a run; its equations then get the result as `p`.
         spec = with_overrides(self.spec, self._own(params or {}), self.name)
+        for kind in ("inputs", "outputs", "states"):
+            had, has = len(getattr(self.spec, kind)), len(getattr(spec, kind))
+            if had != has:
+                raise ParameterError(
+                    f"{type(spec).__name__} had {had} {kind} when the block was made and cannot "
+                    f"have {has} now: make a new block (block '{self.name}')"
+                )
+        self.current_spec = spec
         self._current_params = equation_arguments(spec)
 
     def __repr__(self) -> str:
@@ -146,12 +157,12 @@ def parameter_rows(block: Block, path: str = "") -> list[ParameterRow]:
     return [
         ParameterRow(
             name=f"{path}{name}",
-            value=getattr(block.spec, name),
+            value=getattr(block.current_spec, name),
             unit=p.unit,
             meaning=p.meaning,
             bounds=p.bounds,
         )
-        for name, p in declared_params(block.spec).items()
+        for name, p in declared_params(block.current_spec).items()
     ]
 
 
@@ -188,8 +199,7 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
         what = spec.__name__ if isinstance(spec, type) else type(spec).__name__
         why = "is a class: make a record of it first" if isinstance(spec, type) else None
         raise TypeError(f"{what} {why or 'is no block: it lacks ' + ', '.join(missing)}")
-    if not hasattr(type(spec), "__post_init__"):
-        check_params(spec)
+    ensure_checked(spec)
     made = Block(spec, name, **({} if dt is None else {"dt": dt}))
     _probe(made)
     return made
@@ -199,10 +209,11 @@ def default_state(system: ct.InputOutputSystem) -> np.ndarray:
     """Return the initial state of one block: what its record declares, otherwise 0."""
     x = np.zeros(system.nstates or 0)
     if isinstance(system, Block):
+        states = list(system.spec.states)  # python-control may have renamed the block's own labels
         for name, value in getattr(system.spec, "initial", {}).items():
-            if name not in system.state_index:
-                raise unknown("state", name, system.state_labels, f"in initial of '{system.name}'")
-            x[system.state_index[name]] = value
+            if name not in states:
+                raise unknown("state", name, states, f"in initial of '{system.name}'")
+            x[states.index(name)] = value
     return x
 
 

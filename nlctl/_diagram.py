@@ -12,6 +12,7 @@ import numpy as np
 from ._block import Block, ParameterRow, block, default_state, parameter_rows
 from ._errors import DiagramError, ParameterError
 from ._names import Parameters, find_name, unknown
+from ._param import as_numbers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,21 +20,48 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Leaf:
-    """One block of a flattened diagram: its path, the system, where its states begin."""
+    """One block of a flattened diagram.
+
+    Attributes
+    ----------
+    path : str
+        Names of the diagrams around it and its own, joined by dots.
+    parameter_path : str
+        The same without diagrams that do not put their name in front of their parameters'
+        (those made with plain ``ct.interconnect``).
+    system : control.InputOutputSystem
+    state_offset : int
+        Where its states begin in the diagram's state vector.
+    """
 
     path: str
+    parameter_path: str
     system: ct.InputOutputSystem
     state_offset: int
 
 
-def leaves(system: ct.InputOutputSystem, path: str = "", offset: int = 0) -> Iterator[Leaf]:
+def leaves(system: ct.InputOutputSystem) -> Iterator[Leaf]:
     """Yield the blocks of a diagram in the order of its state vector, nested ones flattened."""
+    yield from _leaves(system, [], [], 0)
+
+
+def _leaves(
+    system: ct.InputOutputSystem, path: list[str], parameter_path: list[str], offset: int
+) -> Iterator[Leaf]:
     if not isinstance(system, ct.InterconnectedSystem):
-        yield Leaf(path=path or system.name, system=system, state_offset=offset)
+        paths = (".".join(p) or system.name for p in (path, parameter_path))
+        yield Leaf(path=next(paths), parameter_path=next(paths), system=system, state_offset=offset)
         return
     for sub in system.syslist:
-        yield from leaves(sub, f"{path}.{sub.name}" if path else sub.name, offset)
+        silent = isinstance(sub, ct.InterconnectedSystem) and not _is_scoped(sub)
+        further = parameter_path if silent else [*parameter_path, sub.name]
+        yield from _leaves(sub, [*path, sub.name], further, offset)
         offset += sub.nstates or 0
+
+
+def _is_scoped(diagram: ct.InterconnectedSystem) -> bool:
+    """Whether a diagram puts its name in front of its parameters' names."""
+    return isinstance(diagram.params, Parameters) and diagram.params.scope is not None
 
 
 def as_system(thing: Any, name: str) -> ct.InputOutputSystem:
@@ -76,7 +104,8 @@ def interconnect(
     Raises
     ------
     DiagramError
-        If two blocks share a name, deliver the same signal, or an input is fed by nothing.
+        If two blocks share a name, deliver the same signal, or an input is fed by nothing or
+        twice, or if one block stands in the diagram twice.
     UnknownNameError
         If `outputs` names a signal that no block delivers, or `inputs` one that none takes.
     """
@@ -84,6 +113,9 @@ def interconnect(
         systems = [as_system(thing, key) for key, thing in blocks.items()]
     else:
         systems = list(blocks)
+    inputs = [inputs] if isinstance(inputs, str) else list(inputs)
+    outputs = [outputs] if isinstance(outputs, str) else outputs
+    _check_blocks(systems)
     sources = _signal_sources(systems)
     _check_inputs(systems, sources, inputs)
     outputs = list(sources) if outputs is None else list(outputs)
@@ -92,7 +124,8 @@ def interconnect(
             raise unknown("output signal", signal, sources)
     diagram = ct.interconnect(
         systems,
-        inputs=list(inputs),
+        inputs=inputs,
+        inplist=[[f"{s.name}.{i}" for s in systems if i in s.input_labels] for i in inputs],
         outputs=outputs,
         outlist=[f"{sources[signal]}.{signal}" for signal in outputs],
         name=name,
@@ -103,14 +136,34 @@ def interconnect(
     return diagram
 
 
-def _signal_sources(systems: Sequence[ct.InputOutputSystem]) -> dict[str, str]:
-    """Return ``{signal: name of the block that delivers it}``."""
-    sources: dict[str, str] = {}
+def _check_blocks(systems: Sequence[Any]) -> None:
+    """Every block has its own name, and stands in its own place only."""
     names: set[str] = set()
+    places: dict[int, str] = {}
     for system in systems:
+        if not isinstance(system, ct.InputOutputSystem):
+            raise DiagramError(
+                f"interconnect needs systems in a list, got a {type(system).__name__}; give "
+                "records with their names: {'plant': ...}"
+            )
         if system.name in names:
             raise DiagramError(f"two blocks are called '{system.name}'; give each its own name")
         names.add(system.name)
+        for leaf in leaves(system):
+            nested = isinstance(system, ct.InterconnectedSystem)
+            path = f"{system.name}.{leaf.path}" if nested else leaf.path
+            if id(leaf.system) in places:
+                raise DiagramError(
+                    f"one block stands in two places, '{places[id(leaf.system)]}' and '{path}', "
+                    "and would share its parameters: use a copy, block.copy(name=...)"
+                )
+            places[id(leaf.system)] = path
+
+
+def _signal_sources(systems: Sequence[ct.InputOutputSystem]) -> dict[str, str]:
+    """Return ``{signal: name of the block that delivers it}``."""
+    sources: dict[str, str] = {}
+    for system in systems:
         for signal in system.output_labels:
             if signal in sources:
                 raise DiagramError(
@@ -125,7 +178,14 @@ def _check_inputs(
     systems: Sequence[ct.InputOutputSystem], sources: Mapping[str, str], inputs: Sequence[str]
 ) -> None:
     taken = {signal for system in systems for signal in system.input_labels}
-    for signal in inputs:
+    for i, signal in enumerate(inputs):
+        if signal in sources:
+            raise DiagramError(
+                f"signal '{signal}' is an external input and is delivered by "
+                f"'{sources[signal]}'; rename one"
+            )
+        if signal in inputs[:i]:
+            raise DiagramError(f"external input '{signal}' is listed twice")
         if signal not in taken:
             raise unknown("input signal", signal, taken)
     for system in systems:
@@ -171,9 +231,10 @@ def initial_state(
     index = {name: i for i, name in enumerate(state_names(system))}
     for name, value in (values or {}).items():
         full = find_name("state", name, index)
-        if not np.isfinite(value):
-            raise ParameterError(f"state '{full}' needs a finite initial value, got {value}")
-        x[index[full]] = value
+        number = as_numbers(value)
+        if number is None or number.ndim or not np.isfinite(number):
+            raise ParameterError(f"state '{full}' needs a finite initial value, got {value!r}")
+        x[index[full]] = number
     return x
 
 
@@ -183,11 +244,13 @@ def parameter_names(system: ct.InputOutputSystem) -> list[str]:
 
 
 def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
-    """Return the parameter table of a diagram (values as the records hold them)."""
+    """Return the parameter table of a diagram, with the values of a run without overrides."""
+    if isinstance(system, ct.NonlinearIOSystem):
+        system._update_params(None)
     rows: list[ParameterRow] = []
     for leaf in leaves(system):
         if isinstance(leaf.system, Block):
-            rows += parameter_rows(leaf.system, f"{leaf.path}.")
+            rows += parameter_rows(leaf.system, f"{leaf.parameter_path}.")
     return rows
 
 

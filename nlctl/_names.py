@@ -8,6 +8,7 @@ ordinary diagram made with ``ct.interconnect`` takes qualified names without bei
 
 from __future__ import annotations
 
+import copy
 import difflib
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -29,8 +30,12 @@ def unknown(kind: str, name: str, known: Iterable[str], where: str = "") -> Unkn
 
 
 def base_name(name: str) -> str:
-    """Return a parameter's name without an element index: ``"c.lambdas[0]"`` -> ``"c.lambdas"``."""
-    return name.partition("[")[0]
+    """Return a parameter's name without an element index: ``"c.lambdas[0]"`` -> ``"c.lambdas"``.
+
+    Block names may hold brackets as well (python-control's generic ``sys[0]``); they stay.
+    """
+    path, dot, last = name.rpartition(".")
+    return path + dot + last.partition("[")[0]
 
 
 def find_name(kind: str, name: str, known: Mapping[str, Any], clashes: Iterable[str] = ()) -> str:
@@ -62,24 +67,28 @@ class Parameters(dict):
 
     Attributes
     ----------
+    block : Block or None
+        The block whose parameters these are; None for a diagram's.
     scope : control.InputOutputSystem or None
         Diagram whose name is put in front of every key when the diagram is nested in another.
-    of_block : bool
-        Whether these are the parameters of one block (and not of a diagram).
     clashes : set of str
-        Keys that stand for two different blocks.  Each block then keeps its own value, and an
-        override of such a name is refused.
+        Keys that do not stand for exactly one block.  Each block then keeps its own value, and
+        an override of such a name is refused.
     table : Parameters or None
         The enclosing diagram's parameters, known while python-control hands overrides down.
+    copies : int
+        How often this was copied since it was made.  python-control copies a diagram's
+        parameters once when it makes the diagram, and again whenever it hands them down.
     """
 
-    def __init__(self, values: Mapping[str, Any], owner: object = None) -> None:
+    def __init__(self, values: Mapping[str, Any], block: Any = None) -> None:
         super().__init__(values)
-        self.owners: dict[str, object] = dict.fromkeys(values, owner)
-        self.of_block = owner is not None
+        self.block = block
+        self.owners: dict[str, Any] = dict.fromkeys(values, block)
         self.clashes: set[str] = set()
         self.scope: ct.InputOutputSystem | None = None
         self.table: Parameters | None = None
+        self.copies = 0
 
     @property
     def prefix(self) -> str:
@@ -88,14 +97,24 @@ class Parameters(dict):
 
     def copy(self) -> Parameters:
         """Return a copy (python-control copies defaults before it overrides them)."""
-        new = Parameters(self)
+        new = Parameters(self, self.block)
         new.owners, new.clashes = self.owners.copy(), self.clashes.copy()
-        new.scope, new.table, new.of_block = self.scope, self.table, self.of_block
+        new.scope, new.table, new.copies = self.scope, self.table, self.copies + 1
+        return new
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Parameters:
+        new = Parameters({})
+        memo[id(self)] = new  # first: scope leads to the diagram, and the diagram back here
+        dict.update(new, copy.deepcopy(dict(self), memo))
+        new.__dict__.update(copy.deepcopy(self.__dict__, memo))
         return new
 
     def __or__(self, other: Mapping[str, Any]) -> Parameters:  # type: ignore[override]
         new = self.copy()
-        new.scope, new.of_block = None, False
+        if self.copies and not isinstance(other, Parameters):
+            new.update(other)  # a user's: a diagram's finished parameters with some changed
+            return new
+        new.scope, new.block, new.copies = None, None, 0
         new._absorb(other)
         return new
 
@@ -104,18 +123,31 @@ class Parameters(dict):
         new._absorb(self)
         return new
 
+    def __ior__(self, other: Mapping[str, Any]) -> Parameters:  # type: ignore[override,misc]
+        self.update(other)
+        return self
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        self._override(name, value)
+
     def _absorb(self, other: Mapping[str, Any]) -> None:
-        """Add the parameters of one more subsystem; note names that two blocks share."""
+        """Add the parameters of one more subsystem; note names that do not mean one block."""
         if not isinstance(other, Parameters):  # a foreign block: python-control's own rule
-            super().update(other)
+            dict.update(self, other)
             return
-        self.clashes |= {other.prefix + key for key in other.clashes}
+        elsewhere: dict[tuple[int, str], str]
+        elsewhere = {(id(o), k.rpartition(".")[2]): k for k, o in self.owners.items() if o}
+        self.clashes.update(other.prefix + key for key in other.clashes)
         for key, value in other.items():
-            name, owner = other.prefix + key, other.owners.get(key)
+            name = other.prefix + key if "." in key else key  # bare names are foreign blocks'
+            owner = other.owners.get(key)
+            twin: str = elsewhere.get((id(owner), key.rpartition(".")[2]), name)
             if owner is not None and self.owners.get(name, owner) is not owner:
-                self.clashes.add(name)
+                self.clashes.add(name)  # two blocks with one name
+            if twin != name:
+                self.clashes.update({name, twin})  # one block in two places
             self.owners[name] = owner
-            self[name] = value
+            dict.__setitem__(self, name, value)
 
     def update(self, other: Mapping[str, Any] | None = None, /, **kwargs: Any) -> None:  # type: ignore[override]
         """Override values: with the defaults of the enclosing diagram, or with a user's dict."""
@@ -128,36 +160,64 @@ class Parameters(dict):
     def _inherit(self, outer: Parameters) -> None:
         """Take over the values that the enclosing diagram has for these parameters."""
         self.table = outer
+        for key in list(self):
+            if key != base_name(key) and self.prefix + base_name(key) in outer:
+                del self[key]  # an element's default gives way to what the outside says
         for name, value in outer.items():
             own = name.removeprefix(self.prefix)
             is_own = name.startswith(self.prefix) and base_name(own) in self
             if (is_own and base_name(name) not in outer.clashes) or "." not in name:
-                self[own] = value
+                dict.__setitem__(self, own, value)
 
     def _override(self, name: str, value: Any) -> None:
+        """Set a parameter by a name that a user wrote."""
         if "." not in name:
             self._refuse_bare_twin(name)
-            self[name] = value
+            dict.__setitem__(self, name, value)
             return
-        table = self if self.table is None else self.table
-        if self.table is None and self.of_block and not self._same_block(name):
-            return  # the diagram was given plain-dict params, and this one is another block's
-        full = find_name("parameter", base_name(name), table, table.clashes)
-        own = full.removeprefix(self.prefix) if table is not self else full
-        if own in self and (table is self or full.startswith(self.prefix)):
-            self[own + name[len(base_name(name)) :]] = value
+        base = base_name(name)
+        names, clashes = self._known_names()
+        if self._handed_down_by_plain_dict() and not _same_block(base, names):
+            return  # the enclosing diagram has a plain dict, and this one is another block's
+        if self.table is None and base in self:
+            base = self.prefix + base  # seen from inside the diagram
+        full = find_name("parameter", base, names, clashes)
+        own = full.removeprefix(self.prefix)
+        if not (full.startswith(self.prefix) and own in self):
+            return  # another block's
+        index = name[len(base_name(name)) :]
+        if not index:
+            for key in [k for k in self if k != own and base_name(k) == own]:
+                del self[key]  # the whole vector replaces elements set before
+        if self.block is not None and self.copies == 0:
+            self.block.params = {own + index: value}
+        dict.__setitem__(self, own + index, value)
 
-    def _same_block(self, name: str) -> bool:
-        """Whether `name` begins with the name of the block whose parameters these are."""
-        return base_name(name).rpartition(".")[0] in {k.rpartition(".")[0] for k in self}
+    def _known_names(self) -> tuple[Mapping[str, Any], set[str]]:
+        """Return the names that overrides may use here, and those that are ambiguous."""
+        if self.table is not None:
+            return self.table, self.table.clashes
+        return {self.prefix + k: v for k, v in self.items()}, {
+            self.prefix + k for k in self.clashes
+        }
+
+    def _handed_down_by_plain_dict(self) -> bool:
+        """Whether python-control hands this down without having told the diagram's names."""
+        return self.table is None and self.copies >= (2 if self.block is None else 1)
 
     def _refuse_bare_twin(self, name: str) -> None:
         """A bare name is a foreign block's, unless it looks like one of ours cut short."""
-        table = self if self.table is None else self.table
-        twins = [k for k in table if k.endswith("." + base_name(name))]
-        if name not in table and twins:
+        names, _ = self._known_names()
+        twins = [k for k in names if k.endswith("." + base_name(name))]
+        if name not in names and twins:
             raise UnknownNameError(
                 f"unknown parameter '{name}'; parameters carry their block's name: "
                 f"{' or '.join(repr(t) for t in twins)} (a block of your own that reads "
                 f"'{name}' declares it in its params)"
             )
+
+
+def _same_block(name: str, names: Iterable[str]) -> bool:
+    """Whether `name` is a parameter, known or not, of a block that has one of `names`."""
+    block = name.rpartition(".")[0]
+    return any(f".{k.rpartition('.')[0]}".endswith(f".{block}") for k in names)

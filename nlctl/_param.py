@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import re
 from collections import namedtuple
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar, dataclass_transform
@@ -107,7 +108,14 @@ def record(cls: type[T]) -> type[T]:
     """
     if "__post_init__" not in cls.__dict__:
         cls.__post_init__ = check_params  # type: ignore[attr-defined]
+        cls.__checked_at_birth__ = True  # type: ignore[attr-defined]
     return dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+
+
+def ensure_checked(spec: Any) -> None:
+    """Check a record that was not checked when it was made, such as a plain dataclass."""
+    if not getattr(type(spec), "__checked_at_birth__", False):
+        check_params(spec)
 
 
 def declared_params(spec: Any) -> dict[str, Param]:
@@ -140,10 +148,9 @@ def _normalised(who: str, name: str, value: Any, ndim: int, kind: Any) -> Any:
         if not isinstance(value, bool | np.bool_):
             raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")
         return bool(value)
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{who} needs numbers for {name}, got {value!r}") from None
+    array = as_numbers(value)
+    if array is None:
+        raise ParameterError(f"{who} needs numbers for {name}, got {value!r}")
     if array.ndim == 0 and ndim == 1:
         array = array.reshape(1)
     if array.ndim != ndim:
@@ -152,10 +159,33 @@ def _normalised(who: str, name: str, value: Any, ndim: int, kind: Any) -> Any:
     if array.size == 0:
         raise ParameterError(f"{who} needs at least one value in {name}, got none")
     if kind in (int, "int"):
-        if float(array) != math.floor(float(array)):
+        if not (math.isfinite(array) and float(array).is_integer()):
             raise ParameterError(f"{who} needs a whole number for {name}, got {value!r}")
         return int(array)
     return _nested_tuple(array.tolist())
+
+
+def as_numbers(value: Any) -> np.ndarray | None:
+    """Return `value` as a float array, or None if it holds anything but real numbers."""
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        return None
+    return array.astype(float) if array.dtype.kind in "iuf" else None
+
+
+def whole_number(who: str, name: str, value: Any, at_least: int) -> int:
+    """Return `value` as an int.
+
+    Raises
+    ------
+    ParameterError
+        If it is no whole number, or below `at_least`.
+    """
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not (is_whole and value >= at_least):
+        raise ParameterError(f"{who} needs {name} >= {at_least}, got {value!r}")
+    return int(value)
 
 
 def _nested_tuple(value: Any) -> Any:
@@ -190,22 +220,23 @@ def with_overrides(spec: Any, overrides: Mapping[str, Any], block: str) -> Any:
         for key, value in overrides.items():
             if "[" in key:
                 changed = _replace_element(changed, key, value)
-        if not hasattr(type(spec), "__post_init__"):  # a plain dataclass: nobody checked it yet
-            check_params(changed)
+        ensure_checked(changed)
     except ParameterError as error:
         raise ParameterError(f"{error} (block '{block}')") from None
     return changed
 
 
 def _replace_element(spec: Any, key: str, value: Any) -> Any:
-    name, _, inside = key.partition("[")
+    name = key.partition("[")[0]
     array = np.array(getattr(spec, name), dtype=float)
+    inside = re.fullmatch(r"\[(\d+(?:, ?\d+)*)\]", key.removeprefix(name))
+    number = as_numbers(value)
     try:
-        index = tuple(int(part) for part in inside.rstrip("]").split(","))
-        if len(index) != array.ndim:
+        index = tuple(int(part) for part in inside[1].split(",")) if inside else None
+        if index is None or len(index) != array.ndim or number is None or number.ndim:
             raise IndexError
-        array[index] = value
-    except (ValueError, IndexError, TypeError):
+        array[index] = number
+    except IndexError:
         raise ParameterError(
             f"{type(spec).__name__} has {name} of shape {array.shape}; "
             f"'{key}' = {value!r} is no element of it"

@@ -6,7 +6,7 @@ import numpy as np
 
 from ._equation import equation
 from ._errors import ParameterError
-from ._param import param, record
+from ._param import as_numbers, param, record
 
 __all__ = ["Backlash", "DeadZone"]
 
@@ -90,6 +90,11 @@ class Backlash:
     O(slope |u''| / rate^2).  In Example 2 over 20 s the states are off by at most 1.5e-2, 1.8e-4
     and 1.8e-6 at rates of 100, 1000 and 10,000 1/s.  The price is a stiff state: simulate with
     ``method="LSODA"`` and rtol <= 1e-8 (the default of `nlctl.input_output_response`).
+
+    Parameters
+    ----------
+    v0 : float, optional
+        Memory v(0-) at the start: the initial value of the state ``memory``.
     """
 
     m_r: float = param(1.2, unit="1", meaning="slope of the right (rising) side", above=0)
@@ -97,7 +102,7 @@ class Backlash:
     c_r: float = param(0.5, unit="1", meaning="right end of the gap, in u")
     c_l: float = param(-0.6, unit="1", meaning="left end of the gap, in u")
     rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memory", above=0)
-    v0: float = param(0.0, unit="1", meaning="memory v(0-) at the start")
+    v0: float = 0.0
 
     inputs = ("u",)
     outputs = ("v",)
@@ -111,7 +116,10 @@ class Backlash:
         return {"memory": self.v0}
 
     def check(self) -> None:
-        """The gap has a left and a right end."""
+        """The gap has a left and a right end, and the memory a finite start."""
+        number = as_numbers(self.v0)
+        if number is None or number.ndim or not np.isfinite(number):
+            raise ParameterError(f"Backlash needs a finite v0, got {self.v0!r}")
         if not self.c_l < self.c_r:
             raise ParameterError(f"Backlash needs c_l < c_r, got {self.c_l:g} and {self.c_r:g}")
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ._equation import equation
+from ._errors import ParameterError
 
 __all__ = [
     "band_limited",
@@ -95,12 +96,12 @@ def band_limited(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument breaks its rule.
     """
     omega, phase = noise_spectrum(low, high, seed, components)
     if not (np.isfinite(rms) and rms >= 0):
-        raise ValueError(f"band_limited needs rms >= 0, got {rms}")
+        raise ParameterError(f"band_limited needs rms >= 0, got {rms}")
     amplitude = float(rms)
 
     @equation
@@ -113,9 +114,11 @@ def band_limited(
 def noise_spectrum(low: float, high: float, seed: int | Sequence[int], components: int):
     """Draw the frequencies (rad/s) and phases (rad) of `band_limited`, each of shape (m,)."""
     if not (np.isfinite(high) and 0 <= low < high):
-        raise ValueError(f"band-limited noise needs 0 <= low < high, got low {low}, high {high}")
+        raise ParameterError(
+            f"band-limited noise needs 0 <= low < high, got low {low}, high {high}"
+        )
     if components < 1:
-        raise ValueError(f"band-limited noise needs components >= 1, got {components}")
+        raise ParameterError(f"band-limited noise needs components >= 1, got {components}")
     rng = np.random.default_rng(seed)
     edges = np.linspace(low, high, components + 1)
     omega = rng.uniform(edges[:-1], edges[1:])

@@ -17,7 +17,7 @@ import numpy as np
 from ._equation import equation
 from ._errors import ParameterError
 from ._names import unknown
-from ._param import param, record
+from ._param import param, record, whole_number
 
 __all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "integrator_chain"]
 
@@ -98,8 +98,8 @@ class PureFeedback:
 
     def check(self) -> None:
         """Refuse an order below 1 and an initial value for a state that does not exist."""
-        if not (isinstance(self.order, int) and self.order >= 1):
-            raise ParameterError(f"PureFeedback needs an order >= 1, got {self.order!r}")
+        order = whole_number("PureFeedback", "an order", self.order, at_least=1)
+        object.__setattr__(self, "order", order)
         for name, value in self.initial.items():
             if name not in self.states:
                 raise unknown("state", name, self.states, "in initial of PureFeedback")

@@ -14,7 +14,7 @@ import numpy as np
 
 from ._equation import equation
 from ._errors import ParameterError
-from ._param import param, record
+from ._param import param, record, whole_number
 from .functions import noise_spectrum, noise_value
 
 __all__ = ["BandLimitedNoise", "FilteredStep", "FunctionReference", "SumOfSines"]
@@ -26,8 +26,9 @@ def derivative_names(order: int) -> tuple[str, ...]:
 
 
 def _check_order(spec: Any) -> None:
-    if not (isinstance(spec.order, int) and spec.order >= 0):
-        raise ParameterError(f"{type(spec).__name__} needs an order >= 0, got {spec.order!r}")
+    """A reference delivers a whole number of derivatives."""
+    order = whole_number(type(spec).__name__, "an order", spec.order, at_least=0)
+    object.__setattr__(spec, "order", order)
 
 
 @record

@@ -75,7 +75,7 @@ def test_simulate_writes_what_was_asked_for(tmp_path):
         ("actuator.b_r=-0.1", "DeadZone needs b_r > 0, got -0.1 (block 'actuator')"),
         ("actuator.b_r=wide", "actuator.b_r needs a number, got 'wide'"),
         ("actuator.b_r", "--set needs NAME=VALUE, got 'actuator.b_r'"),
-        ("plant.x7(0)=1", "unknown state 'plant.x7'; nearest: 'plant.x1'"),
+        ("plant.x7(0)=1", "unknown state 'plant.x7'; nearest: 'plant.x2', 'plant.x1'"),
         ("plant.x1(0)=nan", "state 'plant.x1' needs a finite initial value, got nan"),
         ("law.beta=inf", "NussbaumLaw needs a finite beta, got inf (block 'law')"),
         ("filtered_error.lambdas=-1", "FilteredError needs a Hurwitz polynomial"),

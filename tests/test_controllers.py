@@ -244,7 +244,10 @@ class TestJoined:
     def test_the_number_of_nodes_must_fit(self):
         """Weights for other nodes than the basis has: the missing signal is named."""
         weights = nlctl.AdaptiveWeights(nodes=28)
-        with pytest.raises(nlctl.DiagramError, match=r"'weights' takes .* 'psi\[27\]'"):
+        with pytest.raises(nlctl.ParameterError, match="nodes=28 for 27 centres"):
             nlctl.adaptive_neural(2, weights=weights)
-        with pytest.raises((nlctl.DiagramError, nlctl.ParameterError), match=r"26|27"):
+        basis = nlctl.block(nlctl.GaussianBasis(), "basis")  # a system's centres are not looked at
+        with pytest.raises(nlctl.DiagramError, match=r"'weights' takes .* 'psi\[27\]'"):
+            nlctl.adaptive_neural(2, basis=basis, weights=nlctl.block(weights, "weights"))
+        with pytest.raises(nlctl.ParameterError, match="nodes=26 for 27 centres"):
             nlctl.adaptive_neural(2, weights=nlctl.AdaptiveWeights(nodes=26))

@@ -9,7 +9,7 @@ import control as ct
 from .._diagram import interconnect
 from .._equation import equation
 from .._errors import ParameterError
-from .._param import record
+from .._param import record, whole_number
 from .filtered_error import FilteredError, binomial_lambdas
 from .nussbaum import NussbaumLaw
 from .rbf import AdaptiveWeights, GaussianBasis, diagonal_centres
@@ -87,8 +87,7 @@ def adaptive_neural(
     DiagramError
         If a replaced piece lacks a signal.
     """
-    if not (isinstance(order, int) and order >= 2):
-        raise ParameterError(f"adaptive_neural needs an order >= 2, got {order!r}")
+    order = whole_number("adaptive_neural", "an order", order, at_least=2)
     if filtered_error is None:
         lambdas = FilteredError.lambdas if order == 2 else binomial_lambdas(order)
         filtered_error = FilteredError(lambdas=lambdas)
@@ -104,6 +103,11 @@ def adaptive_neural(
             f"got {len(basis.inputs)}"
         )
     nodes = len(basis.centres) if isinstance(basis, GaussianBasis) else 27
+    if isinstance(weights, AdaptiveWeights) and weights.nodes != nodes:
+        raise ParameterError(
+            f"adaptive_neural needs as many weights as centres, got nodes={weights.nodes} for "
+            f"{nodes} centres"
+        )
     pieces = {
         "filtered_error": filtered_error,
         "basis": basis,

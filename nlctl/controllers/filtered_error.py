@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from fractions import Fraction
+
 import numpy as np
 
 from .._equation import equation
@@ -15,6 +18,27 @@ __all__ = ["FilteredError", "binomial_lambdas"]
 def binomial_lambdas(order: int) -> tuple[float, ...]:
     """Return lambda_1, ..., lambda_{n-1} of (s + 1)^(n-1); (2, 1) for order 3."""
     return tuple(float(c) for c in np.poly(-np.ones(order - 1))[1:])
+
+
+def is_hurwitz(coefficients: Sequence[float]) -> bool:
+    """Whether all roots of a polynomial lie in the open left half plane.
+
+    By the Routh array in exact fractions: roots on the axis, which rounding moves, are found out.
+
+    Parameters
+    ----------
+    coefficients : sequence of float
+        Highest power first, the first one positive.
+    """
+    numbers = [Fraction(c) for c in coefficients]
+    above, row = numbers[::2], numbers[1::2]
+    while row:
+        if row[0] <= 0:
+            return False
+        ratio = above[0] / row[0]
+        below = [*row[1:], Fraction(0)]
+        above, row = row, [a - ratio * b for a, b in zip(above[1:], below, strict=False)]
+    return True
 
 
 @record
@@ -38,12 +62,12 @@ class FilteredError:
 
     def check(self) -> None:
         """The roots must lie in the open left half plane."""
-        roots = np.roots([1.0, *self.lambdas])
-        worst = roots[np.argmax(roots.real)]
-        if not worst.real < 0:
+        if not is_hurwitz((1.0, *self.lambdas)):
+            roots = np.roots([1.0, *self.lambdas])
+            worst = roots[np.argmax(roots.real)]
             raise ParameterError(
                 "FilteredError needs a Hurwitz polynomial s^(n-1) + lambda_1 s^(n-2) + ... (14), "
-                f"got lambdas {self.lambdas} with a root at {worst:.4g}"
+                f"got lambdas {self.lambdas} with a root at {worst:.3g}"
             )
 
     @property

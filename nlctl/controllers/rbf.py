@@ -9,7 +9,7 @@ import numpy as np
 
 from .._equation import equation
 from .._errors import ParameterError
-from .._param import param, record
+from .._param import param, record, whole_number
 from ..functions import gaussian
 
 __all__ = [
@@ -114,8 +114,8 @@ class AdaptiveWeights:
 
     def check(self) -> None:
         """A network has nodes."""
-        if not (isinstance(self.nodes, int) and self.nodes >= 1):
-            raise ParameterError(f"AdaptiveWeights needs nodes >= 1, got {self.nodes!r}")
+        nodes = whole_number("AdaptiveWeights", "nodes", self.nodes, at_least=1)
+        object.__setattr__(self, "nodes", nodes)
 
     @property
     def inputs(self) -> tuple[str, ...]:
