@@ -62,7 +62,7 @@ def find_name(kind: str, name: str, known: Mapping[str, Any], clashes: Iterable[
     return matches[0]
 
 
-class Parameters(dict):
+class Parameters(dict[str, Any]):
     """``{qualified name: value}`` of a block or diagram, for use as python-control ``params``.
 
     Attributes
@@ -141,7 +141,7 @@ class Parameters(dict):
         for key, value in other.items():
             name = other.prefix + key if "." in key else key  # bare names are foreign blocks'
             owner = other.owners.get(key)
-            twin: str = elsewhere.get((id(owner), key.rpartition(".")[2]), name)
+            twin = elsewhere.get((id(owner), key.rpartition(".")[2]), name)
             if owner is not None and self.owners.get(name, owner) is not owner:
                 self.clashes.add(name)  # two blocks with one name
             if twin != name:
