@@ -20,12 +20,22 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from latex2mathml.converter import convert
 from markupsafe import Markup
 
+from nlctl import drawing
 from nlctl._files import replace_file
 
+from .. import figures
 from .document import Equation, Figure, Paragraph, Report, Table
 
 __all__ = ["render_html", "render_json", "write_report"]
 
+# Colours of the figures that follow the page's theme, by the page's own names for them.
+THEME = {
+    "#000000": "currentColor",
+    drawing.INK: "currentColor",
+    drawing.GREY: "var(--soft)",
+    drawing.FILL: "var(--panel)",
+    figures.GREY: "var(--soft)",
+}
 SVG_SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": 9.0}
 
 
@@ -33,7 +43,7 @@ def svg(figure: Figure) -> Markup:
     """Return a figure as inline SVG, the same bytes every time.
 
     Ids get the figure's key in front, so that figures on one page do not refer to each other's
-    parts; black becomes the colour of the text around it, so that dark pages work.
+    parts; ink, grey and fill take the page's colours, so that dark pages work.
     """
     buffer = io.StringIO()
     with mpl.rc_context(SVG_SETTINGS):
@@ -43,7 +53,8 @@ def svg(figure: Figure) -> Markup:
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r'\bid="', f'id="{figure.key}-', text)
     text = re.sub(r'(href="|url\()#', rf"\g<1>#{figure.key}-", text)
-    text = text.replace("#000000", "currentColor")
+    for colour, themed in THEME.items():
+        text = text.replace(colour, themed)
     head = f'<svg role="img" aria-labelledby="{figure.key}-title {figure.key}-desc" '
     names = (
         f'<title id="{figure.key}-title">{html.escape(figure.caption)}</title>'
