@@ -1,4 +1,4 @@
-from . import actuators, controllers, functions, paper, plants, references
+from . import actuators, controllers, functions, native, paper, plants, references
 from ._block import Block, block
 from ._diagram import initial_state, interconnect, parameters, state_names
 from ._equation import equation
@@ -24,16 +24,20 @@ from .controllers import (
     latin_hypercube_centres,
 )
 from .drawing import draw
+from .native import AlgebraicLoopError, Compiled, CompileError, compile  # noqa: A004
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import input_output_response
 
 __all__ = [
     "AdaptiveWeights",
+    "AlgebraicLoopError",
     "AmbiguousNameError",
     "Backlash",
     "BandLimitedNoise",
     "Block",
+    "CompileError",
+    "Compiled",
     "DeadZone",
     "DiagramError",
     "DivergedError",
@@ -53,6 +57,7 @@ __all__ = [
     "actuators",
     "adaptive_neural",
     "block",
+    "compile",
     "controllers",
     "diagonal_centres",
     "draw",
@@ -63,6 +68,7 @@ __all__ = [
     "input_output_response",
     "interconnect",
     "latin_hypercube_centres",
+    "native",
     "paper",
     "param",
     "parameters",

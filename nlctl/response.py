@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
 
 from . import _diagram
 from ._errors import DivergedError, ParameterError
+from ._names import unknown
+
+if TYPE_CHECKING:
+    from .native import Compiled
 
 __all__ = ["input_output_response"]
 
@@ -18,27 +22,29 @@ STANDSTILL = 200  # steps in a row that do not advance the time
 
 
 def input_output_response(
-    system: ct.NonlinearIOSystem,
+    system: ct.NonlinearIOSystem | Compiled,
     timepts: Any,
     inputs: Any = 0.0,
     initial_state: Mapping[str, float] | Any = None,
     *,
     params: Mapping[str, Any] | None = None,
-    method: str = "LSODA",
+    method: str | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
     progress: Callable[[float], object] | None = None,
     **kwargs: Any,
 ) -> ct.TimeResponseData:
-    """Simulate a block or diagram: `control.input_output_response` with this toolbox's defaults.
+    """Simulate a block or diagram, in python-control or as machine code.
 
-    The integration is python-control's.  What is added: blocks start from their own initial
-    states, tolerances are tighter, a run that leaves the finite numbers ends with the time at
-    which it did, and progress can be watched.
+    A diagram is integrated by `control.input_output_response`, a compiled one by nlctl's own
+    integrator, with the same arguments.  What is added to python-control: blocks start from
+    their own initial states, tolerances are tighter, a run that leaves the finite numbers ends
+    with the time at which it did, and progress can be watched.
 
     Parameters
     ----------
-    system : control.NonlinearIOSystem
+    system : control.NonlinearIOSystem or Compiled
+        A diagram, or what `nlctl.compile` made of it.
     timepts : array_like of shape (m,)
         Times in s at which the response is computed.
     inputs : array_like or float, optional
@@ -47,16 +53,21 @@ def input_output_response(
         ``{"plant.x1": 0.8}`` replaces some of the blocks' initial states; an array gives all.
     params : mapping, optional
         Qualified parameters, ``{"actuator.b_r": 0.6}``.
-    method, rtol, atol : optional
-        Passed to `scipy.integrate.solve_ivp`.
+    method : str, optional
+        Method of `scipy.integrate.solve_ivp` in python-control, "LSODA" by default; machine code
+        has "tsit5", an explicit Runge-Kutta pair of orders 5(4).
+    rtol, atol : float, optional
+        Tolerances of the integrator.
     progress : callable, optional
-        Called with the time after every accepted step.
+        Called with the time after every accepted step (machine code: once, at the end).
     **kwargs
-        Passed to `control.input_output_response`.
+        Passed to `control.input_output_response`; machine code takes ``max_steps`` and
+        ``ignore_errors``.
 
     Returns
     -------
     control.TimeResponseData
+        From machine code with an attribute ``statistics``: status, time reached, steps.
 
     Raises
     ------
@@ -67,6 +78,9 @@ def input_output_response(
         increasing or not finite.
     """
     times = _checked_times(timepts)
+    if not isinstance(system, ct.InputOutputSystem):
+        settings = {"params": params, "rtol": rtol, "atol": atol, **kwargs}
+        return _native(system, times, inputs, initial_state, settings, method, progress)
     given_by_name = initial_state is None or isinstance(initial_state, Mapping)
     x0: Any = _diagram.initial_state(system, initial_state) if given_by_name else initial_state
     watch = _Watch(system=system, reached=float(times[0]), progress=progress)
@@ -79,7 +93,7 @@ def input_output_response(
                 inputs,
                 x0,
                 params=dict(params or {}),
-                method=method,
+                method=method or "LSODA",
                 solve_ivp_kwargs=settings | kwargs.pop("solve_ivp_kwargs", {}),
                 **kwargs,
             )
@@ -90,6 +104,25 @@ def input_output_response(
             raise
     if not np.all(np.isfinite(response.y)):
         raise _diverged(system, watch.reached)
+    return response
+
+
+def _native(
+    compiled: Compiled,
+    times: np.ndarray,
+    inputs: Any,
+    initial_state: Any,
+    settings: dict[str, Any],
+    method: str | None,
+    progress: Callable[[float], object] | None,
+) -> ct.TimeResponseData:
+    from .native._response import respond  # late: python-control's users need no compiler
+
+    if method not in (None, "tsit5"):
+        raise unknown("method", str(method), ["tsit5"], "of a compiled diagram")
+    response = respond(compiled, times, inputs, initial_state, **settings)
+    if progress is not None:
+        progress(float(response.time[-1]))
     return response
 
 

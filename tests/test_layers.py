@@ -11,11 +11,11 @@ import pytest
 ROOT = Path(__file__).parent.parent
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
     ["nlctl._errors", "nlctl._files", "nlctl._equation", "nlctl._param", "nlctl._names"]
-    + ["nlctl._block", "nlctl._diagram", "nlctl.functions", "nlctl.response"]
+    + ["nlctl._block", "nlctl._diagram", "nlctl.functions"]
     + ["nlctl._layout", "nlctl.drawing"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers"],
     ["nlctl.paper"],
-    ["nlctl.native"],
+    ["nlctl.native", "nlctl.response"],
     ["analysis.metrics", "analysis.lyapunov", "analysis.robustness", "analysis.reproduction"],
     ["analysis.figures", "analysis.report"],
     ["analysis.studies"],

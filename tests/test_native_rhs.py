@@ -12,6 +12,13 @@ from nlctl.native._emit import CompileError
 from nlctl.native._schedule import AlgebraicLoopError, schedule
 
 
+def evaluated(function, size, t, x, u, p):
+    """What a program's function writes into its last argument."""
+    result = np.full(size, np.nan)
+    function(t, x, u, p, result)
+    return result
+
+
 def compare(system, *, native=False, params=None, points=3, seed=0):
     """Right-hand side and outputs agree with python-control's at random points."""
     compiled = compile_diagram(system, params=params)
@@ -25,8 +32,12 @@ def compare(system, *, native=False, params=None, points=3, seed=0):
         p = compiled.parameter_vector(params)
         rhs, out = compiled.native if native else compiled.interpreted
         close = {"rtol": 1e-13, "atol": 1e-13}
-        np.testing.assert_allclose(rhs(t, x, u, p), system.dynamics(t, x, u, params), **close)
-        np.testing.assert_allclose(out(t, x, u, p), system.output(t, x, u, params), **close)
+        for function, size, reference in (
+            (rhs, system.nstates, system.dynamics),
+            (out, system.noutputs, system.output),
+        ):
+            found = evaluated(function, size, t, x, u, p)
+            np.testing.assert_allclose(found, reference(t, x, u, params), **close)
 
 
 def lag(name, k):
@@ -203,11 +214,11 @@ def test_nan_reaches_every_output_that_depends_on_it():
     """NaN in a state is NaN in the derivatives and outputs that python-control has NaN in."""
     loop = nlctl.paper.example_1()
     compiled = compile_diagram(loop)
-    p = compiled.parameter_vector()
+    (rhs, out), p = compiled.interpreted, compiled.parameter_vector()
     x = nlctl.initial_state(loop)
     x[0] = np.nan
-    assert np.isnan(compiled.interpreted[1](0.0, x, np.zeros(0), p)[:6:2]).all()
-    assert np.isnan(compiled.interpreted[0](0.0, x, np.zeros(0), p)[1])
+    assert np.isnan(evaluated(out, 11, 0.0, x, np.zeros(0), p)[:6:2]).all()
+    assert np.isnan(evaluated(rhs, 31, 0.0, x, np.zeros(0), p)[1])
 
 
 def test_a_parameter_that_changes_shape_is_refused():

@@ -8,7 +8,6 @@ import nlctl
 from analysis import metrics
 from analysis.reproduction import CASES, METRICS, checks, expectations, run, sample_times
 from analysis.reproduction.run import Run
-from nlctl.native._compile import compile as compile_diagram
 
 EXAMPLE_1 = {case.key: case for case in CASES if case.key in ("1", "1-3x9")}
 
@@ -73,11 +72,17 @@ def test_long_horizon_figures(example, max_e, rms_e, max_u, zeta, tolerance):
     """
     (case,) = [c for c in CASES if c.key == str(example)]
     diagram = case.diagram
-    compiled = compile_diagram(diagram)
+    compiled = nlctl.compile(diagram)
     (rhs, out), p = compiled.native, compiled.parameter_vector()
+
+    def filled(function, size, t, x, u):
+        result = np.empty(size)
+        function(t, np.ascontiguousarray(x), u, p, result)
+        return result
+
     fast = ct.nlsys(
-        lambda t, x, u, params: rhs(t, x, u, p),
-        lambda t, x, u, params: out(t, x, u, p),
+        lambda t, x, u, params: filled(rhs, x.size, t, x, u),
+        lambda t, x, u, params: filled(out, diagram.noutputs, t, x, u),
         inputs=0,
         outputs=diagram.output_labels,
         states=diagram.state_labels,

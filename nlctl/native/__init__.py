@@ -1,1 +1,22 @@
-"""The native engine: diagrams as machine code."""
+"""The native engine: any python-control diagram as machine code.
+
+`compile` reads a diagram (`_schedule`), writes the source of its right-hand side (`_emit`), turns
+that into machine code and keeps it on disk (`_compile`, `_cache`); `_integrate` and `_response`
+simulate it.
+"""
+
+from ._compile import Compiled, compile  # noqa: A004 (what it does)
+from ._emit import CompileError
+from ._integrate import Status
+from ._response import Response, Statistics
+from ._schedule import AlgebraicLoopError
+
+__all__ = [
+    "AlgebraicLoopError",
+    "CompileError",
+    "Compiled",
+    "Response",
+    "Statistics",
+    "Status",
+    "compile",
+]

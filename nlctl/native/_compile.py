@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
-import linecache
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,11 +13,14 @@ import numpy as np
 from numba.core.registry import CPUDispatcher
 
 from .._diagram import state_names
+from ._cache import loaded
 from ._emit import CompileError, Program, emit
+from ._integrate import VECTOR
 from ._parameters import packed
 from ._schedule import Schedule, schedule
 
-Rhs = Callable[[float, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+Rhs = Callable[[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray], None]
+SIGNATURE = numba.void(numba.float64, VECTOR, VECTOR, VECTOR, VECTOR)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,14 +51,20 @@ class Compiled:
     @cached_property
     def interpreted(self) -> tuple[Rhs, Rhs]:
         """``(rhs, out)`` of the emitted source as plain Python."""
-        return _defined(self.program, dict(self.program.functions))
+        namespace: dict[str, Any] = {**self.program.constants, **self.program.functions}
+        exec(self.source, namespace)
+        return namespace["rhs"], namespace["out"]
 
     @cached_property
     def native(self) -> tuple[Rhs, Rhs]:
-        """``(rhs, out)`` as machine code; compiled by numba at the first call."""
+        """``(rhs, out)`` as machine code; compiled when first used, or found in the cache."""
         ready = {name: _jitted(f) for name, f in self.program.functions.items()}
-        rhs, out = _defined(self.program, ready)
-        return _njit(rhs), _njit(out)
+        module = loaded(self.program, ready)
+        compile_now = numba.njit(SIGNATURE, cache=True, error_model="numpy", nogil=True)
+        try:
+            return compile_now(module.rhs), compile_now(module.out)
+        except numba.TypingError as error:
+            raise self._explained(error) from error
 
     def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
         """Return the flat vector `p` that the program takes.
@@ -74,19 +81,17 @@ class Compiled:
 
     def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
         """Return the right-hand side, as ``system.dynamics`` does."""
-        return self._call(self.native[0], t, x, u, params)
+        return self._call(self.native[0], self.system.nstates, t, x, u, params)
 
     def output(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
         """Return the outputs, as ``system.output`` does."""
-        return self._call(self.native[1], t, x, u, params)
+        return self._call(self.native[1], self.system.noutputs, t, x, u, params)
 
-    def _call(self, function: Rhs, t: float, x: Any, u: Any, params: Any) -> np.ndarray:
-        p = self.parameter_vector(params)
+    def _call(self, function: Rhs, size: int | None, t: float, x: Any, u: Any, params: Any):
         x, u = (np.array(v, dtype=float).reshape(-1) for v in (x, u))
-        try:
-            return function(float(t), x, u, p)
-        except numba.TypingError as error:
-            raise self._explained(error) from error
+        result = np.empty(size or 0)
+        function(float(t), x, u, self.parameter_vector(params), result)
+        return result
 
     def _explained(self, error: Exception) -> CompileError:
         """Name the block whose function numba refuses, and numba's reason."""
@@ -146,20 +151,6 @@ def compile(  # noqa: A001 (what it does)
     return Compiled(schedule=read, program=emit(read))
 
 
-def _defined(program: Program, functions: Mapping[str, Any]) -> tuple[Any, Any]:
-    """Execute the emitted source and return its two functions."""
-    name = f"<nlctl {abs(hash(program.source)):x}>"
-    lines = program.source.splitlines(keepends=True)
-    linecache.cache[name] = (len(program.source), None, lines, name)  # for numba's messages
-    namespace: dict[str, Any] = {**program.constants, **functions}
-    exec(builtins.compile(program.source, name, "exec"), namespace)
-    return namespace["rhs"], namespace["out"]
-
-
-def _njit(function: Any) -> Any:
-    return numba.njit(function, error_model="numpy", nogil=True)
-
-
 def _jitted(function: Any) -> Any:
     """Make a block's function callable from machine code; equations already are."""
     if isinstance(function, CPUDispatcher):
@@ -168,7 +159,7 @@ def _jitted(function: Any) -> Any:
         raise CompileError(
             f"{function!r} is no plain function: give the block a function made with def"
         )
-    return _njit(function)
+    return numba.njit(function, error_model="numpy", nogil=True)
 
 
 def _place(function: Any) -> str:

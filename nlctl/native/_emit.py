@@ -32,7 +32,7 @@ class Program:
     Attributes
     ----------
     source : str
-        Defines ``rhs(t, x, u, p)`` and ``out(t, x, u, p)``; both return a 1-D float array.
+        Defines ``rhs(t, x, u, p, dx)`` and ``out(t, x, u, p, y)``, which fill their last argument.
     functions : mapping
         The blocks' own functions, by the names that the source uses.
     constants : mapping
@@ -69,16 +69,14 @@ def emit(schedule: Schedule) -> Program:
     outputs = [line for i in schedule.order for line in blocks[i].output_lines()]
     updates = [line for block in blocks for line in block.update_lines()]
     results = [f"y[{i}] = {_sum(c)}" for i, c in enumerate(schedule.outputs)]
-    nstates = schedule.system.nstates or 0
     source = "\n".join(
         [
-            "def rhs(t, x, u, p):",
-            *_indented([*parameters, *outputs, f"dx = np.empty({nstates})", *updates, "return dx"]),
+            "def rhs(t, x, u, p, dx):",
+            *_indented([*parameters, *outputs, *(updates or ["pass"])]),
             "",
             "",
-            "def out(t, x, u, p):",
-            *_indented([*parameters, *outputs, f"y = np.empty({len(results)})", *results]),
-            "    return y",
+            "def out(t, x, u, p, y):",
+            *_indented([*parameters, *outputs, *(results or ["pass"])]),
             "",
         ]
     )

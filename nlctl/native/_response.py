@@ -1,0 +1,186 @@
+"""Responses of compiled diagrams."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numba
+import numpy as np
+
+from .._diagram import initial_state as state_of
+from .._errors import DivergedError, ParameterError
+from ._compile import Compiled
+from ._integrate import RHS, VECTOR, Status, integrator
+
+MATRIX = numba.float64[:, ::1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statistics:
+    """What a run took.
+
+    Attributes
+    ----------
+    status : Status
+    time : float
+        Time that was reached (s).
+    accepted, rejected : int
+        Steps of the integrator.
+    """
+
+    status: Status
+    time: float
+    accepted: int
+    rejected: int
+
+
+class Response(ct.TimeResponseData):
+    """A `control.TimeResponseData` that also keeps how the run went, in `statistics`."""
+
+    statistics: Statistics
+
+
+def _fill_outputs(out, times, inputs, states, p, outputs):
+    u = np.empty(inputs.shape[0])
+    for m in range(outputs.shape[0]):
+        u[:] = inputs[:, m]
+        out(times[m], states[m], u, p, outputs[m])
+
+
+@functools.cache
+def _output_filler() -> Callable[..., None]:
+    signature = numba.void(RHS, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX)
+    return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(_fill_outputs)
+
+
+def respond(
+    compiled: Compiled,
+    times: np.ndarray,
+    inputs: Any = 0.0,
+    initial_state: Mapping[str, float] | Any = None,
+    *,
+    params: Mapping[str, Any] | None = None,
+    rtol: float = 1e-8,
+    atol: float = 1e-10,
+    max_steps: int = 10_000_000,
+    ignore_errors: bool = False,
+) -> Response:
+    """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments.
+
+    Raises
+    ------
+    DivergedError
+        If the run does not reach the last time, unless `ignore_errors`: then the response ends
+        where the run did, with ``success = False``.
+    ParameterError
+        If the diagram is no continuous-time one, or an argument has a wrong shape.
+    """
+    system = compiled.system
+    if not ct.isctime(system):
+        raise ParameterError(
+            f"'{system.name}' has dt = {system.dt}; the native engine integrates continuous time "
+            "only: simulate it with control.input_output_response"
+        )
+    u, x0 = input_array(inputs, system.ninputs or 0, times), state_array(system, initial_state)
+    rhs, out = compiled.native
+    p = compiled.parameter_vector(params)
+    states = np.full((times.size, x0.size), np.nan)
+    status, reached, accepted, rejected = integrator()(
+        rhs, times, u, x0, p, float(rtol), float(atol), int(max_steps), states
+    )
+    run = Statistics(status=Status(status), time=reached, accepted=accepted, rejected=rejected)
+    done = times.size if run.status is Status.OK else int(np.searchsorted(times, reached, "right"))
+    outputs = np.empty((done, system.noutputs or 0))
+    _output_filler()(out, times[:done].copy(), u, states, p, outputs)
+    if run.status is Status.OK and not np.all(np.isfinite(outputs)):
+        run = Statistics(status=Status.DIVERGED, time=reached, accepted=accepted, rejected=rejected)
+    if run.status is not Status.OK and not ignore_errors:
+        raise DivergedError(_message(system, run), reached)
+    return _response(compiled, times[:done], outputs.T, states[:done].T, u[:, :done], run, params)
+
+
+def _message(system: ct.InputOutputSystem, run: Statistics) -> str:
+    what = {
+        Status.DIVERGED: "diverged: no finite state after",
+        Status.STEP_LIMIT: "stopped at the limit of steps at",
+        Status.STEP_TOO_SMALL: "diverged or jumps: no step is small enough after",
+    }
+    return f"'{system.name}' {what[run.status]} t = {run.time:.6g} s"
+
+
+def _response(
+    compiled: Compiled,
+    times: np.ndarray,
+    outputs: np.ndarray,
+    states: np.ndarray,
+    inputs: np.ndarray,
+    run: Statistics,
+    params: Mapping[str, Any] | None,
+) -> Response:
+    system, ok = compiled.system, run.status is Status.OK
+    response = Response(
+        times,
+        outputs,
+        states,
+        inputs,
+        issiso=system.issiso(),
+        params=dict(system.params) | dict(params or {}),
+        output_labels=system.output_labels,
+        input_labels=system.input_labels,
+        state_labels=system.state_labels,
+        title=f"Input/output response for {system.name}",
+        sysname=system.name,
+        success=ok,
+        message=None if ok else _message(system, run),
+    )
+    response.statistics = run
+    return response
+
+
+def input_array(inputs: Any, count: int, times: np.ndarray) -> np.ndarray:
+    """Return the inputs as an array of shape (count, m), as python-control reads them.
+
+    Raises
+    ------
+    ParameterError
+        If the shape fits neither one input over time nor all of them.
+    """
+    shape = (count, times.size)
+    if isinstance(inputs, list | tuple) and len(inputs) == count and count > 1:
+        try:
+            rows = [np.broadcast_to(np.asarray(u, dtype=float), times.shape) for u in inputs]
+        except ValueError:
+            raise ParameterError(f"inputs need shape {shape}, or one entry per input") from None
+        return np.ascontiguousarray(rows)
+    array = np.asarray(inputs, dtype=float)
+    if array.ndim == 0:
+        return np.full(shape, float(array))
+    if array.ndim == 1 and count == 1:
+        array = array[None, :]
+    if array.shape != shape:
+        raise ParameterError(f"inputs need shape {shape} for these times, got {array.shape}")
+    return np.ascontiguousarray(array)
+
+
+def state_array(system: ct.InputOutputSystem, initial_state: Any) -> np.ndarray:
+    """Return the initial state as an array: by name, as a whole, or one number for all.
+
+    Raises
+    ------
+    ParameterError
+        If an array has the wrong length.
+    """
+    if initial_state is None or isinstance(initial_state, Mapping):
+        return state_of(system, initial_state)
+    array = np.asarray(initial_state, dtype=float).reshape(-1)
+    if array.size == 1:
+        return np.full(system.nstates or 0, array[0])
+    if array.size != system.nstates:
+        raise ParameterError(
+            f"initial_state needs {system.nstates} values for '{system.name}', got {array.size}"
+        )
+    return array.copy()
