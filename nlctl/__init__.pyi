@@ -24,7 +24,14 @@ from .controllers import (
     latin_hypercube_centres,
 )
 from .drawing import draw
-from .native import AlgebraicLoopError, Compiled, CompileError, compile  # noqa: A004
+from .native import (
+    AlgebraicLoopError,
+    Compiled,
+    CompileError,
+    Ensemble,
+    compile,  # noqa: A004
+    ensemble_response,
+)
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import input_output_response
@@ -41,6 +48,7 @@ __all__ = [
     "DeadZone",
     "DiagramError",
     "DivergedError",
+    "Ensemble",
     "FilteredError",
     "FilteredStep",
     "ForcedDuffing",
@@ -61,6 +69,7 @@ __all__ = [
     "controllers",
     "diagonal_centres",
     "draw",
+    "ensemble_response",
     "equation",
     "functions",
     "grid_centres",

@@ -7,6 +7,7 @@ simulate it.
 
 from ._compile import Compiled, compile  # noqa: A004 (what it does)
 from ._emit import CompileError
+from ._ensemble import Ensemble, ensemble_response
 from ._integrate import Status
 from ._response import Response, Statistics
 from ._schedule import AlgebraicLoopError
@@ -15,8 +16,10 @@ __all__ = [
     "AlgebraicLoopError",
     "CompileError",
     "Compiled",
+    "Ensemble",
     "Response",
     "Statistics",
     "Status",
     "compile",
+    "ensemble_response",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import FunctionType
 from typing import Any
 
 import control as ct
@@ -15,6 +16,7 @@ from numba.core.registry import CPUDispatcher
 from .._diagram import state_names
 from ._cache import loaded
 from ._emit import CompileError, Program, emit
+from ._foreign import make_callable
 from ._integrate import VECTOR
 from ._parameters import packed
 from ._schedule import Schedule, schedule
@@ -52,6 +54,7 @@ class Compiled:
     def interpreted(self) -> tuple[Rhs, Rhs]:
         """``(rhs, out)`` of the emitted source as plain Python."""
         namespace: dict[str, Any] = {**self.program.constants, **self.program.functions}
+        namespace |= {name: interpreted for name, (interpreted, _) in self.program.records.items()}
         exec(self.source, namespace)
         return namespace["rhs"], namespace["out"]
 
@@ -63,7 +66,7 @@ class Compiled:
         compile_now = numba.njit(SIGNATURE, cache=True, error_model="numpy", nogil=True)
         try:
             return compile_now(module.rhs), compile_now(module.out)
-        except numba.TypingError as error:
+        except Exception as error:  # numba passes on whatever typing raises
             raise self._explained(error) from error
 
     def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
@@ -101,7 +104,8 @@ class Compiled:
             if f"{name}(" in text or _place(function) in text:
                 culprit = f"{name} ({_place(function)})"
         lines = [line.strip() for line in text.splitlines() if line.strip()]
-        reason = next((line for line in lines if "No implementation" in line), lines[-1])
+        marks = ("No implementation", "Unknown attribute", "Untyped global", "Cannot determine")
+        reason = next((line for line in lines if any(m in line for m in marks)), lines[-1])
         return CompileError(
             f"numba cannot compile {culprit}: {reason}; the diagram still runs in python-control"
         )
@@ -155,10 +159,11 @@ def _jitted(function: Any) -> Any:
     """Make a block's function callable from machine code; equations already are."""
     if isinstance(function, CPUDispatcher):
         return function
-    if not hasattr(function, "__code__"):
+    if not isinstance(function, FunctionType):
         raise CompileError(
             f"{function!r} is no plain function: give the block a function made with def"
         )
+    make_callable(function)
     return numba.njit(function, error_model="numpy", nogil=True)
 
 

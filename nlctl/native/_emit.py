@@ -16,9 +16,12 @@ import numpy as np
 
 from .._block import Block
 from .._errors import UsageError
+from ._foreign import params_dict, params_record, unpacked_arguments
 from ._parameters import Slot, current_values, is_numeric, slots
 from ._schedule import Combination, Node, Schedule
 from ._values import as_vector
+
+LONG = 8  # states from which on a block's derivatives are written as one slice
 
 
 class CompileError(UsageError):
@@ -36,7 +39,9 @@ class Program:
     functions : mapping
         The blocks' own functions, by the names that the source uses.
     constants : mapping
-        Types of parameter records and other fixed values, by name.
+        Fixed values that are no numbers, by name.
+    records : mapping
+        What gathers a block's parameters, by name: in plain Python, and in machine code.
     layout : mapping
         For every block the places of its parameters in the flat vector `p`.
     """
@@ -44,6 +49,7 @@ class Program:
     source: str
     functions: Mapping[str, Callable[..., Any]]
     constants: Mapping[str, Any]
+    records: Mapping[str, tuple[Callable[..., Any], type]]
     layout: Mapping[int, Mapping[str, Slot]]
 
 
@@ -82,10 +88,14 @@ def emit(schedule: Schedule) -> Program:
     )
     functions: dict[str, Callable[..., Any]] = {}
     constants: dict[str, Any] = {"np": np, "as_vector": as_vector}
+    records: dict[str, tuple[Callable[..., Any], type]] = {}
     for block in blocks:
         functions |= block.functions()
         constants |= block.constants()
-    return Program(source=source, functions=functions, constants=constants, layout=layout)
+        records |= block.records()
+    return Program(
+        source=source, functions=functions, constants=constants, records=records, layout=layout
+    )
 
 
 def _indented(lines: list[str]) -> Iterator[str]:
@@ -128,6 +138,9 @@ class _Code:
     def constants(self) -> dict[str, Any]:
         return {}
 
+    def records(self) -> dict[str, tuple[Callable[..., Any], type]]:
+        return {}
+
     def parameter_lines(self) -> list[str]:
         return []
 
@@ -151,78 +164,76 @@ class _FunctionCode(_Code):
             found[f"{self.name}_output"] = system.outfcn
         return found
 
-    @property
-    def _vector(self) -> bool:
-        """Whether the functions want arrays; nlctl's small blocks want tuples to unpack."""
+    def _as_tuple(self, function: str, position: int) -> bool:
+        """Whether a function wants its argument x (1) or u (2) as a tuple, to take it apart."""
         spec = getattr(self.node.system, "spec", None)
-        return spec is None or getattr(spec, "vector", False)
+        if spec is not None:
+            return not getattr(spec, "vector", False)
+        return position in unpacked_arguments(self.functions()[f"{self.name}_{function}"])
 
-    def _inputs(self, known: bool) -> str:
+    def _inputs(self, function: str, known: bool) -> str:
         items = _tuple(self.inputs(known))
-        if not self._vector:
+        if self._as_tuple(function, 2):
             return items
         return f"np.array({items})" if self.node.inputs else "np.empty(0)"
 
-    def _states(self) -> str:
+    def _states(self, function: str) -> str:
         n, start = self.node.system.nstates or 0, self.node.state_offset
-        if self._vector:
-            return f"x[{start}:{start + n}]" if n else "np.empty(0)"
-        return _tuple([f"x[{i}]" for i in range(start, start + n)])
+        if self._as_tuple(function, 1):
+            return _tuple([f"x[{i}]" for i in range(start, start + n)])
+        return f"x[{start}:{start + n}]" if n else "np.empty(0)"
 
-    def _call(self, function: str, inputs: str) -> str:
-        return f"{self.name}_{function}(t, {self._states()}, {inputs}, p{self.index})"
+    def _call(self, function: str) -> str:
+        arguments = f"t, {self._states(function)}, u{self.index}, p{self.index}"
+        return f"as_vector({self.name}_{function}({arguments}))"
 
     def constants(self) -> dict[str, Any]:
-        found = {k: v for k, v in self._values.items() if not is_numeric(v)}
-        named = {f"{self.name}_{k}": v for k, v in found.items() if not isinstance(v, str)}
+        return {f"{self.name}_{k}": v for k, v in self._values.items() if not is_numeric(v)}
+
+    def records(self) -> dict[str, tuple[Callable[..., Any], type]]:
+        """What gathers the parameters: in plain Python, and in machine code."""
         if isinstance(self.node.system, Block):
-            named[f"{self.name}_p"] = type(self.node.system._current_params)
-        return named
+            own = type(self.node.system._current_params)
+            return {f"{self.name}_p": (own, own)}
+        names = list(self._values)
+        return {f"{self.name}_p": (params_dict(names), params_record(self.node.path, names))}
 
     @property
     def _values(self) -> Mapping[str, Any]:
         return current_values(self.node.system)
 
     def parameter_lines(self) -> list[str]:
-        """Gather the parameters: a record for nlctl's blocks, a dict for foreign ones.
-
-        A dict whose values are all of one type would become a hash map in machine code; an entry
-        of another type keeps it a record with named fields.
-        """
-        if isinstance(self.node.system, Block):
-            fields = ", ".join(slot.expression for slot in self.slots.values())
-            return [f"p{self.index} = {self.name}_p({fields})"]
-        entries = [f"{k!r}: {self._entry(k)}" for k in self._values]
-        return [f"p{self.index} = {{{', '.join([*entries, repr('') + ': ' + repr('')])}}}"]
-
-    def _entry(self, name: str) -> str:
-        if name in self.slots:
-            return self.slots[name].expression
-        value = self._values[name]
-        return repr(value) if isinstance(value, str) else f"{self.name}_{name}"
+        values = [
+            self.slots[k].expression if k in self.slots else f"{self.name}_{k}"
+            for k in self._values
+        ]
+        return [f"p{self.index} = {self.name}_p({', '.join(values)})"]
 
     def output_lines(self) -> list[str]:
         if not self.node.system.noutputs:
             return []
         if self.node.system.outfcn is None:
-            return [f"y{self.index} = {self._states()}"]
-        if not self.direct:  # evaluated before its inputs are known
-            return [f"y{self.index} = as_vector({self._call('output', self._inputs(False))})"]
-        return [
-            f"u{self.index} = {self._inputs(True)}",
-            f"y{self.index} = as_vector({self._call('output', f'u{self.index}')})",
-        ]
+            start = self.node.state_offset
+            return [f"y{self.index} = x[{start}:{start + (self.node.system.nstates or 0)}]"]
+        inputs = self._inputs("output", known=self.direct)  # NaN where it must not read them
+        return [f"u{self.index} = {inputs}", f"y{self.index} = {self._call('output')}"]
 
     def update_lines(self) -> list[str]:
         n, start = self.node.system.nstates or 0, self.node.state_offset
         if not n:
             return []
-        given = [] if self.direct else [f"u{self.index} = {self._inputs(True)}"]
-        call = f"as_vector({self._call('update', f'u{self.index}')})"
-        if self._vector:
+        inputs = self._inputs("update", known=True)
+        same = self.direct and inputs == self._inputs("output", known=True)
+        given = [] if same else [f"u{self.index} = {inputs}"]
+        call = self._call("update")
+        spec = getattr(self.node.system, "spec", None)
+        if spec is not None and not getattr(spec, "vector", False):
+            targets = [f"dx[{i}]" for i in range(start, start + n)]
+            return [*given, f"{_tuple(targets)} = {call}"]
+        if n > LONG:
             return [*given, f"dx[{start}:{start + n}] = {call}"]
-        names = [f"dx[{i}]" for i in range(start, start + n)]
-        return [*given, f"{_tuple(names)} = {call}"]
+        parts = [f"dx[{start + i}] = d{self.index}[{i}]" for i in range(n)]
+        return [*given, f"d{self.index} = {call}", *parts]
 
 
 @dataclass(frozen=True, kw_only=True)

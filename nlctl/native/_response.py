@@ -86,21 +86,49 @@ def respond(
             "only: simulate it with control.input_output_response"
         )
     u, x0 = input_array(inputs, system.ninputs or 0, times), state_array(system, initial_state)
-    rhs, out = compiled.native
     p = compiled.parameter_vector(params)
-    states = np.full((times.size, x0.size), np.nan)
-    status, reached, accepted, rejected = integrator()(
-        rhs, times, u, x0, p, float(rtol), float(atol), int(max_steps), states
-    )
-    run = Statistics(status=Status(status), time=reached, accepted=accepted, rejected=rejected)
-    done = times.size if run.status is Status.OK else int(np.searchsorted(times, reached, "right"))
-    outputs = np.empty((done, system.noutputs or 0))
-    _output_filler()(out, times[:done].copy(), u, states, p, outputs)
-    if run.status is Status.OK and not np.all(np.isfinite(outputs)):
-        run = Statistics(status=Status.DIVERGED, time=reached, accepted=accepted, rejected=rejected)
+    made = trajectory(compiled, times, u, x0, p, rtol=rtol, atol=atol, max_steps=max_steps)
+    run = made.statistics
     if run.status is not Status.OK and not ignore_errors:
-        raise DivergedError(_message(system, run), reached)
-    return _response(compiled, times[:done], outputs.T, states[:done].T, u[:, :done], run, params)
+        raise DivergedError(_message(system, run), run.time)
+    return _response(compiled, made, u[:, : made.time.size], params)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trajectory:
+    """One run: times that were reached, outputs (outputs, m), states (states, m)."""
+
+    time: np.ndarray
+    outputs: np.ndarray
+    states: np.ndarray
+    statistics: Statistics
+
+
+def trajectory(
+    compiled: Compiled,
+    times: np.ndarray,
+    inputs: np.ndarray,
+    x0: np.ndarray,
+    p: np.ndarray,
+    *,
+    rtol: float,
+    atol: float,
+    max_steps: int,
+) -> Trajectory:
+    """Integrate from arrays alone, without touching the diagram: safe in threads."""
+    rhs, out = compiled.native
+    states = np.full((times.size, x0.size), np.nan)
+    code, reached, accepted, rejected = integrator()(
+        rhs, times, inputs, x0, p, float(rtol), float(atol), int(max_steps), states
+    )
+    status = Status(code)
+    done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
+    outputs = np.empty((done, compiled.system.noutputs or 0))
+    _output_filler()(out, times[:done].copy(), inputs, states, p, outputs)
+    if status is Status.OK and not np.all(np.isfinite(outputs)):
+        status = Status.DIVERGED
+    run = Statistics(status=status, time=reached, accepted=accepted, rejected=rejected)
+    return Trajectory(time=times[:done], outputs=outputs.T, states=states[:done].T, statistics=run)
 
 
 def _message(system: ct.InputOutputSystem, run: Statistics) -> str:
@@ -113,19 +141,14 @@ def _message(system: ct.InputOutputSystem, run: Statistics) -> str:
 
 
 def _response(
-    compiled: Compiled,
-    times: np.ndarray,
-    outputs: np.ndarray,
-    states: np.ndarray,
-    inputs: np.ndarray,
-    run: Statistics,
-    params: Mapping[str, Any] | None,
+    compiled: Compiled, made: Trajectory, inputs: np.ndarray, params: Mapping[str, Any] | None
 ) -> Response:
-    system, ok = compiled.system, run.status is Status.OK
+    system, run = compiled.system, made.statistics
+    ok = run.status is Status.OK
     response = Response(
-        times,
-        outputs,
-        states,
+        made.time,
+        made.outputs,
+        made.states,
         inputs,
         issiso=system.issiso(),
         params=dict(system.params) | dict(params or {}),

@@ -1,0 +1,120 @@
+"""Other people's functions, as they stand: dict parameters and unpacked arguments.
+
+A function of python-control takes ``params``, a dict, and ``x`` and ``u``, arrays of a size that
+is only known when it runs.  In machine code the parameters become a record of named fields, and
+this module teaches numba to read such a record as a dict is read; an argument that the function
+takes apart (``x1, x2 = x``) becomes a tuple.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+import operator
+import textwrap
+from collections import namedtuple
+from collections.abc import Callable, Sequence
+from functools import partial
+from types import FunctionType
+from typing import Any
+
+from numba import types
+from numba.extending import overload, overload_method, register_jitable
+
+from .._errors import UsageError
+
+RECORDS = (types.NamedTuple, types.NamedUniTuple)
+_LIBRARIES = ("numpy", "scipy", "numba")  # numba has its own versions of their functions
+
+
+def params_dict(names: Sequence[str]) -> Callable[..., dict[str, Any]]:
+    """Return a function that makes a parameter dict of values, for plain Python."""
+    return partial(_named, tuple(names))
+
+
+def _named(names: tuple[str, ...], *values: Any) -> dict[str, Any]:
+    return dict(zip(names, values, strict=True))
+
+
+def params_record(path: str, names: Sequence[str]) -> type:
+    """Return the record type that stands for a parameter dict in machine code.
+
+    Raises
+    ------
+    UsageError
+        If a name cannot be that of a field.
+    """
+    try:
+        return namedtuple("Params", names)
+    except ValueError as error:
+        raise UsageError(
+            f"block '{path}' has a parameter that cannot be compiled: {error}; rename it"
+        ) from None
+
+
+def unpacked_arguments(function: Any) -> set[int]:
+    """Return the positions of the arguments that a function takes apart, as in ``a, b = x``."""
+    try:
+        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+        names = list(inspect.signature(function).parameters)
+    except (OSError, TypeError, SyntaxError, ValueError):
+        return set()
+    return {
+        names.index(node.value.id)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign)
+        and isinstance(node.targets[0], ast.Tuple | ast.List)
+        and isinstance(node.value, ast.Name)
+        and node.value.id in names
+    }
+
+
+def make_callable(function: FunctionType) -> None:
+    """Let machine code call the plain functions that a function refers to, and theirs.
+
+    numba knows them from then on; the functions themselves stay as they are.
+    """
+    closure = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+    used = [cell.cell_contents for cell in closure.values()]
+    used += [function.__globals__.get(name) for name in function.__code__.co_names]
+    for other in used:
+        library = getattr(other, "__module__", None) or ""
+        if isinstance(other, FunctionType) and library.partition(".")[0] not in _LIBRARIES:
+            _make_known(other)
+
+
+@functools.cache
+def _make_known(function: FunctionType) -> None:
+    register_jitable(function)
+    make_callable(function)
+
+
+def _field(record: Any, key: Any) -> int | None:
+    """Return the position of a field, None if there is none; the key must be written out."""
+    if not (isinstance(record, RECORDS) and isinstance(key, types.StringLiteral)):
+        return None
+    fields = record.fields
+    return fields.index(key.literal_value) if key.literal_value in fields else None
+
+
+@overload(operator.getitem, prefer_literal=True)
+def _getitem(record, key):
+    index = _field(record, key)
+    return None if index is None else (lambda record, key: record[index])
+
+
+@overload(operator.contains, prefer_literal=True)
+def _contains(record, key):
+    if not (isinstance(record, RECORDS) and isinstance(key, types.StringLiteral)):
+        return None
+    found = _field(record, key) is not None
+    return lambda record, key: found
+
+
+@overload_method(types.BaseNamedTuple, "get", prefer_literal=True)
+def _get(record, key, default=None):
+    index = _field(record, key)
+    if index is None:
+        return lambda record, key, default=None: default
+    return lambda record, key, default=None: record[index]
