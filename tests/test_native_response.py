@@ -7,6 +7,7 @@ import sys
 import control as ct
 import numpy as np
 import pytest
+from numba.core import config
 
 import nlctl
 from analysis.reproduction import CASES, METRICS, checks, sample_times
@@ -219,6 +220,7 @@ class TestStatus:
         np.testing.assert_allclose(run.y[0], [float(wanted([v])) for v in t - 0.5])
 
 
+@pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="nothing is compiled without JIT")
 class TestCache:
     """Compiled programs are found again, and never stale."""
 

@@ -6,6 +6,7 @@ import pytest
 import scipy.special
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba.core import config
 
 import nlctl
 from nlctl.native._compile import compile as compile_diagram
@@ -240,6 +241,7 @@ def test_params_get_and_in_follow_the_dict_in_machine_code():
     compare(predator_prey(), native=True, params={"r": 2.0, "forced": 1})
 
 
+@pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="nothing is compiled without JIT")
 def test_what_numba_cannot_compile_is_named():
     """The message has the block's function and its line; the diagram still runs elsewhere."""
 

@@ -11,6 +11,7 @@ from typing import Any
 import control as ct
 import numba
 import numpy as np
+from numba.core import config
 from numba.core.registry import CPUDispatcher
 
 from .._diagram import state_names
@@ -60,7 +61,12 @@ class Compiled:
 
     @cached_property
     def native(self) -> tuple[Rhs, Rhs]:
-        """``(rhs, out)`` as machine code; compiled when first used, or found in the cache."""
+        """``(rhs, out)`` as machine code; compiled when first used, or found in the cache.
+
+        With NUMBA_DISABLE_JIT=1 the same source runs as plain Python.
+        """
+        if getattr(config, "DISABLE_JIT", False):
+            return self.interpreted
         ready = {name: _jitted(f) for name, f in self.program.functions.items()}
         module = loaded(self.program, ready)
         compile_now = numba.njit(SIGNATURE, cache=True, error_model="numpy", nogil=True)

@@ -118,13 +118,15 @@ def trajectory(
     """Integrate from arrays alone, without touching the diagram: safe in threads."""
     rhs, out = compiled.native
     states = np.full((times.size, x0.size), np.nan)
-    code, reached, accepted, rejected = integrator()(
-        rhs, times, inputs, x0, p, float(rtol), float(atol), int(max_steps), states
-    )
+    with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
+        code, reached, accepted, rejected = integrator()(
+            rhs, times, inputs, x0, p, float(rtol), float(atol), int(max_steps), states
+        )
     status = Status(code)
     done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
     outputs = np.empty((done, compiled.system.noutputs or 0))
-    _output_filler()(out, times[:done].copy(), inputs, states, p, outputs)
+    with np.errstate(all="ignore"):
+        _output_filler()(out, times[:done].copy(), inputs, states, p, outputs)
     if status is Status.OK and not np.all(np.isfinite(outputs)):
         status = Status.DIVERGED
     run = Statistics(status=status, time=reached, accepted=accepted, rejected=rejected)
