@@ -93,7 +93,8 @@ class Block(ct.NonlinearIOSystem):
     @params.setter
     def params(self, values: Mapping[str, Any]) -> None:
         if values:
-            self.spec = with_overrides(self.spec, self._own(values), self.name)
+            self.spec = self._resolved(values)
+            self._update_params(None)
 
     def _own(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return the overrides among `params` that are this block's, by field name."""
@@ -108,16 +109,20 @@ class Block(ct.NonlinearIOSystem):
 
     def _update_params(self, params: Mapping[str, Any] | None) -> None:
         # python-control calls this before a run; its equations then get the result as `p`.
-        spec = with_overrides(self.spec, self._own(params or {}), self.name)
+        self.current_spec = self._resolved(params or {})
+        self._current_params = equation_arguments(self.current_spec)
+
+    def _resolved(self, params: Mapping[str, Any]) -> Any:
+        """Return the record with overrides; they must not change the number of signals."""
+        spec = with_overrides(self.spec, self._own(params), self.name)
         for kind in ("inputs", "outputs", "states"):
-            had, has = len(getattr(self.spec, kind)), len(getattr(spec, kind))
+            had, has = getattr(self, f"n{kind}"), len(getattr(spec, kind))
             if had != has:
                 raise ParameterError(
                     f"{type(spec).__name__} had {had} {kind} when the block was made and cannot "
                     f"have {has} now: make a new block (block '{self.name}')"
                 )
-        self.current_spec = spec
-        self._current_params = equation_arguments(spec)
+        return spec
 
     def __repr__(self) -> str:
         spec = type(self.spec).__name__

@@ -214,6 +214,8 @@ def test_nan_is_a_missed_figure(runs):
     report = paper_report(spoiled)
     assert report.verdict.startswith("Not reproduced")
     assert not report.claims[1].holds
+    content = json.loads(render_json(report), parse_constant=lambda name: pytest.fail(name))
+    assert content["numbers"]["2"]["tail_max_e"] == "nan"
 
 
 @pytest.mark.parametrize("text", HOSTILE)

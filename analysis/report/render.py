@@ -9,9 +9,10 @@ from __future__ import annotations
 import html
 import io
 import json
+import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +112,18 @@ def render_json(report: Report) -> str:
         "command": report.command,
         "provenance": dict(report.provenance),
     }
-    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=True) + "\n"
+    return json.dumps(_json_value(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _json_value(value: Any) -> Any:
+    """Return `value` as JSON can hold it: NaN and infinities, which it has no numbers for, as text."""
+    if isinstance(value, Mapping):
+        return {str(k): _json_value(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_json_value(v) for v in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else str(float(value))
+    return value
 
 
 def _plain(item: Paragraph | Equation | Table | Figure) -> dict[str, Any]:
