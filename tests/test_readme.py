@@ -5,7 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+
+import nlctl
 from analysis.reproduction import expectations
+from nlctl.native import Status
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -25,6 +29,19 @@ def test_the_loop_of_ones_own_runs_in_at_most_30_lines(tmp_path):
     assert abs(float(result.stdout) - float(said[1])) <= 0.51 * 10**-digits
 
 
+def test_the_other_blocks_of_code_run():
+    """They do what is said of them: machine code, an ensemble, the paper's examples."""
+    later = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)[1:]
+    assert len(later) == 2
+    names = {"nlctl": nlctl, "np": np}
+    for code in later:
+        exec(code, names)
+    assert names["response"].statistics.status is Status.OK
+    assert len(names["many"].table) == 1000
+    assert (names["many"].table["status"] == "OK").all()
+    assert names["loop"].output_labels[:2] == ["y", "yd"]
+
+
 def test_the_table_of_figures_is_the_table_that_is_checked():
     """Each rounded figure of the README is an expected figure."""
     wanted = {(e.case, e.metric): e.value for e in expectations()}
@@ -39,7 +56,5 @@ def test_the_table_of_figures_is_the_table_that_is_checked():
 
 def test_commands_and_names_in_the_readme_exist():
     """Every `nlctl.<name>` is public."""
-    import nlctl
-
     for name in re.findall(r"nlctl\.([A-Za-z_]+)", re.sub(r"nlctl\.toml|`pip.*", "", README)):
         assert hasattr(nlctl, name), name

@@ -116,7 +116,7 @@ def render_json(report: Report) -> str:
 
 
 def _json_value(value: Any) -> Any:
-    """Return `value` as JSON can hold it: NaN and infinities, which it has no numbers for, as text."""
+    """Return `value` as JSON can hold it: NaN and infinities become text."""
     if isinstance(value, Mapping):
         return {str(k): _json_value(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
