@@ -59,8 +59,10 @@ def gaussian(Z, centres, widths):
     -------
     ndarray of shape (l,)
     """
-    distance = centres - Z
-    return np.exp(-np.sum(distance * distance, axis=1) / (widths * widths))
+    squared = (centres[:, 0] - Z[0]) ** 2
+    for i in range(1, centres.shape[1]):
+        squared = squared + (centres[:, i] - Z[i]) ** 2
+    return np.exp(-squared / (widths * widths))
 
 
 @equation

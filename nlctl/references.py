@@ -78,9 +78,9 @@ class SumOfSines:
     def output(t, x, u, p):
         """The k-th derivative of sin is a shift of the phase by k pi / 2."""
         yd = np.zeros(p.order + 1)
-        for k in range(p.order + 1):
-            angle = p.frequencies * t + p.phases + k * np.pi / 2
-            yd[k] = np.sum(p.amplitudes * p.frequencies**k * np.sin(angle))
+        for a, w, phi in zip(p.amplitudes, p.frequencies, p.phases):  # noqa: B905 (for numba)
+            for k in range(p.order + 1):
+                yd[k] += a * w**k * np.sin(w * t + phi + k * np.pi / 2)
         return yd
 
 

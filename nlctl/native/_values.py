@@ -19,6 +19,8 @@ def _as_vector_native(value):  # numba compares signatures: no annotations here
     if isinstance(value, types.BaseTuple):
         return lambda value: value
     if isinstance(value, types.Array):
+        if value.ndim == 1:  # no copy: it is only read
+            return lambda value: value
         return lambda value: value.copy().reshape(-1)
     if isinstance(value, types.List | types.ListType):
         return lambda value: np.array(value).reshape(-1)
