@@ -34,10 +34,14 @@ def _axes(rows: int = 1, height: float = 2.6) -> tuple[Figure, list[Axes]]:
     figure = Figure(figsize=(9.0, height * rows), layout="constrained")
     axes = list(np.ravel(figure.subplots(rows, 1, sharex=rows > 1)))
     for ax in axes:
-        ax.grid(True, alpha=0.25, linewidth=0.6)
-        ax.spines[["top", "right"]].set_visible(False)
+        _style(ax)
         ax.margins(x=0.01)
     return figure, axes
+
+
+def _style(ax: Axes) -> None:
+    ax.grid(True, alpha=0.25, linewidth=0.6)
+    ax.spines[["top", "right"]].set_visible(False)
 
 
 def _lines(ax: Axes, t: np.ndarray, curves: Mapping[str, np.ndarray]) -> None:
@@ -87,8 +91,7 @@ def actuator_path(run: Run) -> Figure:
     """The part of the actuator's characteristic that was travelled: v over u."""
     figure = Figure(figsize=(4.6, 3.6), layout="constrained")
     ax = figure.subplots()
-    ax.grid(True, alpha=0.25, linewidth=0.6)
-    ax.spines[["top", "right"]].set_visible(False)
+    _style(ax)
     u, v = run.signals["u"], run.signals["v"]
     late = run.time >= TAIL
     ax.plot(u, v, "-", color=GREY, linewidth=0.9, label=f"t < {TAIL:g} s")

@@ -188,6 +188,22 @@ def whole_number(who: str, name: str, value: Any, at_least: int) -> int:
     return int(value)
 
 
+def checked_times(timepts: Any) -> np.ndarray:
+    """Return a time grid as a float array.
+
+    Raises
+    ------
+    ParameterError
+        If it has fewer than two times, or they are not finite and increasing.
+    """
+    times = np.array(timepts, dtype=float)
+    if times.ndim != 1 or times.size < 2:
+        raise ParameterError(f"timepts needs at least two times, got shape {times.shape}")
+    if not np.all(np.isfinite(times)) or not np.all(np.diff(times) > 0):
+        raise ParameterError("timepts needs finite times in increasing order")
+    return times
+
+
 def _nested_tuple(value: Any) -> Any:
     return tuple(map(_nested_tuple, value)) if isinstance(value, list) else value
 

@@ -20,11 +20,6 @@ from ._param import declared_params
 FIGURE_FORMATS = (".svg", ".png", ".pdf")
 
 
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 @contextmanager
 def progress_bar(what: str, total: float) -> Iterator[Callable[[float], None]]:
     """Show a bar on stderr while the body runs, if that is a terminal."""

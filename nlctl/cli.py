@@ -37,7 +37,8 @@ def report(
     from analysis.report.render import write_report
     from analysis.reproduction import CASES, checks, run_all
 
-    from ._terminal import check_writable, cores, progress_bar
+    from ._terminal import check_writable, progress_bar
+    from .native._ensemble import cores
 
     check_writable(out)
     with progress_bar("simulating", len(CASES)) as advance:

@@ -10,8 +10,9 @@ import control as ct
 import numpy as np
 
 from . import _diagram
-from ._errors import DivergedError, ParameterError
+from ._errors import DivergedError
 from ._names import unknown
+from ._param import checked_times
 
 if TYPE_CHECKING:
     from .native import Compiled
@@ -77,7 +78,7 @@ def input_output_response(
         If a name or a value is refused, or if `timepts` has fewer than two entries, is not
         increasing or not finite.
     """
-    times = _checked_times(timepts)
+    times = checked_times(timepts)
     if not isinstance(system, ct.InputOutputSystem):
         settings = {"params": params, "rtol": rtol, "atol": atol, **kwargs}
         return _native(system, times, inputs, initial_state, settings, method, progress)
@@ -167,12 +168,3 @@ def _diverged(system: ct.InputOutputSystem, time: float) -> DivergedError:
         "simulate up to then to see how",
         float(time),
     )
-
-
-def _checked_times(timepts: Any) -> np.ndarray:
-    times = np.asarray(timepts, dtype=float)
-    if times.ndim != 1 or times.size < 2:
-        raise ParameterError(f"timepts needs at least two times, got shape {times.shape}")
-    if not np.all(np.isfinite(times)) or not np.all(np.diff(times) > 0):
-        raise ParameterError("timepts needs finite times in increasing order")
-    return times

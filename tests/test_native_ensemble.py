@@ -120,6 +120,13 @@ def test_bad_input_names_the_culprit(loop, arguments, error, message):
         nlctl.ensemble_response(loop, T, **arguments)
 
 
+@pytest.mark.parametrize("times", [[0.0], [1.0, 0.0], [0.0, np.nan]])
+def test_bad_time_grids_are_refused_as_for_one_run(loop, times):
+    """Times must be finite, increasing, at least two."""
+    with pytest.raises(nlctl.ParameterError, match="timepts needs"):
+        nlctl.ensemble_response(loop, times)
+
+
 def test_interrupt_returns_what_is_finished(loop):
     """Ctrl-C after the third member: at least three rows, all whole."""
 

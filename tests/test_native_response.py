@@ -10,8 +10,7 @@ import pytest
 from numba.core import config
 
 import nlctl
-from analysis.reproduction import CASES, METRICS, checks, sample_times
-from analysis.reproduction.run import Run
+from analysis.reproduction import CASES, checks, measured, sample_times
 from nlctl.native import Status
 from nlctl.native._cache import cache_folder, program_key
 from nlctl.native._integrate import A, B, C, E
@@ -104,11 +103,7 @@ class TestAccuracy:
             nlctl.compile(loop), sample_times(), rtol=1e-10, atol=1e-12
         )
         signals = {name: run.y[i] for name, i in loop.output_index.items()}
-        numbers = {}
-        for m in METRICS:
-            inside = run.time >= m.start
-            numbers[m.key] = m.function(run.time[inside], signals[m.signal][inside])
-        made = Run(case=case, time=run.time, signals=signals, metrics=numbers)
+        made = measured(case, run.time, signals)
         compared = checks({"1": made})
         assert len(compared) == 13
         assert all(check.passed for check in compared)

@@ -6,7 +6,7 @@ import pytest
 
 import nlctl
 from analysis import metrics
-from analysis.reproduction import CASES, METRICS, checks, expectations, run, sample_times
+from analysis.reproduction import CASES, METRICS, checks, expectations, measured, run, sample_times
 from analysis.reproduction.run import Run
 
 EXAMPLE_1 = {case.key: case for case in CASES if case.key in ("1", "1-3x9")}
@@ -25,11 +25,7 @@ def plain_run(case, *, timepts=None, **solver):
 
 
 def measure(result):
-    numbers = {
-        m.key: m.function(*metrics.over(result.time, result.signals[m.signal], m.start, m.end))
-        for m in METRICS
-    }
-    return Run(case=result.case, time=result.time, signals=result.signals, metrics=numbers)
+    return measured(result.case, result.time, result.signals)
 
 
 @pytest.mark.parametrize("key", EXAMPLE_1)

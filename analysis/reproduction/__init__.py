@@ -1,7 +1,17 @@
 """The reproduction of the paper: cases, runs, figures to reach."""
 
 from .cases import CASES, HORIZON, METRICS, TAIL, Case
-from .run import Check, Expectation, Run, checks, expectations, run, run_all, sample_times
+from .run import (
+    Check,
+    Expectation,
+    Run,
+    checks,
+    expectations,
+    measured,
+    run,
+    run_all,
+    sample_times,
+)
 
 __all__ = [
     "CASES",
@@ -14,6 +24,7 @@ __all__ = [
     "Run",
     "checks",
     "expectations",
+    "measured",
     "run",
     "run_all",
     "sample_times",

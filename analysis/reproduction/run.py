@@ -105,11 +105,13 @@ def run(case: Case) -> Run:
     """
     diagram = case.diagram
     response = input_output_response(diagram, sample_times(), rtol=case.rtol)
-    signals = {name: response.y[i] for name, i in diagram.output_index.items()}
-    metrics = {
-        m.key: m.function(*over(response.time, signals[m.signal], m.start, m.end)) for m in METRICS
-    }
-    return Run(case=case, time=response.time, signals=signals, metrics=metrics)
+    return measured(case, response.time, dict(zip(diagram.output_labels, response.y, strict=True)))
+
+
+def measured(case: Case, time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Run:
+    """Return a run with its metrics, whatever simulated it."""
+    metrics = {m.key: m.function(*over(time, signals[m.signal], m.start, m.end)) for m in METRICS}
+    return Run(case=case, time=time, signals=signals, metrics=metrics)
 
 
 def run_all(

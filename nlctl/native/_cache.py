@@ -37,8 +37,7 @@ def program_key(program: Program) -> str:
     digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
     digest.update(program.source.encode())
     seen: set[int] = set()
-    native = {name: record for name, (_, record) in program.records.items()}
-    parts = {**program.functions, **program.constants, **native}
+    parts = program.namespace(native=True)
     for name in sorted(parts):
         for text in (name, *_fingerprint(parts[name], seen)):
             digest.update(text.encode() + b"\0")
@@ -112,8 +111,7 @@ def loaded(program: Program, functions: Mapping[str, Any]) -> types.ModuleType:
     assert spec is not None, path
     assert spec.loader is not None, path
     module = importlib.util.module_from_spec(spec)
-    native = {name: record for name, (_, record) in program.records.items()}
-    module.__dict__.update({**program.constants, **native, **functions})
+    module.__dict__.update(program.namespace(native=True) | dict(functions))
     sys.modules[name] = module  # numba looks the module up when it loads the code
     spec.loader.exec_module(module)
     return module

@@ -54,8 +54,7 @@ class Compiled:
     @cached_property
     def interpreted(self) -> tuple[Rhs, Rhs]:
         """``(rhs, out)`` of the emitted source as plain Python."""
-        namespace: dict[str, Any] = {**self.program.constants, **self.program.functions}
-        namespace |= {name: interpreted for name, (interpreted, _) in self.program.records.items()}
+        namespace = self.program.namespace(native=False)
         exec(self.source, namespace)
         return namespace["rhs"], namespace["out"]
 

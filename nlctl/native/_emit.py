@@ -52,6 +52,11 @@ class Program:
     records: Mapping[str, tuple[Callable[..., Any], type]]
     layout: Mapping[int, Mapping[str, Slot]]
 
+    def namespace(self, *, native: bool) -> dict[str, Any]:
+        """Return everything that the source refers to, by name."""
+        records = {name: pair[native] for name, pair in self.records.items()}
+        return {**self.constants, **self.functions, **records}
+
 
 def emit(schedule: Schedule) -> Program:
     """Write the program of a schedule.
@@ -164,11 +169,16 @@ class _FunctionCode(_Code):
             found[f"{self.name}_output"] = system.outfcn
         return found
 
+    @property
+    def _unpacks(self) -> bool:
+        """Whether this is one of nlctl's small blocks: tuples in, tuples out."""
+        system = self.node.system
+        return isinstance(system, Block) and not getattr(system.spec, "vector", False)
+
     def _as_tuple(self, function: str, position: int) -> bool:
         """Whether a function wants its argument x (1) or u (2) as a tuple, to take it apart."""
-        spec = getattr(self.node.system, "spec", None)
-        if spec is not None:
-            return not getattr(spec, "vector", False)
+        if isinstance(self.node.system, Block):
+            return self._unpacks
         return position in unpacked_arguments(self.functions()[f"{self.name}_{function}"])
 
     def _inputs(self, function: str, known: bool) -> str:
@@ -226,8 +236,7 @@ class _FunctionCode(_Code):
         same = self.direct and inputs == self._inputs("output", known=True)
         given = [] if same else [f"u{self.index} = {inputs}"]
         call = self._call("update")
-        spec = getattr(self.node.system, "spec", None)
-        if spec is not None and not getattr(spec, "vector", False):
+        if self._unpacks:
             targets = [f"dx[{i}]" for i in range(start, start + n)]
             return [*given, f"{_tuple(targets)} = {call}"]
         if n > LONG:

@@ -13,6 +13,7 @@ import numpy as np
 from .._diagram import state_names
 from .._errors import ParameterError
 from .._names import find_name, unknown
+from .._param import checked_times
 from ._compile import Compiled
 from ._integrate import Status
 from ._response import Trajectory, input_array, state_array, trajectory
@@ -102,11 +103,12 @@ def ensemble_response(
     Raises
     ------
     ParameterError
-        If arrays have different lengths, or a value is refused; the message names the member.
+        If `timepts` is no increasing grid, arrays have different lengths, or a value is refused;
+        the message then names the member.
     UnknownNameError
         If a parameter, state or signal does not exist.
     """
-    times = np.array(timepts, dtype=float)
+    times = checked_times(timepts)
     members = _Members(compiled, params or {}, initial_state or {})
     labels = compiled.system.output_labels
     for signal in (*keep, *(m.signal for m in metrics)):
@@ -125,7 +127,7 @@ def ensemble_response(
             samples[number, : made.time.size] = made.outputs[labels.index(signal)]
         return _row(made, labels, metrics)
 
-    rows = _run(one, len(members), threads or _cores(), progress)
+    rows = _run(one, len(members), threads or cores(), progress)
     return Ensemble(table=members.table(rows), time=times, signals=kept)
 
 
@@ -168,7 +170,8 @@ def _run(
     return rows
 
 
-def _cores() -> int:
+def cores() -> int:
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

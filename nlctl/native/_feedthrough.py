@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import ast
-import inspect
-import textwrap
 from typing import Any
 
 import control as ct
 import numpy as np
 
 from .._block import Block
+from ._foreign import readable_source
 
 
 def feedthrough(system: Any) -> np.ndarray:
@@ -43,13 +42,10 @@ def _mentions_inputs(function: Any) -> bool:
     """Whether the source of an output function uses its third argument (True if unreadable)."""
     if function is None:
         return False  # the outputs are the states
-    try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-        names = list(inspect.signature(function).parameters)
-    except (OSError, TypeError, SyntaxError, ValueError):
+    found = readable_source(function)
+    if found is None or len(found[1]) < 3:
         return True
-    if len(names) < 3:
-        return True
+    tree, names = found
     return any(isinstance(node, ast.Name) and node.id == names[2] for node in ast.walk(tree))
 
 

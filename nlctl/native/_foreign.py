@@ -53,13 +53,21 @@ def params_record(path: str, names: Sequence[str]) -> type:
         ) from None
 
 
-def unpacked_arguments(function: Any) -> set[int]:
-    """Return the positions of the arguments that a function takes apart, as in ``a, b = x``."""
+def readable_source(function: Any) -> tuple[ast.AST, list[str]] | None:
+    """Return a function's syntax tree and argument names; None where it has no readable source."""
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-        names = list(inspect.signature(function).parameters)
+        return tree, list(inspect.signature(function).parameters)
     except (OSError, TypeError, SyntaxError, ValueError):
+        return None
+
+
+def unpacked_arguments(function: Any) -> set[int]:
+    """Return the positions of the arguments that a function takes apart, as in ``a, b = x``."""
+    found = readable_source(function)
+    if found is None:
         return set()
+    tree, names = found
     return {
         names.index(node.value.id)
         for node in ast.walk(tree)
