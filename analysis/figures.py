@@ -65,7 +65,14 @@ def tracking_error(run: Run) -> Figure:
     bound = run.metrics["tail_max_e"]
     _lines(ax, run.time, {"$e_1$": run.signals["e"]})
     ax.fill_between([TAIL, run.time[-1]], -bound, bound, color=GREY, alpha=0.15, linewidth=0)
-    ax.annotate(f"±{bound:.4f}", (TAIL, bound), (3, 3), textcoords="offset points", color=GREY)
+    ax.annotate(
+        f"±{bound:.4f}",
+        (run.time[-1], bound),
+        (-3, 3),
+        textcoords="offset points",
+        ha="right",
+        color=GREY,
+    )
     ax.set(xlabel=TIME, ylabel="tracking error $e_1$")
     return figure
 
