@@ -35,10 +35,11 @@ def timed(function, repeat=3):
 def scipy_run(compiled, x0, rtol):
     """solve_ivp with the compiled right-hand side: what fusing by hand buys."""
     rhs, p, empty = compiled.native[0], compiled.parameter_vector(), np.zeros(0)
+    g = np.empty(compiled.program.events)
 
     def f(t, x):
         dx = np.empty(x.size)
-        rhs(t, np.ascontiguousarray(x), empty, p, dx)
+        rhs(t, np.ascontiguousarray(x), empty, p, dx, g)
         return dx
 
     return solve_ivp(f, (0, 20), x0, "LSODA", t_eval=T, rtol=rtol, atol=rtol * 1e-2).y

@@ -23,7 +23,14 @@ class Spec(Protocol):
     (``p.b_r``), the result is a tuple or a 1-D array.  ``feedthrough`` says whether the outputs
     depend on `u`.  ``initial`` (optional) maps state names to initial values other than 0,
     ``vector = True`` (optional) declares that the equations want `x` and `u` as 1-D arrays and
-    do not unpack them, ``memory`` (optional) names states that no derivative governs.
+    do not unpack them.
+
+    Two optional equations serve the native engine.  ``corners(t, x, u, p)`` returns a tuple of
+    switching functions: where one of them changes its sign, an equation has a corner or a jump,
+    and an integration step ends there.  ``memory`` names states that are memory; ``commit(t, x,
+    u, p)`` returns what they become at the end of a step that was accepted.  Within a step they
+    stand still, and a step in which a memory would turn round is divided where it does.  It must
+    be continuous except where a corner changes its sign.
     """
 
     inputs: Sequence[str]
@@ -222,6 +229,19 @@ def default_state(system: ct.InputOutputSystem) -> np.ndarray:
     return x
 
 
+def memory_states(spec: Any) -> tuple[str, ...]:
+    """Return the names of a record's memory states."""
+    return tuple(getattr(spec, "memory", ())) if hasattr(spec, "commit") else ()
+
+
+def event_count(made: Block) -> int:
+    """Return the number of switching functions that a block declares."""
+    if not hasattr(made.spec, "corners"):
+        return 0
+    u = np.full(made.ninputs or 0, 0.25)
+    return len(made.spec.corners(0.0, default_state(made), u, made._current_params))
+
+
 def _probe(made: Block) -> None:
     """Call the equations once: sizes must match, and feedthrough must be declared truly."""
     spec, who = made.spec, f"{type(made.spec).__name__} (block '{made.name}')"
@@ -230,6 +250,8 @@ def _probe(made: Block) -> None:
         results = [("output", spec.output, made.noutputs)]
         if made.nstates:
             results.append(("update", spec.update, made.nstates))
+        if memory_states(spec):
+            results.append(("commit", spec.commit, len(memory_states(spec))))
         for what, function, wanted in results:
             got = np.size(function(0.0, x, u, p))
             if got != wanted:

@@ -53,6 +53,13 @@ class DeadZone:
             return ((p.slope_r + p.ripple_r * np.sin(u1)) * (u1 - p.b_r),)
         return ((p.slope_l + p.ripple_l * np.cos(u1)) * (u1 - p.b_l),)
 
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """The break points."""
+        (u1,) = u
+        return u1 - p.b_l, u1 - p.b_r
+
 
 @equation
 def play_band(u, p):
@@ -138,3 +145,14 @@ class Backlash:
         (memory,) = x
         (u1,) = u
         return (play(u1, memory, p),)
+
+    commit = output  # the memory v(t-) becomes the output
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Contact with either side of the gap."""
+        (memory,) = x
+        (u1,) = u
+        low, high = play_band(u1, p)
+        return memory - low, memory - high

@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 from numba.core import config
 
 import nlctl
+from nlctl.native._code import CompileError
 from nlctl.native._compile import compile as compile_diagram
-from nlctl.native._emit import CompileError
 from nlctl.native._schedule import AlgebraicLoopError, schedule
 
 
-def evaluated(function, size, t, x, u, p):
+def evaluated(function, size, t, x, u, p, *more):
     """What a program's function writes into its last argument."""
     result = np.full(size, np.nan)
-    function(t, x, u, p, result)
+    function(t, x, u, p, result, *more)
     return result
 
 
@@ -35,11 +35,12 @@ def compare(system, *, native=False, params=None, points=3, seed=0):
         p = compiled.parameter_vector(params)
         rhs, out = compiled.native if native else compiled.interpreted
         close = {"rtol": 1e-13, "atol": 1e-13}
-        for function, size, reference in (
-            (rhs, system.nstates, system.dynamics),
-            (out, system.noutputs, system.output),
+        g = np.empty(compiled.program.events)
+        for function, size, reference, more in (
+            (rhs, system.nstates, system.dynamics, (g,)),
+            (out, system.noutputs, system.output, ()),
         ):
-            found = evaluated(function, size, t, x, u, p)
+            found = evaluated(function, size, t, x, u, p, *more)
             np.testing.assert_allclose(found, reference(t, x, u, given), **close)
 
 
@@ -303,7 +304,7 @@ def test_nan_reaches_every_output_that_depends_on_it():
     x = nlctl.initial_state(loop)
     x[0] = np.nan
     assert np.isnan(evaluated(out, 11, 0.0, x, np.zeros(0), p)[:6:2]).all()
-    assert np.isnan(evaluated(rhs, 31, 0.0, x, np.zeros(0), p)[1])
+    assert np.isnan(evaluated(rhs, 31, 0.0, x, np.zeros(0), p, np.empty(2))[1])
 
 
 def test_a_parameter_that_changes_shape_is_refused():

@@ -71,13 +71,15 @@ def test_long_horizon_figures(example, max_e, rms_e, max_u, zeta, tolerance):
     compiled = nlctl.compile(diagram)
     (rhs, out), p = compiled.native, compiled.parameter_vector()
 
-    def filled(function, size, t, x, u):
+    g = np.empty(compiled.program.events)
+
+    def filled(function, size, t, x, u, *more):
         result = np.empty(size)
-        function(t, np.ascontiguousarray(x), u, p, result)
+        function(t, np.ascontiguousarray(x), u, p, result, *more)
         return result
 
     fast = ct.nlsys(
-        lambda t, x, u, params: filled(rhs, x.size, t, x, u),
+        lambda t, x, u, params: filled(rhs, x.size, t, x, u, g),
         lambda t, x, u, params: filled(out, diagram.noutputs, t, x, u),
         inputs=0,
         outputs=diagram.output_labels,

@@ -5,8 +5,8 @@ that into machine code and keeps it on disk (`_compile`, `_cache`); `_integrate`
 simulate it.
 """
 
+from ._code import CompileError
 from ._compile import Compiled, compile  # noqa: A004 (what it does)
-from ._emit import CompileError
 from ._ensemble import Ensemble, ensemble_response
 from ._integrate import Status
 from ._response import Response, Statistics

@@ -16,14 +16,14 @@ from numba.core.registry import CPUDispatcher
 
 from .._diagram import state_names
 from ._cache import loaded
-from ._emit import CompileError, Program, emit
+from ._code import CompileError
+from ._emit import Program, emit
 from ._foreign import make_callable
-from ._integrate import VECTOR
+from ._integrate import OUT, RHS
 from ._parameters import packed
 from ._schedule import Schedule, schedule
 
-Rhs = Callable[[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray], None]
-SIGNATURE = numba.void(numba.float64, VECTOR, VECTOR, VECTOR, VECTOR)
+Rhs = Callable[..., None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,9 +68,10 @@ class Compiled:
             return self.interpreted
         ready = {name: _jitted(f) for name, f in self.program.functions.items()}
         module = loaded(self.program, ready)
-        compile_now = numba.njit(SIGNATURE, cache=True, error_model="numpy", nogil=True)
+        options = {"cache": True, "error_model": "numpy", "nogil": True}
         try:
-            return compile_now(module.rhs), compile_now(module.out)
+            rhs = numba.njit(RHS.signature, **options)(module.rhs)
+            return rhs, numba.njit(OUT.signature, **options)(module.out)
         except Exception as error:  # numba passes on whatever typing raises
             raise self._explained(error) from error
 
@@ -89,16 +90,19 @@ class Compiled:
 
     def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
         """Return the right-hand side, as ``system.dynamics`` does."""
-        return self._call(self.native[0], self.system.nstates, t, x, u, params)
+        g = np.empty(self.program.events)
+        return self._call(self.native[0], self.system.nstates, t, x, u, params, g)
 
     def output(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
         """Return the outputs, as ``system.output`` does."""
         return self._call(self.native[1], self.system.noutputs, t, x, u, params)
 
-    def _call(self, function: Rhs, size: int | None, t: float, x: Any, u: Any, params: Any):
+    def _call(
+        self, function: Rhs, size: int | None, t: float, x: Any, u: Any, params: Any, *more: Any
+    ):
         x, u = (np.array(v, dtype=float).reshape(-1) for v in (x, u))
         result = np.empty(size or 0)
-        function(float(t), x, u, self.parameter_vector(params), result)
+        function(float(t), x, u, self.parameter_vector(params), result, *more)
         return result
 
     def _explained(self, error: Exception) -> CompileError:

@@ -18,7 +18,8 @@ import numba
 import numpy as np
 
 VECTOR = numba.float64[::1]
-RHS = numba.types.FunctionType(numba.void(numba.float64, VECTOR, VECTOR, VECTOR, VECTOR))
+OUT = numba.types.FunctionType(numba.void(numba.float64, VECTOR, VECTOR, VECTOR, VECTOR))
+RHS = numba.types.FunctionType(numba.void(numba.float64, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR))
 
 C = np.array([0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 1.0])
 A = np.zeros((7, 7))
@@ -100,7 +101,7 @@ def _interpolate(theta, h, x, k, result):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _first_step(rhs, t, x, u, p, k, rtol, atol, span):
+def _first_step(rhs, t, x, u, p, g, k, rtol, atol, span):
     """Return a first step after Hairer, Norsett, Wanner, Solving ODEs I, II.4; k[0] is f(t, x)."""
     d0 = d1 = d2 = 0.0
     for i in range(x.size):
@@ -110,7 +111,7 @@ def _first_step(rhs, t, x, u, p, k, rtol, atol, span):
     d0, d1 = np.sqrt(d0 / max(x.size, 1)), np.sqrt(d1 / max(x.size, 1))
     h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
     h0 = min(h0, span)
-    rhs(t + h0, x + h0 * k[0], u, p, k[1])
+    rhs(t + h0, x + h0 * k[0], u, p, k[1], g)
     for i in range(x.size):
         d2 += ((k[1, i] - k[0, i]) / (atol + rtol * abs(x[i]))) ** 2
     d2 = np.sqrt(d2 / max(x.size, 1)) / h0
@@ -120,7 +121,7 @@ def _first_step(rhs, t, x, u, p, k, rtol, atol, span):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _stages(rhs, t, h, x, segment, times, inputs, u, p, k, x_new):
+def _stages(rhs, t, h, x, segment, times, inputs, u, p, g, k, x_new):
     """Evaluate stages 2 to 7 of a step; `x_new` becomes the solution at its end."""
     for s in range(1, 7):
         for i in range(x.size):
@@ -130,10 +131,10 @@ def _stages(rhs, t, h, x, segment, times, inputs, u, p, k, x_new):
             x_new[i] = x[i] + h * slope
         if u.size:
             _input_at(t + C[s] * h, segment, times, inputs, u)
-        rhs(t + C[s] * h, x_new, u, p, k[s])
+        rhs(t + C[s] * h, x_new, u, p, k[s], g)
 
 
-def tsit5(rhs, times, inputs, x0, p, rtol, atol, max_steps, states):
+def tsit5(rhs, times, inputs, x0, p, g, rtol, atol, max_steps, states):
     """Integrate from times[0] to times[-1] and fill ``states[m]`` with the state at times[m].
 
     Returns
@@ -150,8 +151,8 @@ def tsit5(rhs, times, inputs, x0, p, rtol, atol, max_steps, states):
     u = inputs[:, 0].copy()
     t, segment, accepted, rejected, error_before = times[0], 0, 0, 0, 1.0
     states[0] = x
-    rhs(t, x, u, p, k[0])
-    h = _first_step(rhs, t, x, u, p, k, rtol, atol, times[last] - t)
+    rhs(t, x, u, p, k[0], g)
+    h = _first_step(rhs, t, x, u, p, g, k, rtol, atol, times[last] - t)
     while segment < last:
         # with inputs a step ends at the next corner, without at the end of the run
         stop = times[segment + 1] if u.size else times[last]
@@ -166,7 +167,7 @@ def tsit5(rhs, times, inputs, x0, p, rtol, atol, max_steps, states):
             )
         is_last = t + 1.01 * h >= stop
         step = stop - t if is_last else h
-        _stages(rhs, t, step, x, segment, times, inputs, u, p, k, x_new)
+        _stages(rhs, t, step, x, segment, times, inputs, u, p, g, k, x_new)
         error = _error_norm(step, x, x_new, k, rtol, atol)
         if not error <= 1.0:  # NaN and infinity are rejected as well
             rejected += 1
@@ -192,6 +193,6 @@ def tsit5(rhs, times, inputs, x0, p, rtol, atol, max_steps, states):
 def integrator() -> Callable[..., tuple[int, float, int, int]]:
     """Return `tsit5` as machine code: made when first needed, from the cache in later sessions."""
     number, count, matrix = numba.float64, numba.int64, numba.float64[:, ::1]
-    arguments = (RHS, VECTOR, matrix, VECTOR, VECTOR, number, number, count, matrix)
+    arguments = (RHS, VECTOR, matrix, VECTOR, VECTOR, VECTOR, number, number, count, matrix)
     signature = numba.types.Tuple((count, number, count, count))(*arguments)
     return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(tsit5)

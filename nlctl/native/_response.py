@@ -14,7 +14,7 @@ import numpy as np
 from .._diagram import initial_state as state_of
 from .._errors import DivergedError, ParameterError
 from ._compile import Compiled
-from ._integrate import RHS, VECTOR, Status, integrator
+from ._integrate import OUT, VECTOR, Status, integrator
 
 MATRIX = numba.float64[:, ::1]
 
@@ -53,7 +53,7 @@ def _fill_outputs(out, times, inputs, states, p, outputs):
 
 @functools.cache
 def _output_filler() -> Callable[..., None]:
-    signature = numba.void(RHS, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX)
+    signature = numba.void(OUT, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX)
     return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(_fill_outputs)
 
 
@@ -120,7 +120,16 @@ def trajectory(
     states = np.full((times.size, x0.size), np.nan)
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         code, reached, accepted, rejected = integrator()(
-            rhs, times, inputs, x0, p, float(rtol), float(atol), int(max_steps), states
+            rhs,
+            times,
+            inputs,
+            x0,
+            p,
+            np.empty(compiled.program.events),
+            float(rtol),
+            float(atol),
+            int(max_steps),
+            states,
         )
     status = Status(code)
     done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
