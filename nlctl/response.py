@@ -11,7 +11,6 @@ import numpy as np
 
 from . import _diagram
 from ._errors import DivergedError
-from ._names import unknown
 from ._param import checked_times
 
 if TYPE_CHECKING:
@@ -55,15 +54,16 @@ def input_output_response(
     params : mapping, optional
         Qualified parameters, ``{"actuator.b_r": 0.6}``.
     method : str, optional
-        Method of `scipy.integrate.solve_ivp` in python-control, "LSODA" by default; machine code
-        has "tsit5", an explicit Runge-Kutta pair of orders 5(4).
+        Method of `scipy.integrate.solve_ivp` in python-control, "LSODA" by default.  Machine code
+        has "tsit5", an explicit Runge-Kutta pair of orders 5(4), "rodas5p", a stiff method of
+        orders 5(4), and "auto", the default, which takes whichever is faster at each time.
     rtol, atol : float, optional
         Tolerances of the integrator.
     progress : callable, optional
-        Called with the time after every accepted step (machine code: once, at the end).
+        Called with the time after every accepted step (machine code: every 2000 steps).
     **kwargs
-        Passed to `control.input_output_response`; machine code takes ``max_steps`` and
-        ``ignore_errors``.
+        Passed to `control.input_output_response`; machine code takes ``max_steps``, ``step`` (a
+        fixed step in s, 0 for error control) and ``ignore_errors``.
 
     Returns
     -------
@@ -119,12 +119,8 @@ def _native(
 ) -> ct.TimeResponseData:
     from .native._response import respond  # late: python-control's users need no compiler
 
-    if method not in (None, "tsit5"):
-        raise unknown("method", str(method), ["tsit5"], "of a compiled diagram")
-    response = respond(compiled, times, inputs, initial_state, **settings)
-    if progress is not None:
-        progress(float(response.time[-1]))
-    return response
+    settings["method"] = method or "auto"
+    return respond(compiled, times, inputs, initial_state, progress=progress, **settings)
 
 
 @dataclass

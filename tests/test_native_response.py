@@ -13,7 +13,7 @@ import nlctl
 from analysis.reproduction import CASES, checks, measured, sample_times
 from nlctl.native import Status
 from nlctl.native._cache import cache_folder, program_key
-from nlctl.native._integrate import A, B, C, E
+from nlctl.native._tsit5 import A, B, C, E
 
 OSCILLATOR = ct.ss([[0.0, 1.0], [-1.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]], name="osc")
 

@@ -8,9 +8,10 @@ simulate it.
 from ._code import CompileError
 from ._compile import Compiled, compile  # noqa: A004 (what it does)
 from ._ensemble import Ensemble, ensemble_response
-from ._integrate import Status
-from ._response import Response, Statistics
+from ._lane import Status
+from ._response import Response
 from ._schedule import AlgebraicLoopError
+from ._simulate import Settings, Statistics
 
 __all__ = [
     "AlgebraicLoopError",
@@ -18,6 +19,7 @@ __all__ = [
     "Compiled",
     "Ensemble",
     "Response",
+    "Settings",
     "Statistics",
     "Status",
     "compile",

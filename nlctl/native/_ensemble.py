@@ -15,8 +15,9 @@ from .._errors import ParameterError
 from .._names import find_name, unknown
 from .._param import checked_times
 from ._compile import Compiled
-from ._integrate import Status
-from ._response import Trajectory, input_array, state_array, trajectory
+from ._lane import Status
+from ._response import input_array, state_array
+from ._simulate import Settings, Trajectory, trajectory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,14 +116,14 @@ def ensemble_response(
         if signal not in labels:
             raise unknown("signal", signal, labels)
     u = input_array(inputs, compiled.system.ninputs or 0, times)
-    settings = {"rtol": rtol, "atol": atol, "max_steps": max_steps}
+    settings = Settings(rtol=rtol, atol=atol, max_steps=max_steps)
     kept = {signal: np.full((len(members), times.size), np.nan) for signal in keep}
     prepared = list(members)  # python-control resolves names in one thread only
     compiled.native  # noqa: B018 (compiled once, before the threads start)
 
     def one(number: int) -> dict[str, Any]:
         x0, p = prepared[number]
-        made = trajectory(compiled, times, u, x0, p, **settings)
+        made = trajectory(compiled, times, u, x0, p, settings)
         for signal, samples in kept.items():
             samples[number, : made.time.size] = made.outputs[labels.index(signal)]
         return _row(made, labels, metrics)

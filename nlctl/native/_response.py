@@ -2,59 +2,22 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import control as ct
-import numba
 import numpy as np
 
 from .._diagram import initial_state as state_of
 from .._errors import DivergedError, ParameterError
 from ._compile import Compiled
-from ._integrate import OUT, VECTOR, Status, integrator
-
-MATRIX = numba.float64[:, ::1]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Statistics:
-    """What a run took.
-
-    Attributes
-    ----------
-    status : Status
-    time : float
-        Time that was reached (s).
-    accepted, rejected : int
-        Steps of the integrator.
-    """
-
-    status: Status
-    time: float
-    accepted: int
-    rejected: int
-
+from ._lane import Status
+from ._simulate import Settings, Statistics, Trajectory, trajectory
 
 class Response(ct.TimeResponseData):
     """A `control.TimeResponseData` that also keeps how the run went, in `statistics`."""
 
     statistics: Statistics
-
-
-def _fill_outputs(out, times, inputs, states, p, outputs):
-    u = np.empty(inputs.shape[0])
-    for m in range(outputs.shape[0]):
-        u[:] = inputs[:, m]
-        out(times[m], states[m], u, p, outputs[m])
-
-
-@functools.cache
-def _output_filler() -> Callable[..., None]:
-    signature = numba.void(OUT, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX)
-    return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(_fill_outputs)
 
 
 def respond(
@@ -64,10 +27,9 @@ def respond(
     initial_state: Mapping[str, float] | Any = None,
     *,
     params: Mapping[str, Any] | None = None,
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
-    max_steps: int = 10_000_000,
     ignore_errors: bool = False,
+    progress: Callable[[float], object] | None = None,
+    **settings: Any,
 ) -> Response:
     """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments.
 
@@ -87,65 +49,18 @@ def respond(
         )
     u, x0 = input_array(inputs, system.ninputs or 0, times), state_array(system, initial_state)
     p = compiled.parameter_vector(params)
-    made = trajectory(compiled, times, u, x0, p, rtol=rtol, atol=atol, max_steps=max_steps)
+    made = trajectory(compiled, times, u, x0, p, Settings(**settings), progress)
     run = made.statistics
     if run.status is not Status.OK and not ignore_errors:
         raise DivergedError(_message(system, run), run.time)
     return _response(compiled, made, u[:, : made.time.size], params)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Trajectory:
-    """One run: times that were reached, outputs (outputs, m), states (states, m)."""
-
-    time: np.ndarray
-    outputs: np.ndarray
-    states: np.ndarray
-    statistics: Statistics
-
-
-def trajectory(
-    compiled: Compiled,
-    times: np.ndarray,
-    inputs: np.ndarray,
-    x0: np.ndarray,
-    p: np.ndarray,
-    *,
-    rtol: float,
-    atol: float,
-    max_steps: int,
-) -> Trajectory:
-    """Integrate from arrays alone, without touching the diagram: safe in threads."""
-    rhs, out = compiled.native
-    states = np.full((times.size, x0.size), np.nan)
-    with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
-        code, reached, accepted, rejected = integrator()(
-            rhs,
-            times,
-            inputs,
-            x0,
-            p,
-            np.empty(compiled.program.events),
-            float(rtol),
-            float(atol),
-            int(max_steps),
-            states,
-        )
-    status = Status(code)
-    done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
-    outputs = np.empty((done, compiled.system.noutputs or 0))
-    with np.errstate(all="ignore"):
-        _output_filler()(out, times[:done].copy(), inputs, states, p, outputs)
-    if status is Status.OK and not np.all(np.isfinite(outputs)):
-        status = Status.DIVERGED
-    run = Statistics(status=status, time=reached, accepted=accepted, rejected=rejected)
-    return Trajectory(time=times[:done], outputs=outputs.T, states=states[:done].T, statistics=run)
-
-
 def _message(system: ct.InputOutputSystem, run: Statistics) -> str:
     what = {
         Status.DIVERGED: "diverged: no finite state after",
         Status.STEP_LIMIT: "stopped at the limit of steps at",
+        Status.STOPPED: "was stopped at",
         Status.STEP_TOO_SMALL: "diverged or jumps: no step is small enough after",
     }
     return f"'{system.name}' {what[run.status]} t = {run.time:.6g} s"

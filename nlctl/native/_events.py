@@ -1,0 +1,115 @@
+"""Events inside a step: corners, and memories that turn round.
+
+A switching function that changes its sign marks a corner; a memory turns round where the rate at
+which it would be carried along changes its sign or becomes zero.  In both cases the step is
+repeated, shorter each time, until it ends right behind the event: all stages but a negligible rest
+then lie on one side, and no method order is lost.  Regula falsi with the Illinois modification finds
+the length; every attempt is a step of full order, so nothing rests on an interpolant that has seen
+the other side.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+
+STARTS_BEHIND = 1e-5  # a root in this first part of a step was the end of the step before
+AGAIN, CLEAR, EVENT = 0, 1, 2  # what became of the step just tried
+TRIES = 30
+SHORT = 1e-3  # part of a step: a shorter one between events is no progress
+PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory events
+
+
+@numba.njit(cache=True, error_model="numpy")
+def triggered(start, end, is_memory):
+    """Whether an event function's values at the ends of a step show an event in between."""
+    if is_memory:
+        return start != 0.0 and not start * end > 0.0
+    return start * end < 0.0 and abs(start) > STARTS_BEHIND * abs(end)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def first_root(lane, corners, e_start, e_low, e_high, l):
+    """Return where the first event between the lengths low and high lies, -1 if there is none.
+
+    And whether it is a memory's.
+    """
+    first, is_memory = -1.0, False
+    for i in range(e_start.shape[0]):
+        if triggered(e_start[i, l], e_high[i, l], i >= corners):
+            low, high = e_low[i, l], e_high[i, l]
+            if not low * high < 0.0:
+                high = -low  # a memory that would stand still says no more than that: halve
+            part = 0.5 if low == high else low / (low - high)
+            root = lane.low + part * (lane.high - lane.low)
+            if first < 0.0 or root < first:
+                first, is_memory = root, i >= corners
+    return first, is_memory
+
+
+@numba.njit(cache=True, error_model="numpy")
+def locate(lane, corners, rtol, e_start, e_low, e_high, e, l):
+    """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT.
+
+    With AGAIN, ``lane.step`` is the next length to try.
+    """
+    if lane.tries == 0:
+        lane.low, lane.high = 0.0, lane.step
+        e_low[:, l], e_high[:, l] = e_start[:, l], e[:, l]
+    root, memory = _narrowed(lane, corners, e_start, e_low, e_high, e, l)
+    if root < 0.0:
+        return CLEAR
+    lane.tries += 1
+    # behind a corner stages are wrong by the rest; what a memory misses is quadratic in it
+    tolerance = lane.high * (0.3 * np.sqrt(rtol) if memory else min(10.0 * rtol, 1e-4))
+    behind = lane.high == lane.step
+    if behind and (lane.high - root <= tolerance or lane.tries > TRIES):
+        return EVENT
+    if lane.high - lane.low <= tolerance:
+        lane.step = lane.high
+        lane.tries = TRIES
+    else:
+        aim = root + 0.5 * tolerance
+        width = lane.high - lane.low
+        if lane.tries > 4 and lane.tries % 2:
+            aim = lane.low + 0.5 * width
+        lane.step = min(max(aim, lane.low + 0.001 * width), lane.high - 0.001 * width)
+    lane.ends = 0
+    return AGAIN
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _narrowed(lane, corners, e_start, e_low, e_high, e, l):
+    """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
+    before = lane.high
+    if lane.tries > 0:
+        lane.high = lane.step
+        inside = first_root(lane, corners, e_start, e_low, e, l)[0] >= 0.0
+        if not inside:
+            lane.low, lane.high = lane.step, before
+            lane.same_side = min(lane.same_side, 0) - 1
+            e_low[:, l] = e[:, l]
+            if lane.same_side < -1:
+                e_high[:, l] *= 0.5  # Illinois: an end that stays loses weight
+        else:
+            lane.same_side = max(lane.same_side, 0) + 1
+            e_high[:, l] = e[:, l]
+            if lane.same_side > 1:
+                e_low[:, l] *= 0.5
+    else:
+        lane.same_side = 0
+    return first_root(lane, corners, e_start, e_low, e_high, l)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def step_accepted(lane, event):
+    """Count an accepted step; after several events without progress those of memories rest."""
+    lane.accepted += 1
+    lane.tries = 0
+    lane.quiet = max(0, lane.quiet - 1)
+    if event:
+        lane.events += 1
+        lane.short = lane.short + 1 if lane.step < SHORT * lane.h else 0
+        if lane.short >= PATIENCE:
+            lane.short, lane.quiet = 0, REST

@@ -1,0 +1,61 @@
+"""What is known of each member while it is integrated, and how a run ends."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numba
+import numpy as np
+
+
+class Status(IntEnum):
+    """How a run ended."""
+
+    OK = 0
+    DIVERGED = 1
+    STEP_LIMIT = 2
+    STEP_TOO_SMALL = 3
+    STOPPED = 4
+
+
+OK, DIVERGED, STEP_LIMIT, STEP_TOO_SMALL, STOPPED = map(int, Status)  # for compiled code
+RUNNING, STIFF = -1, -2  # STIFF: to be finished by a method that only single runs have
+FIRST_PATIENCE = 15
+
+_FIELDS = [
+        ("t", "f8"),  # time reached
+        ("h", "f8"),  # step proposed by error control
+        ("step", "f8"),  # step being tried
+        ("low", "f8"),  # while an event is located: a step without it
+        ("high", "f8"),  # and one with it; 0 when none is being located
+        ("error_before", "f8"),  # of the last accepted step, for PI control
+        ("rate", "f8"),  # estimate of the largest eigenvalue's magnitude (1/s)
+        ("jacobian_at", "f8"),  # time for which the Jacobian matrix is known
+        ("explicit_step", "f8"),  # step of the explicit method when it was left
+        ("segment", "i8"),  # interval of the time grid in which t lies
+        ("status", "i8"),
+        ("accepted", "i8"),
+        ("rejected", "i8"),
+        ("events", "i8"),
+        ("tries", "i8"),  # attempts at the event being located
+        ("same_side", "i8"),  # of these in a row with the event inside
+        ("short", "i8"),  # events in a row right after another
+        ("quiet", "i8"),  # steps in which memory events are not looked for
+        ("slow", "i8"),  # steps in a row whose size stability limits
+        ("patience", "i8"),  # such steps that are borne before the stiff method is tried
+        ("stiff", "i8"),  # 0 explicit, otherwise 1 + steps of the stiff method
+        ("ends", "i8"),  # the step being tried ends at a corner of the inputs or at the end
+]
+LANE = np.dtype((np.record, _FIELDS))
+LANES = numba.from_dtype(LANE)[::1]
+
+
+def new_lanes(times: np.ndarray, count: int) -> np.ndarray:
+    """Return `count` members at the first time."""
+    lanes = np.zeros(count, LANE)
+    lanes["t"] = times[0]
+    lanes["error_before"] = 1.0
+    lanes["jacobian_at"] = np.nan
+    lanes["status"] = RUNNING
+    lanes["patience"] = FIRST_PATIENCE
+    return lanes

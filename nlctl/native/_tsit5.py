@@ -1,0 +1,115 @@
+"""One step of Tsitouras' explicit Runge-Kutta pair of orders 5(4), for members side by side.
+
+Ch. Tsitouras, Computers & Mathematics with Applications 62 (2011) 770-775: the last stage of a
+step is the first of the next, and a polynomial of order 4 gives the solution inside a step.
+
+Arrays have the member ("lane") as their last index, so that one loop serves all of them: state
+``x[i, lane]``, stages ``k[s, i, lane]``.  What a lane computes never depends on another lane.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+STAGES = 7
+C = np.array([0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 1.0])
+A = np.zeros((7, 7))
+A[1, :1] = 0.161
+A[2, :2] = -0.008480655492356989, 0.335480655492357
+A[3, :3] = 2.8971530571054935, -6.359448489975075, 4.3622954328695815
+A[4, :4] = 5.325864828439257, -11.748883564062828, 7.4955393428898365, -0.09249506636175525
+A[5, :5] = (
+    *(5.86145544294642, -12.92096931784711, 8.159367898576159),
+    *(-0.071584973281401, -0.028269050394068383),
+)
+A[6, :6] = (
+    *(0.09646076681806523, 0.01, 0.4798896504144996),
+    *(1.379008574103742, -3.290069515436081, 2.324710524099774),
+)
+# difference of the solutions of order 5 and 4
+E = np.array(
+    [
+        *(-0.00178001105222577714, -0.0008164344596567469, 0.007880878010261995),
+        *(-0.1447110071732629, 0.5823571654525552, -0.45808210592918697, 0.015151515151515152),
+    ]
+)
+# b_i(theta) = theta (B[i,0] + B[i,1] theta + B[i,2] theta^2 + B[i,3] theta^3)
+B = np.zeros((7, 4))
+B[0] = 1.0, -2.763706197274826, 2.9132554618219126, -1.0530884977290216
+B[1] = 0.0, 0.13169999999999998, -0.2234, 0.1017
+B[2] = 0.0, 3.9302962368947516, -5.941033872131505, 2.490627285651253
+B[3] = 0.0, -12.411077166933676, 30.33818863028232, -16.548102889244902
+B[4] = 0.0, 37.50931341651104, -88.1789048947664, 47.37952196281928
+B[5] = 0.0, -27.896526289197286, 65.09189467479366, -34.87065786149661
+B[6] = 0.0, 1.5, -4.0, 2.5
+
+STABLE = 3.3  # h |lambda| on the negative real axis up to which a step is stable, a little less
+
+
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def _combined(x, hh, k, s, result):
+    """Fill `result` with x + h (A[s, 0] k[0] + ... + A[s, s-1] k[s-1])."""
+    if s == 1:
+        for j in range(x.size):
+            result[j] = x[j] + hh[j] * (A[1, 0] * k[0, j])
+    elif s == 2:
+        for j in range(x.size):
+            result[j] = x[j] + hh[j] * (A[2, 0] * k[0, j] + A[2, 1] * k[1, j])
+    elif s == 3:
+        for j in range(x.size):
+            slope = A[3, 0] * k[0, j] + A[3, 1] * k[1, j] + A[3, 2] * k[2, j]
+            result[j] = x[j] + hh[j] * slope
+    elif s == 4:
+        for j in range(x.size):
+            slope = A[4, 0] * k[0, j] + A[4, 1] * k[1, j] + A[4, 2] * k[2, j] + A[4, 3] * k[3, j]
+            result[j] = x[j] + hh[j] * slope
+    elif s == 5:
+        for j in range(x.size):
+            slope = A[5, 0] * k[0, j] + A[5, 1] * k[1, j] + A[5, 2] * k[2, j] + A[5, 3] * k[3, j]
+            result[j] = x[j] + hh[j] * (slope + A[5, 4] * k[4, j])
+    else:
+        for j in range(x.size):
+            slope = A[6, 0] * k[0, j] + A[6, 1] * k[1, j] + A[6, 2] * k[2, j] + A[6, 3] * k[3, j]
+            result[j] = x[j] + hh[j] * (slope + A[6, 4] * k[4, j] + A[6, 5] * k[5, j])
+
+
+@numba.njit(cache=True, error_model="numpy")
+def errors(x, x_new, x_stage, k, h, rtol, atol, error, rate):
+    """Fill, lane by lane, the error over its tolerance, and the fastest rate seen (1/s).
+
+    The error is the largest of the estimates, each over atol + rtol |x|; it is not finite if a
+    state is not.  (A mean would let the many weights of a network hide the few states that move.)
+    The rate |k6 - k5| / |x6 - x5| of the two stages at the end of the step
+    estimates the largest eigenvalue (Hairer, Wanner, Solving ODEs II, IV.2).
+    """
+    n, lanes = x.shape
+    above, below, spoilt = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes)
+    error[:] = 0.0
+    for i in range(n):
+        for j in range(lanes):
+            slope = E[0] * k[0, i, j] + E[1] * k[1, i, j] + E[2] * k[2, i, j] + E[3] * k[3, i, j]
+            slope += E[4] * k[4, i, j] + E[5] * k[5, i, j] + E[6] * k[6, i, j]
+            scale = atol + rtol * max(abs(x[i, j]), abs(x_new[i, j]))
+            part = abs(h[j] * slope / scale)
+            error[j] = part if part > error[j] else error[j]
+            spoilt[j] += 0.0 * (part + x_new[i, j])  # NaN or infinity: no maximum keeps it
+            step, change = x_new[i, j] - x_stage[i, j], k[6, i, j] - k[5, i, j]
+            above[j] += change * change
+            below[j] += step * step
+    for j in range(lanes):
+        error[j] += spoilt[j]
+        rate[j] = np.sqrt(above[j] / below[j]) if below[j] > 0.0 else 0.0
+
+
+@numba.njit(cache=True, error_model="numpy")
+def interpolate(theta, h, x, k, lane, result):
+    """Fill column `lane` of `result` with the solution at the fraction theta of its step."""
+    weights = np.empty(STAGES)
+    for s in range(STAGES):
+        weights[s] = theta * (B[s, 0] + theta * (B[s, 1] + theta * (B[s, 2] + theta * B[s, 3])))
+    for i in range(x.shape[0]):
+        slope = 0.0
+        for s in range(STAGES):
+            slope += weights[s] * k[s, i, lane]
+        result[i, lane] = x[i, lane] + h * slope

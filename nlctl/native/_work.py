@@ -1,0 +1,198 @@
+"""What an integration works on: the task, arrays for all members, and the right-hand side.
+
+The right-hand side is an argument of one fixed type: what calls it is compiled once and not once
+per diagram.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any
+
+import numba
+import numpy as np
+
+from . import _rodas5p, _tsit5
+VECTOR = numba.float64[::1]
+MATRIX = numba.float64[:, ::1]
+RHS = numba.types.FunctionType(numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX))
+OUT = numba.types.FunctionType(numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX))
+
+AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
+FAR = 1e6
+AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
+
+Task = namedtuple(
+    "Task", "times inputs p corners memory rtol atol fixed max_steps method alone"
+)
+Work = namedtuple(
+    "Work",
+    "t h hh x x_new x_stage k g e e_start e_low e_high u error rate x_ahead dx_ahead g_ahead "
+    "t_end jacobian matrix f_t pivots U",
+)
+
+
+def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
+    """Return the arrays for integrating members with `n` states."""
+    size = n if lanes == 1 else 0  # the stiff method is for single runs
+    columns: dict[str, Any] = {
+        name: np.zeros((n, lanes)) for name in ("x", "x_new", "x_stage", "x_ahead", "dx_ahead")
+    }
+    rows = ("g", "g_ahead", "e", "e_start", "e_low", "e_high")
+    columns |= {name: np.zeros((events, lanes)) for name in rows}
+    return Work(
+        **columns,
+        **{name: np.zeros(lanes) for name in ("t", "h", "error", "rate", "t_end")},
+        hh=np.zeros(n * lanes),
+        k=np.zeros((_tsit5.STAGES, n, lanes)),
+        u=np.zeros((inputs, lanes)),
+        jacobian=np.zeros((size, size)),
+        matrix=np.zeros((size, size)),
+        f_t=np.zeros(size),
+        pivots=np.zeros(size, dtype=np.int64),
+        U=np.zeros((_rodas5p.STAGES, size)),
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def evaluate(rhs, task, lanes, w, x, dx, g):
+    """Evaluate the right-hand side at the times w.t; memory stands still within a step."""
+    for i in range(w.u.shape[0]):
+        for j in range(lanes.size):
+            m = lanes[j].segment
+            t0, t1 = task.times[m], task.times[m + 1]
+            share = (w.t[j] - t0) / (t1 - t0)
+            w.u[i, j] = task.inputs[i, m] * (1.0 - share) + task.inputs[i, m + 1] * share
+    rhs(w.t, x, w.u, task.p, dx, g)
+    for i in task.memory:
+        dx[i, :] = 0.0
+
+
+@numba.njit(cache=True, error_model="numpy")
+def memory_rates(rhs, task, lanes, w, x, dx):
+    """Fill the memory rows of w.e with the rates at which memories would be carried along.
+
+    A difference over a small part of the step: its error moves the turning point by so little
+    that the turning value does not change.
+    """
+    for j in range(lanes.size):
+        w.t[j] = w.t_end[j] + AHEAD * max(lanes[j].h, 1e-12)
+        ahead = w.t[j] - w.t_end[j]  # what is left of it after rounding
+        w.x_ahead[:, j] = x[:, j] + ahead * dx[:, j]
+    evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
+    for i in range(task.corners, w.g.shape[0]):
+        for j in range(lanes.size):
+            change = w.g_ahead[i, j] - w.g[i, j]  # exactly 0 where the memory stands still
+            noise = 1e-15 * max(abs(w.g[i, j]), abs(w.g_ahead[i, j]))
+            w.e[i, j] = change if change == 0.0 or abs(change) > noise else w.e_start[i, j]
+            if lanes[j].quiet > 0:
+                w.e[i, j] = 0.0  # memories are committed step by step for a while
+
+
+@numba.njit(cache=True, error_model="numpy")
+def restart(rhs, task, lanes, w, chosen):
+    """Make the chosen lanes' derivatives, event functions and memories those of their state."""
+    for _ in range(1 + min(task.memory.size, 1)):  # once more with the memory committed
+        _refresh(rhs, task, lanes, w, chosen)
+        for j in range(lanes.size):
+            for i in range(task.memory.size):
+                if chosen[j]:
+                    w.x[task.memory[i], j] = w.g[task.corners + i, j]
+    if task.memory.size:
+        saved = w.e.copy()
+        for j in range(lanes.size):
+            w.t_end[j] = lanes[j].t
+            if chosen[j]:
+                w.e_start[:, j] = 0.0
+        memory_rates(rhs, task, lanes, w, w.x, w.k[0])
+        for j in range(lanes.size):
+            if not chosen[j]:
+                w.e[:, j] = saved[:, j]
+            for i in range(task.memory.size):
+                if chosen[j]:
+                    _lock(w, task.memory[i], j, w.e[task.corners + i, j])
+        _refresh(rhs, task, lanes, w, chosen)
+    for j in range(lanes.size):
+        if chosen[j]:
+            w.e[: task.corners, j] = w.g[: task.corners, j]
+            w.e_start[:, j] = w.e[:, j]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _refresh(rhs, task, lanes, w, chosen):
+    """Evaluate the chosen lanes' derivatives and event functions at their state."""
+    for j in range(lanes.size):
+        w.t[j] = lanes[j].t
+    evaluate(rhs, task, lanes, w, w.x, w.dx_ahead, w.g_ahead)
+    for j in range(lanes.size):
+        if chosen[j]:
+            w.k[0, :, j], w.g[:, j] = w.dx_ahead[:, j], w.g_ahead[:, j]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _lock(w, i, lane, rate):
+    """Move a memory that is being carried along far behind what carries it.
+
+    The stages of a step are approximations: with the memory right behind, one that falls back a
+    little would see it standing still, and the step would not be smooth.  Only where the memory
+    turns round does its value count again, and there it is committed.
+    """
+    far = FAR * (1.0 + abs(w.x[i, lane]))
+    if rate > 0.0:
+        w.x[i, lane] -= far
+    elif rate < 0.0:
+        w.x[i, lane] += far
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _first_step(rhs, task, lanes, w):
+    """Propose a first step, after Hairer, Norsett, Wanner, Solving ODEs I, II.4."""
+    n, span = w.x.shape[0], task.times[-1] - task.times[0]
+    d0, d1, d2 = np.zeros(lanes.size), np.zeros(lanes.size), np.zeros(lanes.size)
+    for i in range(n):
+        for j in range(lanes.size):
+            if w.k[0, i, j] == 0.0:
+                continue  # a locked memory, for instance
+            scale = task.atol + task.rtol * abs(w.x[i, j])
+            d0[j] += (w.x[i, j] / scale) ** 2 / n
+            d1[j] += (w.k[0, i, j] / scale) ** 2 / n
+    for j in range(lanes.size):
+        small = d0[j] < 1e-10 or d1[j] < 1e-10
+        lanes[j].h = min(1e-6 if small else 0.01 * np.sqrt(d0[j] / d1[j]), span)
+        w.t[j] = lanes[j].t + lanes[j].h
+        w.x_ahead[:, j] = w.x[:, j] + lanes[j].h * w.k[0, :, j]
+    evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
+    for i in range(n):
+        for j in range(lanes.size):
+            scale = task.atol + task.rtol * abs(w.x[i, j])
+            d2[j] += ((w.dx_ahead[i, j] - w.k[0, i, j]) / scale) ** 2 / n
+    for j in range(lanes.size):
+        h0 = lanes[j].h
+        largest = max(np.sqrt(d1[j]), np.sqrt(d2[j]) / h0)
+        h1 = max(1e-6, h0 * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** 0.2
+        h = min(100 * h0, h1, span)
+        lanes[j].h = task.fixed if task.fixed > 0.0 else (h if np.isfinite(h) else h0)
+
+
+def start(rhs, task, lanes, w):
+    """Begin at the initial states in w.x: commit the memories, propose first steps."""
+    everyone = np.ones(lanes.size, np.bool_)
+    restart(rhs, task, lanes, w, everyone)
+    _first_step(rhs, task, lanes, w)
+    restart(rhs, task, lanes, w, everyone)
+
+
+def outputs(rhs, out, task, w, states, y):
+    """Fill ``y[m, :, lane]`` with the outputs at ``states[m, :, lane]``.
+
+    Samples inside a step have the memory of its beginning; here they get their own.
+    """
+    for m in range(task.times.size):
+        w.t[:] = task.times[m]
+        for i in range(w.u.shape[0]):
+            w.u[i, :] = task.inputs[i, m]
+        out(w.t, states[m], w.u, task.p, y[m])
+        if task.memory.size:
+            rhs(w.t, states[m], w.u, task.p, w.dx_ahead, w.g)
+            for i in range(task.memory.size):
+                states[m, task.memory[i], :] = w.g[task.corners + i, :]
