@@ -19,11 +19,13 @@ from ._cache import loaded
 from ._code import CompileError
 from ._emit import Program, emit
 from ._foreign import make_callable
-from ._integrate import OUT, RHS
 from ._parameters import packed
 from ._schedule import Schedule, schedule
 
 Rhs = Callable[..., None]
+VECTOR = numba.float64[::1]
+RHS = numba.void(numba.float64, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR)
+OUT = numba.void(numba.float64, VECTOR, VECTOR, VECTOR, VECTOR)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +72,8 @@ class Compiled:
         module = loaded(self.program, ready)
         options = {"cache": True, "error_model": "numpy", "nogil": True}
         try:
-            rhs = numba.njit(RHS.signature, **options)(module.rhs)
-            return rhs, numba.njit(OUT.signature, **options)(module.out)
+            rhs = numba.njit(RHS, **options)(module.rhs)
+            return rhs, numba.njit(OUT, **options)(module.out)
         except Exception as error:  # numba passes on whatever typing raises
             raise self._explained(error) from error
 
