@@ -1,104 +1,98 @@
-"""Speed of the native engine against python-control, with the accuracy reached beside every time.
+"""Speed of nlctl's engine against other ways to simulate the same closed loops.
 
-    python benchmarks/closed_loops.py [members]
+Both examples of the paper run for 20 s, once and as an ensemble that varies x1(0).  Each solver
+takes the loosest tolerance with which its largest error in the plant's states is at most 1e-6
+against a reference solution, and the error stands beside its time.  Before anything is timed, the
+right-hand side of each solver is compared with nlctl's.  Times are the shortest of several rounds:
+processor time on one core, wall time on two.  They depend on the machine and on what else it does,
+so compare ratios within one output only.
 
-One run and an ensemble of both examples over 20 s.  Compare rows of equal error, and ratios
-within one output only: the times depend on the machine and on what else it does.
+Example 2 has backlash.  "play" is the exact operator; "relaxed" is a memory state that follows it
+at 1000 1/s, which is what solvers without events can do: its errors are then taken against the
+accurate solution of the relaxed loop, and the distance to the exact play is printed beside them.
+
+The C++ programs need a compiler (and Boost's headers); numbalsoda and diffrax are used if they are
+installed (extra "benchmark").  What is missing is skipped.
 """
 
 from __future__ import annotations
 
-import sys
-import time
+import argparse
+import os
 
-import control as ct
-import numpy as np
+import growth
+import measure
+import tables
+from competitors.problem import Problem
 from rich.console import Console
-from rich.table import Table
-from scipy.integrate import solve_ivp
 
-import nlctl
-
-T = np.linspace(0, 20, 201)
+THREADS = min(2, os.cpu_count() or 1)
 
 
-def timed(function, repeat=3):
-    """Return the shortest time of several calls (s) and the result."""
-    best, result = np.inf, None
-    for _ in range(repeat):
-        start = time.perf_counter()
-        result = function()
-        best = min(best, time.perf_counter() - start)
-    return best, result
+def arguments(given: list[str] | None = None) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        *["--example", "-e"],
+        type=int,
+        choices=(1, 2),
+        action="append",
+        help="the paper's example; may be repeated (default: both)",
+    )
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        choices=list(measure.COMPETITORS),
+        default=list(measure.COMPETITORS),
+        help="solvers to compare (default: all)",
+    )
+    parser.add_argument(
+        "--members",
+        type=int,
+        default=10_000,
+        help="largest ensemble in the table of growth; a tenth of it, at most, is compared "
+        "(default: %(default)s)",
+    )
+    parser.add_argument(
+        "--rounds", type=int, default=7, help="times each run is timed (default: 7)"
+    )
+    parser.add_argument("--no-growth", action="store_true", help="leave the tables of growth out")
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="Example 1 without python-control, 1000 members, 3 rounds, small growth",
+    )
+    chosen = parser.parse_args(given)
+    if chosen.quick:
+        chosen.example, chosen.members, chosen.rounds = [1], min(chosen.members, 1000), 3
+        chosen.only = [name for name in chosen.only if name != "python-control"]
+    return chosen
 
 
-def scipy_run(compiled, x0, rtol):
-    """solve_ivp with the compiled right-hand side: what fusing by hand buys."""
-    rhs, p, empty = compiled.native[0], compiled.parameter_vector(), np.zeros(0)
-    g = np.empty(compiled.program.events)
-
-    def f(t, x):
-        dx = np.empty(x.size)
-        rhs(t, np.ascontiguousarray(x), empty, p, dx, g)
-        return dx
-
-    return solve_ivp(f, (0, 20), x0, "LSODA", t_eval=T, rtol=rtol, atol=rtol * 1e-2).y
+def compare(problem: Problem, chosen: argparse.Namespace, console: Console) -> None:
+    """Print both tables of one example."""
+    console.print(f"\n[bold]Example {problem.example}[/bold], {problem.x0.size} states, 20 s")
+    solvers = measure.available(problem, chosen.only, console.print)
+    single = measure.single_runs(problem, solvers, chosen.rounds)
+    console.print(tables.comparison(problem, "One run", single))
+    limit = max(16, chosen.members // 10)
+    many = measure.ensembles(problem, solvers, single, limit, THREADS)
+    console.print(tables.comparison(problem, "Ensemble, per member", many))
 
 
-def rows(loop, members):
-    """Yield engine, tolerance, time per run, error in the states."""
-    x0, compiled = nlctl.initial_state(loop), nlctl.compile(loop)
-    start = time.perf_counter()
-    compiled.native  # noqa: B018
-    yield "compiling, or loading from the cache", "", time.perf_counter() - start, np.nan
-
-    def native(rtol):
-        return nlctl.input_output_response(compiled, T, rtol=rtol, atol=rtol * 1e-2).states
-
-    reference = native(1e-12)
-
-    def error(states):
-        return float(np.abs(states - reference).max())
-
-    def python_control():
-        solver = {"rtol": 1e-7, "atol": 1e-9}
-        return ct.input_output_response(
-            loop, T, 0, x0, method="LSODA", solve_ivp_kwargs=solver
-        ).states
-
-    seconds, states = timed(python_control, repeat=1)
-    yield "python-control, LSODA", "1e-7", seconds, error(states)
-    seconds, states = timed(lambda: scipy_run(compiled, x0, 1e-7))
-    yield "SciPy LSODA, compiled right-hand side", "1e-7", seconds, error(states)
-    for rtol in (1e-5, 1e-6, 1e-8):
-        seconds, states = timed(lambda rtol=rtol: native(rtol))
-        yield "nlctl, one run", f"{rtol:.0e}", seconds, error(states)
-    varied = {"plant.x1": x0[0] + np.linspace(-0.1, 0.1, members)}
-    for threads in (1, 2):
-        seconds, _ = timed(
-            lambda n=threads: nlctl.ensemble_response(compiled, T, 0, varied, threads=n, rtol=1e-6),
-            repeat=1,
-        )
-        yield (
-            f"nlctl, {members} members, {threads} thread(s), per member",
-            "1e-06",
-            (seconds / members),
-            np.nan,
-        )
-
-
-def main():
-    """Print one table per example."""
-    members = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    for loop in (nlctl.paper.example_1(), nlctl.paper.example_2()):
-        table = Table("engine", "rtol", "ms", "max error in the states", "times python-control")
-        base = None
-        for engine, rtol, seconds, error in rows(loop, members):
-            base = seconds if engine.startswith("python-control") else base
-            ratio = f"{base / seconds:.0f}" if base else ""
-            shown = "" if np.isnan(error) else f"{error:.1e}"
-            table.add_row(engine, rtol, f"{1e3 * seconds:.1f}", shown, ratio)
-        Console(width=110).print(f"[bold]{loop.name}[/bold], 20 s", table)
+def main() -> None:
+    """Print the machine, two tables per example, and three tables of growth."""
+    chosen, console = arguments(), Console(width=140)
+    console.print(tables.machine(), soft_wrap=True)
+    for example in chosen.example or (1, 2):
+        compare(Problem(example), chosen, console)
+    if not chosen.no_growth:
+        largest = chosen.members
+        console.print(growth.members((largest // 100, largest // 10, largest), THREADS))
+        console.print(growth.nodes((27, 125) if chosen.quick else (27, 125, 1000)))
+        console.print(growth.blocks((4, 16) if chosen.quick else (4, 16, 64)))
 
 
 if __name__ == "__main__":

@@ -1,23 +1,24 @@
-"""Many runs of one compiled diagram, side by side in threads."""
+"""Many runs of one compiled diagram: side by side in SIMD lanes, lanes side by side in threads."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from .._diagram import state_names
-from .._errors import ParameterError
-from .._names import find_name, unknown
+from .._names import unknown
 from .._param import checked_times
 from ._compile import Compiled
-from ._lane import Status
-from ._response import input_array, state_array
-from ._simulate import Settings, Trajectory, trajectory
+from ._lane import RUNNING, STIFF, Status
+from ._machine import WIDTH, machine
+from ._members import Members, members
+from ._response import input_array
+from ._simulate import Settings, Trajectory, begin, finish, go_on, made, prepared, trajectory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,13 +68,15 @@ def ensemble_response(
     rtol: float = 1e-6,
     atol: float = 1e-8,
     max_steps: int = 1_000_000,
+    method: str | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Ensemble:
     """Simulate many members that differ in parameters and initial states.
 
     Members are independent of each other: the result is the same, bit for bit, for any number of
-    threads and in any order.  Metrics are taken as each member ends, and only the signals in
-    `keep` are stored.
+    threads, in any order and in any company.  (A single run by `input_output_response` sums in
+    another order and agrees to rounding.)  Metrics are taken as each member ends, and only the
+    signals in `keep` are stored.  After Ctrl-C the members that are finished are returned.
 
     Parameters
     ----------
@@ -85,7 +88,8 @@ def ensemble_response(
     initial_state, params : mapping, optional
         ``{"plant.p1": array of shape (members,)}``; a number holds for all members.
     metrics : sequence, optional
-        Numbers to take of each member, such as `analysis.metrics.Metric`.
+        Numbers to take of each member, such as `analysis.metrics.Metric`.  A function that was
+        compiled with ``numba.njit(nogil=True)`` keeps no thread waiting.
     keep : sequence of str, optional
         Outputs whose samples are kept.
     threads : int, optional
@@ -93,6 +97,8 @@ def ensemble_response(
     rtol, atol : float, optional
     max_steps : int, optional
         A member that needs more steps ends with the status STEP_LIMIT.
+    method : str, optional
+        As in `nlctl.input_output_response`.
     progress : callable, optional
         Called with the number of finished members.
 
@@ -110,109 +116,116 @@ def ensemble_response(
         If a parameter, state or signal does not exist.
     """
     times = checked_times(timepts)
-    members = _Members(compiled, params or {}, initial_state or {})
+    every = members(compiled, params or {}, initial_state or {})
     labels = compiled.system.output_labels
     for signal in (*keep, *(m.signal for m in metrics)):
         if signal not in labels:
             raise unknown("signal", signal, labels)
     u = input_array(inputs, compiled.system.ninputs or 0, times)
-    settings = Settings(rtol=rtol, atol=atol, max_steps=max_steps)
-    kept = {signal: np.full((len(members), times.size), np.nan) for signal in keep}
-    prepared = list(members)  # python-control resolves names in one thread only
-    compiled.native  # noqa: B018 (compiled once, before the threads start)
+    settings = Settings(rtol=rtol, atol=atol, max_steps=max_steps, method=method or "auto")
+    kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
+    _, p = every.batch(range(1), WIDTH)  # checks all members before anything runs
+    machine(compiled, p, WIDTH)  # compiled once, before the threads start
 
-    def one(number: int) -> dict[str, Any]:
-        x0, p = prepared[number]
-        made = trajectory(compiled, times, u, x0, p, settings)
-        for signal, samples in kept.items():
-            samples[number, : made.time.size] = made.outputs[labels.index(signal)]
-        return _row(made, labels, metrics)
+    def one(numbers: range, stop: _Stop) -> dict[int, dict[str, Any]]:
+        rows = {}
+        for number, run in zip(
+            numbers, _group(every, numbers, times, u, settings, stop), strict=False
+        ):
+            for signal, samples in kept.items():
+                samples[number, : run.time.size] = run.outputs[labels.index(signal)]
+            rows[number] = _row(run, labels, metrics)
+        return rows
 
-    rows = _run(one, len(members), threads or cores(), progress)
-    return Ensemble(table=members.table(rows), time=times, signals=kept)
+    rows = _run(one, every.size, threads or cores(), progress)
+    return Ensemble(table=_table(every, rows), time=times, signals=kept)
 
 
-def _row(made: Trajectory, labels: Sequence[str], metrics: Sequence[MetricLike]) -> dict[str, Any]:
-    run = made.statistics
+class _Stop:
+    """Set when the members that are running are no longer wanted."""
+
+    wanted = True
+
+
+def _group(
+    every: Members,
+    numbers: range,
+    times: np.ndarray,
+    inputs: np.ndarray,
+    settings: Settings,
+    stop: _Stop,
+) -> Iterator[Trajectory]:
+    """Run up to WIDTH members side by side; yield them in their order."""
+    x0, p = every.batch(numbers, WIDTH)
+    if machine(every.compiled, p, WIDTH).width == 1:
+        for j in range(len(numbers)):
+            yield trajectory(every.compiled, times, inputs, x0[:, j], p[:, j], settings)
+        return
+    with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
+        run = prepared(every.compiled, times, inputs, x0, p, settings)
+        begin(run)
+        while stop.wanted and np.any(run.lanes["status"] == RUNNING):
+            go_on(run)
+        outputs = finish(run)
+    for j in range(len(numbers) if stop.wanted else 0):
+        if run.lanes["status"][j] == STIFF:  # the stiff method is for single runs
+            yield trajectory(every.compiled, times, inputs, x0[:, j], p[:, j], settings)
+        else:
+            yield made(run, outputs, j)
+
+
+def _row(run: Trajectory, labels: Sequence[str], metrics: Sequence[MetricLike]) -> dict[str, Any]:
+    done = run.statistics
     row: dict[str, Any] = {
-        "status": run.status.name,
-        "time": run.time,
-        "steps": run.accepted + run.rejected,
+        "status": done.status.name,
+        "time": done.time,
+        "steps": done.accepted + done.rejected,
     }
     for metric in metrics:
         value = np.nan
-        if run.status is Status.OK:
-            inside = (made.time >= metric.start) & (made.time <= metric.end)
-            y = made.outputs[labels.index(metric.signal)]
-            value = metric.function(made.time[inside], y[inside])
+        if done.status is Status.OK:
+            inside = (run.time >= metric.start) & (run.time <= metric.end)
+            y = run.outputs[labels.index(metric.signal)]
+            value = metric.function(run.time[inside], y[inside])
         row[metric.key] = value
     return row
 
 
 def _run(
-    one: Callable[[int], dict[str, Any]],
+    one: Callable[[range, _Stop], dict[int, dict[str, Any]]],
     count: int,
     threads: int,
     progress: Callable[[int], object] | None,
 ) -> dict[int, dict[str, Any]]:
-    """Run all members; after Ctrl-C return those that are finished."""
+    """Run all members in groups; after Ctrl-C return those that are finished."""
     rows: dict[int, dict[str, Any]] = {}
+    stop = _Stop()
+    groups = iter(range(i, min(i + WIDTH, count)) for i in range(0, count, WIDTH))
     pool = ThreadPoolExecutor(threads)
-    futures = {pool.submit(one, number): number for number in range(count)}
+    waiting = {pool.submit(one, group, stop) for group in islice(groups, 2 * threads)}
     try:
-        for future in as_completed(futures):
-            rows[futures[future]] = future.result()
+        while waiting:
+            ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in ready:
+                rows |= future.result()
+                waiting |= {pool.submit(one, group, stop) for group in islice(groups, 1)}
             if progress is not None:
                 progress(len(rows))
     except KeyboardInterrupt:
-        pass
+        stop.wanted = False
     finally:
         pool.shutdown(cancel_futures=True)
     return rows
 
 
+def _table(every: Members, rows: Mapping[int, Mapping[str, Any]]) -> pd.DataFrame:
+    import pandas as pd
+
+    order = sorted(rows)
+    results = pd.DataFrame([rows[i] for i in order], index=order)
+    return pd.concat([every.table(order), results], axis=1).rename_axis("member")
+
+
 def cores() -> int:
     """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-class _Members:
-    """The members of an ensemble: arrays by name in, a state and a parameter vector each out."""
-
-    def __init__(
-        self, compiled: Compiled, params: Mapping[str, Any], states: Mapping[str, Any]
-    ) -> None:
-        index = dict.fromkeys(state_names(compiled.system))
-        self.compiled = compiled
-        self.params = {name: np.asarray(value) for name, value in params.items()}
-        self.states = {
-            find_name("state", name, index): np.asarray(value) for name, value in states.items()
-        }
-        columns = {**self.params, **{f"{k}(0)": v for k, v in self.states.items()}}
-        sizes = {name: array.shape[0] for name, array in columns.items() if array.ndim}
-        if len(set(sizes.values())) > 1:
-            raise ParameterError(f"an ensemble needs arrays of one length, got {sizes}")
-        self.size = next(iter(sizes.values()), 1)
-        self.columns = {name: np.broadcast_to(a, self.size) for name, a in columns.items()}
-
-    def __len__(self) -> int:
-        return self.size
-
-    def __iter__(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        for number in range(self.size):
-            params = {k: self.columns[k][number] for k in self.params}
-            states = {k: self.columns[f"{k}(0)"][number] for k in self.states}
-            try:
-                p = self.compiled.parameter_vector(params)
-                yield state_array(self.compiled.system, states), p
-            except ParameterError as error:
-                raise ParameterError(f"{error} (member {number})") from None
-
-    def table(self, rows: Mapping[int, Mapping[str, Any]]) -> pd.DataFrame:
-        import pandas as pd
-
-        order = sorted(rows)
-        varied = {name: values[order] for name, values in self.columns.items()}
-        results = pd.DataFrame([rows[i] for i in order], index=order)
-        table = pd.concat([pd.DataFrame(varied, index=order), results], axis=1)
-        return table.rename_axis("member")

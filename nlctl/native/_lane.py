@@ -28,10 +28,9 @@ _FIELDS = [
         ("step", "f8"),  # step being tried
         ("low", "f8"),  # while an event is located: a step without it
         ("high", "f8"),  # and one with it; 0 when none is being located
-        ("error_before", "f8"),  # of the last accepted step, for PI control
+        ("log_error_before", "f8"),  # of the last accepted step, for PI control
         ("rate", "f8"),  # estimate of the largest eigenvalue's magnitude (1/s)
         ("jacobian_at", "f8"),  # time for which the Jacobian matrix is known
-        ("explicit_step", "f8"),  # step of the explicit method when it was left
         ("segment", "i8"),  # interval of the time grid in which t lies
         ("status", "i8"),
         ("accepted", "i8"),
@@ -54,7 +53,6 @@ def new_lanes(times: np.ndarray, count: int) -> np.ndarray:
     """Return `count` members at the first time."""
     lanes = np.zeros(count, LANE)
     lanes["t"] = times[0]
-    lanes["error_before"] = 1.0
     lanes["jacobian_at"] = np.nan
     lanes["status"] = RUNNING
     lanes["patience"] = FIRST_PATIENCE

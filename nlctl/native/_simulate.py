@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 
 from .._errors import ParameterError
@@ -14,7 +13,8 @@ from .._names import unknown
 from ._compile import Compiled
 from ._integrate import machine_code
 from ._lane import RUNNING, Status, new_lanes
-from ._work import AUTO, EXPLICIT, IMPLICIT, OUT, RHS, Task, new_work
+from ._machine import Machine, machine
+from ._work import AUTO, EXPLICIT, IMPLICIT, Task, new_work
 
 METHODS = {"auto": AUTO, "tsit5": EXPLICIT, "rodas5p": IMPLICIT}
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
@@ -99,38 +99,82 @@ def trajectory(
     progress: Callable[[float], object] | None = None,
 ) -> Trajectory:
     """Integrate one member.  Ctrl-C ends the run with the status STOPPED."""
-    rhs, out = lane_functions(compiled)
-    code = machine_code()
-    lanes, task, work, states = _prepared(compiled, times, inputs, x0[:, None], p[:, None], settings)
+    run = prepared(compiled, times, inputs, x0[:, None], p[:, None], settings)
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
-        code["start"](rhs, task, lanes, work)
-        states[0] = work.x
         try:
-            while lanes["status"][0] == RUNNING:
-                code["advance"](rhs, task, lanes, work, states, ROUNDS)
+            begin(run)
+            while run.lanes["status"][0] == RUNNING:
+                go_on(run)
                 if progress is not None:
-                    progress(float(lanes["t"][0]))
+                    progress(float(run.lanes["t"][0]))
         except KeyboardInterrupt:
-            lanes["status"] = Status.STOPPED
-        y = np.full((times.size, compiled.system.noutputs or 0, 1), np.nan)
-        code["outputs"](rhs, out, task, work, states, y)
-    return _made(times, lanes[0], states[:, :, 0], y[:, :, 0])
+            run.lanes["status"] = Status.STOPPED
+        outputs = finish(run)
+    return made(run, outputs, 0)
 
 
-def _prepared(
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """Members that are integrated side by side, and all arrays that this needs.
+
+    Attributes
+    ----------
+    machine : Machine
+    task, work : namedtuple
+        See `_work`.
+    lanes : ndarray
+        One record per member, see `_lane`.
+    states : ndarray of shape (m, states, members)
+        Samples, NaN beyond the time that a member has reached.
+    signals : int
+        Number of outputs.
+    """
+
+    machine: Machine
+    task: Any
+    work: Any
+    lanes: np.ndarray
+    states: np.ndarray
+    signals: int
+
+
+def begin(run: Run) -> None:
+    """Commit the memories and propose first steps."""
+    machine_code()["start"](run.machine.rhs, run.task, run.lanes, run.work)
+    run.states[0] = run.work.x
+
+
+def go_on(run: Run, rounds: int = ROUNDS) -> None:
+    """Try up to `rounds` steps in every lane that is still running."""
+    machine_code()["advance"](run.machine.rhs, run.task, run.lanes, run.work, run.states, rounds)
+
+
+def finish(run: Run) -> np.ndarray:
+    """Return the outputs, shape (m, outputs, members); memories get their values in the samples."""
+    y = np.full((run.task.times.size, run.signals, run.lanes.size), np.nan)
+    machine_code()["outputs"](
+        run.machine.rhs, run.machine.out, run.task, run.work, run.states, y
+    )
+    return y
+
+
+def prepared(
     compiled: Compiled,
     times: np.ndarray,
     inputs: np.ndarray,
     x0: np.ndarray,
     p: np.ndarray,
     settings: Settings,
-) -> tuple[np.ndarray, Any, Any, np.ndarray]:
-    """Return lanes, task, work arrays and samples for members side by side."""
+) -> Run:
+    """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, (n, count) = compiled.program, x0.shape
+    code = machine(compiled, p, count)
+    c = np.zeros((code.rows, count))
+    code.prepare(np.ascontiguousarray(p), c)
     task = Task(
         times=times,
         inputs=inputs,
-        p=np.ascontiguousarray(p),
+        p=c,
         corners=program.corners,
         memory=np.array(program.memory, dtype=np.int64),
         rtol=float(settings.rtol),
@@ -144,15 +188,24 @@ def _prepared(
     lanes["stiff"] = settings.method == "rodas5p"
     work.x[:] = x0
     states = np.full((times.size, n, count), np.nan)
-    return lanes, task, work, states
+    return Run(
+        machine=code,
+        task=task,
+        work=work,
+        lanes=lanes,
+        states=states,
+        signals=compiled.system.noutputs or 0,
+    )
 
 
-def _made(times: np.ndarray, lane: Any, states: np.ndarray, outputs: np.ndarray) -> Trajectory:
+def made(run: Run, outputs: np.ndarray, l: int) -> Trajectory:
+    """Return what became of one member."""
+    lane, times, states, outputs = run.lanes[l], run.task.times, run.states[:, :, l], outputs[:, :, l]
     status, reached = Status(int(lane["status"])), float(lane["t"])
     done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
     if status is Status.OK and not np.all(np.isfinite(outputs)):
         status = Status.DIVERGED
-    run = Statistics(
+    statistics = Statistics(
         status=status,
         time=reached,
         accepted=int(lane["accepted"]),
@@ -161,27 +214,5 @@ def _made(times: np.ndarray, lane: Any, states: np.ndarray, outputs: np.ndarray)
         stiff=bool(lane["stiff"]),
     )
     return Trajectory(
-        time=times[:done], outputs=outputs[:done].T, states=states[:done].T, statistics=run
+        time=times[:done], outputs=outputs[:done].T, states=states[:done].T, statistics=statistics
     )
-
-
-def lane_functions(compiled: Compiled) -> tuple[Any, Any]:
-    """Return ``(rhs, out)`` of a program for one lane."""
-    known = compiled.__dict__.get("_lane_functions")
-    if known is None:
-        one_rhs, one_out = compiled.native
-
-        def rhs(t, x, u, p, dx, g):
-            one_rhs(
-                t[0], x.reshape(-1), u.reshape(-1), p.reshape(-1), dx.reshape(-1), g.reshape(-1)
-            )
-
-        def out(t, x, u, p, y):
-            one_out(t[0], x.reshape(-1), u.reshape(-1), p.reshape(-1), y.reshape(-1))
-
-        known = (
-            numba.njit(RHS.signature, error_model="numpy", nogil=True)(rhs),
-            numba.njit(OUT.signature, error_model="numpy", nogil=True)(out),
-        )
-        compiled.__dict__["_lane_functions"] = known
-    return known

@@ -47,31 +47,25 @@ B[6] = 0.0, 1.5, -4.0, 2.5
 STABLE = 3.3  # h |lambda| on the negative real axis up to which a step is stable, a little less
 
 
-@numba.njit(cache=True, error_model="numpy", inline="always")
-def _combined(x, hh, k, s, result):
+@numba.njit(cache=True, error_model="numpy")
+def combined(x, h, k, s, result):
     """Fill `result` with x + h (A[s, 0] k[0] + ... + A[s, s-1] k[s-1])."""
-    if s == 1:
-        for j in range(x.size):
-            result[j] = x[j] + hh[j] * (A[1, 0] * k[0, j])
-    elif s == 2:
-        for j in range(x.size):
-            result[j] = x[j] + hh[j] * (A[2, 0] * k[0, j] + A[2, 1] * k[1, j])
-    elif s == 3:
-        for j in range(x.size):
-            slope = A[3, 0] * k[0, j] + A[3, 1] * k[1, j] + A[3, 2] * k[2, j]
-            result[j] = x[j] + hh[j] * slope
-    elif s == 4:
-        for j in range(x.size):
-            slope = A[4, 0] * k[0, j] + A[4, 1] * k[1, j] + A[4, 2] * k[2, j] + A[4, 3] * k[3, j]
-            result[j] = x[j] + hh[j] * slope
-    elif s == 5:
-        for j in range(x.size):
-            slope = A[5, 0] * k[0, j] + A[5, 1] * k[1, j] + A[5, 2] * k[2, j] + A[5, 3] * k[3, j]
-            result[j] = x[j] + hh[j] * (slope + A[5, 4] * k[4, j])
-    else:
-        for j in range(x.size):
-            slope = A[6, 0] * k[0, j] + A[6, 1] * k[1, j] + A[6, 2] * k[2, j] + A[6, 3] * k[3, j]
-            result[j] = x[j] + hh[j] * (slope + A[6, 4] * k[4, j] + A[6, 5] * k[5, j])
+    a, lanes = A[s], h.size
+    k0, k1, k2, k3, k4, k5 = k[0], k[1], k[2], k[3], k[4], k[5]
+    for i in range(x.shape[0]):
+        for j in range(lanes):
+            slope = a[0] * k0[i, j]
+            if s > 1:
+                slope += a[1] * k1[i, j]
+            if s > 2:
+                slope += a[2] * k2[i, j]
+            if s > 3:
+                slope += a[3] * k3[i, j]
+            if s > 4:
+                slope += a[4] * k4[i, j]
+            if s > 5:
+                slope += a[5] * k5[i, j]
+            result[i, j] = x[i, j] + h[j] * slope
 
 
 @numba.njit(cache=True, error_model="numpy")

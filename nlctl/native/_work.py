@@ -27,7 +27,7 @@ Task = namedtuple(
 )
 Work = namedtuple(
     "Work",
-    "t h hh x x_new x_stage k g e e_start e_low e_high u error rate x_ahead dx_ahead g_ahead "
+    "t h x x_new x_stage k g e e_start e_low e_high u error rate x_ahead dx_ahead g_ahead "
     "t_end jacobian matrix f_t pivots U",
 )
 
@@ -43,7 +43,6 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
     return Work(
         **columns,
         **{name: np.zeros(lanes) for name in ("t", "h", "error", "rate", "t_end")},
-        hh=np.zeros(n * lanes),
         k=np.zeros((_tsit5.STAGES, n, lanes)),
         u=np.zeros((inputs, lanes)),
         jacobian=np.zeros((size, size)),
@@ -55,14 +54,20 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
 
 
 @numba.njit(cache=True, error_model="numpy")
+def inputs_at(t, times, inputs, lanes, u):
+    """Fill `u` with the inputs at each lane's time: linear within a segment of the time grid."""
+    for j in range(lanes.size):
+        m = lanes[j].segment
+        share = (t[j] - times[m]) / (times[m + 1] - times[m])
+        for i in range(u.shape[0]):
+            u[i, j] = inputs[i, m] * (1.0 - share) + inputs[i, m + 1] * share
+
+
+@numba.njit(cache=True, error_model="numpy")
 def evaluate(rhs, task, lanes, w, x, dx, g):
     """Evaluate the right-hand side at the times w.t; memory stands still within a step."""
-    for i in range(w.u.shape[0]):
-        for j in range(lanes.size):
-            m = lanes[j].segment
-            t0, t1 = task.times[m], task.times[m + 1]
-            share = (w.t[j] - t0) / (t1 - t0)
-            w.u[i, j] = task.inputs[i, m] * (1.0 - share) + task.inputs[i, m + 1] * share
+    if w.u.shape[0]:
+        inputs_at(w.t, task.times, task.inputs, lanes, w.u)
     rhs(w.t, x, w.u, task.p, dx, g)
     for i in task.memory:
         dx[i, :] = 0.0

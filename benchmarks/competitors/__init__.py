@@ -1,0 +1,1 @@
+"""One module per competitor; each has ``solvers(problem)``, which may raise `UnavailableError`."""

@@ -1,0 +1,13 @@
+"""Boost.odeint on the loop fused by hand in C++."""
+
+from .problem import Problem, Solver
+from .shared_library import built, solver
+
+
+def solvers(problem: Problem) -> list[Solver]:
+    """Return one solver per controlled Runge-Kutta method."""
+    library = built("boost_odeint", ("-O3", "-march=native"))
+    return [
+        solver(problem, library, f"C++ Boost.odeint {name}", method)
+        for method, name in enumerate(("dopri5", "fehlberg78"))
+    ]

@@ -1,0 +1,256 @@
+"""Lowering: a diagram as code over members side by side, from the blocks' own functions.
+
+`Program` calls the blocks' functions for one member.  Here the same functions have been run once
+on symbols, and what they compute is written out for several members at a time: each expression
+once, whatever depends on parameters alone in advance.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core import config
+
+from .._equation import equation
+from . import _vector_math, _vector_memory, _vector_type
+from ._cache import loaded
+from ._compile import _jitted
+from ._emit import Program
+from ._lower_blocks import Call, Equations, equations
+from ._lower_emit import written
+from ._lower_plan import Store, needed, plan, split
+from ._schedule import Schedule
+from ._trace_graph import Expr
+from ._vector_math import FUNCTIONS
+
+VECTOR, MATRIX = numba.float64[::1], numba.float64[:, ::1]
+PREPARE = numba.void(MATRIX, MATRIX)
+RHS = numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX)
+OUT = numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX)
+MEMORY = ("load", "store", "gather", "store_first", "repeated", "first", "total", "select")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lowered:
+    """A program over members side by side ("lanes").
+
+    Attributes
+    ----------
+    source : str
+        Defines ``prepare(p, c)``, ``rhs(t, x, u, c, dx, g)`` and ``out(t, x, u, c, y)``.  All
+        arrays have a row per number and a column per member, `t` is one row.  `prepare` fills `c`
+        with all that depends on the parameters `p` alone; the rest of `c` is room that `rhs` and
+        `out` write to, so members that run at the same time need a `c` each.
+    functions : mapping
+        Functions that are called as they stand, by the names that the source uses.
+    constants : mapping
+        What else the source refers to, by name.
+    records : mapping
+        What gathers the parameters of those functions: in plain Python, and in machine code.
+    lanes : int
+        Number of members.
+    size : int
+        Rows of `c`.
+    assumed : mapping
+        Integer parameters that steer what is computed: for places in `p` the values for which the
+        source holds.
+    opaque : mapping
+        Why a function is called and not written out, by its name.
+    """
+
+    source: str
+    functions: Mapping[str, Any]
+    constants: Mapping[str, Any]
+    records: Mapping[str, Any]
+    lanes: int
+    size: int
+    assumed: Mapping[int, int]
+    opaque: Mapping[str, str]
+
+    def namespace(self, *, native: bool) -> dict[str, Any]:
+        """Return everything that the source refers to, by name."""
+        records = {name: pair[native] for name, pair in self.records.items()}
+        return {**self.constants, **self.functions, **records}
+
+    def holds_for(self, p: Any) -> bool:
+        """Whether the source holds for parameters `p`, an array with a row per number."""
+        return all(bool(np.all(np.asarray(p)[i] == v)) for i, v in self.assumed.items())
+
+
+def lower(schedule: Schedule, program: Program, lanes: int = 8) -> Lowered:
+    """Write a diagram as code over members side by side.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    program : Program
+        What was emitted for it.
+    lanes : int, optional
+        Number of members, a power of two.  With 1, loops take several elements at a time.
+
+    Returns
+    -------
+    Lowered
+    """
+    if schedule.loops:
+        return _one_by_one(schedule, program, lanes)
+    found = equations(schedule, program.layout)
+    stores = {
+        name: [part for row, array in rows for part in _stores(name, row, array)]
+        for name, rows in found.results.items()
+    }
+    known = _parameters_alone([s.expr for part in stores.values() for s in part])
+    size = sum(e.size or 1 for e in known)
+    tables: dict[Expr, str] = {}
+    prepared = [Store(array="c", row=r, expr=e, size=e.size or 1) for e, (_, r) in known.items()]
+    lines: list[str] = [f"L = {lanes}", *_calls(found)]
+    for header, wanted, given in (
+        ("prepare(p, c)", prepared, {}),
+        ("rhs(t, x, u, c, dx, g)", [*stores["dx"], *stores["g"]], known),
+        ("out(t, x, u, c, y)", stores["y"], known),
+    ):
+        planned = plan(wanted, given, size)
+        size = planned.rows
+        lines += ["", "", *written(header, planned, given, lanes, found.calls, tables)]
+    constants = {"np": np, **_NAMES, **program.constants}
+    constants |= {name: np.array(table.data) for table, name in tables.items()}
+    return Lowered(
+        source="\n".join([*lines, ""]),
+        functions=program.functions if found.calls else {},
+        records=program.records if found.calls else {},
+        constants=constants,
+        lanes=lanes,
+        size=max(size, 1),
+        assumed=found.graph.assumptions,
+        opaque={name: call.reason for name, call in found.calls.items()},
+    )
+
+
+def _one_by_one(schedule: Schedule, program: Program, lanes: int) -> Lowered:
+    """Return the program itself for one member after the other: loops are solved by iteration."""
+    n, count = schedule.system.nstates or 0, schedule.system.noutputs or 0
+    rows = sum(slot.size for block in program.layout.values() for slot in block.values())
+    one = program.source.replace("def rhs(", "@equation\ndef rhs_of_one(")
+    one = one.replace("def out(", "@equation\ndef out_of_one(")
+    given = f"t[lane], x[:, lane].copy(), u[:, lane].copy(), c[:{rows}, lane].copy()"
+    source = f"""{one}
+
+def prepare(p, c):
+    c[:{rows}] = p
+
+
+def rhs(t, x, u, c, dx, g):
+    dx1, g1 = np.empty({n}), np.empty({program.events})
+    for lane in range({lanes}):
+        rhs_of_one({given}, dx1, g1)
+        dx[:, lane], g[:, lane] = dx1, g1
+
+
+def out(t, x, u, c, y):
+    y1 = np.empty({count})
+    for lane in range({lanes}):
+        out_of_one({given}, y1)
+        y[:, lane] = y1
+"""
+    return Lowered(
+        source=source,
+        functions=program.functions,
+        constants={"np": np, **_NAMES, **program.constants},
+        records=program.records,
+        lanes=lanes,
+        size=max(rows, 1),
+        assumed={},
+        opaque={"rhs_of_one": "it has algebraic loops to be solved"},
+    )
+
+
+def plain_functions(lowered: Lowered) -> tuple[Any, Any, Any]:
+    """Return ``prepare``, ``rhs`` and ``out`` as plain Python."""
+    namespace = lowered.namespace(native=False)
+    exec(lowered.source, namespace)
+    return namespace["prepare"], namespace["rhs"], namespace["out"]
+
+
+def lowered_code(lowered: Lowered) -> tuple[Any, Any, Any]:
+    """Return ``prepare``, ``rhs`` and ``out`` as machine code, from the cache if it is there.
+
+    With NUMBA_DISABLE_JIT=1 the same source runs as plain Python.
+
+    Raises
+    ------
+    CompileError
+        If a block's function is no plain function.
+    """
+    if getattr(config, "DISABLE_JIT", False):
+        return plain_functions(lowered)
+    module = loaded(lowered, {name: _jitted(f) for name, f in lowered.functions.items()})
+    options = {"cache": True, "error_model": "numpy", "nogil": True}
+    prepare = numba.njit(PREPARE, **options)(module.prepare)
+    rhs = numba.njit(RHS, **options)(module.rhs)
+    return prepare, rhs, numba.njit(OUT, **options)(module.out)
+
+
+def _stores(name: str, row: int, array: Any) -> list[Store]:
+    graph = array.graph
+    if array.axis is not None:
+        return split(Store(array=name, row=row, expr=array.only, size=array.length))
+    return [
+        Store(array=name, row=row + k, expr=graph.number(e), size=1)
+        for k, e in enumerate(array.cells.flat)
+    ]
+
+
+def _parameters_alone(results: list[Expr]) -> dict[Expr, tuple[str, int]]:
+    """Return what is used and depends on parameters alone, with its place in `c`."""
+    nodes = needed(results, ())
+    inside = {node for node in nodes if node.varies}
+    used = set(results) - inside
+    for node in reversed(nodes):
+        for arg in node.args if node in inside else ():
+            if arg.kind == "b":  # truth values have no place in an array of floats
+                inside.add(arg)
+            elif not arg.varies:
+                used.add(arg)
+    found, row = {}, 0
+    for node in nodes:
+        if node in used and node.op != "const":
+            found[node], row = ("c", row), row + (node.size or 1)
+    return found
+
+
+def _calls(found: Equations) -> list[str]:
+    """Return the source of the functions that call an opaque function for one member."""
+    lines: list[str] = []
+    for call in found.calls.values():
+        lines += ["", "", "@equation", f"def {call.name}(c, at, lane):  # {call.reason}"]
+        lines += [f"    {line}" for line in _unpacked(call)]
+    return lines
+
+
+def _unpacked(call: Call) -> list[str]:
+    _, x, u, p, y = np.cumsum(call.lengths)
+    given = [
+        f"given = c[at : at + {p}, lane].copy()",
+        "t = given[0]",
+        f"x, u, p = given[1:{x}], given[{x}:{u}], given[{u}:{p}]",
+        f"y = c[at + {p} : at + {y}, lane]",
+    ]
+    return [*given, *call.lines]
+
+
+def _digest() -> str:
+    """Return a number for the code generators that a program's key cannot see into."""
+    digest = hashlib.sha256()
+    for module in (_vector_math, _vector_memory, _vector_type):
+        digest.update(Path(module.__file__ or "").read_bytes())
+    return digest.hexdigest()
+
+
+_NAMES = {name: getattr(_vector_memory, name) for name in MEMORY} | FUNCTIONS
+_NAMES |= {"equation": equation, "vector_code": _digest()}

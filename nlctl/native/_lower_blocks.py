@@ -1,0 +1,268 @@
+"""A schedule as expressions: blocks traced, wired, and what cannot be traced called."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from .._block import Block
+from ._code import Code, code
+from ._parameters import Slot, current_values
+from ._schedule import Combination, Node, Schedule, Signal
+from ._trace import trace
+from ._trace_array import Tracer, boxed, concatenated, full, number, traced, vector
+from ._trace_graph import SMALL, Expr, Graph, Untraceable
+from ._trace_operators import elementwise
+
+
+@dataclass(frozen=True, kw_only=True)
+class Call:
+    """A function that is called for one member at a time.
+
+    Attributes
+    ----------
+    name : str
+    lines : tuple of str
+        Its source in terms of t, x, u and p of its block alone, which fills y.
+    lengths : tuple of int
+        Sizes of t, x, u, p and y.
+    reason : str
+        Why it could not be traced.
+    """
+
+    name: str
+    lines: tuple[str, ...]
+    lengths: tuple[int, ...]
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equations:
+    """What a diagram computes.
+
+    Attributes
+    ----------
+    graph : Graph
+    results : dict
+        For ``"dx"``, ``"g"`` and ``"y"`` pairs of a row and the array that is to be written there.
+    calls : dict
+        Opaque functions by name.
+    """
+
+    graph: Graph
+    results: dict[str, list[tuple[int, Tracer]]]
+    calls: dict[str, Call]
+
+
+def equations(schedule: Schedule, layout: Any) -> Equations:
+    """Write a schedule as expressions.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    layout : mapping
+        Places of the parameters, as in `Program.layout`.
+
+    Returns
+    -------
+    Equations
+    """
+    reader = _Reader(graph=Graph(), layout=layout, blocks=schedule.nodes)
+    with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
+        for i, unknown in zip(schedule.order, schedule.unknown, strict=True):
+            reader.signals[i] = reader.outputs(i, unknown)
+        results = {
+            "dx": [(n.state_offset, reader.derivatives(i)) for i, n in enumerate(schedule.nodes)],
+            "g": _events(reader),
+            "y": [(0, reader.wired(schedule.outputs))],
+        }
+    return Equations(graph=reader.graph, results=results, calls=reader.calls)
+
+
+def _events(reader: _Reader) -> list[tuple[int, Tracer]]:
+    """Return switching functions of all blocks, then what memories are committed to."""
+    blocks = [reader.code(i) for i in range(len(reader.blocks))]
+    corner, memory, found = 0, sum(own.corners for own in blocks), []
+    for i, own in enumerate(blocks):
+        if own.corners or own.memory:
+            events = reader.events(i)
+            found += [(corner, events[: own.corners]), (memory, events[own.corners :])]
+            corner, memory = corner + own.corners, memory + len(own.memory)
+    return found
+
+
+@dataclass(kw_only=True)
+class _Reader:
+    """Reads blocks one after the other; `signals` are the outputs of those that have been read."""
+
+    graph: Graph
+    layout: Any
+    blocks: Sequence[Node]
+    signals: dict[int, Tracer] = field(default_factory=dict)
+    calls: dict[str, Call] = field(default_factory=dict)
+
+    def code(self, i: int) -> Code:
+        return code(i, self.blocks[i], self.layout[i])
+
+    def outputs(self, i: int, unknown: Collection[int]) -> Tracer:
+        """Return a block's outputs; those that depend on unknown inputs are asked for again."""
+        node, system = self.blocks[i], self.blocks[i].system
+        linear = isinstance(system, ct.StateSpace)
+        if not linear and (system.outfcn is None or not system.noutputs):
+            return self._states(node)[: system.noutputs or 0]
+        direct = [bool(column.any()) for column in node.direct.T]
+        missing = [not (d if linear else any(direct)) for d in direct]
+        inputs = self.wired(
+            [
+                None if j in unknown or missing[j] else combination
+                for j, combination in enumerate(node.inputs)
+            ]
+        )
+        if linear:
+            return self._linear(node, system.C, system.D, inputs)
+        return self._function(i, "output", [system.outfcn], inputs, system.noutputs)
+
+    def derivatives(self, i: int) -> Tracer:
+        node, system = self.blocks[i], self.blocks[i].system
+        if not system.nstates:
+            return self._states(node)
+        inputs = self.wired(node.inputs)
+        if isinstance(system, ct.StateSpace):
+            return self._linear(node, system.A, system.B, inputs)
+        return self._function(i, "update", [system.updfcn], inputs, system.nstates)
+
+    def events(self, i: int) -> Tracer:
+        own, spec = self.code(i), self.blocks[i].system.spec
+        used = [("corners", own.corners), ("commit", len(own.memory))]
+        functions = [getattr(spec, name) for name, count in used if count]
+        inputs = self.wired(self.blocks[i].inputs)
+        return self._function(i, "events", functions, inputs, own.corners + len(own.memory))
+
+    def wired(self, combinations: Sequence[Combination | None]) -> Tracer:
+        """Return linear combinations of signals, NaN for None; neighbours become vectors."""
+        parts, at = [traced(self.graph, 0.0).reshape(1)[:0]], 0
+        while at < len(combinations):
+            end = at + 1
+            while end < len(combinations) and _is_next(combinations[end - 1], combinations[end]):
+                end += 1
+            parts.append(self._combined(combinations[at], end - at))
+            at = end
+        return concatenated(self.graph, parts)
+
+    def _combined(self, combination: Combination | None, count: int) -> Tracer:
+        if combination is None:
+            return full(self.graph, count, np.nan)
+        total = full(self.graph, count, 0.0)
+        for signal, gain in combination.items():
+            if signal.block is None:
+                part = vector(self.graph, "u", signal.index, (count,))
+            else:
+                part = self.signals[signal.block][signal.index : signal.index + count]
+            if gain != -1.0:
+                part = elementwise(self.graph, "mul", gain, part)
+            total = elementwise(self.graph, "sub" if gain == -1.0 else "add", total, part)
+        return total
+
+    def _linear(self, node: Node, on_state: Any, on_input: Any, inputs: Tracer) -> Tracer:
+        """Return the products with a system's matrices, without their zeros."""
+        x, rows = self._states(node), []
+        for i in range(on_state.shape[0]):
+            terms = [(on_state[i, j], x[j]) for j in np.flatnonzero(on_state[i])]
+            terms += [(on_input[i, j], inputs[j]) for j in np.flatnonzero(on_input[i])]
+            row = traced(self.graph, 0.0)
+            for factor, value in terms:
+                term = elementwise(self.graph, "mul", float(factor), value)
+                row = elementwise(self.graph, "add", row, term)
+            rows.append(row.reshape(1))
+        return concatenated(self.graph, rows) if rows else x[:0]
+
+    def _states(self, node: Node) -> Tracer:
+        return vector(self.graph, "x", node.state_offset, (node.system.nstates or 0,))
+
+    def _function(
+        self, i: int, kind: str, functions: list[Any], inputs: Tracer, count: int
+    ) -> Tracer:
+        """Return the results of a block's functions, traced if possible."""
+        node = self.blocks[i]
+
+        def arguments() -> tuple[Any, ...]:
+            t = number(self.graph, self.graph.leaf("t", 0, None))
+            return t, self._states(node), inputs.copy(), self._parameters(i)
+
+        try:
+            parts = [trace(self.graph, function, arguments) for function in functions]
+            found = concatenated(self.graph, parts)
+            if found.size != count:
+                raise Untraceable(f"it returns {found.size} values, not {count}")
+        except Untraceable as error:
+            return self._called(i, kind, inputs, count, str(error))
+        return found
+
+    def _parameters(self, i: int) -> Any:
+        """Return the record or dict that a block's functions take."""
+        system, slots = self.blocks[i].system, self.layout[i]
+        values = {
+            name: self._parameter(slots[name], value) if name in slots else value
+            for name, value in current_values(system).items()
+        }
+        return type(system._current_params)(**values) if isinstance(system, Block) else values
+
+    def _parameter(self, slot: Slot, value: Any) -> Tracer:
+        if slot.kind == "i" and not slot.shape:
+            leaf = self.graph.leaf("p", slot.offset, None, kind="i", value=int(value))
+            return number(self.graph, leaf)
+        whole = vector(self.graph, "p", slot.offset, slot.shape)
+        return elementwise(self.graph, "ne", whole, 0.0) if slot.kind == "b" else whole
+
+    def _called(self, i: int, kind: str, inputs: Tracer, count: int, reason: str) -> Tracer:
+        """Return the results of an opaque call."""
+        node, slots = self.blocks[i], self.layout[i]
+        name = f"{self.code(i).name}_{kind}_of_one"
+        size = sum(s.size for s in slots.values())
+        start = min((s.offset for s in slots.values()), default=0)
+        time = number(self.graph, self.graph.leaf("t", 0, None)).reshape(1)
+        given = [time, self._states(node), inputs, vector(self.graph, "p", start, (size,))]
+        lengths = (*(g.size for g in given), count)
+        lines = tuple(_lines_of_one(i, node, slots, start, kind, count))
+        self.calls[name] = Call(name=name, lines=lines, lengths=lengths, reason=reason)
+        pieces = [piece for g in given for piece in _pieces(g)]
+        args, sizes = [e for e, _ in pieces], tuple(n for _, n in pieces)
+        call = self.graph.node("call", *args, data=(name, sizes), size=count, varies=True)
+        if count > SMALL:
+            return Tracer(self.graph, boxed(call), 0, count)
+        items = [number(self.graph, self.graph.item(call, k)).reshape(1) for k in range(count)]
+        return concatenated(self.graph, items)
+
+
+def _is_next(one: Combination | None, other: Combination | None) -> bool:
+    """Whether a combination is another one, of the signals after those."""
+    if one is None or other is None:
+        return one is other
+    shifted = {Signal(s.block, s.index + 1): gain for s, gain in one.items()}
+    return bool(one) and shifted == other
+
+
+def _pieces(array: Tracer) -> list[tuple[Expr, int]]:
+    if array.axis is not None:
+        return [(array.only, array.length)]
+    return [(array.graph.number(e), 1) for e in array.cells.flat]
+
+
+def _lines_of_one(i: int, node: Node, slots: Any, start: int, kind: str, count: int) -> list[str]:
+    """Return the source that evaluates one block alone, with its own t, x, u, p and y."""
+    inputs = tuple({Signal(None, j): 1.0} for j in range(len(node.inputs)))
+    alone = replace(node, state_offset=0, inputs=inputs)
+    own = code(i, alone, {k: replace(s, offset=s.offset - start) for k, s in slots.items()})
+    if kind == "output":
+        body = [*own.output_lines(), *(f"y[{k}] = y{i}[{k}]" for k in range(count))]
+    else:
+        lines = (
+            own.update_lines(ready=False) if kind == "update" else own.event_lines(0, own.corners)
+        )
+        target = "dx" if kind == "update" else "g"
+        body = [f"{target} = y", *lines]
+    return [*own.parameter_lines(), *body]

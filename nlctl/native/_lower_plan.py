@@ -1,0 +1,198 @@
+"""When each expression of a function is computed: numbers, loops, and what lies in memory.
+
+A function is a sequence of levels.  In each, numbers come first, then one loop for every length of
+vectors; the sums of a loop are numbers of the next level.  A vector is computed where it is used,
+in one loop; one that is used in several, or element by element, lies in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+
+from ._trace_graph import Expr
+
+Loop = tuple[int, int]  # level and length
+STORED = ("concat", "call")  # vectors that are made in memory
+READ = (*STORED, "leaf", "table", "item", "slice")  # what a loop reads and does not compute
+
+
+@dataclass(frozen=True, kw_only=True)
+class Store:
+    """Something to be written: `size` consecutive rows of an array, from `row` on."""
+
+    array: str
+    row: int
+    expr: Expr
+    size: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What is computed when.
+
+    Attributes
+    ----------
+    nodes : tuple of Expr
+        Everything that is needed, in an order in which it can be computed.
+    level : dict
+        When each is known.
+    stored : dict
+        Vectors that lie in memory, and where: (array, row).
+    loops : dict
+        For every loop its vectors and sums, in order.
+    stores : tuple of Store
+        Everything to be written, the vectors in memory included.
+    rows : int
+        Rows of memory that are taken, those before included.
+    """
+
+    nodes: tuple[Expr, ...]
+    level: dict[Expr, int]
+    stored: dict[Expr, tuple[str, int]]
+    loops: dict[Loop, list[Expr]]
+    stores: tuple[Store, ...]
+    rows: int
+
+
+def needed(exprs: Iterable[Expr], known: Collection[Expr]) -> tuple[Expr, ...]:
+    """Return all that expressions are made of, parts first; nothing behind what is known."""
+    found: dict[Expr, None] = {}
+    waiting = list(exprs)
+    while waiting:
+        expr = waiting.pop()
+        if expr not in found:
+            found[expr] = None
+            waiting.extend(expr.args if expr not in known else ())
+    return tuple(sorted(found, key=lambda e: e.index))
+
+
+def split(store: Store) -> list[Store]:
+    """Divide what is joined into its parts."""
+    if store.expr.op != "concat":
+        return [store]
+    parts, row = [], store.row
+    for piece, length in zip(store.expr.args, store.expr.data, strict=True):
+        parts += split(Store(array=store.array, row=row, expr=piece, size=length))
+        row += length
+    return parts
+
+
+def plan(wanted: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int) -> Plan:
+    """Plan a function.
+
+    Parameters
+    ----------
+    wanted : sequence of Store
+        Its results.
+    known : dict
+        Expressions that already lie in memory, and where.
+    rows : int
+        Rows of the array ``c`` that are taken.
+
+    Returns
+    -------
+    Plan
+    """
+    wanted = [part for store in wanted for part in split(store)]
+    nodes = needed([s.expr for s in wanted], known)
+    stored = dict(known)
+    for node in _in_memory(nodes, known):
+        stored[node], rows = ("c", rows), rows + _rows(node)
+    level = _levels(nodes, known)
+    written = _written(wanted, nodes, stored, known)
+    users = _loops(nodes, level, stored, written)
+    for node, found in users.items():
+        if len(found) > 1 and node not in stored and node.kind != "b":
+            stored[node], rows = ("c", rows), rows + (node.size or 1)
+    written = _written(wanted, nodes, stored, known)
+    users = _loops(nodes, level, stored, written)  # again: what lies in memory is computed once
+    loops: dict[Loop, list[Expr]] = {}
+    for node in nodes:
+        for loop in users.get(node, ()) if node not in known else ():
+            loops.setdefault(loop, []).append(node)
+    for store in written:
+        if store.size > 1:
+            loops.setdefault((level[store.expr], store.size), [])
+    return Plan(
+        nodes=nodes, level=level, stored=stored, loops=loops, stores=tuple(written), rows=rows
+    )
+
+
+def _rows(node: Expr) -> int:
+    """Rows in memory: a call has its arguments there as well, before its results."""
+    return (node.size or 1) + (sum(node.data[1]) if node.op == "call" else 0)
+
+
+def _in_memory(nodes: Sequence[Expr], known: Collection[Expr]) -> list[Expr]:
+    """Return the vectors that must lie in memory."""
+    found: dict[Expr, None] = {}
+    for node in nodes:
+        if node in known:
+            continue
+        if node.op == "call":
+            found[node] = None
+        for arg in node.args:
+            apart = node.op in ("item", "slice") or (arg.op in STORED and node.op not in STORED)
+            if apart and arg.size and arg not in known:
+                found[arg] = None
+    return list(found)
+
+
+def _levels(nodes: Sequence[Expr], known: Collection[Expr]) -> dict[Expr, int]:
+    """Return when each expression is known: after the loops that it needs."""
+    level: dict[Expr, int] = {}
+    for node in nodes:
+        level[node] = 0
+        for arg in node.args if node not in known else ():
+            ready = arg in known or arg.op == "call" or arg.size is None
+            waits = node.op in ("item", "slice", "call") and not ready
+            joined = arg.op == "concat" and node.op not in STORED and not waits
+            later = (node.op == "sum") + waits + joined
+            level[node] = max(level[node], level[arg] + later)
+    return level
+
+
+def _written(
+    wanted: Sequence[Store],
+    nodes: Sequence[Expr],
+    stored: dict[Expr, tuple[str, int]],
+    known: Collection[Expr],
+) -> list[Store]:
+    """Return all stores: what lies in memory must get there."""
+    inner = []
+    for node, (array, row) in stored.items():
+        if node not in known and node.op != "call":
+            inner += split(Store(array=array, row=row, expr=node, size=node.size or 1))
+    for node in nodes:
+        if node.op == "call" and node in stored:
+            row = stored[node][1]
+            for arg, size in zip(node.args, node.data[1], strict=True):
+                inner += split(Store(array="c", row=row, expr=arg, size=size))
+                row += size
+    return [*inner, *wanted]
+
+
+def _loops(
+    nodes: Sequence[Expr],
+    level: dict[Expr, int],
+    stored: dict[Expr, tuple[str, int]],
+    written: Sequence[Store],
+) -> dict[Expr, set[Loop]]:
+    """Return in which loops each vector and sum is computed."""
+    found: dict[Expr, set[Loop]] = {}
+    for store in written:
+        if store.expr.size:
+            found.setdefault(store.expr, set()).add((level[store.expr], store.size))
+    for node in reversed(nodes):
+        if node.op == "sum":
+            found[node] = {(level[node] - 1, node.args[0].size or 1)}
+        if node.op in READ or (node.op != "sum" and node not in found):
+            found.pop(node, None)
+            continue
+        if node in stored:
+            found[node] = {min(found[node])}  # elsewhere it is read
+        for arg in node.args:
+            if arg.size:
+                found.setdefault(arg, set()).update(found[node])
+    return {node: loops for node, loops in found.items() if node.size or node.op == "sum"}

@@ -1,0 +1,77 @@
+"""Tracing: what a plain Python function computes, as expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from ._trace_array import Tracer, concatenated, number, traced
+from ._trace_graph import BUDGET, UNLIMITED, Expr, Graph, Undecided, Untraceable
+from ._trace_numpy import Stage
+from ._trace_operators import elementwise
+
+PATHS = 32  # ways through one function that are followed
+
+
+def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
+    """Run a function on tracers and return its result in one dimension.
+
+    A condition that depends on tracers is followed both ways: the function runs again for every
+    way through it, and the results are joined by ``select``, which takes the branch that Python
+    takes, also for NaN.
+
+    Parameters
+    ----------
+    graph : Graph
+        Where the expressions are kept.
+    function : callable
+        A block's function of plain Python; its code runs as it stands.
+    arguments : callable
+        Makes the arguments, anew for every run, since a function may change them.
+
+    Raises
+    ------
+    Untraceable
+        If the function does what expressions cannot say, fails, or has too many ways through it.
+    """
+    graph.limit = len(graph.nodes) + BUDGET
+    assumptions = dict(graph.assumptions)
+    try:
+        copy = Stage(graph).copied(function)
+        return _followed(graph, lambda: _flat(graph, copy(*arguments())), {}, [PATHS])
+    except Exception as error:  # a traced function may raise whatever it likes
+        graph.assumptions = assumptions
+        raise Untraceable(str(error)) from error
+    finally:
+        graph.decisions = {}
+        graph.limit = UNLIMITED
+
+
+def _followed(
+    graph: Graph, run: Callable[[], Tracer], decisions: dict[Expr, bool], left: list[int]
+) -> Tracer:
+    """Follow a function from where the decisions have led."""
+    graph.decisions = decisions
+    try:
+        result = run()
+    except Undecided as question:
+        condition = question.condition
+    else:
+        left[0] -= 1
+        if left[0] < 0:
+            raise Untraceable(f"more than {PATHS} ways through it")
+        return result
+    if len(decisions) >= PATHS:
+        raise Untraceable("a loop whose end depends on what is computed")
+    yes = _followed(graph, run, {**decisions, condition: True}, left)
+    no = _followed(graph, run, {**decisions, condition: False}, left)
+    if yes.shape != no.shape:
+        raise Untraceable("results of different sizes")
+    return elementwise(graph, "select", number(graph, condition), yes, no)
+
+
+def _flat(graph: Graph, value: Any) -> Tracer:
+    """Return a function's result, an array, tuple, list or number, in one dimension."""
+    if isinstance(value, tuple | list):
+        return concatenated(graph, [traced(graph, v).reshape(-1) for v in value])
+    return traced(graph, value).reshape(-1)

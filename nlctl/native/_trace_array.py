@@ -1,0 +1,246 @@
+"""Arrays of expressions that behave as NumPy arrays do, with shapes that are known."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ._trace_graph import SMALL, Expr, Graph, Untraceable
+
+
+@dataclass(eq=False)
+class Tracer:
+    """An array of expressions, in the place of an array of floats.
+
+    One of its axes may be long: along it every cell is a vector (or a number that is repeated).
+    Assigning to items changes it, as it changes an array.
+
+    Attributes
+    ----------
+    graph : Graph
+    cells : ndarray of Expr
+        Its shape is the array's without the long axis.
+    axis : int or None
+        The long axis.
+    length : int
+        Size of the long axis, 1 if there is none.
+    alone : bool
+        Whether no part of a long array has been taken: NumPy's parts are views, these are not.
+    """
+
+    graph: Graph
+    cells: np.ndarray
+    axis: int | None = None
+    length: int = 1
+    alone: bool = True
+
+    __array_ufunc__ = None  # NumPy's arrays leave arithmetic with tracers to these
+    __hash__ = None  # type: ignore[assignment]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the array."""
+        shape = list(self.cells.shape)
+        if self.axis is not None:
+            shape.insert(self.axis, self.length)
+        return tuple(shape)
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return len(self.shape)
+
+    @property
+    def size(self) -> int:
+        """Number of elements."""
+        return int(np.prod(self.shape))
+
+    @property
+    def dtype(self) -> np.dtype:
+        """What an array of floats says."""
+        return np.dtype(float)
+
+    @property
+    def T(self) -> Tracer:  # noqa: N802 (NumPy's name)
+        """The transpose."""
+        axis = None if self.axis is None else self.ndim - 1 - self.axis
+        return Tracer(self.graph, self.cells.T, axis, self.length)
+
+    def __len__(self) -> int:
+        if not self.shape:
+            raise TypeError("a number has no length")
+        return self.shape[0]
+
+    def __iter__(self) -> Iterator[Tracer]:
+        return (self[i] for i in range(len(self)))
+
+    def __getitem__(self, key: Any) -> Tracer:
+        keys = full_key(key, self.ndim)
+        if self.axis is None:
+            return Tracer(self.graph, boxed(self.cells[tuple(keys)]))
+        position = [i for i, k in enumerate(keys) if k is not None][self.axis]
+        before = sum(k is None or isinstance(k, slice) for k in keys[:position])
+        along = keys.pop(position)
+        cells = boxed(self.cells[tuple(keys)])
+        if not isinstance(along, slice):
+            k = range(self.length)[along]
+            return Tracer(self.graph, mapped(lambda e: self.graph.item(e, k), cells))
+        indices = range(self.length)[along]
+        if len(indices) <= SMALL:
+            parts = [mapped(lambda e, k=k: self.graph.item(e, k), cells) for k in indices]
+            return Tracer(self.graph, _stacked(parts, before, cells.shape))
+        start, step, size = indices.start, indices.step, len(indices)
+        cells = mapped(lambda e: self.graph.part(e, start, step, size), cells)
+        self.alone = False
+        return Tracer(self.graph, cells, before, size, alone=False)
+
+    def copy(self) -> Tracer:
+        """Return a copy."""
+        return Tracer(self.graph, self.cells.copy(), self.axis, self.length)
+
+    def ravel(self) -> Tracer:
+        """Return the array in one dimension."""
+        return self.reshape(-1)
+
+    flatten = ravel
+
+    def reshape(self, *shape: Any) -> Tracer:
+        """Return the array in another shape."""
+        wanted = shape[0] if len(shape) == 1 and not isinstance(shape[0], int) else shape
+        if self.axis is None:
+            return Tracer(self.graph, self.cells.reshape(wanted))
+        if self.ndim == 1 and tuple(wanted) in ((-1,), (self.length,)):
+            return self
+        raise Untraceable("reshaping a long array")
+
+    @property
+    def only(self) -> Expr:
+        """The expression of an array of one element."""
+        return self.cells.reshape(-1)[0]
+
+
+def boxed(cells: Any) -> np.ndarray:
+    """Return cells as an array; NumPy hands out a single element as it is."""
+    if isinstance(cells, np.ndarray):
+        return cells
+    box = np.empty((), dtype=object)
+    box[()] = cells
+    return box
+
+
+def mapped(function: Callable[..., Expr], *cells: np.ndarray) -> np.ndarray:
+    return boxed(np.frompyfunc(function, len(cells), 1)(*cells))
+
+
+def _stacked(parts: Sequence[np.ndarray], axis: int, shape: tuple[int, ...]) -> np.ndarray:
+    if parts:
+        return np.stack(parts, axis=axis)
+    return np.empty((*shape[:axis], 0, *shape[axis:]), dtype=object)
+
+
+def full_key(key: Any, ndim: int) -> list[Any]:
+    """Return an index as a list with an entry for every axis."""
+    keys = list(key) if isinstance(key, tuple) else [key]
+    if any(isinstance(k, list | np.ndarray) or getattr(k, "shape", ()) for k in keys):
+        raise Untraceable("indexing by arrays")
+    keys = [k if k is None or k is ... or isinstance(k, slice) else operator.index(k) for k in keys]
+    missing = [slice(None)] * (ndim - sum(k is not None and k is not ... for k in keys))
+    if ... in keys:
+        at = keys.index(...)
+        return [*keys[:at], *missing, *keys[at + 1 :]]
+    return [*keys, *missing]
+
+
+def number(graph: Graph, expr: Expr) -> Tracer:
+    """Return an array without axes that holds one expression."""
+    return Tracer(graph, boxed(expr))
+
+
+def traced(graph: Graph, value: Any) -> Tracer:
+    """Return numbers, tracers and nested lists of them as a tracer."""
+    if isinstance(value, Tracer):
+        return value
+    if isinstance(value, list | tuple):
+        parts = [traced(graph, v) for v in value]
+        if any(p.shape != parts[0].shape for p in parts):
+            raise Untraceable("rows of different lengths")
+        if parts and any(p.axis is not None for p in parts):
+            if any(p.axis != 0 or p.ndim != 1 for p in parts) or len(parts) > SMALL:
+                raise Untraceable("a large matrix")
+            rows = _stacked([p.cells for p in parts], 0, ())
+            return Tracer(graph, rows, 1, parts[0].length)
+        if len(parts) > SMALL and parts[0].ndim == 0:
+            return concatenated(graph, [p.reshape(1) for p in parts])
+        return Tracer(graph, _stacked([p.cells for p in parts], 0, ()))
+    array = np.asarray(value)
+    if array.dtype.kind not in "fib":
+        raise Untraceable(f"values of type {array.dtype}")
+    return _constants(graph, array)
+
+
+def _constants(graph: Graph, array: np.ndarray) -> Tracer:
+    long = [i for i, n in enumerate(array.shape) if n > SMALL]
+    if len(long) > 1 or array.ndim > 2:
+        raise Untraceable("a large matrix")
+    if not long:
+        return Tracer(graph, mapped(graph.const, array.astype(object)))
+    moved = np.moveaxis(array, long[0], -1)
+    cells = np.empty(moved.shape[:-1], dtype=object)
+    for index in np.ndindex(cells.shape):
+        cells[index] = graph.table(list(moved[index]))
+    return Tracer(graph, cells, long[0], array.shape[long[0]])
+
+
+def vector(graph: Graph, array: str, start: int, shape: tuple[int, ...], kind: str = "f") -> Tracer:
+    """Return part of an argument of the program as an array of the given shape."""
+    numbers = np.arange(start, start + int(np.prod(shape))).reshape(shape)
+    long = [i for i, n in enumerate(shape) if n > SMALL]
+    if len(long) > 1 or len(shape) > 2:
+        raise Untraceable("a large matrix")
+    if not long:
+        return Tracer(graph, mapped(lambda i: graph.leaf(array, int(i), None, kind), numbers))
+    moved = np.moveaxis(numbers, long[0], -1)
+    step = int(moved.reshape(-1)[1] - moved.reshape(-1)[0]) if moved.ndim == 1 else int(
+        moved[0, 1] - moved[0, 0]
+    )  # fmt: skip
+    size = moved.shape[-1]
+
+    def column(i: int) -> Expr:
+        where = (array, int(i), step)
+        return graph.node("leaf", data=where, size=size, varies=array != "p")
+
+    return Tracer(graph, mapped(column, moved[..., 0]), long[0], size)
+
+
+def full(graph: Graph, shape: Any, value: Any) -> Tracer:
+    """Return an array of equal elements."""
+    shape = tuple(
+        operator.index(n) for n in (shape if isinstance(shape, list | tuple) else [shape])
+    )
+    number = traced(graph, value).only
+    long = [i for i, n in enumerate(shape) if n > SMALL]
+    if len(long) > 1:
+        raise Untraceable("a large matrix")
+    cells = np.empty([n for n in shape if n <= SMALL], dtype=object)
+    cells.fill(number)
+    return Tracer(graph, cells, *([long[0], shape[long[0]]] if long else []))
+
+
+def concatenated(graph: Graph, parts: Sequence[Tracer]) -> Tracer:
+    """Return arrays of one dimension, one after the other."""
+    if any(p.ndim > 1 for p in parts):
+        raise Untraceable("joining matrices")
+    size = sum(p.size for p in parts)
+    if size <= SMALL:
+        return Tracer(graph, np.concatenate([p.cells.reshape(-1) for p in parts]))
+    pieces: list[tuple[Expr, int]] = []
+    for part in parts:
+        if part.axis is None:
+            pieces += [(e, 1) for e in part.cells.reshape(-1)]
+        else:
+            pieces.append((part.only, part.length))
+    return Tracer(graph, boxed(graph.joined(pieces)), 0, size)

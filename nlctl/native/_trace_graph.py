@@ -1,0 +1,295 @@
+"""Expressions: what a diagram computes, each once.
+
+An expression is a number, or a vector of more than `SMALL` numbers that is computed in a loop.
+A graph keeps one copy of each, so that sin(x1) of one block is that of another, and evaluates
+constants.  It never changes the order of a sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+SMALL = 8  # arrays up to this size are numbers of their own, longer ones are loops
+BUDGET = 3000  # expressions of one function, beyond which it is better called than written out
+UNLIMITED = 10**9
+COMPARISONS = {"lt": "less", "le": "less_equal", "gt": "greater", "ge": "greater_equal",
+               "eq": "equal", "ne": "not_equal"}  # fmt: skip
+LOGIC = {"and": "logical_and", "or": "logical_or", "xor": "logical_xor", "not": "logical_not"}
+ARITHMETIC = {"add": "add", "sub": "subtract", "mul": "multiply", "div": "true_divide",
+              "neg": "negative", "select": "where"}  # fmt: skip
+NUMPY = COMPARISONS | LOGIC | ARITHMETIC
+INTEGER = ("add", "sub", "mul", "neg")  # of integers they are integers
+
+
+class Untraceable(Exception):  # noqa: N818 (it ends a trace; nobody else sees it)
+    """A function does what expressions cannot say: it is called as it stands instead."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Expr:
+    """One expression.
+
+    Attributes
+    ----------
+    op : str
+        ``"const"``, ``"table"`` (a vector of constants), ``"leaf"`` (read from an array),
+        ``"item"``, ``"slice"``, ``"concat"``, ``"sum"``, ``"call"`` (of an opaque function),
+        an operation of `NUMPY`, or NumPy's name of a function.
+    args : tuple of Expr
+    data : object
+        What else it needs: a constant, (array, start, step) of a leaf, index or (start, step) of
+        a part, lengths of what is joined, (function, lengths) of a call.
+    size : int or None
+        Number of elements of a vector, None for a number.
+    kind : str
+        ``"f"`` float, ``"i"`` integer, ``"b"`` truth value.
+    index : int
+        Its place in the graph, after all that it is made of.
+    varies : bool
+        Whether it depends on more than parameters.
+    value : int or None
+        Of an integer: what it is for the parameter values of the trace.
+    """
+
+    op: str
+    args: tuple[Expr, ...]
+    data: Any
+    size: int | None
+    kind: str
+    index: int
+    varies: bool
+    value: int | None
+
+
+class Undecided(BaseException):  # (what is traced may catch exceptions)
+    """A function asks whether a condition holds that is not known when it is traced."""
+
+    def __init__(self, condition: Expr) -> None:
+        self.condition = condition
+
+
+class Graph:
+    """All expressions of a diagram.
+
+    Attributes
+    ----------
+    nodes : list of Expr
+    limit : int
+        Largest number of expressions for now.
+    decisions : dict
+        What is taken to hold on the path through a function that is being traced.
+    assumptions : dict
+        Integer parameters that steer what is computed: place in `p`, and value.
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[Expr] = []
+        self.limit = UNLIMITED
+        self.decisions: dict[Expr, bool] = {}
+        self.assumptions: dict[int, int] = {}
+        self._known: dict[Any, Expr] = {}
+
+    def decided(self, condition: Expr) -> bool:
+        """Return whether a condition holds on this path; ask whoever traces if that is open."""
+        if condition.op == "const":
+            return bool(condition.data)
+        if condition not in self.decisions:
+            raise Undecided(condition)
+        return self.decisions[condition]
+
+    def assumed(self, integer: Expr) -> int:
+        """Return the value of an integer; from now on the parameters behind it are fixed."""
+        parts = [integer]
+        while parts:
+            part = parts.pop()
+            parts.extend(part.args)
+            if part.op == "leaf" and part.value is not None:
+                self.assumptions[part.data[1]] = part.value
+        return integer.value or 0
+
+    def node(
+        self,
+        op: str,
+        *args: Expr,
+        data: Any = None,
+        size: int | None = None,
+        kind: str = "f",
+        varies: bool = False,
+        value: int | None = None,
+    ) -> Expr:
+        """Return the one expression that is made of these parts."""
+        key = (op, tuple(a.index for a in args), repr(data), size, kind)
+        if key not in self._known:
+            if len(self.nodes) >= self.limit:
+                raise Untraceable("too long to be written out")
+            varies = varies or any(a.varies for a in args)
+            self._known[key] = Expr(
+                op=op, args=args, data=data, size=size, kind=kind,
+                index=len(self.nodes), varies=varies, value=value,
+            )  # fmt: skip
+            self.nodes.append(self._known[key])
+        return self._known[key]
+
+    def const(self, value: Any) -> Expr:
+        """Return a constant number; a bool and an int keep their kind."""
+        kind = "b" if isinstance(value, bool | np.bool_) else "f"
+        if kind == "f" and isinstance(value, int | np.integer):
+            kind = "i"
+        number = bool(value) if kind == "b" else float(value)
+        whole = int(value) if kind == "i" else None
+        return self.node("const", data=number, kind=kind, value=whole)
+
+    def leaf(self, array: str, start: int, size: int | None, kind: str = "f", value: Any = None):
+        """Return an entry of an argument of the program, or consecutive ones."""
+        where = (array, start, 1 if size else 0)
+        return self.node("leaf", data=where, size=size, kind=kind, varies=array != "p", value=value)
+
+    def op(self, name: str, *args: Expr) -> Expr:
+        """Return an operation on numbers, or on the elements of vectors."""
+        if name in INTEGER and all(a.kind == "i" for a in args):
+            value = int(getattr(np, NUMPY[name])(*(a.value for a in args)))
+            if all(a.op == "const" for a in args):
+                return self.const(value)
+            return self.node(name, *args, kind="i", value=value)
+        kind, args = self._kinds(name, args)
+        sizes = {a.size for a in args if a.size is not None}
+        if len(sizes) > 1:
+            raise Untraceable(f"{name} of vectors of sizes {sizes}")
+        if all(a.op == "const" for a in args):
+            with np.errstate(all="ignore"):
+                return self.const(getattr(np, NUMPY.get(name, name))(*(a.data for a in args))[()])
+        simple = self._simplified(name, *args)
+        return simple or self.node(name, *args, size=max(sizes, default=None), kind=kind)
+
+    def _kinds(self, name: str, args: tuple[Expr, ...]) -> tuple[str, tuple[Expr, ...]]:
+        """Return the kind of a result, and the arguments in the kinds that it takes."""
+        if name in LOGIC:
+            return "b", tuple(
+                a if a.kind == "b" else self.op("ne", a, self.const(0.0)) for a in args
+            )
+        if name == "select":
+            truth = all(a.kind == "b" for a in args[1:])
+            condition = args[0] if args[0].kind == "b" else self.op("ne", args[0], self.const(0.0))
+            rest = args[1:] if truth else tuple(self.number(a) for a in args[1:])
+            return "b" if truth else "f", (condition, *rest)
+        return "b" if name in COMPARISONS else "f", tuple(self.number(a) for a in args)
+
+    def number(self, a: Expr) -> Expr:
+        """Return an expression as a float."""
+        if a.op == "const":
+            return self.const(float(a.data))
+        return self.op("select", a, self.const(1.0), self.const(0.0)) if a.kind == "b" else a
+
+    def _simplified(self, name: str, *args: Expr) -> Expr | None:
+        """Return what is the same and simpler; at most the sign of a zero differs."""
+        a, b = args[0], args[-1]
+        is_const = [x.op == "const" for x in args]
+        if name == "select":
+            if args[1] is args[2] or (is_const[0] and a.data):
+                return args[1]
+            return args[2] if is_const[0] else self._inner_select(*args)
+        for this, other, known in ((a, b, is_const[-1]), (b, a, is_const[0])):
+            neutral = {"mul": 1.0, "div": 1.0, "add": 0.0, "sub": 0.0}.get(name)
+            turned = this is b and name in ("div", "sub") and len(args) == 2
+            if known and not turned and neutral is not None and other.data == neutral:
+                return this
+        if name == "sub" and is_const[0] and a.data == 0.0:
+            return self.op("neg", b)
+        return a.args[0] if name == "neg" and a.op == "neg" else None
+
+    def _inner_select(self, condition: Expr, a: Expr, b: Expr) -> Expr | None:
+        """Choose between two operations that differ in one argument by choosing that."""
+        if a.op != b.op or a.data is not None or a.op in ("const", "sum", "concat"):
+            return None
+        places = [
+            i for i, pair in enumerate(zip(a.args, b.args, strict=True)) if pair[0] != pair[1]
+        ]
+        if len(places) != 1:
+            return None
+        (i,) = places
+        chosen = self.op("select", condition, a.args[i], b.args[i])
+        return self.op(a.op, *a.args[:i], chosen, *a.args[i + 1 :])
+
+    def power(self, base: Expr, exponent: int) -> Expr:
+        """Return an integer power as products."""
+        if exponent < 0:
+            return self.op("div", self.const(1.0), self.power(base, -exponent))
+        if exponent == 0:
+            return self.const(1.0)
+        half = self.power(base, exponent // 2)
+        square = self.op("mul", half, half)
+        return self.op("mul", square, base) if exponent % 2 else square
+
+    def item(self, vector: Expr, k: int) -> Expr:
+        """Return element k of a vector; a number stands for a vector of equal elements."""
+        if vector.size is None:
+            return vector
+        if vector.kind == "b":
+            return self.op("ne", self.item(self.number(vector), k), self.const(0.0))
+        if vector.op == "leaf":
+            array, start, step = vector.data
+            return self.leaf(array, start + k * step, None, vector.kind)
+        if vector.op == "table":
+            return self.const(vector.data[k])
+        if vector.op == "slice":
+            return self.item(vector.args[0], vector.data[0] + k * vector.data[1])
+        if vector.op == "concat":
+            for piece, length in zip(vector.args, vector.data, strict=True):
+                if k < length:
+                    return self.item(piece, k)
+                k -= length
+        return self.node("item", vector, data=k, kind=vector.kind)
+
+    def part(self, vector: Expr, start: int, step: int, size: int) -> Expr:
+        """Return every step-th element of a vector, `size` of them."""
+        if vector.size is None or (start, step, size) == (0, 1, vector.size):
+            return vector
+        if vector.kind == "b":
+            whole = self.part(self.number(vector), start, step, size)
+            return self.op("ne", whole, self.const(0.0))
+        if vector.op == "leaf":
+            array, begin, stride = vector.data
+            where = (array, begin + start * stride, stride * step)
+            return self.node("leaf", data=where, size=size, kind=vector.kind, varies=vector.varies)
+        if vector.op == "table":
+            return self.table([vector.data[start + i * step] for i in range(size)])
+        if vector.op == "slice":
+            begin, stride = vector.data
+            return self.part(vector.args[0], begin + start * stride, stride * step, size)
+        if vector.op == "concat" and step == 1:
+            return self._part_of_joined(vector, start, size)
+        return self.node("slice", vector, data=(start, step), size=size, kind=vector.kind)
+
+    def _part_of_joined(self, vector: Expr, start: int, size: int) -> Expr:
+        pieces, at = [], 0
+        for piece, length in zip(vector.args, vector.data, strict=True):
+            begin, end = max(start - at, 0), min(start + size - at, length)
+            if begin < end:
+                single = end - begin == 1
+                kept = (
+                    self.item(piece, begin) if single else self.part(piece, begin, 1, end - begin)
+                )
+                pieces.append((kept, end - begin))
+            at += length
+        return self.joined(pieces)
+
+    def joined(self, pieces: Sequence[tuple[Expr, int]]) -> Expr:
+        """Return vectors and numbers, each with its length, one after the other."""
+        if len(pieces) == 1:
+            return pieces[0][0]
+        args, lengths = zip(*((self.number(e), n) for e, n in pieces), strict=True)
+        return self.node("concat", *args, data=lengths, size=sum(lengths))
+
+    def table(self, values: Sequence[float]) -> Expr:
+        """Return a vector of constants."""
+        return self.node("table", data=tuple(map(float, values)), size=len(values))
+
+    def sum(self, vector: Expr, size: int) -> Expr:
+        """Return the sum of a vector."""
+        if vector.size is None:
+            return self.op("mul", self.const(float(size)), vector)
+        return self.node("sum", self.number(vector))

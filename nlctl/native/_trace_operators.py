@@ -1,0 +1,158 @@
+"""What can be done with arrays of expressions: arithmetic, choices, sums, products.
+
+These are the operators and methods of `Tracer`.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ._trace_array import Tracer, boxed, concatenated, full, full_key, mapped, traced
+from ._trace_graph import Graph, Untraceable
+
+
+def elementwise(graph: Graph, name: str, *operands: Any) -> Tracer:
+    """Return an operation on arrays, element by element, with NumPy's broadcasting."""
+    arrays = [traced(graph, v) for v in operands]
+    longs = {(a.ndim - a.axis, a.length) for a in arrays if a.axis is not None}
+    if len(longs) > 1:
+        raise Untraceable(f"{name} of arrays that are long in different ways")
+    ndim = len(np.broadcast_shapes(*(a.shape for a in arrays)))
+    if not longs:
+        return Tracer(graph, mapped(lambda *e: graph.op(name, *e), *(a.cells for a in arrays)))
+    ((place, length),) = longs
+    cells = [
+        a.cells if a.axis is not None or a.ndim < place else a.cells.squeeze(a.ndim - place)
+        for a in arrays
+    ]
+    return Tracer(graph, mapped(lambda *e: graph.op(name, *e), *cells), ndim - place, length)
+
+
+def total(array: Tracer, axis: Any = None) -> Tracer:
+    """Return the sum of all elements, or along an axis, from left to right."""
+    graph, cells, long = array.graph, array.cells, array.axis
+    along = range(array.ndim) if axis is None else [operator.index(axis) % array.ndim]
+    if long in along:
+        cells = mapped(lambda e: graph.sum(e, array.length), cells)
+    short = [i - (long is not None and i > long) for i in along if i != long]
+    for i in sorted(short, reverse=True):
+        parts = np.moveaxis(cells, i, 0)
+        cells = boxed(parts[0]) if len(parts) else boxed(graph.const(0.0))
+        for part in parts[1:]:
+            cells = mapped(lambda a, b: graph.op("add", a, b), cells, boxed(part))
+    if long is None or long in along:
+        return Tracer(graph, boxed(cells))
+    return Tracer(graph, boxed(cells), long - sum(i < long for i in along), array.length)
+
+
+def product(a: Tracer, b: Tracer) -> Tracer:
+    """Return the matrix product of vectors and matrices."""
+    if a.ndim == 0 or b.ndim == 0 or b.ndim > 2 or a.ndim > 2:
+        raise Untraceable("a product of these shapes")
+    if a.shape[-1] != b.shape[0]:
+        raise Untraceable(f"a product of shapes {a.shape} and {b.shape}")
+    if b.ndim == 2:
+        a = a[..., None]
+        return total(elementwise(a.graph, "mul", a, b), -2)
+    return total(elementwise(a.graph, "mul", a, b), -1)
+
+
+def _assign(self: Tracer, key: Any, value: Any) -> None:
+    """Assign to items.  A long array must not share them: its parts are no views."""
+    value = traced(self.graph, value)
+    if self.axis is None:
+        if value.axis is not None:
+            raise Untraceable("a long array assigned to a short one")
+        self.cells[key] = value.cells if value.shape else value.cells[()]
+        return
+    if self.ndim > 1 or not self.alone:
+        raise Untraceable("assignment to a part of a long array")
+    (along,) = full_key(key, 1)
+    places = range(self.length)[along if isinstance(along, slice) else slice(along, along + 1)]
+    middle = value if value.shape else full(self.graph, (len(places),), value)
+    if places.step != 1 or middle.size != len(places):
+        raise Untraceable("assignment with a step, or of another shape")
+    parts = [p for p in (self[: places.start], middle, self[places.stop :]) if p.size]
+    self.cells, self.alone = concatenated(self.graph, parts).cells, True
+
+
+def _truth(self: Tracer) -> bool:
+    if self.size != 1 or self.axis is not None:
+        raise Untraceable("the truth value of an array")
+    condition = self.graph.op("ne", self.only, self.graph.const(0.0))
+    return self.graph.decided(self.only if self.only.kind == "b" else condition)
+
+
+def _integer(self: Tracer) -> int:
+    if not _is_integer(self):
+        raise Untraceable("an integer that depends on the state")
+    return self.graph.assumed(self.only)
+
+
+def _is_integer(value: Any) -> bool:
+    return isinstance(value, Tracer) and value.size == 1 and value.only.kind == "i"
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    """Return a power: with a whole exponent, known or assumed, as products."""
+    exponent = _integer(exponent) if _is_integer(exponent) else exponent
+    if isinstance(exponent, float) and exponent.is_integer():
+        exponent = int(exponent)
+    if isinstance(exponent, Tracer):
+        return elementwise(exponent.graph, "power", base, exponent)
+    if not isinstance(base, Tracer):
+        return base**exponent
+    if isinstance(exponent, int | np.integer) and abs(exponent) <= 64:
+        cells = mapped(lambda e: base.graph.power(e, int(exponent)), base.cells)
+        return Tracer(base.graph, cells, base.axis, base.length)
+    return elementwise(base.graph, "power", base, exponent)
+
+
+def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
+    def method(self: Tracer, other: Any) -> Any:
+        if not isinstance(other, Tracer | np.ndarray | float | int | bool | np.generic):
+            return NotImplemented  # a tuple is no array
+        return elementwise(self.graph, name, *((other, self) if swapped else (self, other)))
+
+    return method
+
+
+def _in_place(name: str) -> Callable[[Any, Any], Any]:
+    def method(self: Tracer, other: Any) -> Any:
+        result = elementwise(self.graph, name, self, other)
+        if not self.shape:
+            return result  # a number is not changed but replaced
+        if result.shape != self.shape:
+            raise Untraceable("assignment of another shape")
+        _assign(self, slice(None), result)
+        return self
+
+    return method
+
+
+BINARY = {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div", "mod": "remainder"}
+for _name, _op in (BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
+    setattr(Tracer, f"__{_name}__", _operator(_op))
+    setattr(Tracer, f"__r{_name}__", _operator(_op, swapped=True))
+    setattr(Tracer, f"__i{_name}__", _in_place(_op))
+for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
+    setattr(Tracer, f"__{_name}__", _operator(_name))
+for _name, _op in {"neg": "neg", "abs": "absolute", "invert": "not"}.items():
+    setattr(Tracer, f"__{_name}__", lambda self, op=_op: elementwise(self.graph, op, self))
+for _name, _method in {
+    "setitem": _assign,
+    "bool": _truth,
+    "index": _integer,
+    "int": _integer,
+    "pow": _power,
+    "rpow": lambda self, other: _power(other, self),
+    "floordiv": lambda self, other: operator.floordiv(_integer(self), other),
+    "matmul": lambda self, other: product(self, traced(self.graph, other)),
+    "rmatmul": lambda self, other: product(traced(self.graph, other), self),
+}.items():
+    setattr(Tracer, f"__{_name}__", _method)
+Tracer.sum, Tracer.dot = total, Tracer.__matmul__  # type: ignore[attr-defined]
