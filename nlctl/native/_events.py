@@ -2,17 +2,16 @@
 
 A switching function that changes its sign marks a corner; a memory turns round where the rate at
 which it would be carried along changes its sign or becomes zero.  In both cases the step is
-repeated, shorter each time, until it ends right behind the event: all stages but a negligible rest
-then lie on one side, and no method order is lost.  Regula falsi with the Illinois modification finds
-the length; every attempt is a step of full order, so nothing rests on an interpolant that has seen
-the other side.
+repeated, shorter each time, until it ends right behind the event: all stages but a negligible
+rest then lie on one side, and no method order is lost.  Regula falsi with the Illinois modification
+finds the length; every attempt is a step of full order, so nothing rests on an interpolant that has
+seen the other side.
 """
 
 from __future__ import annotations
 
 import numba
 import numpy as np
-
 
 STARTS_BEHIND = 1e-5  # a root in this first part of a step was the end of the step before
 AGAIN, CLEAR, EVENT = 0, 1, 2  # what became of the step just tried
@@ -30,15 +29,15 @@ def triggered(start, end, is_memory):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def first_root(lane, corners, e_start, e_low, e_high, l):
+def first_root(lane, corners, e_start, e_low, e_high, j):
     """Return where the first event between the lengths low and high lies, -1 if there is none.
 
     And whether it is a memory's.
     """
     first, is_memory = -1.0, False
     for i in range(e_start.shape[0]):
-        if triggered(e_start[i, l], e_high[i, l], i >= corners):
-            low, high = e_low[i, l], e_high[i, l]
+        if triggered(e_start[i, j], e_high[i, j], i >= corners):
+            low, high = e_low[i, j], e_high[i, j]
             if not low * high < 0.0:
                 high = -low  # a memory that would stand still says no more than that: halve
             part = 0.5 if low == high else low / (low - high)
@@ -49,15 +48,15 @@ def first_root(lane, corners, e_start, e_low, e_high, l):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def locate(lane, corners, rtol, e_start, e_low, e_high, e, l):
+def locate(lane, corners, rtol, e_start, e_low, e_high, e, j):
     """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT.
 
     With AGAIN, ``lane.step`` is the next length to try.
     """
     if lane.tries == 0:
         lane.low, lane.high = 0.0, lane.step
-        e_low[:, l], e_high[:, l] = e_start[:, l], e[:, l]
-    root, memory = _narrowed(lane, corners, e_start, e_low, e_high, e, l)
+        e_low[:, j], e_high[:, j] = e_start[:, j], e[:, j]
+    root, memory = _narrowed(lane, corners, e_start, e_low, e_high, e, j)
     if root < 0.0:
         return CLEAR
     lane.tries += 1
@@ -80,26 +79,26 @@ def locate(lane, corners, rtol, e_start, e_low, e_high, e, l):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _narrowed(lane, corners, e_start, e_low, e_high, e, l):
+def _narrowed(lane, corners, e_start, e_low, e_high, e, j):
     """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
     before = lane.high
     if lane.tries > 0:
         lane.high = lane.step
-        inside = first_root(lane, corners, e_start, e_low, e, l)[0] >= 0.0
+        inside = first_root(lane, corners, e_start, e_low, e, j)[0] >= 0.0
         if not inside:
             lane.low, lane.high = lane.step, before
             lane.same_side = min(lane.same_side, 0) - 1
-            e_low[:, l] = e[:, l]
+            e_low[:, j] = e[:, j]
             if lane.same_side < -1:
-                e_high[:, l] *= 0.5  # Illinois: an end that stays loses weight
+                e_high[:, j] *= 0.5  # Illinois: an end that stays loses weight
         else:
             lane.same_side = max(lane.same_side, 0) + 1
-            e_high[:, l] = e[:, l]
+            e_high[:, j] = e[:, j]
             if lane.same_side > 1:
-                e_low[:, l] *= 0.5
+                e_low[:, j] *= 0.5
     else:
         lane.same_side = 0
-    return first_root(lane, corners, e_start, e_low, e_high, l)
+    return first_root(lane, corners, e_start, e_low, e_high, j)
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -15,32 +15,41 @@ import numba
 import numpy as np
 
 from . import _rodas5p, _tsit5
-from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted
 from ._control import choose_method, choose_step, next_step, rejected
+from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted
 from ._lane import LANES, RUNNING
 from ._stiff import stiff_attempt
 from ._work import AUTO, OUT, RHS, Task, inputs_at, memory_rates, new_work, outputs, restart, start
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _explicit_attempt(rhs, task, lanes, t, h, x, x_new, x_stage, k, g, u):
+def _explicit_attempt(rhs, task, lanes, w):
     """Try a step of Tsitouras' pair in all lanes."""
-    for j in range(lanes.size):
-        h[j] = lanes[j].step
+    x, hh, k, count = w.x_flat, w.hh, w.k_flat, lanes.size
+    for j in range(count):
+        w.h[j] = lanes[j].step
+    for i in range(w.x.shape[0]):
+        for j in range(count):
+            hh[i * count + j] = w.h[j]
     for s in range(1, _tsit5.STAGES):
-        target = x_new if s == 6 else x_stage
-        _tsit5.combined(x, h, k, s, target)
-        for j in range(lanes.size):
-            t[j] = lanes[j].t + _tsit5.C[s] * h[j]
-        if u.shape[0]:
-            inputs_at(t, task.times, task.inputs, lanes, u)
-        rhs(t, target, u, task.p, k[s], g)
+        for j in range(count):
+            w.t[j] = lanes[j].t + _tsit5.C[s] * w.h[j]
+        if w.u.shape[0]:
+            inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+        if s < 6:
+            _tsit5.combined(x, hh, k, s, w.x_stage_flat)
+            rhs(w.t, w.x_stage, w.u, task.p, w.k[s], w.g)
+        else:
+            _tsit5.combined(x, hh, k, s, w.x_new_flat)
+            rhs(w.t, w.x_new, w.u, task.p, w.k[s], w.g)
         for i in task.memory:
-            k[s, i, :] = 0.0
+            w.k[s, i, :] = 0.0
+    _tsit5.weighed_errors(x, w.x_new_flat, k, hh, task.rtol, task.atol, w.x_ahead_flat)
+    _tsit5.errors(w.x_ahead, w.x_new, w.x_stage, w.k, w.sums, w.error, w.rate)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _sample(lane, l, times, t_new, x, x_new, k, U, states):
+def _sample(lane, j, times, t_new, x, x_new, k, U, states):
     """Fill the output samples that the accepted step of a lane has passed."""
     last = times.size - 1
     while lane.segment < last and times[lane.segment + 1] <= t_new:
@@ -48,11 +57,11 @@ def _sample(lane, l, times, t_new, x, x_new, k, U, states):
         theta = (times[lane.segment] - lane.t) / lane.step
         target = states[lane.segment]
         if theta >= 1.0:
-            target[:, l] = x_new[:, l]  # exactly the solution, not its interpolant
+            target[:, j] = x_new[:, j]  # exactly the solution, not its interpolant
         elif lane.stiff:
             _rodas5p.interpolate(theta, x, x_new, U, target)
         else:
-            _tsit5.interpolate(theta, lane.step, x, k, l, target)
+            _tsit5.interpolate(theta, lane.step, x, k, j, target)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -69,34 +78,34 @@ def _judge(task, lanes, w, states, done, passed):
     memory in motion.
     """
     corners, memories = task.corners, task.memory.size
-    for l in range(lanes.size):
-        lane = lanes[l]
-        done[l] = passed[l] = False
-        if lane.status != RUNNING or rejected(lane, w.error[l], task.fixed):
+    for j in range(lanes.size):
+        lane = lanes[j]
+        done[j] = passed[j] = False
+        if lane.status != RUNNING or rejected(lane, w.error[j], task.fixed):
             continue
         found = CLEAR
         if w.e.shape[0]:
-            found = locate(lane, corners, task.rtol, w.e_start, w.e_low, w.e_high, w.e, l)
+            found = locate(lane, corners, task.rtol, w.e_start, w.e_low, w.e_high, w.e, j)
         if found == AGAIN:
             lane.rejected += 1
             continue
         t_new = _stop(task.times, lane, w.u) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
-            _sample(lane, l, task.times, t_new, w.x, w.x_new, w.k, w.U, states)
+            _sample(lane, j, task.times, t_new, w.x, w.x_new, w.k, w.U, states)
         step_accepted(lane, found == EVENT)
         lane.t = t_new
-        next_step(lane, w.error[l], w.rate[l], task.fixed, memories)
-        done[l] = True
-        passed[l] = found == EVENT or (memories and _began_to_move(corners, w.e_start, w.e, l))
+        next_step(lane, w.error[j], w.rate[j], task.fixed, memories)
+        done[j] = True
+        passed[j] = found == EVENT or (memories and _began_to_move(corners, w.e_start, w.e, j))
         if task.method == AUTO:
             choose_method(lane, w.x.shape[0], task.alone)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _began_to_move(corners, e_start, e, l):
+def _began_to_move(corners, e_start, e, j):
     """Whether a memory that stood still at the start of the accepted step moves at its end."""
-    for i in range(corners, e.shape[0]):
-        if e_start[i, l] == 0.0 and e[i, l] != 0.0:
+    for i in range(corners, e.shape[0]):  # noqa: SIM110 (no generators in machine code)
+        if e_start[i, j] == 0.0 and e[i, j] != 0.0:
             return True
     return False
 
@@ -126,25 +135,20 @@ def advance(rhs, task, lanes, w, states, rounds):
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     for _ in range(rounds):
         running = 0
-        for l in range(lanes.size):
-            if lanes[l].status == RUNNING:
-                over = lanes[l].segment == task.times.size - 1
-                choose_step(lanes[l], _stop(task.times, lanes[l], w.u), over, task.max_steps)
-                running += lanes[l].status == RUNNING
+        for j in range(lanes.size):
+            if lanes[j].status == RUNNING:
+                over = lanes[j].segment == task.times.size - 1
+                choose_step(lanes[j], _stop(task.times, lanes[j], w.u), over, task.max_steps)
+                running += lanes[j].status == RUNNING
         if not running:
             return
         if lanes[0].stiff:
             stiff_attempt(rhs, task, lanes, w)
         else:
-            _explicit_attempt(
-                rhs, task, lanes, w.t, w.h, w.x, w.x_new, w.x_stage, w.k, w.g, w.u
-            )
-            _tsit5.errors(
-                w.x, w.x_new, w.x_stage, w.k, w.h, task.rtol, task.atol, w.error, w.rate
-            )
+            _explicit_attempt(rhs, task, lanes, w)
         if task.memory.size:
-            for l in range(lanes.size):
-                w.t_end[l] = lanes[l].t + lanes[l].step
+            for j in range(lanes.size):
+                w.t_end[j] = lanes[j].t + lanes[j].step
             memory_rates(rhs, task, lanes, w, w.x_new, w.k[6])
         w.e[: task.corners] = w.g[: task.corners]
         _judge(task, lanes, w, states, done, passed)
@@ -157,7 +161,9 @@ def advance(rhs, task, lanes, w, states, rounds):
 def machine_code() -> dict[str, Callable[..., None]]:
     """Return the compiled functions: made when first needed, from the cache in later sessions."""
     one = np.zeros(1)
-    task = numba.typeof(Task(one, one[None], one[None], 0, np.zeros(1, np.int64), 0.0, 0.0, 0.0, 0, 0, 0))
+    task = numba.typeof(
+        Task(one, one[None], one[None], 0, np.zeros(1, np.int64), 0.0, 0.0, 0.0, 0, 0, 0)
+    )
     work = numba.typeof(new_work(1, 1, 1, 1))
     samples = numba.float64[:, :, ::1]
     signatures = {

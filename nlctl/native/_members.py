@@ -127,7 +127,7 @@ class Members:
 
     @cached_property
     def _owners(self) -> list[tuple[Block, Mapping[str, Slot], dict[str, str]]] | None:
-        """Blocks whose parameters vary, with their places in the vector; None if there are others."""
+        """Blocks whose parameters vary, with their places; None if foreign ones do."""
         self._first_vector  # noqa: B018 (names and fixed values are resolved first)
         known = self.compiled.system.params
         nodes = [node.system for node in self.compiled.schedule.nodes]

@@ -101,7 +101,7 @@ def solve(matrix, pivots, b):
 
 @numba.njit(cache=True, error_model="numpy")
 def error_norm(x, x_new, U, rtol, atol):
-    """Return the largest error, the last stage, over the tolerance; not finite if a state is not."""
+    """Return the largest error over the tolerance; not finite if a state is not."""
     largest, spoilt = 0.0, 0.0
     for i in range(x.shape[0]):
         scale = atol + rtol * max(abs(x[i, 0]), abs(x_new[i, 0]))

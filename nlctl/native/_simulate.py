@@ -152,9 +152,7 @@ def go_on(run: Run, rounds: int = ROUNDS) -> None:
 def finish(run: Run) -> np.ndarray:
     """Return the outputs, shape (m, outputs, members); memories get their values in the samples."""
     y = np.full((run.task.times.size, run.signals, run.lanes.size), np.nan)
-    machine_code()["outputs"](
-        run.machine.rhs, run.machine.out, run.task, run.work, run.states, y
-    )
+    machine_code()["outputs"](run.machine.rhs, run.machine.out, run.task, run.work, run.states, y)
     return y
 
 
@@ -198,9 +196,14 @@ def prepared(
     )
 
 
-def made(run: Run, outputs: np.ndarray, l: int) -> Trajectory:
+def made(run: Run, outputs: np.ndarray, j: int) -> Trajectory:
     """Return what became of one member."""
-    lane, times, states, outputs = run.lanes[l], run.task.times, run.states[:, :, l], outputs[:, :, l]
+    lane, times, states, outputs = (
+        run.lanes[j],
+        run.task.times,
+        run.states[:, :, j],
+        outputs[:, :, j],
+    )
     status, reached = Status(int(lane["status"])), float(lane["t"])
     done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
     if status is Status.OK and not np.all(np.isfinite(outputs)):

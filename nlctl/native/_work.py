@@ -13,6 +13,7 @@ import numba
 import numpy as np
 
 from . import _rodas5p, _tsit5
+
 VECTOR = numba.float64[::1]
 MATRIX = numba.float64[:, ::1]
 RHS = numba.types.FunctionType(numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX))
@@ -22,14 +23,13 @@ AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
 FAR = 1e6
 AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
 
-Task = namedtuple(
-    "Task", "times inputs p corners memory rtol atol fixed max_steps method alone"
-)
+Task = namedtuple("Task", "times inputs p corners memory rtol atol fixed max_steps method alone")
 Work = namedtuple(
     "Work",
-    "t h x x_new x_stage k g e e_start e_low e_high u error rate x_ahead dx_ahead g_ahead "
-    "t_end jacobian matrix f_t pivots U",
+    "t h hh x x_new x_stage k g e e_start e_low e_high u error rate x_ahead dx_ahead g_ahead "
+    "x_flat x_new_flat x_stage_flat x_ahead_flat k_flat sums t_end jacobian matrix f_t pivots U",
 )
+FLAT = ("x", "x_new", "x_stage", "x_ahead")
 
 
 def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
@@ -40,10 +40,16 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
     }
     rows = ("g", "g_ahead", "e", "e_start", "e_low", "e_high")
     columns |= {name: np.zeros((events, lanes)) for name in rows}
+    flat = {f"{name}_flat": columns[name].reshape(-1) for name in FLAT}  # the same memory
+    k = np.zeros((_tsit5.STAGES, n, lanes))
     return Work(
         **columns,
+        **flat,
         **{name: np.zeros(lanes) for name in ("t", "h", "error", "rate", "t_end")},
-        k=np.zeros((_tsit5.STAGES, n, lanes)),
+        hh=np.zeros(n * lanes),
+        k=k,
+        k_flat=k.reshape(_tsit5.STAGES, n * lanes),
+        sums=np.zeros((3, lanes)),
         u=np.zeros((inputs, lanes)),
         jacobian=np.zeros((size, size)),
         matrix=np.zeros((size, size)),
@@ -57,7 +63,7 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
 def inputs_at(t, times, inputs, lanes, u):
     """Fill `u` with the inputs at each lane's time: linear within a segment of the time grid."""
     for j in range(lanes.size):
-        m = lanes[j].segment
+        m = min(lanes[j].segment, times.size - 2)  # a lane that has finished is not moved on
         share = (t[j] - times[m]) / (times[m + 1] - times[m])
         for i in range(u.shape[0]):
             u[i, j] = inputs[i, m] * (1.0 - share) + inputs[i, m + 1] * share
