@@ -2,6 +2,7 @@
 
 from .adaptive import Zero, adaptive_neural
 from .filtered_error import FilteredError, binomial_lambdas
+from .known_sign import KnownSignLaw
 from .nussbaum import NussbaumLaw
 from .rbf import (
     AdaptiveWeights,
@@ -10,12 +11,17 @@ from .rbf import (
     grid_centres,
     latin_hypercube_centres,
 )
+from .remedies import DeadZoneNussbaumLaw, LeakyNussbaumLaw, MonotoneNussbaumLaw
 from .robust import RobustTerm
 
 __all__ = [
     "AdaptiveWeights",
+    "DeadZoneNussbaumLaw",
     "FilteredError",
     "GaussianBasis",
+    "KnownSignLaw",
+    "LeakyNussbaumLaw",
+    "MonotoneNussbaumLaw",
     "NussbaumLaw",
     "RobustTerm",
     "Zero",

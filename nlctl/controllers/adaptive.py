@@ -6,7 +6,7 @@ from typing import Any
 
 import control as ct
 
-from .._diagram import interconnect
+from .._diagram import as_system, interconnect
 from .._equation import equation
 from .._errors import ParameterError
 from .._param import record, whole_number
@@ -60,7 +60,8 @@ def adaptive_neural(
 
         filtered_error -> basis -> weights, robust -> law
 
-    It takes x1, ..., xn and yd, yd1, ..., ydn, and delivers e, r, u, zeta, delta_hat, W_norm.
+    It takes x1, ..., xn and yd, yd1, ..., ydn, and delivers e, r, u, zeta, delta_hat, W_norm;
+    no zeta where the law has none.
     It knows neither the plant nor the actuator: the same controller drives a dead zone and
     backlash.
 
@@ -118,9 +119,11 @@ def adaptive_neural(
     signals = (
         [f"x{i}" for i in range(1, order + 1)] + ["yd"] + [f"yd{i}" for i in range(1, order + 1)]
     )
+    systems = [as_system(piece, key) for key, piece in pieces.items()]
+    argument = ["zeta"] if "zeta" in systems[-1].output_labels else []  # KnownSignLaw has none
     return interconnect(
-        pieces,
+        systems,
         inputs=signals,
-        outputs=["e", "r", "u", "zeta", "delta_hat", "W_norm"],
+        outputs=["e", "r", "u", *argument, "delta_hat", "W_norm"],
         name=name,
     )

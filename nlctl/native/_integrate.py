@@ -17,12 +17,12 @@ import numpy as np
 from . import _rodas5p, _tsit5
 from ._control import choose_method, choose_step, next_step, rejected
 from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted
-from ._lane import LANES, RUNNING
+from ._lane import INNER, LANES, RUNNING
 from ._stiff import stiff_attempt
 from ._work import AUTO, OUT, RHS, Task, inputs_at, memory_rates, new_work, outputs, restart, start
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _explicit_attempt(rhs, task, lanes, w):
     """Try a step of Tsitouras' pair in all lanes."""
     x, hh, k, count = w.x_flat, w.hh, w.k_flat, lanes.size
@@ -48,7 +48,7 @@ def _explicit_attempt(rhs, task, lanes, w):
     _tsit5.errors(w.x_ahead, w.x_new, w.x_stage, w.k, w.sums, w.error, w.rate)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _sample(lane, j, times, t_new, x, x_new, k, U, states):
     """Fill the output samples that the accepted step of a lane has passed."""
     last = times.size - 1
@@ -64,13 +64,13 @@ def _sample(lane, j, times, t_new, x, x_new, k, U, states):
             _tsit5.interpolate(theta, lane.step, x, k, j, target)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _stop(times, lane, u):
     """Return where a step must end: with inputs at the next corner, otherwise at the last time."""
     return times[lane.segment + 1] if u.shape[0] and lane.segment < times.size - 1 else times[-1]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _judge(task, lanes, w, states, done, passed):
     """Accept or reject the step just tried in every lane, and propose the next.
 
@@ -101,7 +101,7 @@ def _judge(task, lanes, w, states, done, passed):
             choose_method(lane, w.x.shape[0], task.alone)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _began_to_move(corners, e_start, e, j):
     """Whether a memory that stood still at the start of the accepted step moves at its end."""
     for i in range(corners, e.shape[0]):  # noqa: SIM110 (no generators in machine code)
@@ -110,7 +110,7 @@ def _began_to_move(corners, e_start, e, j):
     return False
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _take(task, w, done):
     """Make the ends of the accepted steps the states, and commit the memories."""
     n, count = w.x.shape

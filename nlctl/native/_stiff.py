@@ -6,6 +6,7 @@ import numba
 import numpy as np
 
 from . import _rodas5p
+from ._lane import INNER
 from ._work import evaluate
 
 RELATIVE = 1.5e-8  # square root of the machine precision
@@ -13,7 +14,7 @@ FLOOR = 1e-4  # a state smaller than this is varied as if it were so large
 AHEAD = 1e-4  # part of a step by which time is varied
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _jacobian(rhs, task, lanes, w):
     """Fill w.jacobian and w.f_t at the start of a step by forward differences."""
     n, lane = w.x.shape[0], lanes[0]
@@ -33,7 +34,7 @@ def _jacobian(rhs, task, lanes, w):
     lane.jacobian_at = lane.t
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _spectral_radius(w):
     """Estimate the largest eigenvalue's magnitude by a few steps of the power method."""
     n = w.jacobian.shape[0]
@@ -50,7 +51,7 @@ def _spectral_radius(w):
     return rate
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def stiff_attempt(rhs, task, lanes, w):
     """Try a step of Rodas5P in the only lane."""
     n, lane, h = w.x.shape[0], lanes[0], lanes[0].step

@@ -13,6 +13,7 @@ import numba
 import numpy as np
 
 from . import _rodas5p, _tsit5
+from ._lane import INNER
 
 VECTOR = numba.float64[::1]
 MATRIX = numba.float64[:, ::1]
@@ -59,7 +60,7 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def inputs_at(t, times, inputs, lanes, u):
     """Fill `u` with the inputs at each lane's time: linear within a segment of the time grid."""
     for j in range(lanes.size):
@@ -69,7 +70,7 @@ def inputs_at(t, times, inputs, lanes, u):
             u[i, j] = inputs[i, m] * (1.0 - share) + inputs[i, m + 1] * share
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def evaluate(rhs, task, lanes, w, x, dx, g):
     """Evaluate the right-hand side at the times w.t; memory stands still within a step."""
     if w.u.shape[0]:
@@ -79,7 +80,7 @@ def evaluate(rhs, task, lanes, w, x, dx, g):
         dx[i, :] = 0.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def memory_rates(rhs, task, lanes, w, x, dx):
     """Fill the memory rows of w.e with the rates at which memories would be carried along.
 
@@ -100,7 +101,7 @@ def memory_rates(rhs, task, lanes, w, x, dx):
                 w.e[i, j] = 0.0  # memories are committed step by step for a while
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def restart(rhs, task, lanes, w, chosen):
     """Make the chosen lanes' derivatives, event functions and memories those of their state."""
     for _ in range(1 + min(task.memory.size, 1)):  # once more with the memory committed
@@ -129,7 +130,7 @@ def restart(rhs, task, lanes, w, chosen):
             w.e_start[:, j] = w.e[:, j]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _refresh(rhs, task, lanes, w, chosen):
     """Evaluate the chosen lanes' derivatives and event functions at their state."""
     for j in range(lanes.size):
@@ -140,7 +141,7 @@ def _refresh(rhs, task, lanes, w, chosen):
             w.k[0, :, j], w.g[:, j] = w.dx_ahead[:, j], w.g_ahead[:, j]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _lock(w, i, lane, rate):
     """Move a memory that is being carried along far behind what carries it.
 
@@ -155,7 +156,7 @@ def _lock(w, i, lane, rate):
         w.x[i, lane] += far
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _first_step(rhs, task, lanes, w):
     """Propose a first step, after Hairer, Norsett, Wanner, Solving ODEs I, II.4."""
     n, span = w.x.shape[0], task.times[-1] - task.times[0]

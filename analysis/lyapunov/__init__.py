@@ -1,0 +1,1 @@
+"""Lyapunov checks: constants with provenance, inequalities, certificates, the ledger."""

@@ -1,0 +1,123 @@
+"""Boxes: the compact sets over which constants are proved, given or visited by trajectories."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Literal
+
+import control as ct
+import numpy as np
+
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+
+__all__ = ["Box", "Cell", "visited_box"]
+
+Cell = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """A product of intervals with named sides.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Coordinates, ``("x1", "x2", "v")``.
+    low, high : tuple of float
+        Ends of the sides; a side may be infinite.
+    provenance : {"given", "sampled"}
+        "sampled" for a box that trajectories have visited.
+    how : str
+        Where the box comes from.
+    """
+
+    names: tuple[str, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    provenance: Literal["given", "sampled"] = "given"
+    how: str = "given"
+
+    @classmethod
+    def of(cls, **sides: tuple[float, float]) -> Box:
+        """Make a box of its sides, ``Box.of(x1=(-1, 1), v=(-12, 6))``."""
+        low, high = (tuple(float(ends[i]) for ends in sides.values()) for i in (0, 1))
+        return cls(names=tuple(sides), low=low, high=high)
+
+    def __post_init__(self) -> None:
+        for name, a, b in zip(self.names, self.low, self.high, strict=True):
+            if not a <= b:  # refuses NaN, too
+                raise ParameterError(f"Box needs low <= high on side {name}, got [{a:g}, {b:g}]")
+
+    def __getitem__(self, name: str) -> tuple[float, float]:
+        if name not in self.names:
+            raise unknown("side", name, self.names, "of the box")
+        i = self.names.index(name)
+        return self.low[i], self.high[i]
+
+    def only(self, *names: str) -> Box:
+        """Return the box of some of the sides, in the order given."""
+        low, high = (tuple(self[name][i] for name in names) for i in (0, 1))
+        return dataclasses.replace(self, names=names, low=low, high=high)
+
+    def times(self, name: str, low: float, high: float) -> Box:
+        """Return the product of the box with one more side."""
+        names = (*self.names, name)
+        return dataclasses.replace(self, names=names, low=(*self.low, low), high=(*self.high, high))
+
+    @property
+    def cell(self) -> Cell:
+        """The sides as pairs."""
+        return tuple(zip(self.low, self.high, strict=True))
+
+    def __str__(self) -> str:
+        sides = [f"{n} in [{a:g}, {b:g}]" for n, (a, b) in zip(self.names, self.cell, strict=True)]
+        return ", ".join(sides) + ("" if self.how == "given" else f" ({self.how})")
+
+
+def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
+    """Return the box that responses have visited, each side widened at both ends.
+
+    Parameters
+    ----------
+    *responses : control.TimeResponseData
+        With outputs x1, ..., xn, and u and v where they are recorded.
+    margin : float, optional
+        Widening at each end, as a share of the side; >= 0.
+
+    Returns
+    -------
+    Box
+        Provenance "sampled": nothing says that other trajectories stay in it.
+
+    Raises
+    ------
+    ParameterError
+        If there is no response, no state among its outputs, or a value that is not finite.
+    """
+    if not responses or not margin >= 0:
+        raise ParameterError(
+            f"visited_box needs a response and margin >= 0, got {len(responses)} and {margin}"
+        )
+    labels = [list(r.output_labels or ()) for r in responses]
+    wanted = [n for n in labels[0] if n in ("u", "v") or _is_state(n)]
+    if not any(map(_is_state, wanted)):
+        raise ParameterError("visited_box needs the outputs x1, ..., xn in the response")
+    sides = {}
+    for name in wanted:
+        rows = zip(responses, labels, strict=True)
+        values = np.concatenate([np.ravel(r.y[own.index(name)]) for r, own in rows])
+        low, high = np.min(values), np.max(values)
+        room = margin * (high - low)
+        sides[name] = (low - room, high + room)
+        if not np.all(np.isfinite(sides[name])):
+            raise ParameterError(f"visited_box needs finite values, got {name} in {sides[name]}")
+    start, end = (f([f(r.time) for r in responses]) for f in (np.min, np.max))
+    who = "one response" if len(responses) == 1 else f"{len(responses)} responses"
+    how = f"visited by {who} in [{start:g}, {end:g}] s, + {margin:.0%}"
+    return dataclasses.replace(Box.of(**sides), provenance="sampled", how=how)
+
+
+def _is_state(name: str) -> bool:
+    return name[:1] == "x" and name[1:].isdigit()

@@ -1,0 +1,279 @@
+"""Assumption 1: actuators as v = k(u, t) u + eps_u (2), with the bounds (3) of k and of eps_u.
+
+The split of an actuator is not unique.  Any bounds 0 < k_1 <= k_2 give one: k u is v clipped
+between the lines k_1 u and k_2 u, and eps_u the rest.  A small k_1 buys a small eps_u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from nlctl._errors import ParameterError, UsageError
+from nlctl._param import equation_arguments
+from nlctl.actuators import Backlash, DeadZone, play_band
+
+from .balls import Box, Range, enclose
+
+__all__ = ["Decomposable", "Decomposition", "DecompositionError", "clipped_split", "decompose"]
+
+
+class DecompositionError(UsageError):
+    """An actuator that (2) and (3) do not describe; the message says why."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decomposition:
+    """A split v = k(u, v) u + eps_u of an actuator, (2) and (3).
+
+    Attributes
+    ----------
+    k_1, k_2 : float
+        0 < k_1 <= k <= k_2.
+    eps_low, eps_high : float
+        Bounds of eps_u.
+    part : callable
+        ``part(u, v)`` is k u; floats and arrays.  `gain` and `eps_u` follow from it.
+    provenance : {"computed", "proved", "given"}
+        "computed" in closed form, "proved" by branch and bound.
+    how, over : str
+        How the bounds were obtained, and for which inputs they hold.
+    """
+
+    k_1: float
+    k_2: float
+    eps_low: float
+    eps_high: float
+    part: Callable[[Any, Any], Any]
+    provenance: Literal["proved", "computed", "given"]
+    how: str
+    over: str
+
+    def __post_init__(self) -> None:
+        if not 0 < self.k_1 <= self.k_2 < np.inf:
+            raise DecompositionError(
+                f"Assumption 1 needs 0 < k_1 <= k_2, got {self.k_1:g} and {self.k_2:g}"
+            )
+
+    @property
+    def eps_star(self) -> float:
+        """Bound eps_u* of |eps_u|."""
+        return float(np.maximum(abs(self.eps_low), abs(self.eps_high)))
+
+    def eps_u(self, u: Any, v: Any) -> Any:
+        """Return eps_u = v - k u for input u and output v."""
+        return v - self.part(u, v)
+
+    def gain(self, u: Any, v: Any) -> Any:
+        """Return k for input u and output v; k_1 at u = 0, where it has no effect."""
+        u = np.asarray(u, dtype=float)
+        k = self.part(u, v) / np.where(u == 0, 1.0, u)
+        return np.where(u == 0, self.k_1, k)
+
+
+class Decomposable(Protocol):
+    """An actuator record that knows its own split."""
+
+    def decomposition(self, u_max: float) -> Decomposition:
+        """Return the split for inputs |u| <= u_max."""
+        ...
+
+
+def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
+    """Return k u of the split k = min(max(v/u, k_1), k_2), written without the division.
+
+    It serves numbers, arrays and balls, and leaves the smallest |eps_u| that any split with
+    k_1 <= k <= k_2 leaves at (u, v).
+    """
+
+    def part(u: Any, v: Any) -> Any:
+        one, other = k_1 * u, k_2 * u
+        return np.minimum(np.maximum(v, np.minimum(one, other)), np.maximum(one, other))
+
+    return part
+
+
+def decompose(
+    actuator: Any,
+    *,
+    k: tuple[float, float] | None = None,
+    u_max: float = 60.0,
+    tol: float = 1e-4,
+) -> Decomposition:
+    """Split an actuator as v = k u + eps_u and bound k and eps_u.
+
+    Parameters
+    ----------
+    actuator : record
+        A `nlctl.DeadZone` (by default split as in textbooks: k is the slope factor, and 1 inside
+        the dead zone), a `nlctl.Backlash` (k is the slope), a memoryless actuator with one input
+        and one output (`k` must be given), or a record with a method ``decomposition(u_max)``,
+        see `Decomposable`.
+    k : (k_1, k_2), optional
+        Bounds that k shall have.  The split is then `clipped_split`, and eps_u is bounded by
+        branch and bound.
+    u_max : float, optional
+        Largest |u| of the branch and bound.
+    tol : float, optional
+        eps_u* is at most this far from a value that is attained.
+
+    Returns
+    -------
+    Decomposition
+
+    Raises
+    ------
+    DecompositionError
+        If eps_u is not bounded for all u, as with saturation, no split is known, or the record's
+        own one is refuted by a sample of its output.
+    """
+    if k is None and hasattr(actuator, "decomposition"):
+        split = actuator.decomposition(u_max)
+        _refute(actuator, split, u_max)
+        return split
+    if k is None and isinstance(actuator, DeadZone):
+        return _textbook_dead_zone(actuator)
+    if k is None and isinstance(actuator, Backlash):
+        if actuator.m_r == actuator.m_l:
+            return _play(actuator)
+        k = (min(actuator.m_r, actuator.m_l), max(actuator.m_r, actuator.m_l))
+    if k is None:
+        raise DecompositionError(
+            f"{type(actuator).__name__} has no known split (2): give the bounds k=(k_1, k_2), or "
+            "the record a method decomposition(u_max)"
+        )
+    if not (np.isfinite(u_max) and u_max > 0 and 0 < k[0] <= k[1] < np.inf):
+        raise ParameterError(f"decompose needs u_max > 0 and 0 < k_1 <= k_2, got {u_max} and {k}")
+    return _proved_split(actuator, k, u_max, tol)
+
+
+def _refute(actuator: Any, split: Decomposition, u_max: float) -> None:
+    """Look for an input at which a memoryless actuator breaks the split that it declares."""
+    if len(actuator.states):
+        return
+    output, _ = _edges(actuator)
+    for u in np.linspace(-u_max, u_max, 2001):
+        v = output(u)
+        k, eps_u = split.gain(u, v), split.eps_u(u, v)
+        room = 1e-9 * (1 + abs(v))
+        if not (
+            split.k_1 - 1e-9 <= k <= split.k_2 + 1e-9
+            and split.eps_low - room <= eps_u <= split.eps_high + room
+        ):
+            raise DecompositionError(
+                f"{type(actuator).__name__} declares k in [{split.k_1:g}, {split.k_2:g}] and eps_u "
+                f"in [{split.eps_low:g}, {split.eps_high:g}], but at u = {u:g} k is {k:g} and "
+                f"eps_u is {eps_u:g}: correct its decomposition"
+            )
+
+
+def _textbook_dead_zone(zone: DeadZone) -> Decomposition:
+    """k = m(u) outside and 1 inside: eps_u = -m(u) b outside, -u inside."""
+    right = zone.slope_r + abs(zone.ripple_r)
+    left = zone.slope_l + abs(zone.ripple_l)
+    least = min(zone.slope_r - abs(zone.ripple_r), zone.slope_l - abs(zone.ripple_l))
+
+    def part(u: Any, v: Any) -> Any:
+        u, v = np.asarray(u, dtype=float), np.asarray(v, dtype=float)
+        inside = (zone.b_l <= u) & (u <= zone.b_r)
+        distance = np.where(u > 0, u - zone.b_r, u - zone.b_l)
+        return np.where(inside, u, v / np.where(inside, 1.0, distance) * u)
+
+    return Decomposition(
+        k_1=min(1.0, least),
+        k_2=max(1.0, right, left),
+        eps_low=-zone.b_r * max(1.0, right),
+        eps_high=-zone.b_l * max(1.0, left),
+        part=part,
+        provenance="computed",
+        how="slope factor outside the dead zone, 1 inside: eps_u = -m(u) b, or -u",
+        over="all u",
+    )
+
+
+def _play(play: Backlash) -> Decomposition:
+    """k = m: v lies between m (u - c_r) and m (u - c_l)."""
+    m = play.m_r
+    return Decomposition(
+        k_1=m,
+        k_2=m,
+        eps_low=-m * play.c_r,
+        eps_high=-m * play.c_l,
+        part=clipped_split(m, m),
+        provenance="computed",
+        how="k is the slope; v lies in the gap from the first instant",
+        over="all u",
+    )
+
+
+def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: float) -> Decomposition:
+    part, edges = clipped_split(*k), _edges(actuator)
+    reach = {factor: _eps_range(part, edges, factor * u_max, tol) for factor in (1.0, 2.0)}
+    _refuse_growth(actuator, k, u_max, reach)
+    return Decomposition(
+        k_1=k[0],
+        k_2=k[1],
+        eps_low=reach[2.0][0].low,
+        eps_high=reach[2.0][1].high,
+        part=part,
+        provenance="proved",
+        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in reach[2.0])} boxes",
+        over=f"|u| <= {2 * u_max:g}",
+    )
+
+
+def _edges(actuator: Any) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
+    """Return the least and the greatest output v that the actuator can have at input u."""
+    p = equation_arguments(actuator)
+    if isinstance(actuator, Backlash):
+        return (lambda u: play_band(u, p)[0]), (lambda u: play_band(u, p)[1])
+    if len(actuator.states) or len(actuator.inputs) != 1 or len(actuator.outputs) != 1:
+        raise DecompositionError(
+            f"{type(actuator).__name__} has memory or several signals: give the record a method "
+            "decomposition(u_max)"
+        )
+
+    def output(u: Any) -> Any:
+        return actuator.output(0.0, (), (u,), p)[0]
+
+    return output, output
+
+
+def _eps_range(part: Any, edges: Any, u_max: float, tol: float) -> tuple[Range, Range]:
+    """Ranges of eps_u along both edges; it grows with v, so these are its ends."""
+
+    def along(edge: Callable[[Any], Any]) -> Range:
+        def eps_u(point: tuple[Any]) -> Any:
+            (u,) = point
+            v = edge(u)
+            return v - part(u, v)
+
+        return enclose(eps_u, Box.of(u=(-u_max, u_max)), tol=tol)
+
+    low = along(edges[0])
+    return low, low if edges[1] is edges[0] else along(edges[1])
+
+
+def _refuse_growth(
+    actuator: Any, k: tuple[float, float], u_max: float, reach: dict[float, tuple[Range, Range]]
+) -> None:
+    """(2) wants one eps_u* for all u; where eps_u grows with the range of u, there is none."""
+    name, (low, high) = type(actuator).__name__, reach[2.0]
+    undecided = low.undecided + high.undecided
+    if undecided:
+        raise DecompositionError(
+            f"eps_u of {name} could not be bounded for |u| <= {2 * u_max:g}: {undecided} boxes "
+            "are undecided"
+        )
+    bound = max(-reach[1.0][0].low, reach[1.0][1].high)
+    attained = max(high.greatest, -low.least)
+    if attained > bound:
+        raise DecompositionError(
+            f"{name} is not of the form (2) with k in [{k[0]:g}, {k[1]:g}]: |eps_u| is at most "
+            f"{bound:.4g} for |u| <= {u_max:g} and reaches {attained:.4g} for |u| <= "
+            f"{2 * u_max:g}, so no eps_u* bounds it for all u (saturation, or k too narrow); "
+            "give other k, or replace the actuator"
+        )

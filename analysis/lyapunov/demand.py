@@ -1,0 +1,99 @@
+"""What a plant asks of the controller while the filtered error keeps a bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from .ball import as_ball
+from .balls import enclose, upper
+from .box import Box
+from .decomposition import Decomposition
+from .final_bound import total_error
+from .known_sign_loop import KnownSignLoop
+from .sector import plant_terms, sector, state_names
+from .tracking import error_bounds, reference_bounds
+
+__all__ = ["Demand", "demand"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demand:
+    """What the plant asks of the controller while |r| <= C; of the gains only lambda enters.
+
+    Attributes
+    ----------
+    C : float
+        Bound of |r|.
+    box : Box
+        What x stays in.
+    errors : tuple of float
+        Bounds of |e_1|, ..., |e_n|.
+    G_min, G_max : float
+        Proved bounds of G = F/v over the box, for all v.
+    matched : float
+        Proved bound of |g(x) + d(x, t)| over the box, for all t.
+    delta_star : float
+        matched + G_max eps_u*.
+    boxes : int
+        Boxes of the proofs.
+    """
+
+    C: float
+    box: Box
+    errors: tuple[float, ...]
+    G_min: float
+    G_max: float
+    matched: float
+    delta_star: float
+    boxes: int
+
+
+def demand(loop: KnownSignLoop, split: Decomposition, C: float, *, tol: float = 1e-3) -> Demand:
+    """Bound what the plant asks of the controller while |r| <= C.
+
+    Parameters
+    ----------
+    loop : KnownSignLoop
+    split : Decomposition
+        Of the loop's actuator.
+    C : float
+        Bound of |r|.
+    tol : float, optional
+        The suprema are proved to this, relative to their size.
+
+    Returns
+    -------
+    Demand
+    """
+    errors = error_bounds(loop.lambdas, loop.e0, arb(C))
+    wanted = reference_bounds(loop.reference)
+    reach = tuple(upper(e + y) for e, y in zip(errors, wanted, strict=False))
+    low, names = tuple(-a for a in reach), state_names(len(reach))
+    box = Box(names=names, low=low, high=reach, how=f"|r| <= {C:.6g}")
+
+    def over_all(name: str) -> Box:
+        return Box(names=(*names, name), low=(*low, -np.inf), high=(*reach, np.inf))
+
+    f, d = plant_terms(loop.parts.plant)
+
+    def matched(point: tuple[Any, ...]) -> Any:
+        *x, t = point
+        return f(tuple(x), 0.0) + d(tuple(x), t)
+
+    rough = enclose(matched, over_all("t"), tol=np.inf, max_boxes=1).magnitude
+    fine = enclose(matched, over_all("t"), tol=tol * rough, max_boxes=20_000)
+    gain = sector(loop.parts.plant, over_all("v"), tol=tol, max_boxes=2_000)
+    return Demand(
+        C=C,
+        box=box,
+        errors=tuple(map(upper, errors)),
+        G_min=gain.G_min,
+        G_max=gain.G_max,
+        matched=fine.magnitude,
+        delta_star=upper(total_error(as_ball(gain.G_max), split.eps_star, fine.magnitude, 0.0)),
+        boxes=fine.boxes + gain.boxes,
+    )

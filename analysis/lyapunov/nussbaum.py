@@ -1,0 +1,285 @@
+r"""Property (12) of Nussbaum functions, checked over a finite range.
+
+.. math:: \limsup_{s \to \infty} \frac1s \int_0^s N = +\infty, \quad
+          \liminf_{s \to \infty} \frac1s \int_0^s N = -\infty              \qquad (12)
+
+No finite range can prove a limit: what is reported here as a type is *checked*.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq, minimize_scalar
+
+from nlctl import functions
+from nlctl._errors import ParameterError
+
+__all__ = [
+    "Antiderivative",
+    "Lobe",
+    "NussbaumProperty",
+    "antiderivative",
+    "lobe_around",
+    "lobes",
+    "nussbaum_property",
+    "running_means",
+]
+
+Function = Callable[[float], float]
+Antiderivative = Callable[[np.ndarray], np.ndarray]
+DENSE = 4096
+GROWTH = 1.5  # what a quantity must gain from the middle of the range to its end to count
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lobe:
+    """The stretch between two neighbouring zeros of N.
+
+    Attributes
+    ----------
+    low, high : float
+        Its ends: zeros of N, or ends of the range that was searched.
+    integral : float
+        Integral of N from `low` to `high`.
+    place, extremum : float
+        Where |N| is largest, and the value of N there.
+    """
+
+    low: float
+    high: float
+    integral: float
+    place: float
+    extremum: float
+
+    @property
+    def budget(self) -> float:
+        """|int N| over the lobe: what V can lose or gain while zeta crosses it, per unit of k G."""
+        return abs(self.integral)
+
+    @property
+    def sign(self) -> float:
+        """Sign of N in the lobe."""
+        return float(np.sign(self.extremum))
+
+
+@dataclass(frozen=True, kw_only=True)
+class NussbaumProperty:
+    """What a finite range shows of property (12).
+
+    Attributes
+    ----------
+    end : float
+        The range is [0, end].
+    lobes : tuple of Lobe
+        In order from 0; the last one is cut off by `end`.
+    means : tuple of float
+        (1/s) int_0^s N at the end s of every whole lobe, where the mean is extreme or nearly so.
+    ratios : tuple of float
+        Budget of each whole lobe over that of the one before.
+    type_a : bool
+        Checked: the means of both signs grow, as (12) wants.
+    type_b : bool
+        Checked: so do the integrals of max(N, 0) and max(-N, 0), and at the end of each lobe the
+        integral of its sign over that of the other one.  Gains that vary with time need this
+        stronger type (Z. Chen, Automatica 2019).
+    """
+
+    end: float
+    lobes: tuple[Lobe, ...]
+    means: tuple[float, ...]
+    ratios: tuple[float, ...]
+    type_a: bool
+    type_b: bool
+
+    def __str__(self) -> str:
+        lines = [f"property (12), checked on [0, {self.end:g}]:"]
+        for lobe, mean in zip(self.lobes, self.means, strict=False):
+            lines.append(
+                f"  lobe [{lobe.low:.6g}, {lobe.high:.6g}]: int N = {lobe.integral:.6g}, extremum "
+                f"{lobe.extremum:.6g} at {lobe.place:.6g}, mean at its end {mean:.6g}"
+            )
+        for name, holds in (("A", self.type_a), ("B", self.type_b)):
+            lines.append(f"  type {name}: {'checked' if holds else 'not seen on this range'}")
+        return "\n".join(lines)
+
+
+def antiderivative(N: Function) -> Antiderivative:
+    """Return int_0^s N as a function of arrays.
+
+    The closed form for the paper's function, otherwise adaptive quadrature (scipy.integrate.quad)
+    between neighbouring arguments; of more than 4096 of them, between 4096 nodes, with N as the
+    slope of the interpolation.
+    """
+    if N is functions.nussbaum:
+        return functions.nussbaum_integral
+
+    def integral(s: np.ndarray) -> np.ndarray:
+        wanted = np.asarray(s, dtype=float)
+        if wanted.size <= DENSE:
+            points, place = np.unique(np.append(wanted, 0.0), return_inverse=True)
+            return _cumulated(N, points)[place[:-1]].reshape(wanted.shape)
+        nodes = np.union1d(np.linspace(wanted.min(), wanted.max(), DENSE), 0.0)
+        slopes = np.array([float(N(z)) for z in nodes])
+        return CubicHermiteSpline(nodes, _cumulated(N, nodes), slopes)(wanted)
+
+    return integral
+
+
+def _cumulated(N: Function, points: np.ndarray) -> np.ndarray:
+    """Return int_0^s N at increasing points, of which 0 is one."""
+    pieces = [_quadrature(N, a, b) for a, b in itertools.pairwise(points)]
+    total = np.concatenate([[0.0], np.cumsum(pieces)])
+    return total - total[np.searchsorted(points, 0.0)]
+
+
+def _quadrature(N: Function, low: float, high: float) -> float:
+    # The default absolute tolerance would be the whole integral of a small lobe, and a relative
+    # one alone cannot be met where positive and negative parts cancel.
+    size = (high - low) * max(abs(N(low + share * (high - low))) for share in (0.0, 0.3, 0.5, 1.0))
+    return quad(N, low, high, epsabs=1e-12 * size, epsrel=1e-10, limit=200)[0]
+
+
+def running_means(s: np.ndarray, N: Function = functions.nussbaum) -> np.ndarray:
+    """Return (1/s) int_0^s N for an array of s != 0; the limit N(0) at s = 0."""
+    s = np.asarray(s, dtype=float)
+    whole = antiderivative(N)(s)
+    return np.where(s == 0, N(0.0), whole / np.where(s == 0, 1.0, s))
+
+
+def lobes(
+    N: Function = functions.nussbaum, low: float = 0.0, high: float = 9.0, *, step: float = 0.01
+) -> tuple[Lobe, ...]:
+    """Return the lobes of N on [low, high], with their budgets and extrema.
+
+    Parameters
+    ----------
+    N : callable, optional
+        Function of one number; the paper's by default.
+    low, high : float, optional
+        The range; its ends cut lobes off.
+    step : float, optional
+        Zeros nearer to each other than this may be overlooked.
+
+    Raises
+    ------
+    ParameterError
+        If the range is empty, or N is not finite on it.
+    """
+    if not low < high:
+        raise ParameterError(f"lobes needs low < high, got {low:g} and {high:g}")
+    grid = np.linspace(low, high, max(int(np.ceil((high - low) / step)), 2) + 1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = np.array([float(N(z)) for z in grid])
+    if not np.all(np.isfinite(values)):
+        raise ParameterError(
+            f"the Nussbaum function is not finite at zeta = {grid[~np.isfinite(values)][0]:g}: "
+            "choose a shorter range"
+        )
+    zeros = [
+        root(N, a, b)
+        for (a, b), (p, q) in zip(itertools.pairwise(grid), itertools.pairwise(values), strict=True)
+        if np.sign(p) * np.sign(q) < 0
+    ]
+    zeros += [float(z) for z, v in zip(grid, values, strict=True) if v == 0]
+    inner = [float(z) for z in np.sort(zeros) if low + 1e-9 < z < high - 1e-9]
+    ends = [float(low), *inner, float(high)]
+    return tuple(_lobe(N, a, b) for a, b in itertools.pairwise(ends))
+
+
+def root(function: Function, low: float, high: float) -> float:
+    """Return the zero of a function between two points where its signs differ."""
+    found: Any = brentq(function, low, high, xtol=1e-14)
+    return float(found)
+
+
+def _lobe(N: Function, low: float, high: float) -> Lobe:
+    grid = np.linspace(low, high, 65)
+    i = int(np.argmax([abs(N(z)) for z in grid]))
+    around = grid[max(i - 1, 0)], grid[min(i + 1, 64)]
+    found: Any = minimize_scalar(
+        lambda z: -abs(N(z)), bounds=around, method="bounded", options={"xatol": 1e-10}
+    )
+    place = max((float(found.x), float(grid[i])), key=lambda z: abs(N(z)))
+    below, above = antiderivative(N)(np.array([low, high]))
+    return Lobe(
+        low=low, high=high, integral=float(above - below), place=place, extremum=float(N(place))
+    )
+
+
+def lobe_around(zeta: float, N: Function = functions.nussbaum, *, reach: float = 4.0) -> Lobe:
+    """Return the whole lobe that zeta lies in, searched within `reach` on both sides.
+
+    At a zero of N it is the lobe above.
+
+    Raises
+    ------
+    ParameterError
+        If N has no zero on one side within `reach`, so that the lobe has no budget.
+    """
+    found = lobes(N, zeta - reach, zeta + reach)
+    inside = [lobe for lobe in found if lobe.low <= zeta + 1e-9 and zeta + 1e-9 < lobe.high]
+    if not inside or inside[0] in (found[0], found[-1]):
+        raise ParameterError(
+            f"the Nussbaum function has no zeros on both sides of zeta = {zeta:g} within {reach:g}"
+        )
+    return inside[0]
+
+
+def nussbaum_property(N: Function = functions.nussbaum, end: float = 9.0) -> NussbaumProperty:
+    """Check property (12) on [0, end].
+
+    A quantity counts as growing if it gains a factor of 1.5 from the middle lobe of its sign to
+    the last one: means that stay bounded tend to a factor of 1, means that grow as s does to 2.
+
+    Parameters
+    ----------
+    N : callable, optional
+        Function of one number; the paper's by default.
+    end : float, optional
+        End of the range; it must hold four lobes at least.
+
+    Raises
+    ------
+    ParameterError
+        If the range holds fewer than four lobes, or N is not finite on it.
+    """
+    found = lobes(N, 0.0, end)
+    last = abs(N(end)) <= 1e-9 * abs(found[-1].extremum)
+    whole = found if last else found[:-1]
+    if len(whole) < 4:
+        raise ParameterError(
+            f"property (12) needs four lobes of N at least, [0, {end:g}] holds {len(whole)}: "
+            "choose a longer range"
+        )
+    integrals = np.array([lobe.integral for lobe in whole])
+    ends = np.array([lobe.high for lobe in whole])
+    means = np.cumsum(integrals) / ends
+    up, down = (np.cumsum(np.maximum(s * integrals, 0)) for s in (1, -1))
+    rising, falling = integrals > 0, integrals < 0
+    type_a = bool(_grows(means[rising]) and _grows(-means[falling]))
+    with np.errstate(divide="ignore"):
+        shares = (up / down)[rising], (down / up)[falling]
+    parts = (up / ends)[rising], (down / ends)[falling]
+    return NussbaumProperty(
+        end=end,
+        lobes=found,
+        means=tuple(map(float, means)),
+        ratios=tuple(map(float, np.abs(integrals[1:] / integrals[:-1]))),
+        type_a=type_a,
+        type_b=bool(type_a and all(_grows(part[np.isfinite(part)]) for part in (*shares, *parts))),
+    )
+
+
+def _grows(values: np.ndarray) -> bool:
+    """Whether the last value is GROWTH times the middle one at least, and the latter positive."""
+    if values.size < 2:
+        return False
+    middle = values[(values.size - 1) // 2]
+    return bool(middle > 0 and values[-1] >= GROWTH * middle)

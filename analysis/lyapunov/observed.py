@@ -1,0 +1,177 @@
+"""A loop whose blocks also deliver what the proof speaks of: rates of the states, g, G and d.
+
+The rates are the blocks' own update equations on the loop's own signals, so that V' is the
+gradient of V times the right-hand side of the diagram, and no difference of samples.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import control as ct
+import numpy as np
+
+import nlctl
+from nlctl import equation
+from nlctl._block import Block
+from nlctl.plants import PureFeedback
+
+from .decomposition import Decomposition
+from .integral import NussbaumIntegral
+from .parts import Parts
+
+__all__ = ["input_gain", "observed"]
+
+NEAR = 1e-5  # |v| below which G is interpolated: F/v would lose its digits
+
+
+def input_gain(f: Callable) -> Callable:
+    """Make the equation G(x, v) = F(x, v) / v of (6), (7), with its limit at v = 0.
+
+    For |v| < 1e-5 it is the line through its values at v = -1e-5 and 1e-5, whose error is of the
+    order of the rounding, 1e-11, for a twice differentiable F.
+
+    Parameters
+    ----------
+    f : equation
+        ``f(x, v, p)`` of a plant.
+
+    Returns
+    -------
+    equation
+        ``G(x, v, p)``.
+    """
+
+    @equation
+    def G(x, v, p):
+        at_rest = f(x, 0.0, p)
+        if abs(v) >= NEAR:  # false for NaN, which then reaches G
+            return (f(x, v, p) - at_rest) / v
+        right, left = (f(x, NEAR, p) - at_rest) / NEAR, (at_rest - f(x, -NEAR, p)) / NEAR
+        return 0.5 * (right + left) + 0.5 * (right - left) * (v / NEAR)
+
+    return G
+
+
+def observed(
+    loop: ct.InterconnectedSystem, parts: Parts, split: Decomposition, alpha_1: float
+) -> ct.InterconnectedSystem:
+    """Return the loop with all its signals as outputs, and with the integrals of (32), (33).
+
+    Added are ``rate_<state>`` for every state of plant, weights, robust term and law, the
+    estimates ``W_hat[i]``, ``g``, ``G`` and ``d`` of the plant, and `NussbaumIntegral`.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+    parts : Parts
+        What `read_parts` found in it; the blocks are given the parameters of that run.
+    split : Decomposition
+        Of the actuator; machine code must be able to call its ``part``, see `sharpest`.
+    alpha_1 : float
+        Rate of the weight in (32).
+
+    Returns
+    -------
+    control.InterconnectedSystem
+        To be compiled, and run from ``nlctl.initial_state``.
+
+    Raises
+    ------
+    DiagramError
+        If signals are not joined by their names.
+    """
+    roles = {path: part for part, path in parts.paths.items()}
+    integral = NussbaumIntegral(alpha_1=alpha_1, part=split.part)
+    systems = [*_opened(loop, "", roles), nlctl.block(integral, "integral")]
+    return nlctl.interconnect(systems, name=f"{loop.name}_observed")
+
+
+def _opened(diagram: Any, path: str, roles: dict[str, str]) -> list[Any]:
+    """Return copies of a diagram's blocks, nested diagrams with all signals as outputs."""
+    copies = []
+    for system in diagram.syslist:
+        here = f"{path}{system.name}"
+        if isinstance(system, ct.InterconnectedSystem):
+            inner = _opened(system, f"{here}.", roles)
+            inputs = list(system.input_labels)
+            copies.append(nlctl.interconnect(inner, inputs=inputs, name=system.name))
+        elif isinstance(system, Block):
+            copies.append(_observed_block(system, roles.get(here)))
+        else:
+            copies.append(system.copy(name=system.name))
+    return copies
+
+
+def _observed_block(system: Block, part: str | None) -> Block:
+    spec = system.current_spec
+    if part == "plant":
+        spec = _with_outputs(spec, *_plant_terms(spec))
+    elif part in ("weights", "robust", "law"):
+        spec = _with_outputs(spec, (), None)
+    return nlctl.block(spec, system.name)
+
+
+def _plant_terms(plant: Any) -> tuple[tuple[str, ...], Callable]:
+    f, d = plant.f, plant.d
+    if isinstance(plant, PureFeedback):  # the user's functions, without parameters
+        own_f, own_d = equation(f), equation(d)
+
+        @equation
+        def f(x, v, p):
+            return own_f(x, v)
+
+        @equation
+        def d(x, t, p):
+            return own_d(x, t)
+
+    G = input_gain(f)
+
+    @equation
+    def terms(t, x, u, p):
+        (v,) = u
+        state = tuple(x)
+        return f(state, 0.0, p), G(state, v, p), d(state, t, p)
+
+    return ("g", "G", "d"), terms
+
+
+def _with_outputs(spec: Any, names: tuple[str, ...], terms: Callable | None) -> Any:
+    """Return a record with the same parameters and equations, and with more outputs."""
+    if not spec.states:
+        return spec
+    output, update = spec.output, spec.update
+    hidden = tuple(s for s in spec.states if s not in spec.outputs)
+    columns = [i for i, s in enumerate(spec.states) if s in hidden]
+    if getattr(spec, "vector", False):
+        picked = np.array(columns, dtype=np.int64)
+
+        @equation
+        def more(t, x, u, p):
+            shown = np.array(output(t, x, u, p))
+            return np.concatenate((shown, update(t, x, u, p), x[picked]))
+
+    elif terms is None:
+
+        @equation
+        def more(t, x, u, p):
+            return output(t, x, u, p) + update(t, x, u, p)
+
+        hidden = ()
+    else:
+
+        @equation
+        def more(t, x, u, p):
+            return output(t, x, u, p) + update(t, x, u, p) + terms(t, x, u, p)
+
+        hidden = ()
+    rates = tuple(f"rate_{s}" for s in spec.states)
+    namespace = {
+        "outputs": (*spec.outputs, *rates, *hidden, *names),
+        "output": staticmethod(more),
+        "feedthrough": True,
+    }
+    kind = type(type(spec).__name__, (type(spec),), namespace)
+    return kind(**{f.name: getattr(spec, f.name) for f in dataclasses.fields(spec) if f.init})

@@ -1,0 +1,150 @@
+"""From a bound of the filtered error r to the set that the state stays in.
+
+r = (d/dt + p_1) ... (d/dt + p_{n-1}) e_1 is a chain of first-order filters, so that |r| <= C for
+all time bounds every e_i, and with the reference every x_i.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from flint import arb, fmpz_poly
+
+from nlctl._errors import ParameterError
+from nlctl._param import equation_arguments
+from nlctl.references import SumOfSines
+
+__all__ = ["error_bounds", "filter_poles", "reference_bounds"]
+
+ROUNDING = 1e-12  # added to what double precision has summed up
+
+
+def filter_poles(lambdas: Sequence[float]) -> tuple[arb, ...]:
+    """Return p_1, ..., p_{n-1} > 0 of s^(n-1) + lambda_1 s^(n-2) + ... = prod_j (s + p_j).
+
+    As balls, from the exact values of the lambdas.
+
+    Raises
+    ------
+    ParameterError
+        If a root is not real and negative: a chain of first-order filters needs real ones.
+    """
+    coefficients = [Fraction(c) for c in (*reversed(lambdas), 1.0)]
+    common = math.lcm(*(c.denominator for c in coefficients))
+    polynomial = fmpz_poly([int(c * common) for c in coefficients])
+    poles: list[arb] = []
+    found: Any = polynomial.complex_roots()
+    for root, multiplicity in found:
+        if not (root.imag == 0 and root.real < 0):
+            raise ParameterError(
+                f"the filter of lambdas {tuple(lambdas)} has a root at {complex(root):.4g}: bounds "
+                "of e need real negative roots, choose the lambdas as products of (s + p)"
+            )
+        poles += [-root.real] * multiplicity
+    return tuple(sorted(poles, key=float))
+
+
+def error_bounds(lambdas: Sequence[float], e0: Sequence[arb | float], C: arb) -> tuple[arb, ...]:
+    """Bound |e_1|, ..., |e_n| for all time by |r| <= C and the initial error.
+
+    With z_0 = r and z_k' = -p_k z_k + z_{k-1}, e_1 = z_{n-1}: |z_k| <= max(|z_k(0)|, C_{k-1}/p_k),
+    and every e_i is a combination of the z_k.
+
+    Parameters
+    ----------
+    lambdas : sequence of float
+        Of the filtered error (14).
+    e0 : sequence of n numbers or balls
+        e_1(0), ..., e_n(0).
+    C : arb
+        Bound of |r|.
+
+    Returns
+    -------
+    tuple of n arb
+        Upper bounds.
+
+    Raises
+    ------
+    ParameterError
+        If the filter has roots that are not real and negative.
+    """
+    poles = filter_poles(lambdas)
+    n = len(poles) + 1
+    # rows[k]: coefficients of e_1, e_1', ... in z_k = (s + p_{k+1}) ... (s + p_{n-1}) e_1
+    rows = [[arb(1)]]
+    for p in reversed(poles):
+        previous = rows[0]
+        rows.insert(0, [p * a + b for a, b in zip([*previous, 0], [0, *previous], strict=True)])
+    z = [abs(_dot(row, e0)) for row in rows]
+    z[0] = C
+    for k in range(1, n):
+        z[k] = z[k].max(z[k - 1] / poles[k - 1])
+    # e_i = z_{n-i} - (lower derivatives), as combinations of z_{n-1}, z_{n-2}, ...
+    combinations: list[list[arb]] = []
+    for i in range(n):
+        row = rows[n - 1 - i]
+        combination = [arb(0)] * i + [arb(1)]
+        for a, lower in zip(row[:-1], combinations, strict=True):
+            for j, c in enumerate(lower):
+                combination[j] = combination[j] - a * c
+        combinations.append(combination)
+    return tuple(
+        sum((abs(c) * z[n - 1 - j] for j, c in enumerate(row)), arb(0)) for row in combinations
+    )
+
+
+def _dot(row: Sequence[arb], values: Sequence[arb | float]) -> arb:
+    return sum((a * b for a, b in zip(row, values, strict=False)), arb(0))
+
+
+@functools.lru_cache(maxsize=32)
+def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[float, ...]:
+    """Return sup |yd|, ..., sup |yd^(n)| over all time of a sum of sines.
+
+    Where the frequencies have a common period of moderate length, from samples of the reference's
+    own equation over it: between two samples h apart a function exceeds the nearer one by at
+    most |y'| h/2 + sup|y''| h^2/8.  Otherwise, and at most, the sum of the amplitudes.
+
+    Parameters
+    ----------
+    reference : SumOfSines
+    samples : int, optional
+        Samples per period of the slowest sine.
+
+    Returns
+    -------
+    tuple of n + 1 floats
+    """
+    a, w = np.abs(reference.amplitudes), np.array(reference.frequencies)
+    n = reference.order
+    largest = [float(np.sum(a * w**k)) * (1 + ROUNDING) for k in range(n + 3)]
+    turning = [Fraction(f).limit_denominator(10**6) for f in reference.frequencies if f > 0]
+    exact = all(float(f) == v for f, v in zip(turning, w[w > 0], strict=True))
+    if not turning or not exact:
+        return tuple(largest[: n + 1])
+    slowest = functools.reduce(_common_divisor, turning)
+    beats = int(max(turning) / slowest)
+    if beats > 100:
+        return tuple(largest[: n + 1])
+    h = 2 * np.pi / float(slowest) / (samples * beats)
+    p = equation_arguments(dataclasses.replace(reference, order=n + 1))
+    y = np.abs([reference.output(i * h, (), (), p) for i in range(samples * beats + 1)])
+    between = np.max(y[:, :-1] + y[:, 1:] * h / 2, axis=0)
+    return tuple(
+        min(float(between[k]) + largest[k + 2] * h * h / 8 + ROUNDING, largest[k])
+        for k in range(n + 1)
+    )
+
+
+def _common_divisor(a: Fraction, b: Fraction) -> Fraction:
+    return Fraction(
+        math.gcd(a.numerator * b.denominator, b.numerator * a.denominator),
+        a.denominator * b.denominator,
+    )

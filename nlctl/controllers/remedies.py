@@ -1,0 +1,106 @@
+"""Nussbaum laws with another zeta' than (24), against the creep of zeta.
+
+By (23), (24) N(zeta) zeta' = r u: zeta drifts as long as r u has a mean, and where it passes a
+zero of N the loop loses its sign.  These blocks have the signals of `NussbaumLaw` and stand in
+its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from .._equation import equation
+from .._param import param, record
+from .known_sign import damped_base
+from .nussbaum import NussbaumLaw, control_base
+
+__all__ = ["DeadZoneNussbaumLaw", "LeakyNussbaumLaw", "MonotoneNussbaumLaw"]
+
+
+@equation
+def beyond(r, r_0):
+    """What of r lies outside [-r_0, r_0]: d(r) = r - clip(r, -r_0, r_0), continuous in r."""
+    return r - np.minimum(np.maximum(r, -r_0), r_0)
+
+
+@record
+class DeadZoneNussbaumLaw(NussbaumLaw):
+    """Nussbaum law (23) with a dead zone in the adaptation of its argument (lambda-tracking).
+
+        u     = N(zeta) eta,    eta = beta r + W_hat^T psi + delta_hat tanh(r/tau) + Y_d
+        zeta' = d(r) eta,       d(r) = r - clip(r, -r_0, r_0),   zeta(0) = 1
+
+    zeta stands still while |r| <= r_0 and grows until |r| stays there, so that r_0 is about what
+    |r| reaches.  d is the continuous dead zone, so that d(r)^2 / 2 in the place of r^2 / 2 in (21)
+    has the derivative d(r) r' and N(zeta) zeta' = d(r) u holds exactly.
+    """
+
+    r_0: float = param(0.3, unit="1", meaning="half width of the dead zone of r", above=0)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Equation (24) with d(r) in the place of r."""
+        return (beyond(u[0], p.r_0) * control_base(u, p),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """The ends of the dead zone."""
+        return u[0] + p.r_0, u[0] - p.r_0
+
+
+@record
+class LeakyNussbaumLaw(NussbaumLaw):
+    """Nussbaum law (23) whose argument leaks back to where it started.
+
+        u     = N(zeta) eta,    eta = beta r + W_hat^T psi + delta_hat tanh(r/tau) + Y_d
+        zeta' = r eta - c (zeta - 1),   zeta(0) = 1
+
+    zeta settles where the mean of r eta is c (zeta - 1).  It cannot settle at 1, where N of the
+    paper is 0, so the price is a larger steady error than that of a gain which has grown.
+    """
+
+    c: float = param(0.01, unit="1/s", meaning="rate of the leakage", at_least=0)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Equation (24) with leakage."""
+        (zeta,) = x
+        return (u[0] * control_base(u, p) - p.c * (zeta - 1),)
+
+
+@record
+class MonotoneNussbaumLaw(NussbaumLaw):
+    """Nussbaum law whose argument never falls: (23), (24) with the base of `KnownSignLaw`.
+
+        u     = N(zeta) eta,   eta = beta r + s tanh(r s / b)
+        zeta' = r eta >= 0,    s = W_hat^T psi + delta_hat tanh(r/tau) + Y_d,   zeta(0) = 1
+
+    No remedy by itself: zeta creeps on.  But it cannot oscillate, and so cannot pump V under a
+    gain that varies with time; `analysis.lyapunov.drift.safe_horizon` supposes a monotone zeta.
+    """
+
+    b: float = param(0.1, unit="1", meaning="width of the smooth sign of r s", above=0)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Equation (24) with the damped base."""
+        return (u[0] * damped_base(u, p),)
+
+    @cached_property
+    def output(self) -> Callable:
+        """Equation (23) with the damped base."""
+        N = equation(self.N)
+
+        @equation
+        def output(t, x, u, p):
+            (zeta,) = x
+            return N(zeta) * damped_base(u, p), zeta
+
+        return output

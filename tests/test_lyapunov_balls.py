@@ -1,0 +1,200 @@
+"""Balls: they enclose what the equations compute, and never pick a branch."""
+
+import numpy as np
+import pytest
+from flint import arb
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nlctl
+from analysis.lyapunov.ball import Ball, as_ball
+from analysis.lyapunov.balls import Box, Undecided, enclose, prove
+from nlctl._errors import ParameterError, UnknownNameError
+from nlctl._param import equation_arguments
+
+FUNCTIONS = {
+    "sin": (np.sin, np.cos),
+    "cos": (np.cos, lambda x: -np.sin(x)),
+    "exp": (np.exp, np.exp),
+    "log": (np.log, lambda x: 1 / x),
+    "sqrt": (np.sqrt, lambda x: 0.5 / np.sqrt(x)),
+    "sinh": (np.sinh, np.cosh),
+    "cosh": (np.cosh, np.sinh),
+    "tanh": (np.tanh, lambda x: 1 / np.cosh(x) ** 2),
+    "arctan": (np.arctan, lambda x: 1 / (1 + x**2)),
+    "cube": (lambda x: x**3, lambda x: 3 * x**2),
+    "fourth root of a quotient": (
+        lambda x: (2 / (1 + x)) ** 0.25,
+        lambda x: -0.25 * 2**0.25 * (1 + x) ** -1.25,
+    ),
+}
+PLANTS = {"duffing": nlctl.ForcedDuffing(), "genesio": nlctl.Genesio()}
+share = st.floats(0, 1)
+
+
+def interval(low, high, gradient=()):
+    return Ball(arb(low).union(arb(high)), gradient)
+
+
+def holds(ball, number):
+    """Whether a ball contains a number, up to the rounding of the number itself."""
+    return ball.overlaps(arb(float(number), 1e-12 * (1 + abs(float(number)))))
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+@given(low=st.floats(0.1, 3), width=st.floats(0, 2), s=share)
+def test_a_ball_encloses_the_function_and_its_derivative(name, low, width, s):
+    """For every number in the ball, f(x) lies in the value and f'(x) in the gradient."""
+    f, derivative = FUNCTIONS[name]
+    x = low + s * width
+    ball = f(interval(low, low + width, (arb(1),)))
+    assert holds(ball.value, f(x))
+    assert holds(ball.gradient[0], derivative(x))
+
+
+@pytest.mark.parametrize("name", PLANTS)
+@given(data=st.data())
+def test_a_plant_equation_on_balls_encloses_itself_on_numbers(name, data):
+    """f(x, v) and d(x, t) are called as they stand, with balls for numbers."""
+    plant = PLANTS[name]
+    p, n = equation_arguments(plant), len(plant.states)
+    low = np.array(data.draw(st.lists(st.floats(-3, 3), min_size=n + 1, max_size=n + 1)))
+    width = np.array(data.draw(st.lists(share, min_size=n + 1, max_size=n + 1)))
+    point = low + data.draw(share) * width
+    balls = tuple(map(interval, low, low + width))
+    for term in (plant.f, plant.d):
+        assert holds(as_ball(term(balls[:-1], balls[-1], p)).value, term(point[:-1], point[-1], p))
+
+
+def test_the_gaussian_basis_works_on_balls():
+    """Arrays of balls go through the equations of vector blocks."""
+    basis = nlctl.GaussianBasis()
+    p = equation_arguments(basis)
+    balls = np.array([interval(0.1, 0.2), interval(-0.3, 0.0)], dtype=object)
+    psi = basis.output(0.0, (), balls, p)
+    exact = basis.output(0.0, (), np.array([0.15, -0.1]), p)
+    assert all(holds(a.value, b) for a, b in zip(psi, exact, strict=True))
+
+
+def test_a_square_is_not_negative():
+    """Neither x*x nor x**2 forgets that both factors are the same."""
+    x = interval(-1, 1)
+    for square in (x * x, x**2):
+        assert square.value.lower() >= -1e-8
+        assert square.value.upper() <= 1 + 1e-8
+    assert (x - x).value.is_zero()
+
+
+@given(a=st.floats(-2, 2), b=st.floats(-2, 2), wa=share, wb=share, s=share, r=share)
+def test_minimum_and_maximum_join_instead_of_choosing(a, b, wa, wb, s, r):
+    """They are exact on overlapping balls, without a decision."""
+    x, y = interval(a, a + wa), interval(b, b + wb)
+    p, q = a + s * wa, b + r * wb
+    assert holds(np.minimum(x, y).value, min(p, q))
+    assert holds(np.maximum(x, y).value, max(p, q))
+    assert holds(abs(x).value, abs(p))
+
+
+@pytest.mark.parametrize("other", [interval(0.5, 2), 0.5, np.float64(0.5)])
+def test_a_comparison_that_balls_cannot_decide_is_refused(other):
+    """The error says so; decided comparisons are plain."""
+    x = interval(0, 1)
+    for compare in (np.less, np.less_equal, np.greater, np.greater_equal):
+        with pytest.raises(Undecided, match="true for some points"):
+            bool(compare(x, other))
+    assert x < 3
+    assert x >= -1
+    assert x != 3
+
+
+def test_nan_is_never_compared():
+    """A ball that is no number leaves every comparison undecided."""
+    nan = as_ball(1.0) / interval(-1, 1)
+    for compare in (np.less, np.greater, np.equal):
+        with pytest.raises(Undecided, match="no number"):
+            bool(compare(nan, 0.0))
+
+
+def test_a_range_is_tight_to_the_tolerance():
+    """x1^2 + x1 x2 on [-1, 2] x [-1, 1] has the range [-1/4, 6] (corner, and x1 = 1/2)."""
+    box = Box.of(x1=(-1, 2), x2=(-1, 1))
+    for tol in (1e-1, 1e-3, 1e-6):
+        found = enclose(lambda x: x[0] * x[0] + x[0] * x[1], box, tol=tol)
+        assert found.low <= -0.25 <= found.least
+        assert found.greatest <= 6 <= found.high
+        assert found.least - found.low <= tol
+        assert found.high - found.greatest <= tol
+        assert found.undecided == 0
+
+
+def test_every_branch_is_followed():
+    """A jump inside the box is in the range, whichever side is narrow."""
+
+    def step(x):
+        return 1.0 if x[0] >= 0.3 else -2.0
+
+    found = enclose(step, Box.of(x=(0, 0.3)), tol=1e-6)
+    assert found.low <= -2
+    assert found.high >= 1
+
+
+@given(b_r=st.floats(0.1, 2), b_l=st.floats(-2, -0.1), u=st.floats(-3, 3))
+def test_the_dead_zone_lies_in_its_proved_range(b_r, b_l, u):
+    """The actuator's own equation, with break points in the box."""
+    zone = nlctl.DeadZone(b_r=b_r, b_l=b_l)
+    p = equation_arguments(zone)
+    found = enclose(lambda x: zone.output(0.0, (), x, p)[0], Box.of(u=(-3, 3)), tol=0.05)
+    assert found.low <= zone.output(0.0, (), (u,), p)[0] <= found.high
+
+
+def test_a_function_without_value_has_no_bound():
+    """0/0 in the box: the range is infinite, and boxes are counted as undecided."""
+    found = enclose(lambda x: x[0] / x[0] / x[0], Box.of(x=(-1, 1)), max_boxes=300)
+    assert found.high == np.inf
+    assert found.undecided > 0
+
+
+def test_a_disturbance_is_bounded_for_all_time():
+    """q cos(w t) with q = 5 + 0.1 cos t stays within 5.1, chirp or not."""
+    for integrate in (False, True):
+        plant = nlctl.ForcedDuffing(integrate_w=integrate, d_amplitude=0.0)
+        p = equation_arguments(plant)
+        found = enclose(lambda z, f=plant.d, p=p: f((0, 0), z[0], p), Box.of(t=(0, np.inf)))
+        assert found.magnitude == pytest.approx(5.1, abs=1e-6)
+
+
+def test_a_true_claim_is_proved_and_a_false_one_refuted_at_a_point():
+    """sin x <= 1 - 1e-4 fails near pi/2, and 1 + 1e-9 is an upper bound."""
+    box = Box.of(x=(0, 3))
+    assert prove(lambda x: np.sin(x[0]), box, high=1 + 1e-8).holds is True
+    false = prove(lambda x: np.sin(x[0]), box, high=1 - 1e-4)
+    assert false.holds is False
+    assert np.sin(false.where["x"]) > 1 - 1e-4
+
+
+def test_what_the_boxes_leave_open_is_undecided():
+    """With too few boxes a claim is neither proved nor refuted, and the rest is counted."""
+    left = prove(lambda x: x[0] - x[0] * x[0], Box.of(x=(0, 1)), high=0.25 + 1e-9, max_boxes=5)
+    assert left.holds is None
+    assert left.undecided > 0
+
+
+@given(x=st.floats(-1, 1), y=st.floats(-1, 1))
+def test_a_proof_on_a_box_holds_at_its_points(x, y):
+    """x^2 + y^2 - x y >= 0 with a margin, on numbers as on balls."""
+
+    def f(z):
+        return z[0] * z[0] + z[1] * z[1] - z[0] * z[1]
+
+    proof = prove(f, Box.of(x=(-1, 1), y=(-1, 1)), low=-1e-3, high=3 + 1e-3)
+    assert proof.holds
+    assert -1e-3 <= f((x, y)) <= 3 + 1e-3
+
+
+def test_a_box_refuses_what_is_no_interval():
+    """Ends in order, no NaN, and known sides."""
+    for ends in ((1, 0), (np.nan, 1)):
+        with pytest.raises(ParameterError, match="side x1"):
+            Box.of(x1=ends)
+    with pytest.raises(UnknownNameError, match="x1"):
+        Box.of(x1=(0, 1))["x_1"]
