@@ -92,7 +92,7 @@ def lower(schedule: Schedule, program: Program, lanes: int = 8) -> Lowered:
     program : Program
         What was emitted for it.
     lanes : int, optional
-        Number of members, a power of two.  With 1, loops take several elements at a time.
+        Number of members.  With 1, loops take several elements at a time.
 
     Returns
     -------
@@ -199,7 +199,7 @@ def lowered_code(lowered: Lowered) -> tuple[Any, Any, Any]:
 def _stores(name: str, row: int, array: Any) -> list[Store]:
     graph = array.graph
     if array.axis is not None:
-        return split(Store(array=name, row=row, expr=array.only, size=array.length))
+        return split(Store(array=name, row=row, expr=graph.number(array.only), size=array.length))
     return [
         Store(array=name, row=row + k, expr=graph.number(e), size=1)
         for k, e in enumerate(array.cells.flat)

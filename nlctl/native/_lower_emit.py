@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ._lower_blocks import Call
-from ._lower_plan import READ, Loop, Plan, Store
+from ._lower_plan import Loop, Plan, Store
 from ._trace_graph import Expr
 
 WIDE = 8
@@ -57,20 +57,26 @@ class _Writer:
         self.count = 0
         self.uses = Counter(a for n in plan.nodes if n not in known for a in n.args)
         self.uses.update(s.expr for s in plan.stores)
+        loops = (n for n in plan.nodes if n not in known and (n.size or n.op == "sum"))
+        self.uses.update(a for n in loops for a in n.args if not a.size)  # not once but n times
 
     def lines(self) -> Iterator[str]:
         """Yield all lines: level by level numbers, then loops."""
         for level in range(max(self.plan.level.values(), default=0) + 1):
             for node in self.plan.nodes:
-                if self.plan.level[node] == level and node.op != "sum":
+                if self.plan.level[node] == level and not self._summed(node):
                     yield from self._number(node)
                     yield from self._number_stores(node)
             for loop, nodes in sorted(self.plan.loops.items(), key=lambda item: item[0]):
                 if loop[0] == level:
                     yield from self._loop(loop, nodes)
             for node in self.plan.nodes:
-                if node.op == "sum" and self.plan.level[node] == level + 1:
+                if self._summed(node) and self.plan.level[node] == level + 1:
                     yield from self._number_stores(node)
+
+    def _summed(self, node: Expr) -> bool:
+        """Whether a number comes out of a loop of this function."""
+        return node.op == "sum" and node not in self.known
 
     def _number(self, node: Expr) -> Iterator[str]:
         """Give a number its name, and yield the line that computes it."""
@@ -80,13 +86,13 @@ class _Writer:
         elif node.size is None and node.op == "const":
             self.names[node] = _constant(node.data)
         elif node.size is None:
-            text = self._place(node) or self._operation(node)
-            reading = node in self.known or node.op in READ
-            if not reading and self.uses[node] == 1 and len(text) < SHORT and _is_cheap(node):
+            place = self._place(node)
+            text = place or self._operation(node)
+            if self.uses[node] == 1 and len(text) < SHORT and (place or _is_cheap(node)):
                 self.names[node] = text
                 return
             self.names[node] = self._new_name(node)
-            yield f"{self.names[node]} = {text}"
+            yield f"{self.names[node]} = {_bare(text)}"
 
     def _new_name(self, node: Expr) -> str:
         if node.op == "leaf" and node not in self.known and node.size is None:
@@ -170,7 +176,9 @@ class _Writer:
             yield from self._reads(node.args, count)
             if node.op == "sum":
                 term = self.names[node.args[0]]
-                part = f"first({term}, {count})" if self.lanes == 1 and count < WIDE else term
+                part = (
+                    f"first({_bare(term)}, {count})" if self.lanes == 1 and count < WIDE else term
+                )
                 yield f"{self.names[node]} = {self.names[node]} + {part}"
                 continue
             text = self._operation(node)

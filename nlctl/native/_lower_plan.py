@@ -67,13 +67,13 @@ def needed(exprs: Iterable[Expr], known: Collection[Expr]) -> tuple[Expr, ...]:
     return tuple(sorted(found, key=lambda e: e.index))
 
 
-def split(store: Store) -> list[Store]:
-    """Divide what is joined into its parts."""
-    if store.expr.op != "concat":
+def split(store: Store, known: Collection[Expr] = ()) -> list[Store]:
+    """Divide what is joined into its parts, unless it lies in memory already."""
+    if store.expr.op != "concat" or store.expr in known:
         return [store]
     parts, row = [], store.row
     for piece, length in zip(store.expr.args, store.expr.data, strict=True):
-        parts += split(Store(array=store.array, row=row, expr=piece, size=length))
+        parts += split(Store(array=store.array, row=row, expr=piece, size=length), known)
         row += length
     return parts
 
@@ -94,22 +94,28 @@ def plan(wanted: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int)
     -------
     Plan
     """
-    wanted = [part for store in wanted for part in split(store)]
+    wanted = [part for store in wanted for part in split(store, known)]
     nodes = needed([s.expr for s in wanted], known)
     stored = dict(known)
+    places = {s.expr: s.row for s in wanted if s.array == "c"}  # it is to lie there anyway
     for node in _in_memory(nodes, known):
-        stored[node], rows = ("c", rows), rows + _rows(node)
+        if node in places:
+            stored[node] = ("c", places[node])
+        else:
+            stored[node], rows = ("c", rows), rows + _rows(node)
     level = _levels(nodes, known)
     written = _written(wanted, nodes, stored, known)
-    users = _loops(nodes, level, stored, written)
+    users = _loops(nodes, level, stored, known, written)
     for node, found in users.items():
         if len(found) > 1 and node not in stored and node.kind != "b":
             stored[node], rows = ("c", rows), rows + (node.size or 1)
     written = _written(wanted, nodes, stored, known)
-    users = _loops(nodes, level, stored, written)  # again: what lies in memory is computed once
+    users = _loops(
+        nodes, level, stored, known, written
+    )  # again: what lies in memory is computed once
     loops: dict[Loop, list[Expr]] = {}
     for node in nodes:
-        for loop in users.get(node, ()) if node not in known else ():
+        for loop in users.get(node, ()):
             loops.setdefault(loop, []).append(node)
     for store in written:
         if store.size > 1:
@@ -146,7 +152,8 @@ def _levels(nodes: Sequence[Expr], known: Collection[Expr]) -> dict[Expr, int]:
         level[node] = 0
         for arg in node.args if node not in known else ():
             ready = arg in known or arg.op == "call" or arg.size is None
-            waits = node.op in ("item", "slice", "call") and not ready
+            copied = node.op == "call" and arg.size is not None
+            waits = copied or (node.op in ("item", "slice") and not ready)
             joined = arg.op == "concat" and node.op not in STORED and not waits
             later = (node.op == "sum") + waits + joined
             level[node] = max(level[node], level[arg] + later)
@@ -163,20 +170,21 @@ def _written(
     inner = []
     for node, (array, row) in stored.items():
         if node not in known and node.op != "call":
-            inner += split(Store(array=array, row=row, expr=node, size=node.size or 1))
+            inner += split(Store(array=array, row=row, expr=node, size=node.size or 1), known)
     for node in nodes:
         if node.op == "call" and node in stored:
             row = stored[node][1]
             for arg, size in zip(node.args, node.data[1], strict=True):
-                inner += split(Store(array="c", row=row, expr=arg, size=size))
+                inner += split(Store(array="c", row=row, expr=arg, size=size), known)
                 row += size
-    return [*inner, *wanted]
+    return list(dict.fromkeys([*inner, *wanted]))
 
 
 def _loops(
     nodes: Sequence[Expr],
     level: dict[Expr, int],
     stored: dict[Expr, tuple[str, int]],
+    known: Collection[Expr],
     written: Sequence[Store],
 ) -> dict[Expr, set[Loop]]:
     """Return in which loops each vector and sum is computed."""
@@ -185,9 +193,9 @@ def _loops(
         if store.expr.size:
             found.setdefault(store.expr, set()).add((level[store.expr], store.size))
     for node in reversed(nodes):
-        if node.op == "sum":
+        if node.op == "sum" and node not in known:
             found[node] = {(level[node] - 1, node.args[0].size or 1)}
-        if node.op in READ or (node.op != "sum" and node not in found):
+        if node in known or node.op in READ or node not in found:
             found.pop(node, None)
             continue
         if node in stored:

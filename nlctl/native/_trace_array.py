@@ -221,12 +221,14 @@ def full(graph: Graph, shape: Any, value: Any) -> Tracer:
     shape = tuple(
         operator.index(n) for n in (shape if isinstance(shape, list | tuple) else [shape])
     )
-    number = traced(graph, value).only
+    number = traced(graph, value)
+    if number.size != 1 or number.only.kind != "f":
+        raise Untraceable("an array that is filled with something else than one float")
     long = [i for i, n in enumerate(shape) if n > SMALL]
     if len(long) > 1:
         raise Untraceable("a large matrix")
     cells = np.empty([n for n in shape if n <= SMALL], dtype=object)
-    cells.fill(number)
+    cells.fill(number.only)
     return Tracer(graph, cells, *([long[0], shape[long[0]]] if long else []))
 
 

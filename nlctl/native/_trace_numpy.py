@@ -83,14 +83,18 @@ class Stage:
             return self.copied(value)
         if isinstance(value, FunctionType):
             return _for_numbers(value) if library in _LIBRARIES else self.copied(value)
+        if callable(value) and not isinstance(value, type) and library != "builtins":
+            return lambda *arguments, **options: _forbidden(repr(value), value)  # may have a memory
         return value
 
     def _ufunc(self, operation: str, real: Callable[..., Any]) -> Callable[..., Any]:
+        count = getattr(np, operation if operation in FUNCTIONS else NUMPY[operation]).nin
+
         def function(*arguments: Any, **options: Any) -> Any:
             if not any(map(holds_tracers, arguments)):
                 return real(*arguments, **options)
-            if options:
-                raise Untraceable(f"options {list(options)}")
+            if options or len(arguments) != count:
+                raise Untraceable(f"{operation} with other arguments")
             if operation == "power":
                 return traced(self.graph, arguments[0]) ** arguments[1]
             return elementwise(self.graph, operation, *arguments)
@@ -110,7 +114,8 @@ class Stage:
 
     def _math_function(self, name: str, real: Any) -> Any:
         operation = _MATH.get(name, name)
-        return self._ufunc(operation, real) if operation in FUNCTIONS else _for_numbers(real)
+        known = operation in FUNCTIONS and name != "remainder"  # NumPy's is another one
+        return self._ufunc(operation, real) if known else _for_numbers(real)
 
     def _builtin(self, name: str) -> Any:
         if name == "float":
@@ -167,17 +172,24 @@ def _names(code: CodeType) -> Iterator[str]:
             yield from _names(constant)
 
 
+def _only_floats(dtype: Any) -> None:
+    if dtype not in (None, float, np.float64):
+        raise Untraceable(f"arrays of {dtype}")
+
+
 class _Numpy:
     """Functions of NumPy that are no ufuncs."""
 
     @staticmethod
     def zeros(graph, shape, dtype=float):
+        _only_floats(dtype)
         return full(graph, shape, 0.0)
 
     empty = zeros
 
     @staticmethod
     def ones(graph, shape, dtype=float):
+        _only_floats(dtype)
         return full(graph, shape, 1.0)
 
     @staticmethod
@@ -186,21 +198,24 @@ class _Numpy:
 
     @staticmethod
     def zeros_like(graph, array):
-        return full(graph, traced(graph, array).shape, 0.0)
+        return full(graph, array.shape, 0.0) if holds_tracers(array) else np.zeros_like(array)
 
     empty_like = zeros_like
 
     @staticmethod
     def ones_like(graph, array):
-        return full(graph, traced(graph, array).shape, 1.0)
+        return full(graph, array.shape, 1.0) if holds_tracers(array) else np.ones_like(array)
 
     @staticmethod
-    def array(graph, values, dtype=float):
+    def array(graph, values, dtype=None):
+        if not holds_tracers(values) and np.array(values, dtype).dtype != float:
+            return np.array(values, dtype)  # an array of integers rounds what it is assigned
+        _only_floats(dtype)
         return traced(graph, values).copy()
 
     @staticmethod
-    def asarray(graph, values, dtype=float):
-        return traced(graph, values)
+    def asarray(graph, values, dtype=None):
+        return values if isinstance(values, Tracer) else _Numpy.array(graph, values, dtype)
 
     @staticmethod
     def copy(graph, values):

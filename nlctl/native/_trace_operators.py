@@ -67,7 +67,7 @@ def _assign(self: Tracer, key: Any, value: Any) -> None:
     if self.axis is None:
         if value.axis is not None:
             raise Untraceable("a long array assigned to a short one")
-        self.cells[key] = value.cells if value.shape else value.cells[()]
+        self.cells[tuple(full_key(key, self.ndim))] = value.cells if value.shape else value.only
         return
     if self.ndim > 1 or not self.alone:
         raise Untraceable("assignment to a part of a long array")
