@@ -38,7 +38,7 @@ from .native import (
 )
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
-from .response import input_output_response
+from .response import EngineWarning, input_output_response
 
 __all__ = [
     "AdaptiveWeights",
@@ -53,6 +53,7 @@ __all__ = [
     "DeadZoneNussbaumLaw",
     "DiagramError",
     "DivergedError",
+    "EngineWarning",
     "Ensemble",
     "FilteredError",
     "FilteredStep",

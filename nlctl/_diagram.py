@@ -18,45 +18,62 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, kw_only=True)
-class Leaf:
-    """One block of a flattened diagram.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Place:
+    """Where a block or diagram stands: one system may stand in a diagram twice.
 
     Attributes
     ----------
     path : str
-        Names of the diagrams around it and its own, joined by dots.
+        Names of the diagrams around it and its own, joined by dots; empty for the outermost
+        diagram.
     parameter_path : str
         The same without diagrams that do not put their name in front of their parameters'
         (those made with plain ``ct.interconnect``).
     system : control.InputOutputSystem
     state_offset : int
-        Where its states begin in the diagram's state vector.
+        Where its states begin in the outermost diagram's state vector.
+    parent : Place or None
+        The diagram around it, and ...
+    position : int
+        ... its position in that diagram's ``syslist``.
     """
 
     path: str
     parameter_path: str
-    system: ct.InputOutputSystem
+    system: Any  # a diagram or a block; only diagrams have maps and offsets
     state_offset: int
+    parent: Place | None
+    position: int
 
 
-def leaves(system: ct.InputOutputSystem) -> Iterator[Leaf]:
+def places(
+    system: Any, parent: Place | None = None, position: int = 0, offset: int = 0
+) -> Iterator[Place]:
+    """Yield a system's place and then, in the order of the state vector, those of its parts."""
+    nested = isinstance(system, ct.InterconnectedSystem)
+    outer, outer_parameters = ("", "") if parent is None else (parent.path, parent.parameter_path)
+    own = "" if nested and parent is None else system.name
+    silent = nested and not _is_scoped(system)
+    here = Place(
+        path=f"{outer}.{own}" if outer else own,
+        parameter_path=".".join(p for p in (outer_parameters, "" if silent else own) if p),
+        system=system,
+        state_offset=offset,
+        parent=parent,
+        position=position,
+    )
+    yield here
+    for i, part in enumerate(system.syslist if nested else ()):
+        yield from places(part, here, i, offset)
+        offset += part.nstates or 0
+
+
+def leaves(system: ct.InputOutputSystem) -> Iterator[Place]:
     """Yield the blocks of a diagram in the order of its state vector, nested ones flattened."""
-    yield from _leaves(system, [], [], 0)
-
-
-def _leaves(
-    system: ct.InputOutputSystem, path: list[str], parameter_path: list[str], offset: int
-) -> Iterator[Leaf]:
-    if not isinstance(system, ct.InterconnectedSystem):
-        paths = (".".join(p) or system.name for p in (path, parameter_path))
-        yield Leaf(path=next(paths), parameter_path=next(paths), system=system, state_offset=offset)
-        return
-    for sub in system.syslist:
-        silent = isinstance(sub, ct.InterconnectedSystem) and not _is_scoped(sub)
-        further = parameter_path if silent else [*parameter_path, sub.name]
-        yield from _leaves(sub, [*path, sub.name], further, offset)
-        offset += sub.nstates or 0
+    for place in places(system):
+        if not isinstance(place.system, ct.InterconnectedSystem):
+            yield place
 
 
 def _is_scoped(diagram: ct.InterconnectedSystem) -> bool:

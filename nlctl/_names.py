@@ -8,7 +8,6 @@ ordinary diagram made with ``ct.interconnect`` takes qualified names without bei
 
 from __future__ import annotations
 
-import copy
 import difflib
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -102,12 +101,13 @@ class Parameters(dict[str, Any]):
         new.scope, new.table, new.copies = self.scope, self.table, self.copies + 1
         return new
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Parameters:
-        new = Parameters({})
-        memo[id(self)] = new  # first: scope leads to the diagram, and the diagram back here
-        dict.update(new, copy.deepcopy(dict(self), memo))
-        new.__dict__.update(copy.deepcopy(self.__dict__, memo))
-        return new
+    def __reduce__(self) -> tuple[Any, ...]:
+        # contents last: scope leads to the diagram, and the diagram back here
+        return Parameters, ({},), (dict(self), self.__dict__)
+
+    def __setstate__(self, state: tuple[dict[str, Any], dict[str, Any]]) -> None:
+        dict.update(self, state[0])
+        self.__dict__.update(state[1])
 
     def __or__(self, other: Mapping[str, Any]) -> Parameters:  # type: ignore[override]
         new = self.copy()

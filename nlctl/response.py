@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,15 +11,23 @@ import control as ct
 import numpy as np
 
 from . import _diagram
-from ._errors import DivergedError
+from ._errors import DivergedError, ParameterError
+from ._names import unknown
 from ._param import checked_times
 
 if TYPE_CHECKING:
     from .native import Compiled
 
-__all__ = ["input_output_response"]
+__all__ = ["EngineWarning", "input_output_response"]
+
+ENGINES = ("python-control", "native", "auto")
+NATIVE_ONLY = ("max_steps", "step")  # settings that python-control does not know
 
 STANDSTILL = 200  # steps in a row that do not advance the time
+
+
+class EngineWarning(UserWarning):
+    """A diagram could not be compiled, and python-control runs it: the message says why."""
 
 
 def input_output_response(
@@ -28,6 +37,7 @@ def input_output_response(
     initial_state: Mapping[str, float] | Any = None,
     *,
     params: Mapping[str, Any] | None = None,
+    engine: str | None = None,
     method: str | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
@@ -53,6 +63,11 @@ def input_output_response(
         ``{"plant.x1": 0.8}`` replaces some of the blocks' initial states; an array gives all.
     params : mapping, optional
         Qualified parameters, ``{"actuator.b_r": 0.6}``.
+    engine : {"python-control", "native", "auto"}, optional
+        What computes the run of a diagram: python-control, the default; machine code, compiled
+        for this run (for many runs compile once, with `nlctl.compile`); or machine code where the
+        diagram can be compiled and python-control, with an `EngineWarning` that says why, where
+        it cannot.  A `Compiled` always runs as machine code.
     method : str, optional
         Method of `scipy.integrate.solve_ivp` in python-control, "LSODA" by default.  Machine code
         has "tsit5", an explicit Runge-Kutta pair of orders 5(4), "rodas5p", a stiff method of
@@ -74,29 +89,74 @@ def input_output_response(
     ------
     DivergedError
         If the state becomes infinite or NaN.
+    CompileError, AlgebraicLoopError
+        If `engine` is "native" and the diagram cannot be compiled.
     UnknownNameError, ParameterError
         If a name or a value is refused, or if `timepts` has fewer than two entries, is not
         increasing or not finite.
     """
     times = checked_times(timepts)
-    if not isinstance(system, ct.InputOutputSystem):
-        settings = {"params": params, "rtol": rtol, "atol": atol, **kwargs}
-        return _native(system, times, inputs, initial_state, settings, method, progress)
+    interpretable = isinstance(system, ct.InputOutputSystem)
+    if not _takes_machine_code(engine, interpretable):
+        run = _Run(system, times, inputs, initial_state, params, rtol, atol, progress, kwargs)
+        return _interpreted(run, method)
+    from .native import AlgebraicLoopError, CompileError  # late: others need no compiler
+
+    run = _Run(system, times, inputs, initial_state, params, rtol, atol, progress, kwargs)
+    try:
+        return _native(run, method)
+    except (CompileError, AlgebraicLoopError) as error:
+        if engine != "auto" or not interpretable:
+            raise
+        warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=2)
+    run.kwargs = {k: v for k, v in kwargs.items() if k not in NATIVE_ONLY}
+    return _interpreted(run, None)
+
+
+def _takes_machine_code(engine: str | None, interpretable: bool) -> bool:
+    if engine is not None and engine not in ENGINES:
+        raise unknown("engine", str(engine), ENGINES)
+    if not interpretable and engine == "python-control":
+        raise ParameterError(
+            "engine='python-control' needs a diagram, got a compiled one: give compiled.system"
+        )
+    return not interpretable or engine in ("native", "auto")
+
+
+@dataclass
+class _Run:
+    """The arguments of a run that both engines take."""
+
+    system: Any
+    times: np.ndarray
+    inputs: Any
+    initial_state: Any
+    params: Mapping[str, Any] | None
+    rtol: float
+    atol: float
+    progress: Callable[[float], object] | None
+    kwargs: dict[str, Any]
+
+
+def _interpreted(run: _Run, method: str | None) -> ct.TimeResponseData:
+    """Run a diagram in python-control."""
+    system, times, initial_state, params = run.system, run.times, run.initial_state, run.params
     given_by_name = initial_state is None or isinstance(initial_state, Mapping)
     x0: Any = _diagram.initial_state(system, initial_state) if given_by_name else initial_state
-    watch = _Watch(system=system, reached=float(times[0]), progress=progress)
-    settings = {"rtol": rtol, "atol": atol, "events": watch}
+    watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
+    settings = {"rtol": run.rtol, "atol": run.atol, "events": watch}
+    settings |= run.kwargs.pop("solve_ivp_kwargs", {})
     with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
         try:
             response = ct.input_output_response(
                 system,
                 times,
-                inputs,
+                run.inputs,
                 x0,
                 params=dict(params or {}),
                 method=method or "LSODA",
-                solve_ivp_kwargs=settings | kwargs.pop("solve_ivp_kwargs", {}),
-                **kwargs,
+                solve_ivp_kwargs=settings,
+                **run.kwargs,
             )
         except RuntimeError as error:
             # python-control takes a NaN signal for an algebraic loop: it never equals itself
@@ -108,19 +168,26 @@ def input_output_response(
     return response
 
 
-def _native(
-    compiled: Compiled,
-    times: np.ndarray,
-    inputs: Any,
-    initial_state: Any,
-    settings: dict[str, Any],
-    method: str | None,
-    progress: Callable[[float], object] | None,
-) -> ct.TimeResponseData:
-    from .native._response import respond  # late: python-control's users need no compiler
+def _native(run: _Run, method: str | None) -> ct.TimeResponseData:
+    """Run a compiled diagram, or one that is compiled for this run, as machine code."""
+    from .native import compile as compile_diagram
+    from .native._response import respond
 
-    settings["method"] = method or "auto"
-    return respond(compiled, times, inputs, initial_state, progress=progress, **settings)
+    compiled = run.system
+    if isinstance(compiled, ct.InputOutputSystem):
+        compiled = compile_diagram(compiled, params=run.params)
+    return respond(
+        compiled,
+        run.times,
+        run.inputs,
+        run.initial_state,
+        params=run.params,
+        progress=run.progress,
+        method=method or "auto",
+        rtol=run.rtol,
+        atol=run.atol,
+        **run.kwargs,
+    )
 
 
 @dataclass

@@ -252,7 +252,7 @@ def test_what_numba_cannot_compile_is_named():
 
     block = ct.nlsys(None, output, inputs=1, outputs=1, name="words")
     line = output.__code__.co_firstlineno
-    with pytest.raises(CompileError, match=rf"words_output .*line {line}.*python-control"):
+    with pytest.raises(CompileError, match=rf"block 'words' .*line {line + 1}\).*erfcx"):
         compile_diagram(block).output(0.0, [], [1.0])
     compare(block)
 
@@ -275,7 +275,7 @@ def test_an_algebraic_loop_prints_its_ring():
         schedule(ring)
     said = str(caught.value)
     assert "has no state in it" in said
-    ring_text = said.removeprefix("algebraic loop: ").removesuffix(" has no state in it")
+    ring_text = said.removeprefix("algebraic loop: ").partition(" has no state in it")[0]
     around = ring_text.split(" -> ")
     assert around[0] == around[-1]
     turns = [around[:-1][i:] + around[:-1][:i] for i in range(3)]

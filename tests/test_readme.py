@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import nlctl
 from analysis.reproduction import expectations
@@ -32,7 +33,7 @@ def test_the_loop_of_ones_own_runs_in_at_most_30_lines(tmp_path):
 def test_the_other_blocks_of_code_run():
     """They do what is said of them: machine code, an ensemble, the paper's examples."""
     later = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)[1:]
-    assert len(later) == 2
+    assert len(later) == 3
     names = {"nlctl": nlctl, "np": np}
     for code in later:
         exec(code, names)
@@ -40,6 +41,13 @@ def test_the_other_blocks_of_code_run():
     assert len(names["many"].table) == 1000
     assert (names["many"].table["status"] == "OK").all()
     assert names["loop"].output_labels[:2] == ["y", "yd"]
+    assert round(names["certificate"].C_0, 3) == 0.477
+    assert names["prediction"].burst == pytest.approx(9.4e3, rel=0.02)
+    late = names["late"]
+    zeta, e = late.states[late.state_labels.index("controller.law_zeta")], late.outputs[2]
+    assert not late.success
+    assert 9.1e3 < late.time[np.argmax(zeta > 2.99)] <= late.time[-1] < 9.5e3
+    assert np.abs(e[(late.time > 100) & (late.time < 9e3)]).max() < 0.06
 
 
 def test_the_table_of_figures_is_the_table_that_is_checked():

@@ -17,14 +17,22 @@ import tempfile
 import types
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numba
 import numpy as np
 import platformdirs
 
 from .._files import replace_file
-from ._emit import Program
+
+
+class Sourced(Protocol):
+    """Emitted source, and what it refers to: a `Program`, or one that was lowered."""
+
+    @property
+    def source(self) -> str: ...
+
+    def namespace(self, *, native: bool) -> dict[str, Any]: ...
 
 
 def cache_folder() -> Path:
@@ -32,7 +40,7 @@ def cache_folder() -> Path:
     return Path(os.environ.get("NLCTL_CACHE_DIR") or platformdirs.user_cache_dir("nlctl"))
 
 
-def program_key(program: Program) -> str:
+def program_key(program: Sourced) -> str:
     """Return a key that changes whenever anything changes that the machine code depends on."""
     digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
     digest.update(program.source.encode())
@@ -46,6 +54,11 @@ def program_key(program: Program) -> str:
 
 def _fingerprint(thing: Any, seen: set[int]) -> Iterator[str]:
     """Yield text for a function and for everything that it refers to."""
+    if isinstance(thing, tuple | list):
+        yield f"{type(thing).__name__} of {len(thing)}"
+        for item in thing:
+            yield from _fingerprint(item, seen)
+        return
     function = getattr(thing, "py_func", thing)
     if not isinstance(function, types.FunctionType):
         yield _constant(thing)
@@ -53,6 +66,7 @@ def _fingerprint(thing: Any, seen: set[int]) -> Iterator[str]:
     if id(function) in seen:
         return
     seen.add(id(function))
+    yield f"of {function.__module__}"  # what is on disk refers to it by this name
     yield from _code_text(function.__code__)
     for cell in function.__closure__ or ():
         yield from _fingerprint(cell.cell_contents, seen)
@@ -92,7 +106,7 @@ def _constant(value: Any) -> str:
     return re.sub(r" at 0x[0-9a-f]+", "", repr(value))  # addresses differ between processes
 
 
-def loaded(program: Program, functions: Mapping[str, Any]) -> types.ModuleType:
+def loaded(program: Sourced, functions: Mapping[str, Any]) -> types.ModuleType:
     """Return the program as a module whose file lies in the cache, where numba finds its code.
 
     Where the cache cannot be written to, a folder for this process alone takes its place.

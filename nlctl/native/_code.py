@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import control as ct
@@ -12,10 +13,13 @@ import numpy as np
 
 from .._block import Block, event_count, memory_states
 from .._errors import UsageError
-from ._foreign import params_dict, params_record, unpacked_arguments
-from ._parameters import Slot, current_values, is_numeric
-from ._schedule import Combination, Node
+from . import _numpy  # noqa: F401 (numba learns what it lacks)
+from ._foreign import callable_constant, params_dict, params_record, unpacked_arguments
+from ._frozen import frozen
+from ._parameters import Slot, current_values
+from ._schedule import Combination, Node, Signal
 
+NOTHING: Mapping[Any, str] = MappingProxyType({})
 LONG = 8  # states from which on a block's derivatives are written as one slice
 
 
@@ -23,11 +27,12 @@ class CompileError(UsageError):
     """A block that cannot be compiled: the message names it and says why."""
 
 
-def sum_of(combination: Combination) -> str:
-    """Write a linear combination of signals."""
+def sum_of(combination: Combination, guesses: Mapping[Signal, str] = NOTHING) -> str:
+    """Write a linear combination of signals; `guesses` says where those lie that are guessed."""
     terms = []
     for signal, gain in combination.items():
         name = f"u[{signal.index}]" if signal.block is None else f"y{signal.block}[{signal.index}]"
+        name = guesses.get(signal, name)
         sign = {1.0: "", -1.0: "-"}.get(gain, f"{gain!r} * ")
         terms.append(sign + name)
     return " + ".join(terms).replace("+ -", "- ") if terms else "0.0"
@@ -40,14 +45,19 @@ class Code:
     index: int
     node: Node
     slots: Mapping[str, Slot]
+    name: str  # what its names in the source begin with
 
-    @property
-    def name(self) -> str:
-        return re.sub(r"\W", "_", self.node.path)
+    def signal(self, signal: Signal) -> str:
+        """Name one of the block's outputs, for people."""
+        return f"{self.node.path}.{self.node.system.output_labels[signal.index]}"
 
-    def inputs(self, known: bool) -> list[str]:
+    def inputs(
+        self, unknown: Collection[int] = (), guesses: Mapping[Signal, str] = NOTHING
+    ) -> list[str]:
         """Expressions of the inputs; NaN where they are not known yet and must not matter."""
-        return [sum_of(c) if known else "np.nan" for c in self.node.inputs]
+        return [
+            "np.nan" if j in unknown else sum_of(c, guesses) for j, c in enumerate(self.node.inputs)
+        ]
 
     @property
     def direct(self) -> bool:
@@ -69,6 +79,11 @@ class Code:
     def functions(self) -> dict[str, Callable[..., Any]]:
         return {}
 
+    @property
+    def fixed(self) -> dict[str, Any]:
+        """Parameters that are no numbers."""
+        return {}
+
     def constants(self) -> dict[str, Any]:
         return {}
 
@@ -78,10 +93,14 @@ class Code:
     def parameter_lines(self) -> list[str]:
         return []
 
-    def update_lines(self) -> list[str]:
+    def output_lines(
+        self, unknown: Collection[int] = (), guesses: Mapping[Signal, str] = NOTHING
+    ) -> list[str]:
+        """Lines that make ``y{index}``, from inputs some of which may be unknown or guessed."""
         raise NotImplementedError
 
-    def output_lines(self) -> list[str]:
+    def update_lines(self, ready: bool) -> list[str]:
+        """Lines that make the derivatives; `ready` if the last output had the final inputs."""
         raise NotImplementedError
 
 
@@ -93,9 +112,9 @@ class _FunctionCode(Code):
         system = self.node.system
         found = {}
         if system.nstates:
-            found[f"{self.name}_update"] = system.updfcn
+            found[f"{self.name}_update"] = frozen(system.updfcn)
         if system.noutputs and system.outfcn is not None:
-            found[f"{self.name}_output"] = system.outfcn
+            found[f"{self.name}_output"] = frozen(system.outfcn)
         if self.corners:
             found[f"{self.name}_corners"] = system.spec.corners
         if self.memory:
@@ -117,7 +136,7 @@ class _FunctionCode(Code):
         """The block's switching functions and what its memory would become, written into g."""
         if not (self.corners or self.memory):
             return []
-        lines = [f"u{self.index} = {self._inputs('output', known=True)}"]
+        lines = [f"u{self.index} = {self._inputs('output', self.inputs())}"]
         for function, first, count in (
             ("corners", corner, self.corners),
             ("commit", memory, len(self.memory)),
@@ -137,10 +156,13 @@ class _FunctionCode(Code):
         """Whether a function wants its argument x (1) or u (2) as a tuple, to take it apart."""
         if isinstance(self.node.system, Block):
             return self._unpacks
-        return position in unpacked_arguments(self.functions()[f"{self.name}_{function}"])
+        system = self.node.system
+        return position in unpacked_arguments(
+            system.updfcn if function == "update" else system.outfcn
+        )
 
-    def _inputs(self, function: str, known: bool) -> str:
-        items = _tuple(self.inputs(known))
+    def _inputs(self, function: str, inputs: list[str]) -> str:
+        items = _tuple(inputs)
         if self._as_tuple(function, 2):
             return items
         return f"np.array({items})" if self.node.inputs else "np.empty(0)"
@@ -155,8 +177,12 @@ class _FunctionCode(Code):
         arguments = f"t, {self._states(function)}, u{self.index}, p{self.index}"
         return f"as_vector({self.name}_{function}({arguments}))"
 
+    @property
+    def fixed(self) -> dict[str, Any]:
+        return {k: v for k, v in self._values.items() if k not in self.slots}
+
     def constants(self) -> dict[str, Any]:
-        return {f"{self.name}_{k}": v for k, v in self._values.items() if not is_numeric(v)}
+        return {f"{self.name}_p_{k}": callable_constant(v) for k, v in self.fixed.items()}
 
     def records(self) -> dict[str, tuple[Callable[..., Any], type]]:
         """What gathers the parameters: in plain Python, and in machine code."""
@@ -172,26 +198,32 @@ class _FunctionCode(Code):
 
     def parameter_lines(self) -> list[str]:
         values = [
-            self.slots[k].expression if k in self.slots else f"{self.name}_{k}"
+            self.slots[k].expression if k in self.slots else f"{self.name}_p_{k}"
             for k in self._values
         ]
-        return [f"p{self.index} = {self.name}_p({', '.join(values)})"]
+        filler = [] if values or isinstance(self.node.system, Block) else ["0.0"]
+        return [f"p{self.index} = {self.name}_p({', '.join(values or filler)})"]
 
-    def output_lines(self) -> list[str]:
-        if not self.node.system.noutputs:
+    def output_lines(
+        self, unknown: Collection[int] = (), guesses: Mapping[Signal, str] = NOTHING
+    ) -> list[str]:
+        system = self.node.system
+        if not system.noutputs:
             return []
-        if self.node.system.outfcn is None:
+        if system.outfcn is None:
             start = self.node.state_offset
-            return [f"y{self.index} = x[{start}:{start + (self.node.system.nstates or 0)}]"]
-        inputs = self._inputs("output", known=self.direct)  # NaN where it must not read them
-        return [f"u{self.index} = {inputs}", f"y{self.index} = {self._call('output')}"]
+            return [f"y{self.index} = x[{start}:{start + system.noutputs}]"]
+        # an output that does not depend on the inputs must not read them
+        inputs = self.inputs(unknown if self.direct else range(len(self.node.inputs)), guesses)
+        given = self._inputs("output", inputs)
+        return [f"u{self.index} = {given}", f"y{self.index} = {self._call('output')}"]
 
-    def update_lines(self) -> list[str]:
+    def update_lines(self, ready: bool) -> list[str]:
         n, start = self.node.system.nstates or 0, self.node.state_offset
         if not n:
             return []
-        inputs = self._inputs("update", known=True)
-        same = self.direct and inputs == self._inputs("output", known=True)
+        inputs = self._inputs("update", self.inputs())
+        same = ready and self.direct and inputs == self._inputs("output", self.inputs())
         given = [] if same else [f"u{self.index} = {inputs}"]
         call = self._call("update")
         if self._unpacks:
@@ -218,25 +250,42 @@ class _LinearCode(Code):
         first, second = (getattr(self.node.system, n).astype(float).astype(object) for n in names)
         return first, second
 
-    def output_lines(self) -> list[str]:
-        matrices, inputs = self._matrices("C", "D"), self.inputs(known=True)
+    def output_lines(
+        self, unknown: Collection[int] = (), guesses: Mapping[Signal, str] = NOTHING
+    ) -> list[str]:
+        matrices, inputs = self._matrices("C", "D"), self.inputs(unknown, guesses)
         rows = [self._row(matrices, i, inputs) for i in range(self.node.system.noutputs or 0)]
         return [f"y{self.index} = {_tuple(rows)}"] if rows else []
 
-    def update_lines(self) -> list[str]:
-        matrices, inputs = self._matrices("A", "B"), self.inputs(known=True)
+    def update_lines(self, ready: bool) -> list[str]:
+        matrices, inputs = self._matrices("A", "B"), self.inputs()
         start = self.node.state_offset
         rows = range(self.node.system.nstates or 0)
         return [f"dx[{start + i}] = {self._row(matrices, i, inputs)}" for i in rows]
 
 
-def code(index: int, node: Node, own: Mapping[str, Slot]) -> Code:
-    if isinstance(node.system, ct.StateSpace):
-        return _LinearCode(index=index, node=node, slots=own)
-    if isinstance(node.system, ct.NonlinearIOSystem):
-        return _FunctionCode(index=index, node=node, slots=own)
+def code(index: int, node: Node, own: Mapping[str, Slot], name: str | None = None) -> Code:
+    """Return how a block is called.
+
+    Raises
+    ------
+    CompileError
+        If it is of a kind that cannot be compiled, or has no fixed size.
+    """
+    system = node.system
+    for kind in ("inputs", "outputs", "states"):
+        if getattr(system, f"n{kind}") is None:
+            raise CompileError(
+                f"block '{node.path}' does not say how many {kind} it has: give {kind}=... to "
+                "ct.nlsys"
+            )
+    label = re.sub(r"\W", "_", node.path) if name is None else name
+    if isinstance(system, ct.StateSpace):
+        return _LinearCode(index=index, node=node, slots=own, name=label)
+    if isinstance(system, ct.NonlinearIOSystem):
+        return _FunctionCode(index=index, node=node, slots=own, name=label)
     raise CompileError(
-        f"block '{node.path}' is a {type(node.system).__name__}; only nonlinear and state-space "
+        f"block '{node.path}' is a {type(system).__name__}; only nonlinear and state-space "
         "blocks can be compiled: convert it with ct.ss first"
     )
 

@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
+import pickle
+import threading
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import FunctionType
-from typing import Any
+from typing import Any, Literal
 
+import cloudpickle
 import control as ct
 import numba
 import numpy as np
 from numba.core import config
+from numba.core.errors import NumbaWarning
 from numba.core.registry import CPUDispatcher
 
-from .._diagram import state_names
+from .._errors import ParameterError
+from .._names import unknown
 from ._cache import loaded
 from ._code import CompileError
+from ._describe import described
 from ._emit import Program, emit
+from ._explain import explained
 from ._foreign import make_callable
 from ._parameters import packed
+from ._probe import check_functions, check_sizes
 from ._schedule import Schedule, schedule
 
+_RESOLVING = threading.Lock()
+LOOPS = ("error", "solve")  # what may be done with algebraic loops
 Rhs = Callable[..., None]
 VECTOR = numba.float64[::1]
 RHS = numba.void(numba.float64, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR)
@@ -42,6 +53,10 @@ class Compiled:
 
     schedule: Schedule
     program: Program
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # functions made at run time are pickled by value; machine code is found on disk again
+        return _restored, (cloudpickle.dumps((self.schedule, self.program)),)
 
     @property
     def system(self) -> Any:
@@ -72,10 +87,12 @@ class Compiled:
         module = loaded(self.program, ready)
         options = {"cache": True, "error_model": "numpy", "nogil": True}
         try:
-            rhs = numba.njit(RHS, **options)(module.rhs)
-            return rhs, numba.njit(OUT, **options)(module.out)
+            with warnings.catch_warnings():  # of what the user need not know
+                warnings.simplefilter("ignore", NumbaWarning)
+                rhs = numba.njit(RHS, **options)(module.rhs)
+                return rhs, numba.njit(OUT, **options)(module.out)
         except Exception as error:  # numba passes on whatever typing raises
-            raise self._explained(error) from error
+            raise explained(error, self.program) from error
 
     def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
         """Return the flat vector `p` that the program takes.
@@ -87,8 +104,9 @@ class Compiled:
         UnknownNameError, ParameterError
             If a name or a value is refused.
         """
-        self.system._update_params(params)
-        return packed(self.schedule.nodes, self.program.layout)
+        with _RESOLVING:  # python-control keeps what it has resolved in the blocks
+            self.system._update_params(params)
+            return packed(self.schedule.nodes, self.program.layout, self.program.fixed)
 
     def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
         """Return the right-hand side, as ``system.dynamics`` does."""
@@ -103,40 +121,22 @@ class Compiled:
         self, function: Rhs, size: int | None, t: float, x: Any, u: Any, params: Any, *more: Any
     ):
         x, u = (np.array(v, dtype=float).reshape(-1) for v in (x, u))
+        for what, given, wanted in (("x", x, self.system.nstates), ("u", u, self.system.ninputs)):
+            if given.size != (wanted or 0):
+                raise ParameterError(f"{what} needs {wanted or 0} values, got {given.size}")
         result = np.empty(size or 0)
         function(float(t), x, u, self.parameter_vector(params), result, *more)
         return result
 
-    def _explained(self, error: Exception) -> CompileError:
-        """Name the block whose function numba refuses, and numba's reason."""
-        text = str(error)
-        culprit = "the program"
-        for name, function in self.program.functions.items():
-            if f"{name}(" in text or _place(function) in text:
-                culprit = f"{name} ({_place(function)})"
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        marks = ("No implementation", "Unknown attribute", "Untyped global", "Cannot determine")
-        reason = next((line for line in lines if any(m in line for m in marks)), lines[-1])
-        return CompileError(
-            f"numba cannot compile {culprit}: {reason}; the diagram still runs in python-control"
-        )
-
     def __repr__(self) -> str:
-        names = [self.schedule.nodes[i].path for i in self.schedule.order]
-        direct = [n.path for n in self.schedule.nodes if n.direct.any()]
-        return "\n".join(
-            [
-                f"Compiled '{self.system.name}': {len(names)} blocks, "
-                f"{self.system.nstates or 0} states, {self.system.noutputs or 0} outputs",
-                f"  order:       {' -> '.join(names)}",
-                f"  feedthrough: {', '.join(direct) or 'none'}",
-                f"  states:      {_shortened(state_names(self.system))}",
-            ]
-        )
+        return described(self.schedule, self.program, self.parameter_vector())
 
 
 def compile(  # noqa: A001 (what it does)
-    system: Any, *, params: Mapping[str, Any] | None = None
+    system: Any,
+    *,
+    params: Mapping[str, Any] | None = None,
+    algebraic_loops: Literal["error", "solve"] = "error",
 ) -> Compiled:
     """Turn a python-control system into machine code.
 
@@ -147,6 +147,12 @@ def compile(  # noqa: A001 (what it does)
     params : mapping, optional
         Parameters that will be overridden although no block declares them, such as those that a
         foreign function reads with ``params.get``; the values given here are not kept.
+    algebraic_loops : {"error", "solve"}, optional
+        What is done with signals that depend on each other at the same instant: refuse the
+        diagram, or solve for them by Newton's method in every evaluation.  A linear loop is then
+        exact to rounding.  Of several solutions the one is found that the search from 0 (then
+        from 1 and -1) reaches first.  Where there is none, or the loop's matrix is singular to
+        1e-7, the results are NaN, and a run ends as diverged.
 
     Returns
     -------
@@ -157,13 +163,31 @@ def compile(  # noqa: A001 (what it does)
     AlgebraicLoopError
         If signals depend on each other without a state in between.
     CompileError
-        If a block cannot be compiled.
+        If a block cannot be compiled: at once where it is of a wrong kind or size, and when the
+        program is first used where numba refuses one of its functions.
+
+    Notes
+    -----
+    Objects that a function reads (``self.gain``, a linear system that it closes over) and
+    parameters that are no numbers are constants of the program: compile again to change them.
     """
     if isinstance(system, ct.TransferFunction):
         system = ct.ss(system)
     system._update_params(params)
-    read = schedule(system)
-    return Compiled(schedule=read, program=emit(read))
+    if algebraic_loops not in LOOPS:
+        raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
+    read = schedule(system, solve_loops=algebraic_loops == "solve")
+    program = emit(read)
+    check_sizes(system, read.nodes)
+    for node in read.nodes:
+        check_functions(node)
+    return Compiled(schedule=read, program=program)
+
+
+def _restored(content: bytes) -> Compiled:
+    """Make a compiled diagram of what `Compiled.__reduce__` has written."""
+    read, program = pickle.loads(content)
+    return Compiled(schedule=read, program=program)
 
 
 def _jitted(function: Any) -> Any:
@@ -175,15 +199,4 @@ def _jitted(function: Any) -> Any:
             f"{function!r} is no plain function: give the block a function made with def"
         )
     make_callable(function)
-    return numba.njit(function, error_model="numpy", nogil=True)
-
-
-def _place(function: Any) -> str:
-    """File and line of a function, as numba prints them."""
-    code = function.__code__
-    return f'File "{code.co_filename}", line {code.co_firstlineno}'
-
-
-def _shortened(names: list[str]) -> str:
-    shown = names if len(names) <= 8 else [*names[:4], "...", *names[-3:]]
-    return ", ".join(shown) or "none"
+    return numba.njit(function, error_model="numpy", nogil=True, boundscheck=True)

@@ -6,16 +6,20 @@ runs as plain Python and as machine code.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ._algebraic import failed, improve, new_loop, searching
 from ._code import Code, code, sum_of
 from ._parameters import Slot, slots
-from ._schedule import Schedule
+from ._schedule import Schedule, Signal
 from ._values import as_vector
+
+NEWTON = (new_loop, searching, improve, failed)  # what a program with algebraic loops calls
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,8 +34,12 @@ class Program:
         the memory states would be committed to.
     functions : mapping
         The blocks' own functions, by the names that the source uses.
+    owners : mapping
+        Paths of the blocks that these functions belong to, by the same names.
     constants : mapping
-        Fixed values that are no numbers, by name.
+        What else the source uses, by name: fixed values that are no numbers.
+    fixed : mapping
+        For every block its parameters that are no numbers.
     records : mapping
         What gathers a block's parameters, by name: in plain Python, and in machine code.
     layout : mapping
@@ -44,6 +52,8 @@ class Program:
 
     source: str
     functions: Mapping[str, Callable[..., Any]]
+    owners: Mapping[str, str]
+    fixed: Mapping[int, Mapping[str, Any]]
     constants: Mapping[str, Any]
     records: Mapping[str, tuple[Callable[..., Any], type]]
     layout: Mapping[int, Mapping[str, Slot]]
@@ -78,13 +88,16 @@ def emit(schedule: Schedule) -> Program:
         If a block is of a kind that cannot be compiled.
     """
     layout = slots(schedule.nodes)
-    blocks = [code(i, node, layout[i]) for i, node in enumerate(schedule.nodes)]
+    labels = _labels([node.path for node in schedule.nodes])
+    blocks = [code(i, node, layout[i], labels[i]) for i, node in enumerate(schedule.nodes)]
     parameters = [line for block in blocks for line in block.parameter_lines()]
-    outputs = [line for i in schedule.order for line in blocks[i].output_lines()]
-    updates = [line for block in blocks for line in block.update_lines()]
+    outputs, ready = _output_lines(schedule, blocks)
+    updates = [line for i, block in enumerate(blocks) for line in block.update_lines(i in ready)]
     events = _numbered(blocks)
     updates += [line for block, places in events for line in block.event_lines(*places)]
     results = [f"y[{i}] = {sum_of(c)}" for i, c in enumerate(schedule.outputs)]
+    updates += _unsolved(schedule, ["dx[:] = np.nan", "g[:] = np.nan"])
+    results += _unsolved(schedule, ["y[:] = np.nan"])
     source = "\n".join(
         [
             "def rhs(t, x, u, p, dx, g):",
@@ -96,22 +109,66 @@ def emit(schedule: Schedule) -> Program:
             "",
         ]
     )
-    functions: dict[str, Callable[..., Any]] = {}
     constants: dict[str, Any] = {"np": np, "as_vector": as_vector}
-    records: dict[str, tuple[Callable[..., Any], type]] = {}
-    for block in blocks:
-        functions |= block.functions()
-        constants |= block.constants()
-        records |= block.records()
+    constants |= {f.__name__: f for f in NEWTON} if schedule.loops else {}
     return Program(
         source=source,
-        functions=functions,
-        constants=constants,
-        records=records,
+        functions={name: f for block in blocks for name, f in block.functions().items()},
+        owners={name: block.node.path for block in blocks for name in block.functions()},
+        fixed={block.index: block.fixed for block in blocks if block.fixed},
+        constants=constants | {k: v for block in blocks for k, v in block.constants().items()},
+        records={name: pair for block in blocks for name, pair in block.records().items()},
         layout=layout,
         corners=sum(block.corners for block in blocks),
         memory=tuple(i for block in blocks for i in block.memory),
     )
+
+
+def _labels(paths: Sequence[str]) -> list[str]:
+    """Return what names in the source begin with; a number is added where two would be equal."""
+    clean = [re.sub(r"\W|^(?=\d)", "_", path) for path in paths]
+    return [f"{name}_{i}" if clean.count(name) > 1 else name for i, name in enumerate(clean)]
+
+
+def _output_lines(schedule: Schedule, blocks: Sequence[Code]) -> tuple[list[str], set[int]]:
+    """Return the lines that make every block's outputs, and which blocks had their final inputs."""
+    lines: list[str] = []
+    ready: set[int] = set()
+    at = 0
+    for number, loop in enumerate(schedule.loops):
+        lines += _evaluated(schedule, blocks, range(at, loop.start), {}, ready)
+        name = f"loop{number}"
+        guesses = {signal: f"{name}.guess[{k}]" for k, signal in enumerate(loop.torn)}
+        inside = _evaluated(schedule, blocks, range(loop.start, loop.stop), guesses, ready)
+        inside += [f"{name}.found[{k}] = {sum_of({s: 1.0})}" for k, s in enumerate(loop.torn)]
+        names = ", ".join(blocks[s.block or 0].signal(s) for s in loop.torn)
+        lines += [f"{name} = new_loop({len(loop.torn)})  # solved for {names}"]
+        lines += [f"while searching({name}):"]
+        lines += _indented([*inside, f"improve({name})"])
+        at = loop.stop
+    lines += _evaluated(schedule, blocks, range(at, len(schedule.order)), {}, ready)
+    return lines, ready
+
+
+def _evaluated(
+    schedule: Schedule,
+    blocks: Sequence[Code],
+    places: Iterable[int],
+    guesses: Mapping[Signal, str],
+    ready: set[int],
+) -> list[str]:
+    lines: list[str] = []
+    for place in places:
+        block, unknown = schedule.order[place], schedule.unknown[place]
+        lines += blocks[block].output_lines(unknown, guesses)
+        (ready.discard if unknown or guesses else ready.add)(block)
+    return lines
+
+
+def _unsolved(schedule: Schedule, lines: list[str]) -> list[str]:
+    """Make all results NaN where a loop was not solved: a block may turn NaN into a number."""
+    which = " or ".join(f"failed(loop{i})" for i in range(len(schedule.loops)))
+    return [f"if {which}:", *_indented(lines)] if which else []
 
 
 def _numbered(blocks: Sequence[Code]) -> list[tuple[Code, tuple[int, int]]]:

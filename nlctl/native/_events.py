@@ -13,7 +13,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-STARTS_BEHIND = 1e-5  # a root in this first part of a step was the end of the step before
+STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
 AGAIN, CLEAR, EVENT = 0, 1, 2  # what became of the step just tried
 TRIES = 30
 SHORT = 1e-3  # part of a step: a shorter one between events is no progress
@@ -21,22 +21,26 @@ PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory
 
 
 @numba.njit(cache=True, error_model="numpy")
-def triggered(start, end, is_memory):
-    """Whether an event function's values at the ends of a step show an event in between."""
+def triggered(start, end, is_memory, behind):
+    """Whether an event function's values at the ends of a step show an event in between.
+
+    With `behind` its own event was the end of the step before: on a surface that attracts from
+    both sides, going back through it at once is no event.
+    """
     if is_memory:
         return start != 0.0 and not start * end > 0.0
-    return start * end < 0.0 and abs(start) > STARTS_BEHIND * abs(end)
+    return start * end < 0.0 and not (behind and abs(start) <= STARTS_BEHIND * abs(end))
 
 
 @numba.njit(cache=True, error_model="numpy")
-def first_root(lane, corners, e_start, e_low, e_high, j):
+def first_root(lane, corners, e_start, e_low, e_high, behind, j):
     """Return where the first event between the lengths low and high lies, -1 if there is none.
 
     And whether it is a memory's.
     """
     first, is_memory = -1.0, False
     for i in range(e_start.shape[0]):
-        if triggered(e_start[i, j], e_high[i, j], i >= corners):
+        if triggered(e_start[i, j], e_high[i, j], i >= corners, behind[i, j] != 0.0):
             low, high = e_low[i, j], e_high[i, j]
             if not low * high < 0.0:
                 high = -low  # a memory that would stand still says no more than that: halve
@@ -48,7 +52,7 @@ def first_root(lane, corners, e_start, e_low, e_high, j):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def locate(lane, corners, rtol, e_start, e_low, e_high, e, j):
+def locate(lane, corners, rtol, e_start, e_low, e_high, e, behind, j):
     """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT.
 
     With AGAIN, ``lane.step`` is the next length to try.
@@ -56,14 +60,14 @@ def locate(lane, corners, rtol, e_start, e_low, e_high, e, j):
     if lane.tries == 0:
         lane.low, lane.high = 0.0, lane.step
         e_low[:, j], e_high[:, j] = e_start[:, j], e[:, j]
-    root, memory = _narrowed(lane, corners, e_start, e_low, e_high, e, j)
+    root, memory = _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j)
     if root < 0.0:
         return CLEAR
     lane.tries += 1
     # behind a corner stages are wrong by the rest; what a memory misses is quadratic in it
     tolerance = lane.high * (0.3 * np.sqrt(rtol) if memory else min(10.0 * rtol, 1e-4))
-    behind = lane.high == lane.step
-    if behind and (lane.high - root <= tolerance or lane.tries > TRIES):
+    is_behind = lane.high == lane.step
+    if is_behind and (lane.high - root <= tolerance or lane.tries > TRIES):
         return EVENT
     if lane.high - lane.low <= tolerance:
         lane.step = lane.high
@@ -79,12 +83,12 @@ def locate(lane, corners, rtol, e_start, e_low, e_high, e, j):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _narrowed(lane, corners, e_start, e_low, e_high, e, j):
+def _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j):
     """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
     before = lane.high
     if lane.tries > 0:
         lane.high = lane.step
-        inside = first_root(lane, corners, e_start, e_low, e, j)[0] >= 0.0
+        inside = first_root(lane, corners, e_start, e_low, e, behind, j)[0] >= 0.0
         if not inside:
             lane.low, lane.high = lane.step, before
             lane.same_side = min(lane.same_side, 0) - 1
@@ -98,7 +102,7 @@ def _narrowed(lane, corners, e_start, e_low, e_high, e, j):
                 e_low[:, j] *= 0.5
     else:
         lane.same_side = 0
-    return first_root(lane, corners, e_start, e_low, e_high, j)
+    return first_root(lane, corners, e_start, e_low, e_high, behind, j)
 
 
 @numba.njit(cache=True, error_model="numpy")

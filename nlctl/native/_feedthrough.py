@@ -35,7 +35,19 @@ def feedthrough(system: Any) -> np.ndarray:
         return np.not_equal(system.D, 0.0)
     if 0 in shape or not _mentions_inputs(system.outfcn):
         return np.zeros(shape, dtype=bool)
-    return np.full(shape, _responds(system))
+    return np.full(shape, _responds(system, np.arange(shape[1])).any())
+
+
+def probed_feedthrough(system: Any, direct: np.ndarray) -> np.ndarray:
+    """Return which entries of `direct` respond when one input after the other is changed.
+
+    What several points do not show may still be there.  Where that matters, the program runs
+    into a NaN: an input that is not known yet is NaN.
+    """
+    if isinstance(system, ct.StateSpace) or not direct.any():
+        return direct
+    columns = [_responds(system, np.array([j])) for j in range(direct.shape[1])]
+    return direct & np.stack(columns, axis=1)
 
 
 def _mentions_inputs(function: Any) -> bool:
@@ -49,21 +61,25 @@ def _mentions_inputs(function: Any) -> bool:
     return any(isinstance(node, ast.Name) and node.id == names[2] for node in ast.walk(tree))
 
 
-def _responds(system: ct.NonlinearIOSystem) -> bool:
-    """Whether changing the inputs changes an output at any of several points.
+def _responds(system: ct.NonlinearIOSystem, changed: np.ndarray) -> np.ndarray:
+    """Return which outputs change at any of several points with the inputs `changed`.
 
     A point at which the function raises says nothing, and then the answer is the safe one.
     """
     rng = np.random.default_rng(0)
+    found = np.zeros(system.noutputs or 0, dtype=bool)
     for scale in (0.0, 1.0, 1.0, 10.0):
         x = scale * rng.standard_normal(system.nstates or 0)
         u = scale * rng.standard_normal(system.ninputs or 0)
         others = (rng.standard_normal(u.size), 100 * rng.standard_normal(u.size), u * np.nan)
         try:
             with np.errstate(all="ignore"):
-                base = system._out(0.7, x, u)
-                if any(not np.array_equal(base, system._out(0.7, x, v), True) for v in others):
-                    return True
+                base = np.array(system._out(0.7, x, u), dtype=float)
+                for values in others:
+                    v = u.copy()
+                    v[changed] = values[changed]
+                    y = np.asarray(system._out(0.7, x, v), dtype=float)
+                    found |= (y != base) & ~(np.isnan(y) & np.isnan(base))
         except Exception:
-            return True
-    return False
+            return np.ones_like(found)
+    return found

@@ -9,28 +9,35 @@ takes apart (``x1, x2 = x``) becomes a tuple.
 from __future__ import annotations
 
 import ast
-import functools
 import inspect
 import operator
 import textwrap
+import weakref
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from functools import partial
 from types import FunctionType
 from typing import Any
 
+import numba
+import numpy as np
 from numba import types
 from numba.extending import overload, overload_method, register_jitable
 
 from .._errors import UsageError
 
 RECORDS = (types.NamedTuple, types.NamedUniTuple)
+FILLER = "no_parameters"  # numba cannot call methods of a record without fields
 _LIBRARIES = ("numpy", "scipy", "numba")  # numba has its own versions of their functions
 
 
 def params_dict(names: Sequence[str]) -> Callable[..., dict[str, Any]]:
     """Return a function that makes a parameter dict of values, for plain Python."""
-    return partial(_named, tuple(names))
+    return partial(_named, tuple(names)) if names else _no_parameters
+
+
+def _no_parameters(*_: Any) -> dict[str, Any]:
+    return {}
 
 
 def _named(names: tuple[str, ...], *values: Any) -> dict[str, Any]:
@@ -46,7 +53,7 @@ def params_record(path: str, names: Sequence[str]) -> type:
         If a name cannot be that of a field.
     """
     try:
-        return namedtuple("Params", names)
+        return namedtuple("Params", names or [FILLER])
     except ValueError as error:
         raise UsageError(
             f"block '{path}' has a parameter that cannot be compiled: {error}; rename it"
@@ -78,6 +85,9 @@ def unpacked_arguments(function: Any) -> set[int]:
     }
 
 
+_KNOWN: weakref.WeakSet[FunctionType] = weakref.WeakSet()  # a function may call itself
+
+
 def make_callable(function: FunctionType) -> None:
     """Let machine code call the plain functions that a function refers to, and theirs.
 
@@ -88,14 +98,22 @@ def make_callable(function: FunctionType) -> None:
     used += [function.__globals__.get(name) for name in function.__code__.co_names]
     for other in used:
         library = getattr(other, "__module__", None) or ""
-        if isinstance(other, FunctionType) and library.partition(".")[0] not in _LIBRARIES:
-            _make_known(other)
+        if not isinstance(other, FunctionType) or library.partition(".")[0] in _LIBRARIES:
+            continue
+        if other not in _KNOWN:
+            _KNOWN.add(other)
+            register_jitable(other)
+            make_callable(other)
 
 
-@functools.cache
-def _make_known(function: FunctionType) -> None:
-    register_jitable(function)
-    make_callable(function)
+def callable_constant(value: Any) -> Any:
+    """Return a function as one that machine code can hand on; any other value as it is."""
+    if isinstance(value, np.ufunc):
+        return numba.njit(error_model="numpy")(lambda v: value(v))
+    if isinstance(value, FunctionType):
+        make_callable(value)
+        return numba.njit(error_model="numpy")(value)
+    return value
 
 
 def _field(record: Any, key: Any) -> int | None:

@@ -85,7 +85,7 @@ def _judge(task, lanes, w, states, done, passed):
             continue
         found = CLEAR
         if w.e.shape[0]:
-            found = locate(lane, corners, task.rtol, w.e_start, w.e_low, w.e_high, w.e, j)
+            found = locate(lane, corners, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j)
         if found == AGAIN:
             lane.rejected += 1
             continue
@@ -96,7 +96,10 @@ def _judge(task, lanes, w, states, done, passed):
         lane.t = t_new
         next_step(lane, w.error[j], w.rate[j], task.fixed, memories)
         done[j] = True
-        passed[j] = found == EVENT or (memories and _began_to_move(corners, w.e_start, w.e, j))
+        if memories:  # at a corner of the inputs memories may turn round as well
+            at_corner = lane.ends and w.u.shape[0] > 0
+            passed[j] = at_corner or _began_to_move(corners, w.e_start, w.e, j)
+        passed[j] |= found == EVENT
         if task.method == AUTO:
             choose_method(lane, w.x.shape[0], task.alone)
 
@@ -118,9 +121,15 @@ def _take(task, w, done):
         for j in range(count):
             w.x[i, j] = w.x_new[i, j] if done[j] else w.x[i, j]
             w.k[0, i, j] = w.k[6, i, j] if done[j] else w.k[0, i, j]
+    for i in range(task.corners):
+        for j in range(count):
+            if done[j]:
+                w.behind[i, j] = w.e_start[i, j] * w.e[i, j] < 0.0
     for i in range(task.memory.size):
         for j in range(count):
             if done[j] and w.e_start[task.corners + i, j] == 0.0:  # otherwise locked
+                if w.x[task.memory[i], j] != w.g[task.corners + i, j]:
+                    w.behind[:, j] = 0.0  # with another memory the way back is an event
                 w.x[task.memory[i], j] = w.g[task.corners + i, j]
     for i in range(w.e.shape[0]):
         for j in range(count):

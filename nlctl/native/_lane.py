@@ -23,30 +23,35 @@ RUNNING, STIFF = -1, -2  # STIFF: to be finished by a method that only single ru
 FIRST_PATIENCE = 15
 # for functions that only machine code calls: without a way in from Python, which for a workspace
 # of many arrays takes longer to compile than the function
-INNER = {"cache": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+INNER = {
+    "cache": True,
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
 
 _FIELDS = [
-        ("t", "f8"),  # time reached
-        ("h", "f8"),  # step proposed by error control
-        ("step", "f8"),  # step being tried
-        ("low", "f8"),  # while an event is located: a step without it
-        ("high", "f8"),  # and one with it; 0 when none is being located
-        ("log_error_before", "f8"),  # of the last accepted step, for PI control
-        ("rate", "f8"),  # estimate of the largest eigenvalue's magnitude (1/s)
-        ("jacobian_at", "f8"),  # time for which the Jacobian matrix is known
-        ("segment", "i8"),  # interval of the time grid in which t lies
-        ("status", "i8"),
-        ("accepted", "i8"),
-        ("rejected", "i8"),
-        ("events", "i8"),
-        ("tries", "i8"),  # attempts at the event being located
-        ("same_side", "i8"),  # of these in a row with the event inside
-        ("short", "i8"),  # events in a row right after another
-        ("quiet", "i8"),  # steps in which memory events are not looked for
-        ("slow", "i8"),  # steps in a row whose size stability limits
-        ("patience", "i8"),  # such steps that are borne before the stiff method is tried
-        ("stiff", "i8"),  # 0 explicit, otherwise 1 + steps of the stiff method
-        ("ends", "i8"),  # the step being tried ends at a corner of the inputs or at the end
+    ("t", "f8"),  # time reached
+    ("h", "f8"),  # step proposed by error control
+    ("step", "f8"),  # step being tried
+    ("low", "f8"),  # while an event is located: a step without it
+    ("high", "f8"),  # and one with it; 0 when none is being located
+    ("log_error_before", "f8"),  # of the last accepted step, for PI control
+    ("rate", "f8"),  # estimate of the largest eigenvalue's magnitude (1/s)
+    ("jacobian_at", "f8"),  # time for which the Jacobian matrix is known
+    ("segment", "i8"),  # interval of the time grid in which t lies
+    ("status", "i8"),
+    ("accepted", "i8"),
+    ("rejected", "i8"),
+    ("events", "i8"),
+    ("tries", "i8"),  # attempts at the event being located
+    ("same_side", "i8"),  # of these in a row with the event inside
+    ("short", "i8"),  # events in a row right after another
+    ("quiet", "i8"),  # steps in which memory events are not looked for
+    ("slow", "i8"),  # steps in a row whose size stability limits
+    ("patience", "i8"),  # such steps that are borne before the stiff method is tried
+    ("stiff", "i8"),  # 0 explicit, otherwise 1 + steps of the stiff method
+    ("ends", "i8"),  # the step being tried ends at a corner of the inputs or at the end
 ]
 LANE = np.dtype((np.record, _FIELDS))
 LANES = numba.from_dtype(LANE)[::1]

@@ -8,6 +8,7 @@ once, whatever depends on parameters alone in advance.
 from __future__ import annotations
 
 import hashlib
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import config
+from numba.core.errors import NumbaWarning
 
 from .._equation import equation
 from . import _vector_math, _vector_memory, _vector_type
@@ -191,9 +193,11 @@ def lowered_code(lowered: Lowered) -> tuple[Any, Any, Any]:
         return plain_functions(lowered)
     module = loaded(lowered, {name: _jitted(f) for name, f in lowered.functions.items()})
     options = {"cache": True, "error_model": "numpy", "nogil": True}
-    prepare = numba.njit(PREPARE, **options)(module.prepare)
-    rhs = numba.njit(RHS, **options)(module.rhs)
-    return prepare, rhs, numba.njit(OUT, **options)(module.out)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NumbaWarning)  # "cannot cache": that costs time only
+        prepare = numba.njit(PREPARE, **options)(module.prepare)
+        rhs = numba.njit(RHS, **options)(module.rhs)
+        return prepare, rhs, numba.njit(OUT, **options)(module.out)
 
 
 def _stores(name: str, row: int, array: Any) -> list[Store]:

@@ -9,8 +9,10 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import config
+from numba.core.errors import NumbaError
 
 from ._compile import Compiled
+from ._explain import explained
 from ._lower import lower, lowered_code
 from ._work import OUT, RHS
 
@@ -48,9 +50,13 @@ def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:
     known: dict[Any, Any] = compiled.__dict__.setdefault("_machines", {})
     if width not in known:
         lowered = lower(compiled.schedule, compiled.program, width)
-        prepare, rhs, out = lowered_code(lowered)
-        known[width] = lowered, Machine(
-            width=width, rows=lowered.size, prepare=prepare, rhs=rhs, out=out
+        try:
+            prepare, rhs, out = lowered_code(lowered)
+        except NumbaError as error:
+            raise explained(error, compiled.program) from error
+        known[width] = (
+            lowered,
+            Machine(width=width, rows=lowered.size, prepare=prepare, rhs=rhs, out=out),
         )
     lowered, made = known[width]
     if lowered.holds_for(p):

@@ -11,11 +11,11 @@ import numpy as np
 
 from .._block import Block
 from .._diagram import state_names
-from .._errors import ParameterError
+from .._errors import ParameterError, UsageError
 from .._names import Parameters, base_name, find_name
 from .._param import equation_arguments, with_overrides
 from ._compile import Compiled
-from ._parameters import Slot
+from ._parameters import Slot, filled
 from ._response import state_array
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Members:
         for number in range(self.size) if places.size else ():
             try:
                 self._fill(p, number, owners)
-            except ParameterError as error:
+            except UsageError as error:
                 raise ParameterError(f"{error} (member {number})") from None
             values[:, number] = p[places]
         return places, values
@@ -101,13 +101,7 @@ class Members:
             given = {key: _one(self.params[name], number) for key, name in names.items()}
             values = equation_arguments(with_overrides(block.current_spec, given, block.name))
             for name, slot in slots.items():
-                value = np.asarray(getattr(values, name), dtype=float)
-                if value.shape != slot.shape:
-                    raise ParameterError(
-                        f"'{slot.name}' had shape {slot.shape} when the diagram was compiled and "
-                        f"cannot have shape {value.shape} now: compile again"
-                    )
-                p[slot.offset : slot.offset + slot.size] = value.ravel()
+                filled(p, slot, getattr(values, name))
 
     @cached_property
     def _rows(self) -> dict[str, int]:

@@ -105,31 +105,71 @@ def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
     return found
 
 
-def packed(nodes: Sequence[Node], layout: Mapping[int, Mapping[str, Slot]]) -> np.ndarray:
+def packed(
+    nodes: Sequence[Node],
+    layout: Mapping[int, Mapping[str, Slot]],
+    fixed: Mapping[int, Mapping[str, Any]],
+) -> np.ndarray:
     """Return the parameter vector with the values that the blocks have now.
 
     Raises
     ------
     UsageError
-        If an override has changed the shape of a parameter, or brings one that nobody declared.
+        If an override has changed what is fixed by compiling, or brings a parameter that nobody
+        declared.
     """
     size = sum(slot.size for block in layout.values() for slot in block.values())
     p = np.empty(size)
     for i, block in layout.items():
-        values = current_values(nodes[i].system)
-        for name in values:
-            if name not in block and is_numeric(values[name]):
+        path, values, constants = nodes[i].path, current_values(nodes[i].system), fixed.get(i, {})
+        for name, value in values.items():
+            if name in block:
+                filled(p, block[name], value)
+            elif name not in constants:
                 raise UsageError(
-                    f"parameter '{name}' of block '{nodes[i].path}' was not known when the diagram "
+                    f"parameter '{name}' of block '{path}' was not known when the diagram "
                     f"was compiled: declare it in the block's params, or compile with "
                     f"params={{'{name}': ...}}"
                 )
-        for name, slot in block.items():
-            array = np.asarray(values[name], dtype=float)
-            if array.shape != slot.shape:
+            elif not _same(value, constants[name]):
                 raise UsageError(
-                    f"parameter '{slot.name}' had shape {slot.shape} when the diagram was "
-                    f"compiled and cannot have shape {array.shape} now: compile again"
+                    f"parameter '{path}.{name}' is no number and was {constants[name]!r} when the "
+                    f"diagram was compiled; it cannot be {value!r} now: compile again"
                 )
-            p[slot.offset : slot.offset + slot.size] = array.ravel()
     return p
+
+
+def filled(p: np.ndarray, slot: Slot, value: Any) -> None:
+    """Put a parameter into its place in the vector.
+
+    Raises
+    ------
+    UsageError
+        If its shape is another than when the diagram was compiled, or it is no whole number any
+        more.
+    """
+    array = np.asarray(value) if is_numeric(value) else None
+    if array is None or array.shape != slot.shape:
+        now = f"be {value!r}" if array is None else f"have shape {array.shape}"
+        raise UsageError(
+            f"parameter '{slot.name}' had shape {slot.shape} when the diagram was "
+            f"compiled and cannot {now} now: compile again"
+        )
+    whole = {"i": "a whole number", "b": "True or False"}.get(slot.kind)
+    if whole and not slot.shape and array.dtype.kind == "f" and array != np.trunc(array):
+        raise UsageError(
+            f"parameter '{slot.name}' was {whole} when the diagram was compiled and cannot be "
+            f"{value!r} now: declare it as a float ({float(np.trunc(array))!r}), or compile with "
+            f"params={{'{slot.name.rpartition('.')[2]}': {value!r}}}"
+        )
+    p[slot.offset : slot.offset + slot.size] = array.ravel()
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values that are no numbers are equal."""
+    if one is other:
+        return True
+    try:
+        return type(one) is type(other) and bool(np.all(one == other))
+    except (TypeError, ValueError):
+        return False

@@ -11,8 +11,10 @@ import numpy as np
 from .._diagram import initial_state as state_of
 from .._errors import DivergedError, ParameterError
 from ._compile import Compiled
+from ._discrete import simulate_discrete
 from ._lane import Status
 from ._simulate import Settings, Statistics, Trajectory, trajectory
+
 
 class Response(ct.TimeResponseData):
     """A `control.TimeResponseData` that also keeps how the run went, in `statistics`."""
@@ -39,21 +41,34 @@ def respond(
         If the run does not reach the last time, unless `ignore_errors`: then the response ends
         where the run did, with ``success = False``.
     ParameterError
-        If the diagram is no continuous-time one, or an argument has a wrong shape.
+        If an argument has a wrong shape, or times do not fit a discrete-time diagram.
     """
     system = compiled.system
-    if not ct.isctime(system):
-        raise ParameterError(
-            f"'{system.name}' has dt = {system.dt}; the native engine integrates continuous time "
-            "only: simulate it with control.input_output_response"
-        )
     u, x0 = input_array(inputs, system.ninputs or 0, times), state_array(system, initial_state)
     p = compiled.parameter_vector(params)
-    made = trajectory(compiled, times, u, x0, p, Settings(**settings), progress)
+    if ct.isctime(system):
+        made = trajectory(compiled, times, u, x0, p, Settings(**settings), progress)
+    else:
+        made = _sampled(compiled, times, u, x0, p)
     run = made.statistics
     if run.status is not Status.OK and not ignore_errors:
         raise DivergedError(_message(system, run), run.time)
     return _response(compiled, made, u[:, : made.time.size], params)
+
+
+def _sampled(
+    compiled: Compiled, times: np.ndarray, u: np.ndarray, x0: np.ndarray, p: np.ndarray
+) -> Trajectory:
+    """Run a discrete-time diagram; there is nothing to be set."""
+    outputs, states = simulate_discrete(compiled, times, u, x0, p)
+    done = outputs.shape[1]
+    run = Statistics(
+        status=Status.OK if done == times.size else Status.DIVERGED,
+        time=float(times[max(done - 1, 0)]),
+        accepted=done,
+        rejected=0,
+    )
+    return Trajectory(time=times[:done], outputs=outputs, states=states, statistics=run)
 
 
 def _message(system: ct.InputOutputSystem, run: Statistics) -> str:

@@ -1,40 +1,26 @@
 """Reading a diagram: which blocks there are, what feeds them, in which order they are evaluated.
 
 python-control evaluates every output function up to n + 1 times per right-hand side, until no
-signal changes.  A schedule orders the outputs once, so that each is evaluated once.
+signal changes.  A schedule orders the outputs once, so that each is evaluated once.  What counts
+is which output depends on which input: a block that feeds itself through separate channels is
+evaluated more than once and is no algebraic loop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
-from itertools import pairwise
 from typing import Any
 
 import control as ct
 import numpy as np
 
-from .._diagram import leaves
-from .._errors import UsageError
-from ._feedthrough import feedthrough
+from ._feedthrough import feedthrough, probed_feedthrough
+from ._tearing import first_loop, tear
+from ._wiring import AlgebraicLoopError, Combination, Signal, Wiring
 
-Combination = Mapping["Signal", float]
-
-
-class AlgebraicLoopError(UsageError):
-    """Signals that depend on each other at the same instant; the message prints the ring."""
-
-
-@dataclass(frozen=True)
-class Signal:
-    """An elementary signal: output `index` of block `block`, or external input `index`.
-
-    ``block`` is None for an external input.
-    """
-
-    block: int | None
-    index: int
+__all__ = ["AlgebraicLoopError", "Combination", "Loop", "Node", "Schedule", "Signal", "schedule"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +48,23 @@ class Node:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Loop:
+    """Signals that depend on each other at the same instant and are solved for together.
+
+    Attributes
+    ----------
+    start, stop : int
+        The part of the order that is repeated until the signals fit.
+    torn : tuple of Signal
+        Signals that are guessed: with these, all others of the loop follow.
+    """
+
+    start: int
+    stop: int
+    torn: tuple[Signal, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Schedule:
     """A flattened diagram.
 
@@ -72,24 +75,38 @@ class Schedule:
     nodes : tuple of Node
         Blocks in the order of the state vector.
     order : tuple of int
-        Indices of the blocks in an order in which every output can be evaluated once.
+        Indices of the blocks in the order of their evaluation.  A block comes more than once if
+        some of its outputs are needed before all of its inputs are known.
+    unknown : tuple of frozenset of int
+        For every entry of `order` the inputs of the block that are not known yet.
     outputs : tuple of mappings
         Linear combination of signals that makes each output of the diagram.
+    loops : tuple of Loop
+        Parts of the order that are solved for; empty unless that was asked for.
     """
 
     system: Any
     nodes: tuple[Node, ...]
     order: tuple[int, ...]
+    unknown: tuple[frozenset[int], ...]
     outputs: tuple[Combination, ...]
+    loops: tuple[Loop, ...]
+
+    @property
+    def simple(self) -> bool:
+        """Whether every block is evaluated exactly once, and nothing is solved for."""
+        return not self.loops and len(self.order) == len(self.nodes)
 
 
-def schedule(system: ct.InputOutputSystem) -> Schedule:
+def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Schedule:
     """Flatten a diagram and order its blocks.
 
     Parameters
     ----------
     system : control.InputOutputSystem
         A diagram, nested to any depth, or a single block.
+    solve_loops : bool, optional
+        Whether algebraic loops are scheduled to be solved instead of being an error.
 
     Returns
     -------
@@ -100,138 +117,114 @@ def schedule(system: ct.InputOutputSystem) -> Schedule:
     AlgebraicLoopError
         If signals depend on each other without a state in between.
     """
-    wiring = _Wiring(system)
+    wiring = Wiring(system)
     nodes = tuple(
         Node(
-            path=leaf.path,
-            system=leaf.system,
-            state_offset=leaf.state_offset,
-            inputs=tuple(wiring.inputs(occurrence)),
-            direct=feedthrough(leaf.system),
+            path=place.path,
+            system=place.system,
+            state_offset=place.state_offset,
+            inputs=tuple(wiring.inputs(place)),
+            direct=feedthrough(place.system),
         )
-        for leaf, occurrence in zip(leaves(system), wiring.blocks, strict=True)
+        for place in wiring.blocks
     )
     outputs = tuple(wiring.output(wiring.top, i) for i in range(system.noutputs or 0))
-    return Schedule(system=system, nodes=nodes, order=_ordered(nodes), outputs=outputs)
+    try:
+        order = tuple(TopologicalSorter(_blocks_before(nodes)).static_order())
+        unknown, loops = (frozenset(),) * len(order), ()
+    except CycleError:  # look closer: which output depends on which input
+        nodes = tuple(replace(n, direct=probed_feedthrough(n.system, n.direct)) for n in nodes)
+        ordering = _Ordering(nodes=nodes)
+        ordering.run(solve_loops)
+        order, unknown = tuple(ordering.order), tuple(ordering.unknown)
+        loops = tuple(ordering.loops)
+    return Schedule(
+        system=system, nodes=nodes, order=order, unknown=unknown, outputs=outputs, loops=loops
+    )
 
 
-def _ordered(nodes: tuple[Node, ...]) -> tuple[int, ...]:
-    """Order blocks so that whatever an output depends on comes before it."""
+def _blocks_before(nodes: tuple[Node, ...]) -> dict[int, set[int]]:
+    """Return for every block the blocks that its outputs depend on."""
     before: dict[int, set[int]] = {i: set() for i in range(len(nodes))}
     for i, node in enumerate(nodes):
         for j, combination in enumerate(node.inputs):
             if node.direct[:, j].any():
                 before[i] |= {s.block for s in combination if s.block is not None}
+    return before
+
+
+@dataclass(kw_only=True)
+class _Ordering:
+    """Blocks are evaluated as soon as outputs can be had, whole ones first."""
+
+    nodes: tuple[Node, ...]
+    known: set[Signal] = field(default_factory=set)
+    order: list[int] = field(default_factory=list)
+    unknown: list[frozenset[int]] = field(default_factory=list)
+    loops: list[Loop] = field(default_factory=list)
+
+    def run(self, solve_loops: bool) -> None:
+        every = {Signal(i, k) for i, node in enumerate(self.nodes) for k in range(len(node.direct))}
+        self._evaluate(every, ())
+        while every - self.known:
+            before = _signals_before(self.nodes, every - self.known)
+            if not solve_loops:
+                raise AlgebraicLoopError(
+                    f"algebraic loop: {_ring_text(self.nodes, before)} has no state in it; put one "
+                    "in, or compile with algebraic_loops='solve'"
+                )
+            loop = first_loop(before)
+            torn, start = tear({s: before[s] & loop for s in before if s in loop}), len(self.order)
+            self._evaluate(loop, torn)
+            self.loops.append(Loop(start=start, stop=len(self.order), torn=torn))
+            self._evaluate(every, ())
+
+    def _evaluate(self, wanted: set[Signal], guessed: Iterable[Signal]) -> None:
+        """Order blocks until no more of the wanted signals can be had."""
+        while True:
+            given, offers = self.known.union(guessed), []
+            for i in sorted({s.block for s in wanted - self.known if s.block is not None}):
+                unknown, ready = _available(i, self.nodes[i], given)
+                if wanted & ready - self.known:
+                    offers.append((len(ready) < len(self.nodes[i].direct), i, unknown, ready))
+            if not offers:
+                return
+            _, chosen, unknown, ready = min(offers, key=lambda offer: offer[:2])
+            self.order.append(chosen)
+            self.unknown.append(unknown)
+            self.known |= ready
+
+
+def _available(i: int, node: Node, given: set[Signal]) -> tuple[frozenset[int], set[Signal]]:
+    """Return which inputs of a block are not given, and which outputs do not need these."""
+    unknown = frozenset(
+        j
+        for j, combination in enumerate(node.inputs)
+        if any(s.block is not None and s not in given for s in combination)
+    )
+    blocked = node.direct[:, sorted(unknown)].any(axis=1)
+    return unknown, {Signal(i, int(k)) for k in np.flatnonzero(~blocked)}
+
+
+def _signals_before(nodes: tuple[Node, ...], signals: set[Signal]) -> dict[Signal, set[Signal]]:
+    """Return for every signal those among `signals` that it depends on at the same instant."""
+    before: dict[Signal, set[Signal]] = {}
+    for s in sorted(signals, key=lambda s: (s.block or 0, s.index)):
+        assert s.block is not None
+        node = nodes[s.block]
+        sources = (node.inputs[int(j)] for j in np.flatnonzero(node.direct[s.index]))
+        before[s] = {source for combination in sources for source in combination} & signals
+    return before
+
+
+def _ring_text(nodes: tuple[Node, ...], before: Mapping[Signal, set[Signal]]) -> str:
+    """Print a ring of signals in the order in which they act on each other."""
     try:
-        return tuple(TopologicalSorter(before).static_order())
+        TopologicalSorter(before).prepare()
     except CycleError as error:
         ring = error.args[1]
-        raise AlgebraicLoopError(
-            f"algebraic loop: {_ring_text(nodes, ring)} has no state in it"
-        ) from None
-
-
-def _ring_text(nodes: tuple[Node, ...], ring: list[int]) -> str:
-    """Print a ring of blocks with the signals that join them."""
-    labels = []
-    for here, there in pairwise(ring):
-        signals = [
-            s
-            for j, combination in enumerate(nodes[there].inputs)
-            for s in combination
-            if s.block == here and nodes[there].direct[:, j].any()
-        ]
-        label = nodes[here].system.output_labels[signals[0].index]
-        labels.append(f"{nodes[here].path}.{label}")
-    return " -> ".join([*labels, labels[0]])
-
-
-@dataclass(frozen=True, eq=False)
-class _Occurrence:
-    """A system in its place: the same object may stand in a diagram twice."""
-
-    system: Any  # a diagram or a block; only diagrams have maps and offsets
-    parent: _Occurrence | None
-    position: int
-
-
-class _Wiring:
-    """The symbolic equations of a diagram's wiring, solved on demand."""
-
-    def __init__(self, system: ct.InputOutputSystem) -> None:
-        self.blocks: list[_Occurrence] = []
-        self._parts: dict[_Occurrence, list[_Occurrence]] = {}
-        self._solved: dict[tuple[str, _Occurrence, int], dict[Signal, float] | None] = {}
-        self.top = self._place(system, None, 0)
-        self._index = {block: i for i, block in enumerate(self.blocks)}
-
-    def _place(
-        self, system: ct.InputOutputSystem, parent: _Occurrence | None, position: int
-    ) -> _Occurrence:
-        here = _Occurrence(system, parent, position)
-        if isinstance(system, ct.InterconnectedSystem):
-            parts = enumerate(system.syslist)
-            self._parts[here] = [self._place(part, here, i) for i, part in parts]
-        else:
-            self.blocks.append(here)
-        return here
-
-    def inputs(self, here: _Occurrence) -> Iterator[Combination]:
-        """Yield what feeds each input of a block."""
-        for i in range(here.system.ninputs or 0):
-            yield self._solve("in", here, i)
-
-    def output(self, here: _Occurrence, i: int) -> Combination:
-        """Return what makes output i of a block or diagram."""
-        return self._solve("out", here, i)
-
-    def _solve(self, kind: str, here: _Occurrence, i: int) -> dict[Signal, float]:
-        key = (kind, here, i)
-        if key not in self._solved:
-            self._solved[key] = None  # being solved
-            terms = self._input_terms(here, i) if kind == "in" else self._output_terms(here, i)
-            total: dict[Signal, float] = {}
-            for gain, combination in terms:
-                for signal, weight in combination.items():
-                    total[signal] = total.get(signal, 0.0) + gain * weight
-            self._solved[key] = total
-        found = self._solved[key]
-        if found is None:
-            raise AlgebraicLoopError(
-                f"algebraic loop: signal {i} of '{here.system.name}' is wired to itself"
-            )
-        return found
-
-    def _input_terms(
-        self, here: _Occurrence, i: int
-    ) -> Iterator[tuple[float, dict[Signal, float]]]:
-        if here.parent is None:
-            yield 1.0, {Signal(None, i): 1.0}
-            return
-        diagram = here.parent.system
-        row = diagram.input_offset[here.position] + i
-        for column in np.flatnonzero(diagram.connect_map[row]):
-            yield float(diagram.connect_map[row, column]), self._stacked(here.parent, int(column))
-        for column in np.flatnonzero(diagram.input_map[row]):
-            gain = float(diagram.input_map[row, column])
-            yield gain, self._solve("in", here.parent, int(column))
-
-    def _output_terms(
-        self, here: _Occurrence, i: int
-    ) -> Iterator[tuple[float, dict[Signal, float]]]:
-        if here not in self._parts:
-            yield 1.0, {Signal(self._index[here], i): 1.0}
-            return
-        for column in np.flatnonzero(here.system.output_map[i]):
-            yield float(here.system.output_map[i, column]), self._stacked(here, int(column))
-
-    def _stacked(self, diagram: _Occurrence, column: int) -> dict[Signal, float]:
-        """Solve for an entry of a diagram's stacked outputs, followed by its stacked inputs."""
-        system = diagram.system
-        count = system.connect_map.shape[1]
-        kind, offsets = (
-            ("out", system.output_offset) if column < count else ("in", system.input_offset)
+        labels = (
+            f"{nodes[s.block].path}.{nodes[s.block].system.output_labels[s.index]}" for s in ring
         )
-        position = column if column < count else column - count
-        part = int(np.searchsorted(offsets, position, side="right")) - 1
-        return self._solve(kind, self._parts[diagram][part], int(position - offsets[part]))
+        return " -> ".join(labels)
+    raise AssertionError("signals that cannot be ordered form a ring")

@@ -27,8 +27,9 @@ AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
 Task = namedtuple("Task", "times inputs p corners memory rtol atol fixed max_steps method alone")
 Work = namedtuple(
     "Work",
-    "t h hh x x_new x_stage k g e e_start e_low e_high u error rate x_ahead dx_ahead g_ahead "
-    "x_flat x_new_flat x_stage_flat x_ahead_flat k_flat sums t_end jacobian matrix f_t pivots U",
+    "t h hh x x_new x_stage k g e e_start e_low e_high behind u error rate x_ahead dx_ahead "
+    "g_ahead x_flat x_new_flat x_stage_flat x_ahead_flat k_flat sums t_end jacobian matrix f_t "
+    "pivots U",
 )
 FLAT = ("x", "x_new", "x_stage", "x_ahead")
 
@@ -39,7 +40,7 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
     columns: dict[str, Any] = {
         name: np.zeros((n, lanes)) for name in ("x", "x_new", "x_stage", "x_ahead", "dx_ahead")
     }
-    rows = ("g", "g_ahead", "e", "e_start", "e_low", "e_high")
+    rows = ("g", "g_ahead", "e", "e_start", "e_low", "e_high", "behind")
     columns |= {name: np.zeros((events, lanes)) for name in rows}
     flat = {f"{name}_flat": columns[name].reshape(-1) for name in FLAT}  # the same memory
     k = np.zeros((_tsit5.STAGES, n, lanes))
@@ -104,13 +105,12 @@ def memory_rates(rhs, task, lanes, w, x, dx):
 @numba.njit(**INNER)
 def restart(rhs, task, lanes, w, chosen):
     """Make the chosen lanes' derivatives, event functions and memories those of their state."""
-    for _ in range(1 + min(task.memory.size, 1)):  # once more with the memory committed
-        _refresh(rhs, task, lanes, w, chosen)
-        for j in range(lanes.size):
-            for i in range(task.memory.size):
-                if chosen[j]:
-                    w.x[task.memory[i], j] = w.g[task.corners + i, j]
+    _refresh(rhs, task, lanes, w, chosen)
     if task.memory.size:
+        for _ in range(task.memory.size):  # one that commits may move the next
+            if not _commit(task, w, chosen):
+                break
+            _refresh(rhs, task, lanes, w, chosen)
         saved = w.e.copy()
         for j in range(lanes.size):
             w.t_end[j] = lanes[j].t
@@ -120,14 +120,23 @@ def restart(rhs, task, lanes, w, chosen):
         for j in range(lanes.size):
             if not chosen[j]:
                 w.e[:, j] = saved[:, j]
-            for i in range(task.memory.size):
-                if chosen[j]:
-                    _lock(w, task.memory[i], j, w.e[task.corners + i, j])
-        _refresh(rhs, task, lanes, w, chosen)
+        _lock(rhs, task, lanes, w, chosen)
     for j in range(lanes.size):
         if chosen[j]:
             w.e[: task.corners, j] = w.g[: task.corners, j]
             w.e_start[:, j] = w.e[:, j]
+
+
+@numba.njit(**INNER)
+def _commit(task, w, chosen):
+    """Commit the chosen lanes' memories; return whether one of them has changed."""
+    changed = False
+    for i in range(task.memory.size):
+        for j in range(chosen.size):
+            if chosen[j] and w.x[task.memory[i], j] != w.g[task.corners + i, j]:
+                w.x[task.memory[i], j] = w.g[task.corners + i, j]
+                changed = True
+    return changed
 
 
 @numba.njit(**INNER)
@@ -142,18 +151,58 @@ def _refresh(rhs, task, lanes, w, chosen):
 
 
 @numba.njit(**INNER)
-def _lock(w, i, lane, rate):
-    """Move a memory that is being carried along far behind what carries it.
+def _lock(rhs, task, lanes, w, chosen):
+    """Move memories that are being carried along far behind what carries them.
 
     The stages of a step are approximations: with the memory right behind, one that falls back a
     little would see it standing still, and the step would not be smooth.  Only where the memory
     turns round does its value count again, and there it is committed.
+
+    A memory that counts wherever it stands, a relay's, is not carried but about to jump.  It
+    keeps its value up to the corner where it jumps; at that corner already, it jumps.
     """
-    far = FAR * (1.0 + abs(w.x[i, lane]))
-    if rate > 0.0:
-        w.x[i, lane] -= far
-    elif rate < 0.0:
-        w.x[i, lane] += far
+    every = np.ones(task.memory.size, np.bool_)
+    if np.all(_carried(rhs, task, lanes, w, chosen, every)):
+        return
+    for j in range(lanes.size):
+        for i in range(task.memory.size):
+            if chosen[j] and w.e[task.corners + i, j] != 0.0:
+                w.x[task.memory[i], j] = w.x_ahead[task.memory[i], j]
+    _refresh(rhs, task, lanes, w, chosen)
+    for i in range(task.memory.size):
+        row, one = task.corners + i, np.zeros(task.memory.size, np.bool_)
+        one[i] = True
+        before, after = w.g[row].copy(), w.g[row] + w.e[row]
+        carried = _carried(rhs, task, lanes, w, chosen, one)
+        for j in range(lanes.size):
+            if not carried[j]:
+                at_corner = np.any(w.g[: task.corners, j] == 0.0)
+                w.x[task.memory[i], j] = after[j] if at_corner else before[j]
+                w.e[row, j] = 0.0
+        if not np.all(carried):
+            _refresh(rhs, task, lanes, w, chosen)
+
+
+@numba.njit(**INNER)
+def _carried(rhs, task, lanes, w, chosen, which):
+    """Move memories far behind; return, lane by lane, whether nothing else has changed by that.
+
+    Where they stood is left in w.x_ahead.
+    """
+    g, k = w.g[task.corners :].copy(), w.k[0].copy()
+    w.x_ahead[:] = w.x
+    for j in range(lanes.size):
+        for i in range(task.memory.size):
+            rate, m = w.e[task.corners + i, j], task.memory[i]
+            if chosen[j] and which[i] and rate != 0.0:
+                far = FAR * (1.0 + abs(w.x[m, j]))
+                w.x[m, j] -= far if rate > 0.0 else -far
+    _refresh(rhs, task, lanes, w, chosen)
+    carried = np.ones(lanes.size, np.bool_)
+    for j in range(lanes.size):
+        same = np.all(g[:, j] == w.g[task.corners :, j]) and np.all(k[:, j] == w.k[0, :, j])
+        carried[j] = same or not chosen[j]
+    return carried
 
 
 @numba.njit(**INNER)
@@ -203,8 +252,8 @@ def outputs(rhs, out, task, w, states, y):
         w.t[:] = task.times[m]
         for i in range(w.u.shape[0]):
             w.u[i, :] = task.inputs[i, m]
-        out(w.t, states[m], w.u, task.p, y[m])
         if task.memory.size:
             rhs(w.t, states[m], w.u, task.p, w.dx_ahead, w.g)
             for i in range(task.memory.size):
                 states[m, task.memory[i], :] = w.g[task.corners + i, :]
+        out(w.t, states[m], w.u, task.p, y[m])

@@ -1,0 +1,110 @@
+"""Which engine computes a run, and what is said when machine code cannot."""
+
+import control as ct
+import numpy as np
+import pytest
+import scipy.special
+from numba.core import config
+
+import nlctl
+from nlctl._errors import ParameterError
+from nlctl.response import EngineWarning
+
+TIMES = np.linspace(0, 1, 5)
+WITHOUT_JIT = pytest.mark.skipif(
+    getattr(config, "DISABLE_JIT", False), reason="nothing is compiled without JIT"
+)
+
+
+def decay(function=lambda t, x, u, params: [-params["k"] * x[0]]):
+    return ct.nlsys(
+        function, None, inputs=0, outputs=["y"], states=["x"], name="decay", params={"k": 2.0}
+    )
+
+
+def special(t, x, u, params):
+    rate = scipy.special.erfcx(0.0)
+    return [-rate * params["k"] * x[0]]
+
+
+@pytest.mark.parametrize("engine", [None, "python-control", "native", "auto"])
+def test_every_engine_gives_the_same_answer(engine):
+    """x' = -k x with an override."""
+    response = nlctl.input_output_response(
+        decay(), TIMES, 0, [1.0], params={"k": 3.0}, engine=engine, rtol=1e-9
+    )
+    np.testing.assert_allclose(response.states[0], np.exp(-3 * TIMES), rtol=1e-7)
+    assert hasattr(response, "statistics") == (engine in ("native", "auto"))
+
+
+@WITHOUT_JIT
+def test_what_cannot_be_compiled_falls_back_with_a_warning():
+    """The warning names block, line and reason; "native" raises instead."""
+    line = special.__code__.co_firstlineno + 1
+    said = rf"'decay' \(file .*test_native_engine.py, line {line}\).*erfcx"
+    with pytest.raises(nlctl.CompileError, match=said):
+        nlctl.input_output_response(decay(special), TIMES, 0, [1.0], engine="native")
+    with pytest.warns(EngineWarning, match=f"python-control takes over: .*{said}"):
+        response = nlctl.input_output_response(
+            decay(special), TIMES, 0, [1.0], engine="auto", method="tsit5", max_steps=1000
+        )
+    np.testing.assert_allclose(response.states[0], np.exp(-2 * TIMES), rtol=1e-7)
+
+
+def test_a_mistake_is_no_reason_to_change_the_engine():
+    """Names and values are refused by "auto" as they are by "native"."""
+    with pytest.raises(nlctl.UnknownNameError, match=r"unknown state 'decay\.z'"):
+        nlctl.input_output_response(decay(), TIMES, 0, {"decay.z": 1.0}, engine="auto")
+    with pytest.raises(nlctl.UnknownNameError, match="unknown engine 'naive'; nearest: 'native'"):
+        nlctl.input_output_response(decay(), TIMES, engine="naive")
+
+
+def test_a_compiled_diagram_does_not_run_in_python_control():
+    """It is machine code whatever else is asked for."""
+    compiled = nlctl.compile(decay())
+    with pytest.raises(ParameterError, match=r"give compiled\.system"):
+        nlctl.input_output_response(compiled, TIMES, 0, [1.0], engine="python-control")
+    response = nlctl.input_output_response(compiled, TIMES, 0, [1.0], engine="native")
+    assert response.statistics.accepted > 0
+
+
+def test_a_block_that_raises_ends_the_run_with_its_own_error():
+    """In machine code as in Python: the exception reaches the caller."""
+
+    def update(t, x, u, params):
+        if x[0] > 0.5:
+            raise ValueError("beyond the table")
+        return [1.0]
+
+    for engine in ("python-control", "native"):
+        with pytest.raises(ValueError, match="beyond the table"):
+            nlctl.input_output_response(decay(update), TIMES, 0, [0.0], engine=engine)
+
+
+def test_a_block_that_returns_nan_ends_the_run_as_diverged():
+    """Behind t = 1/2 the rate is NaN: there the run ends, with the time."""
+
+    def update(t, x, u, params):
+        return [np.nan if x[0] > 0.5 else 1.0]
+
+    with pytest.raises(nlctl.DivergedError) as caught:
+        nlctl.input_output_response(decay(update), TIMES, 0, [0.0], engine="native")
+    assert caught.value.time == pytest.approx(0.5, abs=1e-3)
+
+
+def test_an_index_out_of_range_is_an_error():
+    """Machine code that reads beyond an array would compute with whatever lies there."""
+
+    def update(t, x, u, params):
+        return [-x[len(x)]]
+
+    with pytest.raises((IndexError, nlctl.CompileError)):
+        nlctl.input_output_response(decay(update), TIMES, 0, [1.0], engine="native")
+
+
+@pytest.mark.parametrize("result", [[1.0, 2.0], []])
+def test_a_wrong_number_of_values_is_an_error(result):
+    """The message names the block, what it returned and what it should."""
+    short = np.array(result)
+    with pytest.raises(nlctl.CompileError, match=rf"'decay' returns {len(result)} .* needs 1"):
+        nlctl.compile(decay(lambda t, x, u, params: short))
