@@ -1,4 +1,4 @@
-"""The figures to reach, by plain python-control at tight tolerance."""
+"""The figures to reach, by plain python-control at tight tolerance and by machine code."""
 
 import control as ct
 import numpy as np
@@ -9,7 +9,7 @@ from analysis import metrics
 from analysis.reproduction import CASES, METRICS, checks, expectations, measured, run, sample_times
 from analysis.reproduction.run import Run
 
-EXAMPLE_1 = {case.key: case for case in CASES if case.key in ("1", "1-3x9")}
+EXAMPLE_1 = {case.key: case for case in CASES if case.key == "1"}
 
 
 def plain_run(case, *, timepts=None, **solver):
@@ -28,7 +28,7 @@ def measure(result):
     return measured(result.case, result.time, result.signals)
 
 
-@pytest.mark.parametrize("key", EXAMPLE_1)
+@pytest.mark.parametrize("key", ["1"])
 def test_example_1_holds_to_the_digits_given(key):
     """States at the end agree in every digit given, peaks to 1e-6 (read between samples)."""
     tight = {"method": "DOP853", "solve_ivp_kwargs": {"rtol": 1e-12, "atol": 1e-13}}
@@ -40,15 +40,26 @@ def test_example_1_holds_to_the_digits_given(key):
         assert check.error <= max(allowed, 2e-12), (check.metric.key, check.value)
 
 
-@pytest.mark.parametrize("key", ["2", "2-diagonal", "1-backlash", "2-dead-zone"])
-def test_other_cases_reach_their_figures(key):
-    """With LSODA at rtol 1e-8 every other figure is within the tolerance of its method."""
+RELAXED = 5e-5  # what python-control's relaxed play allows
+
+
+@pytest.mark.parametrize("key", ["2", "2-dead-zone"])
+def test_other_cases_reach_their_figures_in_python_control(key):
+    """With LSODA at rtol 1e-8 every figure is within the tolerance of its method."""
     (case,) = [c for c in CASES if c.key == key]
     result = measure(
         plain_run(case, method="LSODA", solve_ivp_kwargs={"rtol": 1e-8, "atol": 1e-10})
     )
     found = checks({key: result})
     assert found
+    for check in found:
+        assert check.error <= max(RELAXED, check.expectation.tolerance), check
+
+
+def test_every_case_reaches_its_figures():
+    """Machine code of every case, to the tolerance in the table."""
+    found = checks({case.key: run(case) for case in CASES})
+    assert len(found) == len(expectations())
     for check in found:
         assert check.passed, (check.metric.key, check.value, check.expectation)
 

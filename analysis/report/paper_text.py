@@ -137,12 +137,6 @@ PRINTED = {
             "any value in [−0.6, 0.72] is possible; both ends are tried below",
         ),
         (
-            "memory relaxation",
-            "none",
-            "{actuator.rate:g} 1/s",
-            "python-control has no hook to commit a memory; see Numerics",
-        ),
-        (
             "centres",
             "“controller structure unchanged”: 27",
             "3×3×3 grid",
