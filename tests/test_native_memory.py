@@ -410,10 +410,6 @@ class TestSeveral:
         z = made.outputs[compiled.system.output_index["z"]]
         np.testing.assert_allclose(z, exact, atol=1e-9)
 
-    @pytest.mark.xfail(
-        strict=True,
-        reason="no state has an error here, so that steps grow beyond the turns of the input",
-    )
     def test_a_play_that_drives_nothing(self):
         """A wave through a play and nothing else: its turns must be seen all the same."""
         compiled = nlctl.compile(nlctl.interconnect({"wave": Wave(), "play": DEFAULT}))

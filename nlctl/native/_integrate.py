@@ -16,7 +16,7 @@ import numpy as np
 
 from . import _rodas5p, _tsit5
 from ._control import choose_method, choose_step, next_step, rejected
-from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted
+from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
 from ._lane import INNER, LANES, RUNNING
 from ._stiff import stiff_attempt
 from ._work import AUTO, OUT, RHS, Task, inputs_at, memory_rates, new_work, outputs, restart, start
@@ -78,10 +78,16 @@ def _judge(task, lanes, w, states, done, passed):
     memory in motion.
     """
     corners, memories = task.corners, task.memory.size
+    shortest = 1e-7 * (task.times[-1] - task.times[0])
     for j in range(lanes.size):
         lane = lanes[j]
         done[j] = passed[j] = False
         if lane.status != RUNNING or rejected(lane, w.error[j], task.fixed):
+            continue
+        growing = lane.step > 2.0 * lane.last and lane.step > shortest and lane.tries == 0
+        if memories and growing and task.fixed == 0.0 and unforeseen(w, lane.step, j):
+            lane.rejected += 1
+            lane.h = 0.3 * lane.step
             continue
         found = CLEAR
         if w.e.shape[0]:
@@ -133,7 +139,9 @@ def _take(task, w, done):
                 w.x[task.memory[i], j] = w.g[task.corners + i, j]
     for i in range(w.e.shape[0]):
         for j in range(count):
-            w.e_start[i, j] = w.e[i, j] if done[j] else w.e_start[i, j]
+            if done[j]:
+                w.e_start[i, j] = w.e[i, j]
+                w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
 
 
 def advance(rhs, task, lanes, w, states, rounds):

@@ -34,6 +34,7 @@ _FIELDS = [
     ("t", "f8"),  # time reached
     ("h", "f8"),  # step proposed by error control
     ("step", "f8"),  # step being tried
+    ("last", "f8"),  # last accepted step
     ("low", "f8"),  # while an event is located: a step without it
     ("high", "f8"),  # and one with it; 0 when none is being located
     ("log_error_before", "f8"),  # of the last accepted step, for PI control

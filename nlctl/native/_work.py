@@ -28,7 +28,7 @@ Task = namedtuple("Task", "times inputs p corners memory rtol atol fixed max_ste
 Work = namedtuple(
     "Work",
     "t h hh x x_new x_stage k g e e_start e_low e_high behind u error rate x_ahead dx_ahead "
-    "g_ahead x_flat x_new_flat x_stage_flat x_ahead_flat k_flat sums t_end jacobian matrix f_t "
+    "g_start slope slope_start g_ahead x_flat x_new_flat x_stage_flat x_ahead_flat k_flat sums t_end jacobian matrix f_t "
     "pivots U",
 )
 FLAT = ("x", "x_new", "x_stage", "x_ahead")
@@ -40,7 +40,18 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
     columns: dict[str, Any] = {
         name: np.zeros((n, lanes)) for name in ("x", "x_new", "x_stage", "x_ahead", "dx_ahead")
     }
-    rows = ("g", "g_ahead", "e", "e_start", "e_low", "e_high", "behind")
+    rows = (
+        "g",
+        "g_ahead",
+        "e",
+        "e_start",
+        "e_low",
+        "e_high",
+        "behind",
+        "g_start",
+        "slope",
+        "slope_start",
+    )
     columns |= {name: np.zeros((events, lanes)) for name in rows}
     flat = {f"{name}_flat": columns[name].reshape(-1) for name in FLAT}  # the same memory
     k = np.zeros((_tsit5.STAGES, n, lanes))
@@ -91,8 +102,12 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     for j in range(lanes.size):
         w.t[j] = w.t_end[j] + AHEAD * max(lanes[j].h, 1e-12)
         ahead = w.t[j] - w.t_end[j]  # what is left of it after rounding
+        w.h[j] = ahead
         w.x_ahead[:, j] = x[:, j] + ahead * dx[:, j]
     evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
+    for i in range(w.g.shape[0]):
+        for j in range(lanes.size):
+            w.slope[i, j] = (w.g_ahead[i, j] - w.g[i, j]) / max(w.h[j], 1e-300)
     for i in range(task.corners, w.g.shape[0]):
         for j in range(lanes.size):
             change = w.g_ahead[i, j] - w.g[i, j]  # exactly 0 where the memory stands still
@@ -125,6 +140,7 @@ def restart(rhs, task, lanes, w, chosen):
         if chosen[j]:
             w.e[: task.corners, j] = w.g[: task.corners, j]
             w.e_start[:, j] = w.e[:, j]
+            w.g_start[:, j], w.slope_start[:, j] = w.g[:, j], w.slope[:, j]
 
 
 @numba.njit(**INNER)
