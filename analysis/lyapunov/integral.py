@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from nlctl import equation, param, record
+from nlctl._equation import equation
+from nlctl._param import param, record
 
 from .decomposition import Decomposition, clipped_split
 

@@ -13,9 +13,10 @@ from typing import Any
 import control as ct
 import numpy as np
 
-import nlctl
-from nlctl import equation
-from nlctl._block import Block
+from nlctl._block import Block, block
+from nlctl._diagram import interconnect
+from nlctl._equation import equation
+from nlctl._errors import DiagramError
 from nlctl.plants import PureFeedback
 
 from .decomposition import Decomposition
@@ -45,14 +46,14 @@ def input_gain(f: Callable) -> Callable:
     """
 
     @equation
-    def G(x, v, p):
+    def gain(x, v, p):
         at_rest = f(x, 0.0, p)
         if abs(v) >= NEAR:  # false for NaN, which then reaches G
             return (f(x, v, p) - at_rest) / v
         right, left = (f(x, NEAR, p) - at_rest) / NEAR, (at_rest - f(x, -NEAR, p)) / NEAR
         return 0.5 * (right + left) + 0.5 * (right - left) * (v / NEAR)
 
-    return G
+    return gain
 
 
 def observed(
@@ -81,12 +82,17 @@ def observed(
     Raises
     ------
     DiagramError
-        If signals are not joined by their names.
+        If the law has no Nussbaum argument, or signals are not joined by their names.
     """
+    if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
+        raise DiagramError(
+            "(23), (24) need a law with the state zeta and a function N, got "
+            f"{type(parts.law).__name__}: for a known sign see certify"
+        )
     roles = {path: part for part, path in parts.paths.items()}
     integral = NussbaumIntegral(alpha_1=alpha_1, part=split.part)
-    systems = [*_opened(loop, "", roles), nlctl.block(integral, "integral")]
-    return nlctl.interconnect(systems, name=f"{loop.name}_observed")
+    systems = [*_opened(loop, "", roles), block(integral, "integral")]
+    return interconnect(systems, name=f"{loop.name}_observed")
 
 
 def _opened(diagram: Any, path: str, roles: dict[str, str]) -> list[Any]:
@@ -97,7 +103,7 @@ def _opened(diagram: Any, path: str, roles: dict[str, str]) -> list[Any]:
         if isinstance(system, ct.InterconnectedSystem):
             inner = _opened(system, f"{here}.", roles)
             inputs = list(system.input_labels)
-            copies.append(nlctl.interconnect(inner, inputs=inputs, name=system.name))
+            copies.append(interconnect(inner, inputs=inputs, name=system.name))
         elif isinstance(system, Block):
             copies.append(_observed_block(system, roles.get(here)))
         else:
@@ -110,23 +116,13 @@ def _observed_block(system: Block, part: str | None) -> Block:
     if part == "plant":
         spec = _with_outputs(spec, *_plant_terms(spec))
     elif part in ("weights", "robust", "law"):
-        spec = _with_outputs(spec, (), None)
-    return nlctl.block(spec, system.name)
+        spec = _with_outputs(spec)
+    return block(spec, system.name)
 
 
 def _plant_terms(plant: Any) -> tuple[tuple[str, ...], Callable]:
-    f, d = plant.f, plant.d
-    if isinstance(plant, PureFeedback):  # the user's functions, without parameters
-        own_f, own_d = equation(f), equation(d)
-
-        @equation
-        def f(x, v, p):
-            return own_f(x, v)
-
-        @equation
-        def d(x, t, p):
-            return own_d(x, t)
-
+    """Return the outputs g, G, d of a plant, and the equation that delivers them."""
+    f, d = _with_parameters(plant)
     G = input_gain(f)
 
     @equation
@@ -138,40 +134,66 @@ def _plant_terms(plant: Any) -> tuple[tuple[str, ...], Callable]:
     return ("g", "G", "d"), terms
 
 
-def _with_outputs(spec: Any, names: tuple[str, ...], terms: Callable | None) -> Any:
-    """Return a record with the same parameters and equations, and with more outputs."""
+def _with_parameters(plant: Any) -> tuple[Callable, Callable]:
+    """Return ``f(x, v, p)`` and ``d(x, t, p)`` as equations that machine code can call."""
+    if not isinstance(plant, PureFeedback):
+        return plant.f, plant.d
+    own_f, own_d = equation(plant.f), equation(plant.d)  # the user's functions, without parameters
+
+    @equation
+    def f(x, v, p):
+        return own_f(x, v)
+
+    @equation
+    def d(x, t, p):
+        return own_d(x, t)
+
+    return f, d
+
+
+def _with_outputs(spec: Any, names: tuple[str, ...] = (), terms: Callable | None = None) -> Any:
+    """Return a record with the same parameters and equations, and with more outputs.
+
+    These are the rates of its states, of a record of vectors also the states that it does not
+    deliver, and what `terms` returns.
+    """
     if not spec.states:
         return spec
-    output, update = spec.output, spec.update
-    hidden = tuple(s for s in spec.states if s not in spec.outputs)
-    columns = [i for i, s in enumerate(spec.states) if s in hidden]
-    if getattr(spec, "vector", False):
-        picked = np.array(columns, dtype=np.int64)
-
-        @equation
-        def more(t, x, u, p):
-            shown = np.array(output(t, x, u, p))
-            return np.concatenate((shown, update(t, x, u, p), x[picked]))
-
-    elif terms is None:
-
-        @equation
-        def more(t, x, u, p):
-            return output(t, x, u, p) + update(t, x, u, p)
-
-        hidden = ()
-    else:
-
-        @equation
-        def more(t, x, u, p):
-            return output(t, x, u, p) + update(t, x, u, p) + terms(t, x, u, p)
-
-        hidden = ()
-    rates = tuple(f"rate_{s}" for s in spec.states)
+    vector = getattr(spec, "vector", False)
+    hidden = [s for s in spec.states if s not in spec.outputs] if vector else []
+    output = _longer_vector(spec, hidden) if vector else _longer_tuple(spec, terms)
     namespace = {
-        "outputs": (*spec.outputs, *rates, *hidden, *names),
-        "output": staticmethod(more),
+        "outputs": (*spec.outputs, *(f"rate_{s}" for s in spec.states), *hidden, *names),
+        "output": staticmethod(output),
         "feedthrough": True,
     }
     kind = type(type(spec).__name__, (type(spec),), namespace)
     return kind(**{f.name: getattr(spec, f.name) for f in dataclasses.fields(spec) if f.init})
+
+
+def _longer_vector(spec: Any, hidden: list[str]) -> Callable:
+    output, update = spec.output, spec.update
+    picked = np.array([list(spec.states).index(s) for s in hidden], dtype=np.int64)
+
+    @equation
+    def longer(t, x, u, p):
+        return np.concatenate((np.array(output(t, x, u, p)), update(t, x, u, p), x[picked]))
+
+    return longer
+
+
+def _longer_tuple(spec: Any, terms: Callable | None) -> Callable:
+    output, update = spec.output, spec.update
+    more = no_terms if terms is None else terms
+
+    @equation
+    def longer(t, x, u, p):
+        return output(t, x, u, p) + update(t, x, u, p) + more(t, x, u, p)
+
+    return longer
+
+
+@equation
+def no_terms(t, x, u, p):
+    """Nothing to add."""
+    return ()

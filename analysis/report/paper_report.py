@@ -260,10 +260,9 @@ def _numerics() -> Section:
         items=[
             Paragraph(
                 text="All runs are machine code of the python-control diagrams, compiled by nlctl: "
-                "an explicit Runge-Kutta pair of orders 5(4) at relative tolerance 1e-9, with steps "
-                "that end at the corners of the dead zone. Peaks between samples are found by a "
-                "parabola through three samples. The tests repeat the published cases in plain "
-                "python-control (ct.input_output_response)."
+                "an explicit Runge-Kutta pair of orders 5(4) at relative tolerance 1e-9; steps "
+                "end at the corners of the dead zone. Peaks between samples are those of a "
+                "parabola. The tests repeat published cases in plain python-control."
             ),
             Paragraph(
                 text="The backlash is the play operator itself: within a step its memory stands "

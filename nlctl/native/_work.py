@@ -28,8 +28,8 @@ Task = namedtuple("Task", "times inputs p corners memory rtol atol fixed max_ste
 Work = namedtuple(
     "Work",
     "t h hh x x_new x_stage k g e e_start e_low e_high behind u error rate x_ahead dx_ahead "
-    "g_start slope slope_start g_ahead x_flat x_new_flat x_stage_flat x_ahead_flat k_flat sums t_end jacobian matrix f_t "
-    "pivots U",
+    "g_start slope slope_start g_ahead x_flat x_new_flat x_stage_flat x_ahead_flat k_flat sums "
+    "t_end jacobian matrix f_t pivots U",
 )
 FLAT = ("x", "x_new", "x_stage", "x_ahead")
 

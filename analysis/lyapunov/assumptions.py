@@ -1,0 +1,56 @@
+"""Assumptions 1 to 3, (10) and the compact set, as margins along a response."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .box import Box
+from .premises import Premises
+from .signals import Margin, Signals, inequality
+
+__all__ = ["assumptions"]
+
+
+def assumptions(signals: Signals, given: Premises, box: Box, u_max: float) -> tuple[Margin, ...]:
+    """Evaluate what the proof supposes, along a response of an observed loop.
+
+    Parameters
+    ----------
+    signals : Signals
+    given : Premises
+    box : Box
+        The compact set, with sides x1, ..., xn and v.
+    u_max : float
+        Largest |u| for which the actuator's split is proved; it may be infinite.
+
+    Returns
+    -------
+    tuple of Margin
+        Omega, A1, A1 range, A2, A3, (10).
+    """
+    t, split, u = signals.t, given.split, np.abs(signals["u"])
+    eps_u = np.abs(split.eps_u(signals["u"], signals["v"]))
+    psi = signals.vector("psi")[:, : given.W.size]
+    error = np.abs(signals["g"] + given.forcing(t) - psi @ given.W)
+    d, G = np.abs(signals["d"] - given.forcing(t)), signals["G"]
+    sector = np.minimum(G - given.G_min, given.G_max - G)
+    return (
+        inequality("Omega", "x and v stay in the box", t, 0.0, _room(signals, box), 1.0),
+        inequality("A1", "v = k u + eps_u, k_1 <= k <= k_2, |eps_u| <= eps_u*", t, eps_u,
+                   split.eps_star),
+        inequality("A1 range", "|u| stays where the split is proved", t, u, u_max),
+        inequality("A2", "|d| <= d*", t, d, given.d),
+        inequality("A3", "G_min <= F/v <= G_max, G_min > 0", t, 0.0,
+                   np.minimum(sector, given.G_min), given.G_max),
+        inequality("(10)", "|g - W^T psi| <= eps*", t, error, given.eps),
+    )  # fmt: skip
+
+
+def _room(signals: Signals, box: Box) -> np.ndarray:
+    """Least distance to a face of the box, over half the side's length."""
+    room = np.full(signals.t.size, np.inf)
+    for name, (low, high) in zip(box.names, box.cell, strict=True):
+        y, half = signals[name], 0.5 * (high - low) if np.isfinite(high - low) else 1.0
+        distance = np.minimum(y - low, high - y) / (half if half > 0 else 1.0)
+        room = np.minimum(room, distance)  # keeps NaN
+    return room

@@ -1,0 +1,233 @@
+"""What the paper concludes by Lemma 1, what of it is true, and whether the compact set closes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from flint import arb
+
+from nlctl._diagram import leaves
+from nlctl._errors import ParameterError
+from nlctl._param import equation_arguments
+from nlctl.references import SumOfSines
+
+from .creep import Creep, creep
+from .drift import drift, drift_margin, safe_horizon
+from .inequalities import terms
+from .lines import Line
+from .nussbaum import antiderivative, lobe_around, nussbaum_property
+from .premises import Premises, premises
+from .record import Constants
+from .runs import Run
+from .tracking import error_bounds, reference_bounds
+
+__all__ = ["closure", "conclusions", "creep_of"]
+
+SAFE = "zeta cannot cross its lobe before T"
+WINDOW = 50.0  # s; longer than the period of the paper's reference
+LEMMA = (
+    "false on [0, inf): with zeta' = c1 c2/(2 + exp(zeta^2)), V = c1 + I and g = 1 its premise "
+    "holds and zeta is unbounded"
+)
+NO_BOUND = (
+    "boundedness for all t, (33)-(36) and 'semi-globally uniformly ultimately bounded' do not "
+    "follow; what holds is checked over the horizon, and 2.3 (b), (c)."
+)
+
+
+class _Response:
+    """A run as `drift` and `creep` read a response."""
+
+    def __init__(self, run: Run) -> None:
+        names = ("zeta", "r", "u")
+        self.time, self.output_labels = run.signals.t, list(names)
+        self.outputs = np.array([run.signals[name] for name in names])
+
+
+def creep_of(run: Run) -> Creep | None:
+    """Return where the creep of zeta leads; None if the run is too short to tell."""
+    if run.signals.t[-1] - run.signals.t[0] < 6 * WINDOW:
+        return None
+    try:
+        return creep(_Response(run), run.parts.law.N, window=WINDOW)
+    except ParameterError:
+        return None
+
+
+def conclusions(loop: ct.InterconnectedSystem, run: Run, found: Constants) -> list[Line]:
+    """Return the lines of (12), Lemma 1, what remains true of it, the creep and the closure."""
+    given = premises(found, run.gains)
+    lines = [_property(given), _lemma(), *_bounded(run, given)]
+    if np.isfinite(run.signals["zeta"]).all():
+        lines += [*_remains(run, given, found), _creep(run)]
+    return [*lines, closure(loop, run, found, given)]
+
+
+def _property(given: Premises) -> Line:
+    statement = "(1/s) int_0^s N is unbounded above and below"
+    try:
+        seen = nussbaum_property(given.N)
+    except ParameterError as error:
+        return Line(key="(12)", statement=statement, status="undecided", evidence=str(error))
+    return Line(
+        key="(12)",
+        statement=statement,
+        status="checked" if seen.type_a else "violated",
+        evidence=f"lobes on [0, {seen.end:g}], type B {'seen' if seen.type_b else 'not seen'}",
+        follows="" if seen.type_a else "N is no Nussbaum function on this range.",
+    )
+
+
+def _lemma() -> Line:
+    return Line(
+        key="Lemma 1",
+        statement="V, zeta and int k G N dzeta are bounded if (32) holds",
+        status="violated",
+        evidence=LEMMA,
+        follows=NO_BOUND,
+        reading="paper",
+    )
+
+
+def _bounded(run: Run, given: Premises) -> list[Line]:
+    """Lemma 1's conclusion over the horizon, and the readings of Q."""
+    s = run.signals
+    zeta, horizon = s["zeta"], f"{s.t[-1]:g} s"
+    Q, bar, printed = (float(np.max(s[name])) for name in ("I", "I_bar", "I_printed"))
+    i = int(np.argmax(zeta))
+    lines = [
+        Line(
+            key="(33)",
+            statement=f"I(t) <= Q = {Q:.5g}; with the bar over all {bar:.5g}, as printed "
+            f"{printed:.5g}",
+            status="computed" if np.isfinite(Q) else "violated",
+            time=float(s.t[int(np.argmax(s["I"]))]),
+            evidence=f"integrated with the loop over {horizon}",
+        )
+    ]
+    try:
+        lobe = lobe_around(float(zeta[0]), given.N)
+        room = lobe.high - zeta[i]
+        ends = antiderivative(given.N)(np.array([lobe.low, zeta[-1]]))
+        share = abs(float(ends[1] - ends[0])) / lobe.budget
+        told = f"max zeta = {zeta[i]:.6g}, {100 * share:.3g} % of the lobe's budget spent"
+    except ParameterError:
+        room, told = np.nan, f"max zeta = {zeta[i]:.6g}"
+    status = "checked" if room > 0 else "undecided" if np.isnan(room) else "violated"
+    lost = "" if run.lost is None else f"; {run.message}"
+    lines.append(
+        Line(
+            key="Lemma 1, horizon",
+            statement=f"zeta stays in its lobe, all signals bounded over {horizon}",
+            status="violated" if lost else status,
+            least=float(room),
+            time=float(s.t[i]),
+            state=s.at(float(s.t[i])),
+            evidence=told + lost,
+            follows="N has changed its sign, or r bursts." if lost or room <= 0 else "",
+        )
+    )
+    return lines
+
+
+def _remains(run: Run, given: Premises, found: Constants) -> list[Line]:
+    """Inequality 2.3 (c), and the safe horizon (b)."""
+    x = terms(run.signals, given)
+    low, high = found["k_1"] * given.G_min, found["k_2"] * given.G_max
+    names = ("(c)", "(b)")
+    if not (0 < low <= high < np.inf and np.isfinite(given.alpha_0)):
+        return [Line(key=k, statement="bounds of k G", status="undecided") for k in names]
+    moved = drift(_Response(run), given.N)
+    margin = drift_margin(moved, x.V[0], given.alpha_0, l_min=low, l_max=high, V=x.V)
+    holds = margin.least >= -1e-6 * float(np.max(x.V))
+    c = Line(
+        key="(c)",
+        statement="V <= V(0) + alpha_0 t + zeta - zeta(0) + l+ E+ - l- E-",
+        status="checked" if holds else "violated",
+        least=margin.least,
+        time=margin.when,
+        state=run.signals.at(margin.when),
+        evidence=f"E+ = {moved.gained[-1]:.5g}, E- = {moved.lost[-1]:.5g}, "
+        f"k G in [{low:.4g}, {high:.4g}]",
+        follows="" if holds else "k G left its bounds, or N zeta' is not r u.",
+    )
+    try:
+        safe = safe_horizon(
+            float(x.V[0]), given.alpha_0, l_min=low, l_max=high, zeta_0=float(moved.zeta[0]),
+            N=given.N,
+        )  # fmt: skip
+    except ParameterError as error:
+        return [c, Line(key="(b)", statement=SAFE, status="undecided", evidence=str(error))]
+    crossed = bool(np.any(moved.zeta[moved.time - moved.time[0] < safe.time] >= safe.zeta))
+    kept = "violated" if crossed else "checked"
+    told = f"T = {safe.time:.4g} s for a monotone zeta or a constant gain"
+    b = Line(
+        key="(b)",
+        statement=SAFE,
+        status=kept if margin.monotone else "not applicable",
+        evidence=told + ("" if margin.monotone else "; here zeta falls and k G varies"),
+        follows="k G left its bounds." if margin.monotone and crossed else "",
+    )
+    return [c, b]
+
+
+def _creep(run: Run) -> Line:
+    statement = "the drift of zeta ends before N changes its sign"
+    found = creep_of(run)
+    if found is None:
+        return Line(
+            key="creep",
+            statement=statement,
+            status="undecided",
+            evidence=f"{run.signals.t[-1]:g} s show nothing of it: run {6 * WINDOW:g} s at least",
+        )
+    calm = found.verdict in ("settles", "turned round")
+    burst = np.min([found.burst, found.burst_by_balance])
+    soon = f"; budget spent by {burst:.4g} s at the latest rate, then max |r| = {found.peak:.4g}"
+    return Line(
+        key="creep",
+        statement=statement,
+        status="checked" if calm else "undecided",
+        least=1 - found.share,
+        time=found.time,
+        evidence=f"{found.verdict}: {100 * found.share:.3g} % of the budget spent, "
+        f"{found.recent.mean():.3g} per s" + ("" if calm else soon),
+    )
+
+
+def closure(loop: ct.InterconnectedSystem, run: Run, found: Constants, given: Premises) -> Line:
+    """Return the line that tells whether |r| <= C_0 keeps the state in the box."""
+    statement, key = "|r| <= C_0 keeps x in the box that C_0 was computed on", "closure"
+    path = run.parts.paths["reference"]
+    spec: Any = next(
+        getattr(x.system, "current_spec", None) for x in leaves(loop) if x.path == path
+    )
+    s, n = run.signals, len(given.lambdas) + 1
+    C_0 = given.C_0(float(terms(s, given).V[0]), float(np.max(s["I"])))
+    if not isinstance(spec, SumOfSines) or not np.isfinite(C_0):
+        why = "C_0 is infinite" if not np.isfinite(C_0) else "no bound of the reference is known"
+        return Line(key=key, statement=statement, status="undecided", evidence=why)
+    yd = spec.output(float(s.t[0]), (), (), equation_arguments(spec))
+    e0 = [arb(float(s[f"x{i + 1}"][0])) - arb(float(yd[i]), 1e-12) for i in range(n)]
+    try:
+        errors = error_bounds(given.lambdas, e0, arb(C_0))
+    except ParameterError as error:
+        return Line(key=key, statement=statement, status="undecided", evidence=str(error))
+    reach = [float(e.upper()) + y for e, y in zip(errors, reference_bounds(spec), strict=False)]
+    sides = [found.box[f"x{i + 1}"] for i in range(n)]
+    room = min(min(high, -low) - a for (low, high), a in zip(sides, reach, strict=True))
+    told = ", ".join(f"|x{i + 1}| <= {a:.4g}" for i, a in enumerate(reach))
+    return Line(
+        key=key,
+        statement=statement,
+        status="computed" if room >= 0 else "violated",
+        least=room,
+        evidence=f"C_0 = {C_0:.5g} gives {told}",
+        follows=""
+        if room >= 0
+        else "that x stays in Omega, which (19) needs, is supposed and not "
+        "shown: (36) holds only as far as the runs were seen in the box.",
+        reading="paper",
+    )

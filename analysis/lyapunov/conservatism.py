@@ -1,0 +1,278 @@
+"""How far the proof's bound is from what happens, term by term, and tighter bounds."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import control as ct
+import numpy as np
+
+from nlctl.functions import smooth_sign
+
+from ..metrics import over, peak
+from .examine import Examination, examine
+from .final_bound import KAPPA, initial_V
+from .inequalities import terms
+from .nussbaum import root
+from .premises import Premises, premises
+from .record import Constants
+from .signals import Signals
+from .weights import Network, tightest_weights
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Comparison", "Conservatism", "Share", "comparison", "conservatism"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Share:
+    """One term of C_0^2 / 2.
+
+    Attributes
+    ----------
+    term, formula : str
+    value : float
+    share : float
+        Of C_0^2 / 2.
+    """
+
+    term: str
+    formula: str
+    value: float
+    share: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A bound of |r| on [start, end] by direct comparison, without V and without Lemma 1.
+
+    Attributes
+    ----------
+    start, end : float
+        Interval (s); infinite bounds where k G N is not negative throughout.
+    rho : float
+        Where beta rho + min delta_hat tanh(rho/tau) = sup M.
+    bound : float
+        max(|r(start)|, rho).
+    max_r : float
+        max |r| on the interval.
+    """
+
+    start: float
+    end: float
+    rho: float
+    bound: float
+    max_r: float
+
+    @property
+    def ratio(self) -> float:
+        """Bound over max |r|."""
+        return self.bound / self.max_r
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conservatism:
+    """C_0 against what happens.
+
+    Attributes
+    ----------
+    C_0, max_r : float
+    ultimate, tail_max_r : float
+        sqrt(2 (alpha_0/alpha_1 + sup I)) and max |r| over the second half of the run.
+    shares : tuple of Share
+        Terms of C_0^2 / 2.
+    delta_shares : tuple of Share
+        Terms of delta*, over delta*.
+    C_0_along : float
+        C_0 with delta* = sup |G eps_u + d + eps| along the run (sampled), same W.
+    C_0_fitted : float
+        The same with the weights that make it smallest along the run.
+    sqrt_2V : float
+        max of sqrt(2 V): what is lost by bounding r by V alone.
+    comparisons : tuple of Comparison
+        From 1 s on, and over the second half of the run.
+    e_1, tail_max_e_1 : float
+        Bound tail max |r| / lambda_{n-1} of limsup |e_1| for real stable roots, and what
+        max |e_1| is over the second half.
+    """
+
+    C_0: float
+    max_r: float
+    ultimate: float
+    tail_max_r: float
+    shares: tuple[Share, ...]
+    delta_shares: tuple[Share, ...]
+    C_0_along: float
+    C_0_fitted: float
+    sqrt_2V: float
+    comparisons: tuple[Comparison, ...]
+    e_1: float
+    tail_max_e_1: float
+
+    @property
+    def ratio(self) -> float:
+        """C_0 over max |r|."""
+        return self.C_0 / self.max_r
+
+    def table(self) -> pd.DataFrame:
+        """Return the terms of C_0^2 / 2, indexed by term."""
+        import pandas as pd
+
+        return pd.DataFrame([dataclasses.asdict(s) for s in self.shares]).set_index("term")
+
+    def __str__(self) -> str:
+        lines = [f"C_0 = {self.C_0:.5g} for max |r| = {self.max_r:.5g}: {self.ratio:.4g} times"]
+        lines += [
+            f"  {s.term:<22} {s.value:<10.5g} {100 * s.share:5.1f} %  {s.formula}"
+            for s in (*self.shares, *self.delta_shares)
+        ]
+        lines.append(f"ultimate bound {self.ultimate:.5g} for tail max |r| = {self.tail_max_r:.5g}")
+        lines.append(
+            f"C_0 with delta* along the run: {self.C_0_along:.5g}; with W fitted to it: "
+            f"{self.C_0_fitted:.5g}"
+        )
+        lines += [
+            f"comparison on [{c.start:g}, {c.end:g}] s: |r| <= {c.bound:.5g}, {c.ratio:.4g} times"
+            for c in self.comparisons
+        ]
+        lines.append(f"|e_1| <= {self.e_1:.5g} in the end, for {self.tail_max_e_1:.5g}")
+        return "\n".join(lines)
+
+
+def conservatism(
+    loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **settings: Any
+) -> Conservatism:
+    """Take C_0 of (36) apart and set it against a run.
+
+    Parameters
+    ----------
+    loop, run, **settings
+        As for `analysis.lyapunov.ledger`; of an ensemble the first member.
+
+    Returns
+    -------
+    Conservatism
+    """
+    study = loop if isinstance(loop, Examination) else examine(loop, run, **settings)
+    member, found = study.runs.first, study.constants
+    s, given = member.signals, premises(found, member.gains)
+    x, Q = terms(s, given), float(np.max(s["I"]))
+    V_0, half = float(x.V[0]), 0.5 * (s.t[0] + s.t[-1])
+    late, r = over(s.t, s["r"], half, np.inf)
+    _, e_1 = over(s.t, s["e"], half, np.inf)
+    C_0 = given.C_0(V_0, Q)
+    along = float(np.max(np.abs(x.rest + x.g - x.W_psi)))
+    ends = float(s.t[-1])
+    starts = [a for a in (s.t[0] + 1.0, half) if a < ends]
+    return Conservatism(
+        C_0=C_0,
+        max_r=peak(s.t, s["r"]),
+        ultimate=given.C_0(0.0, Q),
+        tail_max_r=peak(late, r),
+        shares=_shares(given, V_0, Q),
+        delta_shares=_delta_shares(given, found),
+        C_0_along=_bound_with(given, along, given.W, Q),
+        C_0_fitted=_fitted(s, given, Q),
+        sqrt_2V=float(np.sqrt(2 * np.max(x.V))),
+        comparisons=tuple(comparison(s, given, a, ends) for a in starts),
+        e_1=peak(late, r) / given.lambdas[-1],
+        tail_max_e_1=peak(late, e_1),
+    )
+
+
+def _shares(given: Premises, V_0: float, Q: float) -> tuple[Share, ...]:
+    gains, rate = given.gains, given.alpha_1
+    W, error = given.W @ given.W, given.W - np.array(gains.W_hat_0)
+    by = rate if rate > 0 else np.nan
+    start_delta = (given.delta - gains.delta_hat_0) ** 2 / (2 * gains.gamma)
+    start_W = float(error @ error) / (2 * gains.Gamma)
+    rows = (
+        ("delta* in alpha_0", "sigma_2 delta*^2 / (2 alpha_1)",
+         gains.sigma_2 * given.delta**2 / 2 / by),
+        ("|W| in alpha_0", "sigma_1 |W|^2 / (2 alpha_1)", gains.sigma_1 * W / 2 / by),
+        ("tau in alpha_0", "0.2785 tau delta* / alpha_1", KAPPA * gains.tau * given.delta / by),
+        ("delta* in V(0)", "(delta* - delta_hat(0))^2 / (2 gamma)", start_delta),
+        ("|W| in V(0)", "|W - W_hat(0)|^2 / (2 Gamma)", start_W),
+        ("r(0) in V(0)", "r(0)^2 / 2", V_0 - start_delta - start_W),
+        ("Q", "sup I(t)", Q),
+    )  # fmt: skip
+    whole = sum(value for _, _, value in rows)
+    return tuple(
+        Share(term=term, formula=formula, value=float(v), share=float(v / whole))
+        for term, formula, v in rows
+    )
+
+
+def _delta_shares(given: Premises, found: Constants) -> tuple[Share, ...]:
+    rows = (
+        ("actuator in delta*", "G_max eps_u*", given.G_max * given.split.eps_star),
+        ("disturbance in delta*", "d*", given.d),
+        ("network in delta*", "eps*", given.eps),
+    )
+    return tuple(
+        Share(term=term, formula=formula, value=v, share=v / found["delta*"])
+        for term, formula, v in rows
+    )
+
+
+def _bound_with(given: Premises, delta: float, W: np.ndarray, Q: float) -> float:
+    changed = dataclasses.replace(given, delta=delta, W=W)
+    error = W - np.array(given.gains.W_hat_0)
+    return changed.C_0(float(initial_V(given.gains, delta, float(error @ error))), Q)
+
+
+def _fitted(s: Signals, given: Premises, Q: float) -> float:
+    """C_0 with the weights that are best for the errors along the run."""
+    x = terms(s, given)
+    target, psi = x.g + x.rest, s.vector("psi")[:, : given.W.size]
+    if not given.W.size:
+        return _bound_with(given, float(np.max(np.abs(target))), given.W, Q)
+    every = slice(None, None, max(1, s.t.size // 1000))
+    network = Network(psi=psi[every], g=target[every], points=s.t[every, None])
+    W = tightest_weights(network, given.gains, 0.0)
+    return _bound_with(given, float(np.max(np.abs(target - psi @ W))), W, Q)
+
+
+def comparison(signals: Signals, given: Premises, start: float, end: float) -> Comparison:
+    """Bound |r| on an interval by comparison, from the signals along a run.
+
+    While k G N < 0,  |r|' <= k G |N| (M - beta |r| - delta_hat tanh(|r|/tau)),
+    M = |(g + d + G eps_u + Y_d) / (k G N) + W_hat^T psi + Y_d|, hence
+    |r| <= max(|r(start)|, rho),  beta rho + min delta_hat tanh(rho/tau) = sup M.
+    The suprema are taken over the samples.
+
+    Parameters
+    ----------
+    signals : Signals
+        Of an observed run.
+    given : Premises
+    start, end : float
+        In s.
+
+    Returns
+    -------
+    Comparison
+        With an infinite bound where k G N is not negative on the whole interval.
+    """
+    x, gains = terms(signals, given), given.gains
+    inside = (signals.t >= start - 1e-9) & (signals.t <= end + 1e-9)
+    t, r, gain = signals.t[inside], x.r[inside], x.kGN[inside]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        M = np.abs(((x.g + x.rest + x.Y_d) / x.kGN + signals["W_psi"] + x.Y_d)[inside])
+    estimate, largest = float(np.min(signals["delta_hat"][inside])), float(np.max(M))
+    rho = np.inf
+    if np.all(gain < 0) and np.isfinite(largest) and estimate >= 0:
+        rho = root(
+            lambda z: gains.beta * z + estimate * float(smooth_sign(z, gains.tau)) - largest,
+            0.0, largest / gains.beta + 1e-12,
+        )  # fmt: skip
+    return Comparison(
+        start=float(t[0]),
+        end=float(t[-1]),
+        rho=rho,
+        bound=float(np.maximum(abs(r[0]), rho)),
+        max_r=peak(t, r),
+    )

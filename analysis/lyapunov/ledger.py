@@ -1,0 +1,184 @@
+"""The proof as a ledger: what holds of a loop, how that is known, and what does not follow."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import control as ct
+import numpy as np
+
+from nlctl._names import unknown
+
+from ..metrics import peak
+from .conclusions import conclusions, creep_of
+from .creep import Creep
+from .examine import U_MAX, Examination, examine
+from .lines import Line, assumption_lines, decay_line, inequality_lines, run_line
+from .record import Constants
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Ledger", "Line", "ledger"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ledger:
+    """Assumptions and inequalities of the proof for one loop, one line each.
+
+    Attributes
+    ----------
+    loop : str
+        Name of the diagram.
+    lines : tuple of Line
+    constants : Constants
+    horizon : float
+        Length of the longest run (s).
+    members : int
+        Number of runs.
+    Q, max_r : float
+        sup I(t) of (33) and max |r|, over all runs.
+    creep : Creep or None
+        Of the first run, if it is long enough.
+    """
+
+    loop: str
+    lines: tuple[Line, ...]
+    constants: Constants
+    horizon: float
+    members: int
+    Q: float
+    max_r: float
+    creep: Creep | None
+
+    @property
+    def violated(self) -> tuple[Line, ...]:
+        """Corrected statements that do not hold."""
+        return tuple(x for x in self.lines if x.status == "violated" and x.reading == "corrected")
+
+    @property
+    def failing(self) -> tuple[Line, ...]:
+        """Statements of the paper, as they are printed or used there, that do not hold."""
+        return tuple(x for x in self.lines if x.status == "violated" and x.reading == "paper")
+
+    @property
+    def holds(self) -> bool:
+        """Whether no corrected statement is violated."""
+        return not self.violated
+
+    def __getitem__(self, key: str) -> Line:
+        for line in self.lines:
+            if line.key == key:
+                return line
+        raise unknown("line", key, [line.key for line in self.lines], "of the ledger")
+
+    def table(self) -> pd.DataFrame:
+        """Return the lines as a table, indexed by key."""
+        import pandas as pd
+
+        return pd.DataFrame([dataclasses.asdict(line) for line in self.lines]).set_index("key")
+
+    def to_json(self) -> str:
+        """Return the ledger as JSON; numbers that are not finite become null."""
+        return json.dumps(
+            _plain(
+                {
+                    "loop": self.loop,
+                    "holds": self.holds,
+                    "horizon": self.horizon,
+                    "members": self.members,
+                    "Q": self.Q,
+                    "C_0": self.constants.C_0(self.Q),
+                    "max_r": self.max_r,
+                    "constants": [dataclasses.asdict(c) for c in self.constants.entries],
+                    "lines": [dataclasses.asdict(line) for line in self.lines],
+                }
+            ),
+            allow_nan=False,
+            indent=1,
+        )
+
+    def __str__(self) -> str:
+        runs = "one run" if self.members == 1 else f"{self.members} runs"
+        head = f"Ledger of '{self.loop}', {runs} over {self.horizon:g} s, {self.constants.box}"
+        width = max(len(line.key) for line in self.lines)
+        rows = [head, *(line.text(width) for line in self.lines)]
+        meaning: dict[str, list[str]] = {}
+        for line in self.lines:
+            if line.follows:
+                meaning.setdefault(line.follows, []).append(line.key)
+        rows += [f"  {', '.join(keys)}: {follows}" for follows, keys in meaning.items()]
+        return "\n".join(rows)
+
+
+def _plain(thing: Any) -> Any:
+    """Return a value that JSON can hold."""
+    if isinstance(thing, Mapping):
+        return {str(k): _plain(v) for k, v in thing.items()}
+    if isinstance(thing, list | tuple):
+        return [_plain(v) for v in thing]
+    if isinstance(thing, float | np.floating):
+        return float(thing) if np.isfinite(thing) else None
+    return thing.item() if isinstance(thing, np.generic) else thing
+
+
+def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **settings: Any) -> Ledger:
+    """Check the proof's assumptions and inequalities for a loop, line by line.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem or Examination
+        A loop, or what `examine` found.
+    run : float, control.TimeResponseData or sequence of them, optional
+        Horizon (s), or responses of the loop.
+    **settings
+        box, W, k, start, params, step, max_steps: as for `examine`.
+
+    Returns
+    -------
+    Ledger
+
+    Raises
+    ------
+    DiagramError, DecompositionError, ParameterError, UnknownNameError
+        As `examine` does.
+    """
+    found = loop if isinstance(loop, Examination) else examine(loop, run, **settings)
+    return _assembled(found)
+
+
+def _assembled(study: Examination) -> Ledger:
+    """Merge the lines of all runs: of each the worst."""
+    merged: dict[str, Line] = {}
+    loop, found = study.loop, study.constants
+    Q, max_r, horizon, count = -np.inf, 0.0, 0.0, 0
+    for number, run in enumerate(study.runs):
+        limit = 2 * U_MAX if found.split.provenance == "proved" else np.inf
+        lines = [
+            run_line(run),
+            decay_line(run),
+            *assumption_lines(run, found, limit),
+            *inequality_lines(run, found),
+            *conclusions(loop, run, found),
+        ]
+        for line in lines:
+            own = dataclasses.replace(line, member=number, replay=run.member.options)
+            merged[line.key] = own.worse_of(merged.get(line.key))
+        Q = float(np.maximum(Q, np.max(run.signals["I"])))
+        max_r = float(np.maximum(max_r, peak(run.signals.t, run.signals["r"])))
+        horizon, count = max(horizon, float(run.signals.t[-1])), count + 1
+    lines = tuple(dataclasses.replace(line, runs=count) for line in merged.values())
+    return Ledger(
+        loop=str(loop.name),
+        lines=lines,
+        constants=found,
+        horizon=horizon,
+        members=count,
+        Q=Q,
+        max_r=max_r,
+        creep=creep_of(study.runs.first),
+    )

@@ -1,0 +1,230 @@
+"""Lines of the ledger: what became of a statement, how that is known, and what follows."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from .assumptions import assumptions
+from .constants import kappa
+from .final_bound import alpha_1
+from .inequalities import inequalities
+from .premises import literal, premises
+from .record import Constants, Provenance
+from .runs import Run
+from .signals import Margin, Signals
+
+__all__ = ["Line", "Status", "assumption_lines", "decay_line", "inequality_lines", "run_line"]
+
+Status = Literal["proved", "computed", "checked", "violated", "not applicable", "undecided"]
+RANK = {"violated": 0, "undecided": 1, "checked": 2, "computed": 3, "proved": 4}
+KNOWN: dict[Provenance, Status] = {
+    "proved": "proved",
+    "computed": "computed",
+    "given": "checked",
+    "sampled": "checked",
+    "undecided": "undecided",
+}
+FOLLOWS = {
+    "run": "the run ends there: no statement of the paper holds beyond.",
+    "Omega": "the constants were proved on the box: beyond it none of them need hold.",
+    "A1": "(2), (3) fail: delta* of (20) does not bound the actuator's error.",
+    "A1 range": "the actuator's split is not proved there, and eps_u* need not hold.",
+    "A2": "the disturbance is larger than declared: delta* of (20), C_0 of (36) are too small.",
+    "A3": "the gain leaves its sector: (8) fails, G_max and the sign of k G are not as supposed.",
+    "(10)": "eps* does not bound the network's error: delta* of (20) is too small.",
+    "(9)": "the plant is not x_n' = f(x, v) + d(x, t): the proof is about another plant.",
+    "(14)": "r is not the filtered error of (14): (36) says nothing about e.",
+    "(15)": "r' is not what (18) starts from: Y_d or the plant differs from the paper's.",
+    "(26)": "the control law or zeta' is not that of (23), (24).",
+    "(27)": "zeta' is not that of (24).",
+    "(28)": "an adaptation law is not that of (25): W_hat or delta_hat need not stay bounded.",
+    "(31)": "V need not decay: (32), (34), (36) do not follow.",
+}
+NEXT = "the steps that build on it do not follow along this run."
+LITERAL = "(18)", "(20)", "(22)", "(30)", "(31)", "(32)", "(36)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One line of the ledger.
+
+    Attributes
+    ----------
+    key : str
+        Number in the paper, or name of the assumption.
+    statement : str
+    status : {"proved", "computed", "checked", "violated", "not applicable", "undecided"}
+        "proved" by interval arithmetic over the box; "computed" in closed form; "checked" at the
+        samples of the runs; "undecided" where a premise is infinite or cannot be decided.
+    least : float
+        Least margin along the runs; NaN where there is none.
+    time : float
+        Its time (s).
+    first : float
+        Time (s) of the first sample that violates it; NaN if none does.
+    state : dict
+        x, r, u, v, zeta, delta_hat there.
+    evidence, follows : str
+        How it is known, and what a violation means for the paper's conclusion.
+    reading : {"corrected", "paper"}
+        "paper": as printed, or as the paper uses it.
+    member : int
+        Number of the run.
+    replay : str
+        Options of the command line that repeat that run.
+    runs : int
+        Number of runs behind the line.
+    """
+
+    key: str
+    statement: str
+    status: Status
+    least: float = np.nan
+    time: float = np.nan
+    first: float = np.nan
+    state: dict[str, float] = dataclasses.field(default_factory=dict)
+    evidence: str = ""
+    follows: str = ""
+    reading: Literal["corrected", "paper"] = "corrected"
+    member: int = 0
+    replay: str = ""
+    runs: int = 1
+
+    def worse_of(self, other: Line | None) -> Line:
+        """Return the line with the worse status, or the smaller least margin."""
+        if other is None or self._order < other._order:
+            return self
+        return other
+
+    @property
+    def _order(self) -> tuple[int, float]:
+        return RANK.get(self.status, 5), self.least if not np.isnan(self.least) else np.inf
+
+    def text(self, width: int) -> str:
+        """Return the line for a plain table."""
+        least = "" if np.isnan(self.least) else f"{self.least:.5g}"
+        where = "" if np.isnan(self.time) else f"at {self.time:.5g} s"
+        since = "" if np.isnan(self.first) else f" (first at {self.first:.5g} s)"
+        who = f", run {self.member}" if self.runs > 1 else ""
+        note = "" if self.reading == "corrected" else " [as in the paper]"
+        return (
+            f"  {self.key:<{width}}  {self.status:<14}  {least:>11}  {where:<13}{who}  "
+            f"{self.statement}{note}; {self.evidence}{since}"
+        ).rstrip()
+
+
+def run_line(run: Run) -> Line:
+    """Return the line that tells whether a run reached its horizon."""
+    asked, reached = float(run.member.times[-1]), float(run.signals.t[-1])
+    lost = run.lost is not None
+    return Line(
+        key="run",
+        statement=f"all signals stay finite over {asked:g} s",
+        status="violated" if lost else "checked",
+        least=(reached if run.lost is None else run.lost) - asked,
+        time=run.lost if run.lost is not None else np.nan,
+        state=run.signals.at(reached),
+        evidence=run.message or "native run",
+        follows=FOLLOWS["run"] if lost else "",
+    )
+
+
+def decay_line(run: Run) -> Line:
+    """Return the line that tells whether V decays: every rate of (31) is positive."""
+    gains = run.gains
+    rates = {"2 beta": 2 * gains.beta, "sigma_2 gamma": gains.sigma_2 * gains.gamma}
+    if gains.W_hat_0:
+        rates["sigma_1 Gamma"] = gains.sigma_1 * gains.Gamma
+    least = min(rates, key=lambda name: rates[name])
+    decays = alpha_1(gains) > 0
+    return Line(
+        key="decay",
+        statement="alpha_1 = min{2 beta, sigma_1 Gamma, sigma_2 gamma} > 0",
+        status="computed" if decays else "violated",
+        least=alpha_1(gains),
+        evidence=f"{least} = {rates[least]:.5g}",
+        follows="" if decays else "alpha_0/alpha_1 is infinite: (32)-(36) bound nothing.",
+    )
+
+
+def assumption_lines(run: Run, found: Constants, u_max: float) -> list[Line]:
+    """Return the lines of Assumptions 1 to 3, (10) and the compact set."""
+    given = premises(found, run.gains)
+    how = found.table()
+    sources = {"A1": "eps_u*", "A2": "d*", "A3": "G_max", "(10)": "eps*"}
+    lines = []
+    for margin in assumptions(run.signals, given, found.box, u_max):
+        line = _line(margin, run.signals, "checked", "samples of the run")
+        if margin.equation == "A1 range" and not np.isfinite(u_max):
+            continue  # a split in closed form holds for all u
+        if margin.equation in sources and line.status == "checked":
+            row = how.loc[sources[margin.equation]]
+            over = "the box" if row["over"].startswith("x1") else row["over"]
+            line = dataclasses.replace(
+                line, status=KNOWN[row["provenance"]], evidence=f"{row['how']}; over {over}"
+            )
+        if margin.equation == "Omega":
+            line = dataclasses.replace(line, evidence=f"box {found.box.how}")
+        lines.append(line)
+    return lines
+
+
+def inequality_lines(run: Run, found: Constants) -> list[Line]:
+    """Return the lines of the numbered inequalities, corrected and, where it fails, as printed."""
+    given = premises(found, run.gains)
+    lines = [
+        _line(margin, run.signals, "checked", f"{margin.t.size} samples")
+        for margin in inequalities(run.signals, given)
+    ]
+    lines = [_beyond_samples(line) for line in lines]
+    printed = literal(given, found, run.parts.plant)
+    if printed is None:
+        return lines
+    for margin in inequalities(run.signals, printed):
+        if margin.equation in LITERAL:
+            broken = f"{100 * margin.share_violated:.3g} % of {margin.t.size} samples violate it"
+            line = _line(margin, run.signals, "checked", broken)
+            why = "q cos(w t) is no function of x; counted to d instead, the line above holds."
+            lines.append(
+                dataclasses.replace(
+                    line,
+                    key=f"{line.key} literal",
+                    statement=f"{line.statement}, q cos(w t) in g, d* = {printed.d:.4g}",
+                    follows=why if line.status == "violated" else "",
+                    reading="paper",
+                )
+            )
+    return lines
+
+
+def _beyond_samples(line: Line) -> Line:
+    """Return the line with what is known of it for all states, not at the samples only."""
+    if line.key == "(29)" and line.status == "checked":
+        proof = kappa()
+        how = f"all r, {proof.boxes} boxes"
+        return dataclasses.replace(line, status="proved", evidence=how) if proof.holds else line
+    if line.key == "Young" and line.status == "checked":
+        return dataclasses.replace(line, status="computed", evidence="completing the square")
+    return line
+
+
+def _line(margin: Margin, signals: Signals, known: Status, evidence: str) -> Line:
+    status: Status = known if margin.holds else "violated"
+    if margin.kind == "inequality" and not np.isfinite(margin.margin).all():
+        finite = np.isfinite(np.stack([signals["r"], signals["u"], signals["I"]])).all()
+        status = "undecided" if finite else status
+    return Line(
+        key=margin.equation,
+        statement=margin.statement,
+        status=status,
+        least=margin.least,
+        time=margin.at,
+        first=margin.first_violated,
+        state=signals.at(margin.at),
+        evidence=evidence,
+        follows=FOLLOWS.get(margin.equation, NEXT) if status == "violated" else "",
+    )

@@ -1,0 +1,275 @@
+"""Gains, weights and set with the smallest bound of the same proof, under a limit of |u|."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import control as ct
+import numpy as np
+from scipy.optimize import minimize
+
+from nlctl import native
+from nlctl._errors import DivergedError, ParameterError
+from nlctl._names import unknown
+from nlctl.response import input_output_response
+
+from ..metrics import peak
+from .box import Box, visited_box
+from .constants import disturbance
+from .decomposition import Decomposition, decompose
+from .examine import U_MAX, Examination, examine
+from .final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
+from .integral import sharpest
+from .observed import observed
+from .parts import Parts, read_parts
+from .sector import sector
+from .signals import signals_of
+from .weights import approximation_error, network_on_grid, tightest_weights
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Tightened", "TrialBound", "tighten"]
+
+BOUNDS = ("C_0", "ultimate")
+TOLERANCE = 1e-2  # of the branch and bounds in the search
+OVER = 10.0  # weight of log(|u| / limit) in the cost
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialBound:
+    """One set of gains that the search looked at.
+
+    Attributes
+    ----------
+    gains : dict
+        Values by qualified name.
+    C_0, ultimate : float
+        Bounds of the proof with the tightest W on the set that the run visits, eps* on a grid.
+    u : float
+        max |u| along the run; infinite if it diverged.
+    """
+
+    gains: dict[str, float]
+    C_0: float
+    ultimate: float
+    u: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tightened:
+    """The gains that were found, and the constants of the proof for them.
+
+    Attributes
+    ----------
+    gains : dict
+        Values by qualified name, for ``params=`` of a run.
+    examination : Examination
+        The run with these gains and the constants on its set, by branch and bound; a ledger can
+        be made of it.
+    C_0, ultimate : float
+        From those constants, with Q along the run.
+    u, u_limit, horizon : float
+        max |u| along the run, its limit, and the length of the runs (s).
+    trials : tuple of TrialBound
+        All gains that the search looked at, in order.
+    """
+
+    gains: dict[str, float]
+    examination: Examination
+    C_0: float
+    ultimate: float
+    u: float
+    u_limit: float
+    horizon: float
+    trials: tuple[TrialBound, ...]
+
+    def table(self, bound: str = "C_0") -> pd.DataFrame:
+        """Return the trade-off curve: trials that no other beats in max |u| and in the bound.
+
+        Sorted by u; columns u, C_0, ultimate and one per gain.
+        """
+        import pandas as pd
+
+        front: list[TrialBound] = []
+        for trial in sorted(self.trials, key=lambda trial: (trial.u, getattr(trial, bound))):
+            value = getattr(trial, bound)
+            if np.isfinite(trial.u + value) and (not front or value < getattr(front[-1], bound)):
+                front.append(trial)
+        rows = [{"u": t.u, "C_0": t.C_0, "ultimate": t.ultimate, **t.gains} for t in front]
+        return pd.DataFrame(rows)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Search:
+    loop: ct.InterconnectedSystem
+    compiled: Any
+    parts: Parts
+    split: Decomposition
+    times: np.ndarray
+    max_steps: int
+
+
+def tighten(
+    loop: ct.InterconnectedSystem,
+    *,
+    u_limit: float,
+    bound: str = "C_0",
+    horizon: float = 20.0,
+    k: tuple[float, float] | None = None,
+    evaluations: int = 60,
+    max_steps: int = 100_000,
+) -> Tightened:
+    """Search W, the set and the gains for the smallest bound of the paper's proof.
+
+    Searched are beta, tau, gamma, sigma_2, Gamma and sigma_1, by Nelder-Mead on their logarithms
+    from the loop's own values; each trial is run, its set is what the run visits and a tenth,
+    and W is the best one on that set.  The bound is as valid as the proof: over the horizon,
+    with Q along the run.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+        As for `analysis.lyapunov.ledger`.
+    u_limit : float
+        Limit of max |u| along the run.
+    bound : {"C_0", "ultimate"}, optional
+        What is to be small: C_0 of (36), or the ultimate bound sqrt(2 (alpha_0/alpha_1 + Q)).
+    horizon : float, optional
+        Length of the runs (s).
+    k : (k_1, k_2), optional
+        Bounds of the actuator's gain, see `decompose`.
+    evaluations : int, optional
+        Number of gains that are looked at.
+    max_steps : int, optional
+        Steps of a run beyond which gains count as too stiff.
+
+    Returns
+    -------
+    Tightened
+
+    Raises
+    ------
+    ParameterError
+        If no gains that were looked at keep the limit, or it is not positive.
+    """
+    if bound not in BOUNDS:
+        raise unknown("bound", bound, BOUNDS)
+    if not (u_limit > 0 and horizon > 0 and evaluations >= 1):
+        raise ParameterError(
+            f"tighten needs u_limit, horizon and evaluations > 0, got {u_limit:g}, {horizon:g}, "
+            f"{evaluations}"
+        )
+    parts = read_parts(loop)
+    split = sharpest(decompose(parts.actuator, k=k, u_max=U_MAX))
+    search = _Search(
+        loop=loop,
+        compiled=native.compile(observed(loop, parts, split, alpha_1(parts.gains))),
+        parts=parts,
+        split=split,
+        times=np.linspace(0.0, horizon, round(horizon / 4e-3) + 1),
+        max_steps=max_steps,
+    )
+    trials: list[TrialBound] = []
+
+    def cost(point: np.ndarray) -> float:
+        trial = _trial(search, _gains(parts, point))
+        trials.append(trial)
+        value = getattr(trial, bound)
+        if not np.isfinite(value + trial.u):
+            return 1e3
+        return float(np.log(value) + OVER * max(np.log(trial.u / u_limit), 0.0))
+
+    first = _point(parts)
+    simplex = np.vstack([first, first + np.diag(np.full(first.size, 0.7))])
+    options = {"maxfev": evaluations, "initial_simplex": simplex, "adaptive": True}
+    minimize(cost, first, method="Nelder-Mead", options=options)
+    return _best(search, trials, bound, u_limit, k)
+
+
+def _best(
+    search: _Search, trials: list[TrialBound], bound: str, u_limit: float, k: Any
+) -> Tightened:
+    """Examine the best trial that keeps the limit."""
+    allowed = [t for t in trials if t.u <= u_limit and np.isfinite(getattr(t, bound))]
+    if not allowed:
+        raise ParameterError(
+            f"none of {len(trials)} sets of gains keeps max |u| <= {u_limit:g}: the least is "
+            f"{min(t.u for t in trials):.4g}; raise u_limit or evaluations"
+        )
+    best, horizon = min(allowed, key=lambda t: getattr(t, bound)), float(search.times[-1])
+    study = examine(search.loop, horizon, k=k, params=best.gains)
+    Q = float(np.max(study.runs.first.signals["I"]))
+    return Tightened(
+        gains=best.gains,
+        examination=study,
+        C_0=study.constants.C_0(Q),
+        ultimate=study.constants.ultimate(Q),
+        u=best.u,
+        u_limit=u_limit,
+        horizon=horizon,
+        trials=tuple(trials),
+    )
+
+
+def _point(parts: Parts) -> np.ndarray:
+    g = parts.gains
+    values = [g.beta, g.tau, g.gamma, g.sigma_2]
+    if g.W_hat_0:
+        values += [g.Gamma, g.sigma_1]
+    if not min(values) > 0:
+        raise ParameterError(f"tighten starts from gains > 0, got {values}: choose other gains")
+    return np.log(values)
+
+
+def _gains(parts: Parts, point: np.ndarray) -> dict[str, float]:
+    """Return the gains of a point of the search by qualified name."""
+    values, paths = list(map(float, np.exp(point))), parts.paths
+    names = [f"{paths['law']}.beta"]
+    names += [f"{paths['robust']}.{name}" for name in ("tau", "gamma", "sigma_2")]
+    names += [f"{paths['weights']}.{name}" for name in ("Gamma", "sigma_1")]
+    return dict(zip(names, values, strict=False))
+
+
+def _trial(search: _Search, gains: dict[str, float]) -> TrialBound:
+    """Run a set of gains, and bound r on the set that the run visits."""
+    named = {name.rpartition(".")[2]: value for name, value in gains.items()}
+    changed = dataclasses.replace(search.parts.gains, **named)
+    params = {**gains, "integral.alpha_1": alpha_1(changed)}
+    try:
+        response = input_output_response(
+            search.compiled, search.times, params=params, max_steps=search.max_steps
+        )
+    except DivergedError:
+        return TrialBound(gains=gains, C_0=np.inf, ultimate=np.inf, u=np.inf)
+    signals = signals_of(response)
+    Q = float(np.max(signals["I"]))
+    C_0, ultimate = _bounds(search, changed, visited_box(response), Q)
+    return TrialBound(gains=gains, C_0=C_0, ultimate=ultimate, u=peak(signals.t, signals["u"]))
+
+
+def _bounds(search: _Search, gains: Gains, box: Box, Q: float) -> tuple[float, float]:
+    """C_0 and the ultimate bound with the tightest W on a box, eps* on a grid."""
+    parts, n = search.parts, search.parts.order
+    states = box.only(*(f"x{i + 1}" for i in range(n)))
+    G_max = sector(parts.plant, box.only(*states.names, "v"), tol=TOLERANCE).G_max
+    d = disturbance(parts.plant, states, (0.0, np.inf), tol=TOLERANCE).magnitude
+    rest = float(total_error(G_max, search.split.eps_star, d, 0.0))
+    if not np.isfinite(rest):
+        return np.inf, np.inf
+    W, eps = _weights(parts, gains, states, rest)
+    delta, error = rest + eps, W - np.array(gains.W_hat_0)
+    drive, rate = float(alpha_0(gains, delta, float(W @ W))), alpha_1(gains)
+    V_0 = float(initial_V(gains, delta, float(error @ error)))
+    return float(final_bound(drive, rate, V_0, Q)), float(final_bound(drive, rate, 0.0, Q))
+
+
+def _weights(parts: Parts, gains: Gains, box: Box, rest: float) -> tuple[np.ndarray, float]:
+    """Return the tightest weights on a coarse grid, and eps* there."""
+    if not gains.W_hat_0:
+        return np.zeros(0), approximation_error(parts.plant, None, (), box, tol=TOLERANCE).magnitude
+    network = network_on_grid(parts.plant, parts.basis, box, per_side=max(7, 43 // parts.order))
+    W = tightest_weights(network, gains, rest)
+    return W, network.error(W)

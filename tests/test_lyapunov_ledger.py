@@ -1,0 +1,273 @@
+"""The ledger of whole loops: the audit's figures, what is violated, ensembles."""
+
+import functools
+import json
+
+import numpy as np
+import pytest
+
+import nlctl
+from analysis.lyapunov import (
+    Box,
+    conservatism,
+    decompose,
+    examine,
+    inequalities,
+    ledger,
+    literal,
+    premises,
+)
+from analysis.lyapunov.conclusions import creep_of
+from nlctl import ParameterError, UnknownNameError
+
+BOXES = {
+    1: Box.of(x1=(-0.85, 1.0), x2=(-0.55, 1.1), v=(-12, 6)),
+    2: Box.of(x1=(-0.85, 1.1), x2=(-0.55, 0.75), x3=(-0.6, 0.6), v=(-2.5, 4.5)),
+}
+FOUND_BY_THE_AUDIT = {"Lemma 1", "closure"}
+
+
+@functools.cache
+def example(number):
+    return getattr(nlctl.paper, f"example_{number}")()
+
+
+@functools.cache
+def study(number):
+    return examine(example(number), 20.0, box=BOXES[number])
+
+
+@functools.cache
+def book(number):
+    return ledger(study(number))
+
+
+@functools.cache
+def faults():
+    """A healthy member of Example 1, and one with each fault, on the same constants."""
+    n = 5
+    x1, d, gain, sigma = np.full(n, 0.5), np.full(n, 0.1), np.full(n, 0.2), np.full(n, 0.5)
+    x1[1], d[2], gain[3], sigma[4] = 1.3, 1.0, 0.5, 0.0
+    return {
+        "start": {"plant.x1": x1},
+        "params": {
+            "plant.d_amplitude": d,
+            "plant.gain_v": gain,
+            "controller.robust.sigma_2": sigma,
+        },
+    }
+
+
+@functools.cache
+def of_member(i):
+    """The ledger of one member, with the constants of the healthy loop."""
+    many = {kind: {k: v[[i, i]] for k, v in named.items()} for kind, named in faults().items()}
+    return ledger(example(1), 2.0, box=BOXES[1], W=np.zeros(27), step=0.01, **many)
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_the_examples_hold_as_corrected(number):
+    """No corrected statement is violated; of the paper's own, Lemma 1 and the closed set are."""
+    assert book(number).holds
+    failing = {line.key for line in book(number).failing if "literal" not in line.key}
+    assert failing == FOUND_BY_THE_AUDIT
+    statuses = {line.key: line.status for line in book(number).lines}
+    assert statuses["A2"] == statuses["A3"] == statuses["(10)"] == statuses["(29)"] == "proved"
+    assert statuses["A1"] == "computed"
+    assert statuses["(31)"] == statuses["(32)"] == statuses["Lemma 1, horizon"] == "checked"
+    assert statuses["(b)"] == "not applicable"  # zeta falls at times
+    assert statuses["creep"] == "undecided"
+    assert creep_of(study(number).runs.first) is None
+
+
+@pytest.mark.parametrize(
+    ("number", "Q", "C_0", "largest"), [(1, None, 11.035, 0.99591), (2, 0.0339, 20.948, 0.6768)]
+)
+def test_the_bound_is_that_of_the_audit(number, Q, C_0, largest):
+    """C_0 and max |r| of an independent computation; Q where the split is the same."""
+    assert book(number).max_r == pytest.approx(largest, abs=3e-4)
+    assert book(number).constants.C_0(book(number).Q) == pytest.approx(C_0, rel=1e-3)
+    if Q is not None:
+        assert pytest.approx(Q, abs=1e-4) == book(number).Q
+
+
+def test_the_margins_of_example_2_are_those_of_the_audit():
+    """Least margins and their times, of an independent computation."""
+    audit = {"(30)": (1.0009, 9.947), "(31)": (13.779, 10.08), "(32b)": (156.8, 10.96)}
+    audit |= {"(36)": (20.27, 0.046), "(36b)": (10.45, 0.04)}
+    for key, (least, time) in audit.items():
+        assert book(2)[key].least == pytest.approx(least, rel=1e-3)
+        assert book(2)[key].time == pytest.approx(time, abs=5e-3)
+
+
+def test_the_margins_of_example_1_are_those_of_the_audit():
+    """With the textbook's split of the dead zone, which the audit used."""
+    split, found = decompose(nlctl.DeadZone()), study(1).constants
+    given = premises(found, split=split)
+    signals = study(1).runs.first.signals
+    seen = {m.equation: m for m in inequalities(signals, given)}
+    for key, least, time in (("(30)", 0.1343, 12.537), ("(31)", 6.975, 0.766)):
+        assert seen[key].least == pytest.approx(least, rel=5e-3)
+        assert seen[key].at == pytest.approx(time, abs=5e-3)
+    printed = {m.equation: m for m in inequalities(signals, literal(given, found))}
+    audit = {"(20)": (-4.313, 0.234), "(30)": (-4.228, None), "(31)": (-1.578, 0.238)}
+    for key, (least, time) in audit.items():
+        assert printed[key].least == pytest.approx(least, rel=1e-2)
+        assert time is None or printed[key].at == pytest.approx(time, abs=5e-3)
+
+
+def test_example_1_as_printed_is_violated_with_the_time():
+    """q cos(w t) in g: (20), (30), (31), (32) fail, and the ledger says when and what it means."""
+    for key in ("(20)", "(30)", "(31)", "(32)"):
+        line = book(1)[f"{key} literal"]
+        assert line.status == "violated"
+        assert line.reading == "paper"
+        assert line.least < 0
+        assert 0 <= line.first <= line.time < 2
+        assert {"x1", "x2", "r", "u", "v", "zeta", "delta_hat"} <= set(line.state)
+        assert "no function of x" in line.follows
+        assert book(1)[key].status == "checked"
+
+
+def test_the_integral_is_that_of_its_samples():
+    """I from the integrator and I by the trapezoidal rule: two ways to one number."""
+    run, rate = study(1).runs.first, study(1).constants["alpha_1"]
+    s = run.signals
+    w = s["r"] * s["kGu"] + s["rate_zeta"]
+    weighted = np.exp(rate * s.t) * w
+    steps = 0.5 * (weighted[1:] + weighted[:-1]) * np.diff(s.t)
+    by_samples = np.exp(-rate * s.t[1:]) * np.cumsum(steps)
+    assert s["I"][1:] == pytest.approx(by_samples, abs=3e-3)
+    assert np.all(np.abs(s["I"]) <= s["I_bar"] + 1e-9)
+
+
+def test_the_ledger_prints_tabulates_and_is_json():
+    """Three readings of one record; numbers that are not finite become null."""
+    text, table = str(book(1)), book(1).table()
+    assert all(line.key in text for line in book(1).lines)
+    assert "do not follow" in text.replace("\n", " ")
+    assert list(table.index) == [line.key for line in book(1).lines]
+    told = json.loads(book(1).to_json())
+    assert told["holds"] is True
+    assert {line["key"]: line["status"] for line in told["lines"]} == dict(table["status"])
+    with pytest.raises(UnknownNameError, match=r"unknown line '\(13\)'"):
+        book(1)["(13)"]
+
+
+class TestFaults:
+    @pytest.mark.parametrize(
+        ("member", "broken"), [(1, {"Omega"}), (2, {"A2"}), (3, {"A3"}), (4, {"decay"})]
+    )
+    def test_planted_faults_are_named(self, member, broken):
+        """A state out of the box, a larger disturbance, a gain out of its sector, no decay."""
+        violated = {line.key for line in of_member(member).violated}
+        assert broken <= violated
+        assert all(line.follows for line in of_member(member).violated)
+
+    def test_the_healthy_member_is_healthy(self):
+        """A check that always fails is as bad as one that cannot."""
+        assert of_member(0).holds
+
+    def test_a_run_that_is_lost_is_no_calm_one(self):
+        """From the wrong sign of N the loop bursts at once; the ledger says when the run ended."""
+        found = ledger(
+            example(1),
+            2.0,
+            box=BOXES[1],
+            W=np.zeros(27),
+            start={"law.zeta": 3.05},
+            max_steps=20_000,
+        )
+        assert not found.holds
+        assert found["run"].status == found["Lemma 1, horizon"].status == "violated"
+        assert 0 < found["run"].time < 2
+        assert f"{found['run'].time:.3g}"[:4] in found["run"].evidence
+        assert found["run"].follows
+
+    def test_an_ensemble_tells_the_worst_member_and_how_to_replay_it(self):
+        """One line per statement over all members; the options carry every digit."""
+        many = ledger(
+            example(1), 2.0, box=BOXES[1], W=np.zeros(27), step=0.01, **faults()
+        )  # fmt: skip
+        assert many.members == 5
+        worst = {key: many[key].member for key in ("Omega", "A2", "A3", "decay")}
+        assert worst["A2"] == 2
+        assert worst["A3"] == 3
+        assert worst["decay"] == 4
+        assert '--set "plant.d_amplitude=1"' in many["A2"].replay
+        assert '--set "plant.x1(0)=0.5"' in many["A2"].replay
+        assert "run 2" in many["A2"].text(10)
+
+
+def test_responses_are_run_again_with_what_the_proof_needs():
+    """A response of the loop gives the ledger of its own start, times and parameters."""
+    times = np.linspace(0, 0.2, 21)
+    response = nlctl.input_output_response(
+        example(1), times, 0, {"plant.x1": 0.6}, params={"law.beta": 3.0}
+    )
+    found = ledger(example(1), response, box=BOXES[1], W=np.zeros(27))
+    assert found.holds
+    assert found.constants.parts.gains.beta == 3.0
+    assert found.horizon == pytest.approx(0.2)
+    assert found["(14)"].state["x1"] == pytest.approx(0.6)
+    response.outputs[response.output_labels.index("r")][10:] += 0.1
+    with pytest.raises(ParameterError, match="not one of this loop"):
+        ledger(example(1), response, box=BOXES[1], W=np.zeros(27))
+
+
+def test_without_a_box_it_is_what_the_run_visits():
+    """A tenth of each side is added at both ends, so that a sixth of a half side is left."""
+    found = ledger(example(1), 0.5, W=np.zeros(27))
+    assert found["Omega"].least == pytest.approx(0.1 / 0.6)
+    assert "visited by one response" in found["Omega"].evidence
+    assert found.holds
+
+
+def test_a_long_run_tells_where_the_creep_leads():
+    """Example 2 spends its budget slowly: some percent, and a time long after the run."""
+    found = ledger(example(2), 320.0, box=BOXES[2], W=np.zeros(27), step=0.04)
+    assert found.creep is not None
+    assert found.creep.burst > 5000
+    line = found["creep"]
+    assert line.status == "undecided"
+    assert line.evidence.startswith("creeps")
+    assert line.least == pytest.approx(1 - found.creep.share)
+    assert "budget spent by" in line.evidence
+    assert found["(c)"].status == found["Lemma 1, horizon"].status == "checked"
+
+
+def test_what_cannot_be_run_is_refused():
+    """Arrays of two lengths, no horizon, a start for a response."""
+    with pytest.raises(ParameterError, match="one length"):
+        ledger(example(1), start={"plant.x1": [0.1, 0.2]}, params={"law.beta": [1.0, 2.0, 3.0]})
+    with pytest.raises(ParameterError, match="horizon"):
+        ledger(example(1), -1.0)
+    with pytest.raises(UnknownNameError, match="x1"):
+        ledger(example(1), 1.0, start={"plant.x9": 0.0})
+
+
+class TestConservatism:
+    def test_the_shares_are_those_of_the_bound(self):
+        """The terms add up to C_0^2 / 2, and delta*'s to delta*."""
+        for number in (1, 2):
+            found = conservatism(study(number))
+            whole = sum(share.value for share in found.shares)
+            assert whole == pytest.approx(found.C_0**2 / 2, rel=1e-9)
+            assert sum(s.share for s in found.shares) == pytest.approx(1)
+            assert sum(s.share for s in found.delta_shares) == pytest.approx(1, rel=1e-9)
+            assert found.C_0_fitted <= found.C_0_along <= found.C_0
+            assert found.max_r <= found.sqrt_2V <= found.C_0
+            assert found.e_1 >= found.tail_max_e_1
+            assert {"Q", "|W| in alpha_0"} <= set(found.table().index)
+
+    @pytest.mark.parametrize(
+        ("number", "ratio", "bound", "from_1s"), [(1, 11.1, 0.2694, 1.19), (2, 31.0, 0.1382, 1.011)]
+    )
+    def test_the_ratios_are_those_of_the_audit(self, number, ratio, bound, from_1s):
+        """C_0 / max |r|, and the direct comparison, which needs neither V nor Lemma 1."""
+        found = conservatism(study(number))
+        assert found.ratio == pytest.approx(ratio, rel=5e-3)
+        first, half = found.comparisons
+        assert half.bound == pytest.approx(bound, rel=2e-3)
+        assert first.ratio == pytest.approx(from_1s, rel=3e-3)
+        assert half.bound >= half.max_r
