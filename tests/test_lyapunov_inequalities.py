@@ -127,14 +127,14 @@ def test_the_gain_has_its_limit_at_v_0(x1, v):
     assert np.isnan(input_gain(duffing_f)((x1, 0.5), np.nan, p))
 
 
-@given(st.floats(-40, 40))
+@given(st.floats(-40, 40, allow_subnormal=False))
 def test_no_split_leaves_less_than_the_sharpest_one(u):
     """Bounds of eps_u that a textbook's split has, hold for it as well."""
     split = decompose(nlctl.DeadZone())
     (v,) = nlctl.block(nlctl.DeadZone(), "zone").output(0, [], [u])
     sharp = sharpest(split)
     assert abs(sharp.eps_u(u, v)) <= abs(split.eps_u(u, v)) + 1e-12
-    assert split.k_1 <= sharp.gain(u, v) <= split.k_2 * (1 + 1e-12)
+    assert split.k_1 * (1 - 1e-12) <= sharp.gain(u, v) <= split.k_2 * (1 + 1e-12)
     assert sharp.eps_star == split.eps_star
 
 

@@ -5,11 +5,11 @@ import math
 import control as ct
 import numpy as np
 import pytest
+from test_native_rhs import compare
 
 import nlctl
 from nlctl._errors import UsageError
 from nlctl.native._compile import compile as compile_diagram
-from tests.test_native_rhs import compare
 
 TOLERANCES = {"rtol": 1e-9, "atol": 1e-11}
 

@@ -44,7 +44,7 @@ def test_the_other_blocks_of_code_run():
     assert round(names["certificate"].C_0, 3) == 0.477
     assert names["prediction"].burst == pytest.approx(9.4e3, rel=0.02)
     late = names["late"]
-    zeta, e = late.states[late.state_labels.index("controller.law_zeta")], late.outputs[2]
+    zeta, e = (late.outputs[late.output_labels.index(name)] for name in ("zeta", "e"))
     assert not late.success
     assert 9.1e3 < late.time[np.argmax(zeta > 2.99)] <= late.time[-1] < 9.5e3
     assert np.abs(e[(late.time > 100) & (late.time < 9e3)]).max() < 0.06
