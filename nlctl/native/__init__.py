@@ -1,8 +1,15 @@
-"""The native engine: any python-control diagram as machine code.
+"""The native engine: any python-control diagram as machine code, and ensembles of it.
 
-`compile` reads a diagram (`_schedule`), writes the source of its right-hand side (`_emit`), turns
-that into machine code and keeps it on disk (`_compile`, `_cache`); `_integrate` and `_response`
-simulate it.
+`compile` reads a diagram (`_schedule`, `_wiring`, `_feedthrough`) and writes readable source of its
+right-hand side that calls the blocks' own functions (`_code`, `_emit`); rings without a state in
+them are refused or solved (`_tearing`, `_algebraic`).  For simulation the same functions are run
+once on symbols (`_trace*`) and written out for several members at a time (`_lower*`,
+`_vector_*`); both kinds of source are kept on disk as machine code (`_cache`).
+
+`_integrate` moves members side by side through time, each with its own steps: an explicit pair
+(`_tsit5`), a stiff method (`_rodas5p`, `_stiff`), decisions (`_control`), corners and memories
+(`_events`, `_work`).  `_response` makes of one run what python-control returns, `_ensemble` runs
+many; `_discrete` is for sampled systems.
 """
 
 from ._code import CompileError
