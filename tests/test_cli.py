@@ -30,7 +30,7 @@ def refused(*arguments, cwd=None):
 def test_help_lists_the_commands():
     """--help names every command."""
     text = nlctl("--help").stdout
-    for command in ("report", "simulate", "list", "diagram"):
+    for command in ("report", "simulate", "check", "list", "diagram"):
         assert command in text
 
 
