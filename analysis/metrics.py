@@ -1,6 +1,9 @@
 """Numbers of a response: one function, one number, with unit and meaning.
 
-Every function takes sample times and samples; peaks between samples are found by a parabola.
+Every function takes sample times and samples, and numba can compile it:
+``numba.njit(nogil=True)(peak)`` keeps no thread of an ensemble waiting.  Peaks between samples are
+found by a parabola, integrals by Simpson's rule, the rest by straight lines between samples.  A
+response with NaN has the number NaN, or one that is no finite number.
 """
 
 from __future__ import annotations
@@ -9,9 +12,29 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import simpson
 
-__all__ = ["Metric", "final", "highest", "lowest", "over", "peak", "rms"]
+from nlctl._equation import equation
+
+__all__ = [
+    "Metric",
+    "absolute_integral",
+    "final",
+    "highest",
+    "integral",
+    "lowest",
+    "over",
+    "peak",
+    "reversals",
+    "rms",
+    "settling_time",
+    "spread",
+    "square_integral",
+    "time_weighted_integral",
+    "time_within",
+    "total_variation",
+    "ultimate_bound",
+    "vertex",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,36 +81,184 @@ def over(t: np.ndarray, y: np.ndarray, start: float, end: float) -> tuple[np.nda
     return t[inside], y[inside]
 
 
-def highest(t: np.ndarray, y: np.ndarray) -> float:
+@equation
+def vertex(h_before, h_after, before, here, after):
+    """Return where the parabola through three samples has its vertex, and its value there.
+
+    Parameters
+    ----------
+    h_before, h_after : float or ndarray
+        Distances (s) to the neighbours of the middle sample.
+    before, here, after : float or ndarray
+        The samples, not on a line.
+
+    Returns
+    -------
+    offset, value : float or ndarray
+        Offset (s) from the middle sample.
+    """
+    d_before, d_after = (here - before) / h_before, (after - here) / h_after
+    curvature = (d_after - d_before) / (h_before + h_after)  # half the second derivative
+    slope = (d_before * h_after + d_after * h_before) / (h_before + h_after)
+    offset = -slope / (2 * curvature)
+    return offset, here + slope * offset / 2
+
+
+@equation
+def highest(t, y):
     """Largest value of y, between samples by the parabola through the largest and its neighbours.
 
     Its error is of third order in the sampling interval for smooth y (fourth on uniform samples).
     """
     if not np.all(np.isfinite(y)):
-        return float(np.max(y))  # NaN and inf stay what they are
+        top = np.max(y)  # NaN and inf stay what they are, -inf is no calm maximum of the rest
+        return np.nan if np.isfinite(top) else float(top)
     i = int(np.argmax(y))
-    if i in (0, y.size - 1):
+    if i == 0 or i == y.size - 1 or y[i - 1] + y[i + 1] == 2 * y[i]:
         return float(y[i])
-    s, w = t[i - 1 : i + 2] - t[i], y[i - 1 : i + 2]
-    a, b, c = np.linalg.solve(np.vander(s, 3), w)
-    return float(max(y[i], c - b * b / (4 * a))) if a < 0 else float(y[i])
+    top = vertex(t[i] - t[i - 1], t[i + 1] - t[i], y[i - 1], y[i], y[i + 1])[1]
+    return float(top) if top > y[i] else float(y[i])  # rounding may have lost a flat parabola
 
 
-def lowest(t: np.ndarray, y: np.ndarray) -> float:
+@equation
+def lowest(t, y):
     """Smallest value of y, see `highest`."""
     return -highest(t, -y)
 
 
-def peak(t: np.ndarray, y: np.ndarray) -> float:
+@equation
+def spread(t, y):
+    """Range of y, `highest` less `lowest`."""
+    return highest(t, y) + highest(t, -y)
+
+
+@equation
+def peak(t, y):
     """Largest magnitude max |y|, see `highest`."""
     return float(np.maximum(highest(t, y), highest(t, -y)))
 
 
-def rms(t: np.ndarray, y: np.ndarray) -> float:
-    """Root mean square over time, by Simpson's rule."""
-    return float(np.sqrt(simpson(y * y, x=t) / (t[-1] - t[0])))
+@equation
+def ultimate_bound(t, y, share=0.25):
+    """Largest magnitude in the last `share` of the time: what is left when transients are over.
+
+    A number of this response, not a bound for all time.
+    """
+    late = t >= t[-1] - share * (t[-1] - t[0])
+    return peak(t[late], y[late])
 
 
-def final(t: np.ndarray, y: np.ndarray) -> float:
+@equation
+def final(t, y):
     """Value at the last sample."""
     return float(y[-1])
+
+
+@equation
+def integral(t, y):
+    """Integral of y by the composite Simpson rule on any samples, exact for parabolas.
+
+    Of an odd number of intervals the last takes the parabola through the last three samples, as
+    in `scipy.integrate.simpson`.  Two samples are joined by a line.  Where neighbouring intervals
+    differ by more than a factor of 2, weights may be negative.
+    """
+    h = np.diff(t)
+    if h.size == 1:
+        return float(h[0] * (y[0] + y[1]) / 2)
+    n = h.size - h.size % 2
+    a, b = h[0:n:2], h[1:n:2]
+    left, middle, right = y[0:n:2], y[1 : n + 1 : 2], y[2 : n + 1 : 2]
+    weighted = (2 - b / a) * left + (a + b) ** 2 / (a * b) * middle + (2 - a / b) * right
+    total = np.sum((a + b) / 6 * weighted)
+    if h.size > n:
+        p, q = h[-2], h[-1]
+        total += (2 * q * q + 3 * p * q) / (6 * (p + q)) * y[-1]
+        total += (q * q + 3 * p * q) / (6 * p) * y[-2] - q**3 / (6 * p * (p + q)) * y[-3]
+    return float(total)
+
+
+@equation
+def rms(t, y):
+    """Root mean square over time."""
+    return float(np.sqrt(integral(t, y * y) / (t[-1] - t[0])))
+
+
+@equation
+def absolute_integral(t, y):
+    """Integral of |y| (IAE of an error); of second order where y changes sign."""
+    return integral(t, np.abs(y))
+
+
+@equation
+def square_integral(t, y):
+    """Integral of y^2: ISE of an error, energy of an input."""
+    return integral(t, y * y)
+
+
+@equation
+def time_weighted_integral(t, y):
+    """Integral of (t - t_0) |y| (ITAE of an error), time counted from the first sample t_0."""
+    return integral(t, (t - t[0]) * np.abs(y))
+
+
+@equation
+def total_variation(t, y):
+    """Sum of |y_{i+1} - y_i|, the way that y travels; between samples it is a lower bound."""
+    return float(np.sum(np.abs(np.diff(y))))
+
+
+@equation
+def settling_time(t, y, band):
+    """Time after the first sample from which on |y| <= band, by a line between samples.
+
+    Infinite where the last sample lies outside: the response has not settled.
+    """
+    if not np.all(np.isfinite(y)):
+        return np.nan
+    outside = np.nonzero(np.abs(y) > band)[0]
+    if outside.size == 0:
+        return 0.0
+    i = outside[-1]
+    if i == y.size - 1:
+        return np.inf
+    edge = band if y[i] > 0 else -band
+    return float(t[i] - t[0] + (t[i + 1] - t[i]) * (edge - y[i]) / (y[i + 1] - y[i]))
+
+
+@equation
+def time_within(t, y, lower, upper):
+    """Time (s) that y spends in [lower, upper], by lines between samples.
+
+    With the break points of a dead zone it is the time in which its input has no effect; the same
+    for the output v of a dead zone and lower = upper = 0, where the break points are uncertain.
+    """
+    if not np.all(np.isfinite(y)):
+        return np.nan
+    low, high = np.minimum(y[:-1], y[1:]), np.maximum(y[:-1], y[1:])
+    inside = np.minimum(high, upper) - np.maximum(low, lower)  # negative: none of the interval
+    span = high - low
+    level = span == 0
+    share = np.where(level, inside >= 0, np.maximum(inside, 0.0) / (span + level))
+    return float(np.sum(np.diff(t) * share))
+
+
+@equation
+def reversals(t, y, above=0.0):
+    """How often y turns round: the turns between swings of more than `above`."""
+    if not np.all(np.isfinite(y)):
+        return np.nan
+    steps = np.diff(y)
+    moving = np.nonzero(steps)[0]
+    up = steps[moving] > 0
+    turns = y[moving[:-1][up[1:] != up[:-1]] + 1]
+    count, direction = 0.0, 0
+    low = high = y[0]
+    for value in np.append(turns, y[-1]):
+        low, high = min(low, value), max(high, value)
+        if direction <= 0 and value - low > above:
+            count += direction < 0
+            direction, high = 1, value
+        elif direction >= 0 and high - value > above:
+            count += direction > 0
+            direction, low = -1, value
+    return count

@@ -1,0 +1,198 @@
+"""Which points of a space are run: independent draws, or rows that were chosen otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+from nlctl._param import whole_number
+
+from .space import Space, sampled
+
+__all__ = [
+    "Design",
+    "Kind",
+    "checked_entropy",
+    "from_table",
+    "independent",
+    "listed",
+    "row_seed",
+    "rows",
+    "seed_number",
+]
+
+Kind = Literal[
+    "i.i.d.", "Sobol'", "Latin hypercube", "grid", "corners", "one at a time", "Saltelli",
+    "Morris", "user's table", "adaptive",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Design:
+    """Rows to run.
+
+    Attributes
+    ----------
+    space : Space
+    kind : str
+        How the rows were chosen.
+    size : int
+        Number of rows.
+    is_iid : bool
+        Whether the rows are independent draws of the space's laws: what a statement about
+        probabilities needs.
+    entropy : int
+        What all random numbers follow from.
+    points : pandas.DataFrame, optional
+        The rows; None for i.i.d. rows, which are drawn when they are asked for.
+    details : mapping
+        Numbers that analyses of this kind of design need.
+    """
+
+    space: Space
+    kind: Kind
+    size: int
+    is_iid: bool
+    entropy: int
+    points: pd.DataFrame | None = None
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """All rows, see `rows`."""
+        return rows(self, range(self.size))
+
+
+def row_seed(design: Design, row: int) -> np.random.SeedSequence:
+    """Return the seed that everything random in a row follows from.
+
+    It depends on the design's entropy and the row's number alone: any row can be run again without
+    the others, and a longer design begins with the same rows.
+    """
+    return np.random.SeedSequence(design.entropy, spawn_key=(row,))
+
+
+def seed_number(design: Design, row: int) -> int:
+    """Return the row's seed as one number of 64 bits, for the table of results."""
+    return int(row_seed(design, row).generate_state(1, np.uint64)[0])
+
+
+def rows(design: Design, numbers: range) -> pd.DataFrame:
+    """Return some rows, indexed by their numbers; one column for each name of the space.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not in the design.
+    """
+    if len(numbers) and not (min(numbers) >= 0 and max(numbers) < design.size):
+        raise ParameterError(
+            f"the design has rows 0 to {design.size - 1}, asked for {min(numbers)} to "
+            f"{max(numbers)}"
+        )
+    index = pd.RangeIndex(numbers.start, numbers.stop, numbers.step, name="row")
+    if design.points is not None:
+        return design.points.iloc[list(numbers)].set_axis(index)
+    unit = np.empty((len(numbers), len(design.space.names)))
+    for i, number in enumerate(numbers):
+        unit[i] = np.random.default_rng(row_seed(design, number)).random(unit.shape[1])
+    return sampled(design.space, unit).set_axis(index)
+
+
+def checked_entropy(entropy: int | None) -> int:
+    """Return the entropy, or fresh one."""
+    if entropy is None:
+        return int(np.random.SeedSequence().entropy)  # type: ignore[arg-type]
+    return whole_number("a design", "entropy", entropy, at_least=0)
+
+
+def independent(space: Space, size: int, entropy: int | None = None) -> Design:
+    """Draw rows from the laws, independent of each other: for statements about probabilities.
+
+    Parameters
+    ----------
+    space : Space
+    size : int
+        Number of rows, see `guarantee.runs_needed`.
+    entropy : int, optional
+        Fresh by default; the design keeps it.
+    """
+    size = whole_number("a design", "size", size, at_least=1)
+    return Design(
+        space=space, kind="i.i.d.", size=size, is_iid=True, entropy=checked_entropy(entropy)
+    )  # fmt: skip
+
+
+def from_table(
+    space: Space,
+    table: pd.DataFrame,
+    *,
+    drawn_independently: bool = False,
+    entropy: int | None = None,
+) -> Design:
+    """Run the user's own rows.
+
+    Parameters
+    ----------
+    space : Space
+    table : pandas.DataFrame
+        One column for each name of the space; others are refused.
+    drawn_independently : bool, optional
+        The user's word that rows are independent draws of the space's laws.  Statements about
+        probabilities then quote it.
+    entropy : int, optional
+
+    Raises
+    ------
+    UnknownNameError
+        If a column is no name of the space, or a choice has no such option.
+    ParameterError
+        If a column is missing, there is no row, or a number is not finite.
+    """
+    for column in table.columns:
+        if column not in space.names:
+            raise unknown("quantity", str(column), space.names, "in the table")
+    missing = [name for name in space.names if name not in table.columns]
+    if missing or not len(table):
+        raise ParameterError(f"a table needs rows and all columns, it lacks {missing or 'rows'}")
+    columns: dict[str, Any] = {}
+    for q in space.quantities:
+        columns[q.name] = np.array(pd.to_numeric(table[q.name], errors="coerce"), dtype=float)
+        bad = np.nonzero(~np.isfinite(columns[q.name]))[0]
+        if bad.size:
+            raise ParameterError(
+                f"'{q.name}' needs finite numbers, row {bad[0]} of the table has "
+                f"{table[q.name].iloc[bad[0]]!r}"
+            )
+    for choice in space.choices:
+        columns[choice.name] = table[choice.name].astype(str).to_numpy()
+        for label in columns[choice.name]:
+            if label not in choice.options:
+                raise unknown("option", label, choice.options, f"of '{choice.name}'")
+    made = listed(space, "user's table", pd.DataFrame(columns), checked_entropy(entropy))
+    return replace(made, is_iid=drawn_independently)
+
+
+def listed(
+    space: Space,
+    kind: Kind,
+    points: pd.DataFrame,
+    entropy: int,
+    details: Mapping[str, Any] | None = None,
+) -> Design:
+    """Return a design of these rows; they are not independent draws."""
+    return Design(
+        space=space,
+        kind=kind,
+        size=len(points),
+        is_iid=False,
+        entropy=entropy,
+        points=points,
+        details=details or {},
+    )

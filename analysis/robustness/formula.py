@@ -1,0 +1,274 @@
+"""Formulas over signals, and their margins: signal temporal logic with quantitative semantics.
+
+    in_band:        rho(t) = min(upper - y(t), y(t) - lower) / scale
+    ~a:             -rho_a                a & b:   min(rho_a, rho_b)
+    a | b:          max(rho_a, rho_b)
+    always(a):      min of rho_a over [t + start, t + end]
+    eventually(a):  max of rho_a over the same
+
+(Donzé, Maler: Robust satisfaction of temporal logic over real-valued signals, FORMATS 2010).
+rho > 0 holds, rho < 0 fails.  Signals are joined by lines between samples, through the parabola's
+vertex at local extrema; on these lines the margins are exact, sliding windows included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+
+from .piecewise import Trace, joined, largest, with_vertices
+
+__all__ = [
+    "Always",
+    "And",
+    "Band",
+    "Eventually",
+    "Formula",
+    "Not",
+    "Signals",
+    "always",
+    "eventually",
+    "horizon",
+    "in_band",
+    "signals_of",
+    "trace",
+]
+
+
+class Formula:
+    """What ``&``, ``|`` and ``~`` are defined for."""
+
+    def __and__(self, other: Formula) -> And:
+        return And(parts=(self, other))
+
+    def __or__(self, other: Formula) -> Formula:
+        return ~(~self & ~other)
+
+    def __invert__(self) -> Formula:
+        return Not(part=self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Band(Formula):
+    """lower <= y <= upper, in multiples of `scale`; see `in_band`."""
+
+    signal: str
+    lower: float
+    upper: float
+    scale: float
+
+    def __str__(self) -> str:
+        if self.lower == -self.upper:
+            return f"|{self.signal}| <= {self.upper:g}"
+        if not np.isfinite(self.lower):
+            return f"{self.signal} <= {self.upper:g}"
+        if not np.isfinite(self.upper):
+            return f"{self.signal} >= {self.lower:g}"
+        return f"{self.lower:g} <= {self.signal} <= {self.upper:g}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Not(Formula):
+    """The opposite."""
+
+    part: Formula
+
+    def __invert__(self) -> Formula:
+        return self.part
+
+    def __str__(self) -> str:
+        if isinstance(self.part, And):
+            return f"({' or '.join(str(~part) for part in self.part.parts)})"
+        return f"not {self.part}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class And(Formula):
+    """All parts."""
+
+    parts: tuple[Formula, ...]
+
+    def __str__(self) -> str:
+        return f"({' and '.join(map(str, self.parts))})"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Eventually(Formula):
+    """Once between t + start and t + end."""
+
+    part: Formula
+    start: float
+    end: float
+
+    def __str__(self) -> str:
+        return f"eventually{_interval(self)} {self.part}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Always(Formula):
+    """All the time from t + start to t + end."""
+
+    part: Formula
+    start: float
+    end: float
+
+    def __str__(self) -> str:
+        return f"always{_interval(self)} {self.part}"
+
+
+def _interval(window: Always | Eventually) -> str:
+    if np.isfinite(window.end):
+        return f" in [{window.start:g}, {window.end:g}] s"
+    return f" from {window.start:g} s on" if window.start else ""
+
+
+def in_band(
+    signal: str, *, lower: float = -np.inf, upper: float = np.inf, scale: float | None = None
+) -> Band:
+    """Require lower <= signal <= upper.
+
+    Parameters
+    ----------
+    signal : str
+    lower, upper : float, optional
+        Bounds in the signal's unit; one may be left out.
+    scale : float, optional
+        The margin is counted in multiples of it, so that requirements with different units can be
+        compared.  By default the larger magnitude of the finite bounds, or 1 where that is 0: of
+        ``|e| <= 0.15`` a margin of 0.2 means that 20 % of the bound are left.
+
+    Raises
+    ------
+    ParameterError
+        If both bounds are infinite or they are in the wrong order, or the scale is not positive.
+    """
+    finite = [abs(bound) for bound in (lower, upper) if np.isfinite(bound)]
+    if not finite or not lower <= upper:
+        raise ParameterError(
+            f"a band of '{signal}' needs lower <= upper with one of them finite, "
+            f"got [{lower}, {upper}]"
+        )
+    scale = (max(finite) or 1.0) if scale is None else scale
+    if not (np.isfinite(scale) and scale > 0):
+        raise ParameterError(f"a band of '{signal}' needs a finite scale > 0, got {scale}")
+    return Band(signal=signal, lower=float(lower), upper=float(upper), scale=float(scale))
+
+
+def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
+    """Require `part` all the time from start to end, in s from where the formula stands.
+
+    An infinite `end` is as far as the requirement looks, its `until`.
+
+    Raises
+    ------
+    ParameterError
+        If not 0 <= start <= end, or start is infinite.
+    """
+    _check_window("always", start, end)
+    return Always(part=part, start=float(start), end=float(end))
+
+
+def eventually(part: Formula, start: float = 0.0, end: float = np.inf) -> Eventually:
+    """Require `part` once between start and end; arguments and errors as in `always`."""
+    _check_window("eventually", start, end)
+    return Eventually(part=part, start=float(start), end=float(end))
+
+
+def _check_window(name: str, start: float, end: float) -> None:
+    if not (0 <= start <= end and np.isfinite(start)):
+        raise ParameterError(
+            f"'{name}' needs 0 <= start <= end with a finite start, got [{start}, {end}] s"
+        )
+
+
+def parts_of(formula: Formula) -> Iterator[Formula]:
+    """Yield a formula and all its parts."""
+    yield formula
+    for part in getattr(formula, "parts", None) or (
+        [formula.part] if isinstance(formula, Not | Always | Eventually) else []
+    ):
+        yield from parts_of(part)
+
+
+def signals_of(formula: Formula) -> tuple[str, ...]:
+    """Return the names of the signals that a formula looks at, in alphabetical order."""
+    return tuple(sorted({part.signal for part in parts_of(formula) if isinstance(part, Band)}))
+
+
+def horizon(formula: Formula) -> float:
+    """Return how far (s) a formula looks ahead at least."""
+    if isinstance(formula, Always | Eventually):
+        far = formula.end if np.isfinite(formula.end) else formula.start
+        return far + horizon(formula.part)
+    inner = [horizon(part) for part in parts_of(formula) if part is not formula]
+    return max(inner, default=0.0)
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Samples by name, all finite.
+
+    Attributes
+    ----------
+    t : ndarray of shape (m,)
+        Increasing times (s).
+    samples : mapping
+        Arrays of shape (m,).
+    until : float
+        Time (s) at which windows without an end stop, at most ``t[-1]``.
+    """
+
+    t: np.ndarray
+    samples: Mapping[str, np.ndarray]
+    until: float
+
+
+def trace(formula: Formula, signals: Signals, low: float, high: float) -> Trace:
+    """Return the margin of a formula as a function of time in [low, high].
+
+    Parameters
+    ----------
+    formula : Formula
+    signals : Signals
+    low, high : float
+        Times (s) with ``high + horizon(formula)`` at most ``signals.until``.
+
+    Raises
+    ------
+    UnknownNameError
+        If a signal is missing.
+    """
+    match formula:
+        case Band():
+            return _band(formula, signals, low, high)
+        case Not():
+            return -trace(formula.part, signals, low, high)
+        case And():
+            return -joined([-trace(part, signals, low, high) for part in formula.parts])
+        case Always():
+            opposite = Eventually(part=~formula.part, start=formula.start, end=formula.end)
+            return -trace(opposite, signals, low, high)
+        case Eventually():
+            start, end = formula.start, formula.end
+            last = min(high + end, signals.until - horizon(formula.part))
+            inner = trace(formula.part, signals, low + start, max(last, low + start))
+            return largest(inner, low, high, start, end)
+    raise TypeError(f"no formula: {formula!r}")
+
+
+def _band(band: Band, signals: Signals, low: float, high: float) -> Trace:
+    if band.signal not in signals.samples:
+        raise unknown("signal", band.signal, signals.samples)
+    t = signals.t
+    i, j = np.searchsorted(t, low, "right"), np.searchsorted(t, high, "left")
+    near = slice(max(i - 3, 0), j + 3)  # with the neighbours that vertices need
+    y = with_vertices(t[near], signals.samples[band.signal][near]).between(low, high)
+    sides = [] if np.isinf(band.upper) else [Trace(y.t, (y.y - band.upper) / band.scale)]
+    if np.isfinite(band.lower):
+        sides.append(Trace(y.t, (band.lower - y.y) / band.scale))
+    return -joined(sides)

@@ -1,0 +1,282 @@
+"""Statements about the probability of a violation that are exact, and when they may be made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from nlctl._errors import ParameterError, UsageError
+from nlctl._param import whole_number
+
+from .design import Design
+
+__all__ = [
+    "Margins",
+    "NoGuaranteeError",
+    "Side",
+    "Violation",
+    "assumptions",
+    "check_iid",
+    "checked_confidence",
+    "clopper_pearson",
+    "runs_needed",
+    "violation_probability",
+    "violations_of",
+]
+
+Side = Literal["upper", "lower", "both"]
+Margins = Sequence[float] | np.ndarray | pd.Series
+
+
+class NoGuaranteeError(UsageError):
+    """The runs do not support a statement about probabilities; the message says what would."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Violation:
+    """How likely a violation is; printed, it is a sentence with its assumptions.
+
+    Attributes
+    ----------
+    violations, runs : int
+    confidence : float
+    lower, upper : float
+        Bounds of the probability that hold with this confidence.
+    method : str
+    assumptions : tuple of str
+        What the statement rests on.
+    """
+
+    violations: int
+    runs: int
+    confidence: float
+    lower: float
+    upper: float
+    method: str
+    assumptions: tuple[str, ...]
+
+    def __str__(self) -> str:
+        bounds = f"between {_down(self.lower)} and {_up(self.upper)}"
+        if self.lower == 0:
+            bounds = f"at most {_up(self.upper)}"
+        elif self.upper == 1:
+            bounds = f"at least {_down(self.lower)}"
+        return (
+            f"{self.violations} of {self.runs} runs violate the spec. With confidence "
+            f"{100 * self.confidence:.10g} % the probability of a violation is {bounds} "
+            f"({self.method}). Assumed: {'; '.join(self.assumptions)}."
+        )
+
+
+def _up(value: float) -> str:
+    """Four digits, rounded up so that the printed bound holds as well."""
+    return _rounded(value, np.ceil)
+
+
+def _down(value: float) -> str:
+    return _rounded(value, np.floor)
+
+
+def _rounded(value: float, towards: Any) -> str:
+    if not 0 < value < 1:
+        return f"{value:g}"
+    unit = 10.0 ** (np.floor(np.log10(value)) - 3)
+    return f"{towards(value / unit) * unit:.4g}"
+
+
+def checked_confidence(confidence: float) -> float:
+    """Return a confidence.
+
+    Raises
+    ------
+    ParameterError
+        If it is not between 0 and 1.
+    """
+    if not 0 < confidence < 1:
+        raise ParameterError(f"a confidence needs 0 < confidence < 1, got {confidence}")
+    return float(confidence)
+
+
+def clopper_pearson(
+    violations: int, runs: int, confidence: float = 0.99, side: Side = "upper"
+) -> tuple[float, float]:
+    """Return exact bounds of the probability of a violation after a fixed number of runs.
+
+        upper: the p with P(at most k violations in n | p) = a, the 1 - a quantile of Beta(k+1, n-k)
+        lower: the p with P(at least k violations in n | p) = a, the a quantile of Beta(k, n-k+1)
+
+    where a = 1 - confidence for one side and half of it for both (Clopper, Pearson, Biometrika
+    1934).  They hold with at least this confidence for every p.
+
+    Parameters
+    ----------
+    violations, runs : int
+        k and n.
+    confidence : float, optional
+    side : {"upper", "lower", "both"}, optional
+        The bound that is left out is 0 or 1.
+
+    Raises
+    ------
+    ParameterError
+        If not 0 <= violations <= runs with at least one run, or the confidence is none.
+    """
+    k, n = checked_counts(violations, runs)
+    a = (1 - checked_confidence(confidence)) / (2 if side == "both" else 1)
+    upper = float(stats.beta.isf(a, k + 1, n - k)) if side != "lower" and k < n else 1.0
+    lower = float(stats.beta.ppf(a, k, n - k + 1)) if side != "upper" and k > 0 else 0.0
+    return lower, upper
+
+
+def checked_counts(violations: int, runs: int) -> tuple[int, int]:
+    """Return numbers of violations and runs.
+
+    Raises
+    ------
+    ParameterError
+        If not 0 <= violations <= runs with at least one run.
+    """
+    n = whole_number("a probability", "runs", runs, at_least=1)
+    k = whole_number("a probability", "violations", violations, at_least=0)
+    if k > n:
+        raise ParameterError(f"a probability needs violations <= runs, got {k} of {n}")
+    return k, n
+
+
+def runs_needed(probability: float, confidence: float = 0.99, violations: int = 0) -> int:
+    """Return the least number of runs that proves a probability, if few enough of them violate.
+
+    The least n with P(at most `violations` in n | probability) <= 1 - confidence: if no more runs
+    than that violate, the upper bound of `clopper_pearson` is at most `probability`.  Without
+    violations n = log(1 - confidence) / log(1 - probability), rounded up.
+
+    Raises
+    ------
+    ParameterError
+        If the probability is not between 0 and 1, the confidence is none, or `violations` is no
+        whole number >= 0.
+    """
+    k = whole_number("a plan", "violations", violations, at_least=0)
+    a = 1 - checked_confidence(confidence)
+    if not 0 < probability < 1:
+        raise ParameterError(f"a plan needs 0 < probability < 1, got {probability}")
+    too_few, enough = k, k + 1
+    while stats.binom.cdf(k, enough, probability) > a:
+        too_few, enough = enough, 2 * enough
+    while enough - too_few > 1:
+        middle = (too_few + enough) // 2
+        if stats.binom.cdf(k, middle, probability) > a:
+            too_few = middle
+        else:
+            enough = middle
+    return enough
+
+
+def violation_probability(
+    design: Design,
+    margins: Margins,
+    confidence: float = 0.99,
+    side: Side = "upper",
+) -> Violation:
+    """Bound the probability of a violation from all runs of a design.
+
+    Parameters
+    ----------
+    design : Design
+    margins : sequence of length ``design.size``
+        Margin of every row in order; a run violates the spec unless its margin is > 0, so NaN is a
+        violation.  A Series goes by its index.
+    confidence, side
+        As in `clopper_pearson`.
+
+    Raises
+    ------
+    NoGuaranteeError
+        If the rows are no independent draws, or some are missing.
+    """
+    violated = violations_of(design, margins)
+    k, n = int(np.count_nonzero(violated)), violated.size
+    if n != design.size:
+        raise NoGuaranteeError(
+            f"the bound holds for a number of runs that was fixed in advance, {design.size}, and "
+            f"{n} are done: finish them, or use sequential.confidence_sequence, which may be "
+            "looked at any time"
+        )
+    lower, upper = clopper_pearson(k, n, confidence, side)
+    fixed = "the number of runs was fixed in advance"
+    return Violation(
+        violations=k,
+        runs=n,
+        confidence=confidence,
+        lower=lower,
+        upper=upper,
+        method=f"Clopper-Pearson, {'two-sided' if side == 'both' else 'one-sided'}",
+        assumptions=(*assumptions(design), fixed),
+    )
+
+
+def violations_of(design: Design, margins: Margins) -> np.ndarray:
+    """Return for each of the first rows of a design whether it is a violation, in their order.
+
+    Raises
+    ------
+    NoGuaranteeError
+        If the rows are no independent draws, or are not rows 0, 1, 2, ... without a gap: which
+        runs end first may depend on whether they violate.
+    """
+    check_iid(design)
+    series = pd.Series(margins, dtype=float).sort_index()
+    if not np.array_equal(series.index, np.arange(series.size)):
+        raise NoGuaranteeError(
+            "a statement needs the first rows of the design without a gap, and rows are missing: "
+            "which runs end first may depend on how they end. Finish them, or give the rows before "
+            "the first gap"
+        )
+    if not 0 < series.size <= design.size:
+        raise NoGuaranteeError(
+            f"the design has {design.size} rows, got margins of {series.size} runs"
+        )
+    return ~(series.to_numpy() > 0)
+
+
+def check_iid(design: Design) -> None:
+    """Refuse a design whose rows are no independent draws.
+
+    Raises
+    ------
+    NoGuaranteeError
+        The message says why, and what to run instead.
+    """
+    if design.is_iid:
+        return
+    if design.kind == "user's table":
+        raise NoGuaranteeError(
+            "rows of a user's table are no independent draws of the space's laws unless the user "
+            "says so: from_table(..., drawn_independently=True)"
+        )
+    why = {
+        "adaptive": "were chosen by looking at earlier results",
+        "Sobol'": "avoid each other",
+        "Latin hypercube": "avoid each other",
+    }.get(design.kind, "were chosen systematically")
+    raise NoGuaranteeError(
+        f"no guarantee from a design of kind '{design.kind}': its rows {why}, and exact statements "
+        "need independent draws. Run independent(space, size) instead; for a bound of a "
+        "probability size = runs_needed(probability, confidence)"
+    )
+
+
+def assumptions(design: Design) -> tuple[str, ...]:
+    """Return what every statement from this design rests on."""
+    laws = ", ".join(f"{name} ~ {law}" for name, law in design.space.laws.items())
+    drawn = "as the user says, " if design.kind == "user's table" else ""
+    return (
+        f"{drawn}rows are independent draws of {laws}, independent of each other",
+        "the simulated loop is the real one, to the tolerance of the integrator",
+        "a run that did not reach its end is a violation",
+    )

@@ -1,0 +1,144 @@
+"""Designs that fill a space evenly or walk through it systematically."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from scipy.stats import qmc
+
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+from nlctl._param import whole_number
+
+from .design import Design, checked_entropy, listed
+from .space import Space, boxed, nominal, sampled
+
+__all__ = ["corners", "grid", "latin_hypercube", "one_at_a_time", "sobol", "sobol_points"]
+
+
+def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
+    """Fill the space evenly with a scrambled Sobol' sequence: for means, maps and sensitivity.
+
+    Arguments as in `independent`.
+
+    Raises
+    ------
+    ParameterError
+        If `size` is no power of 2, which the sequence's balance needs.
+    """
+    entropy = checked_entropy(entropy)
+    unit = sobol_points(len(space.names), size, entropy)
+    return listed(space, "Sobol'", sampled(space, unit), entropy)
+
+
+def sobol_points(dimension: int, size: int, entropy: int) -> np.ndarray:
+    """Return `size` scrambled Sobol' points of the unit cube, see `sobol`."""
+    size = whole_number("a Sobol' design", "size", size, at_least=1)
+    if size & (size - 1):
+        raise ParameterError(
+            f"a Sobol' design needs a power of 2 as its size, got {size}: take "
+            f"{2 ** (size.bit_length() - 1)} or {2 ** size.bit_length()}"
+        )
+    return qmc.Sobol(dimension, rng=entropy).random_base2(size.bit_length() - 1)
+
+
+def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Design:
+    """Fill the space so that each quantity has one value in each of `size` equally likely parts.
+
+    Arguments as in `independent`.
+    """
+    size = whole_number("a Latin hypercube", "size", size, at_least=1)
+    entropy = checked_entropy(entropy)
+    unit = qmc.LatinHypercube(len(space.names), rng=entropy).random(size)
+    return listed(space, "Latin hypercube", sampled(space, unit), entropy)
+
+
+def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = None) -> Design:
+    """Cross evenly spaced values of every box, ends included, and all options of every choice.
+
+    Parameters
+    ----------
+    space : Space
+    levels : int or mapping
+        Number of values per quantity, at least 1; one value is the middle of the box.  A mapping
+        names every quantity.
+    entropy : int, optional
+
+    Raises
+    ------
+    ParameterError
+        If a number of levels is missing or below 1.
+    UnknownNameError
+        If a level is given for an unknown quantity.
+    """
+    names = [q.name for q in space.quantities]
+    counts = dict.fromkeys(names, levels) if isinstance(levels, int) else dict(levels)
+    for name in counts:
+        if name not in names:
+            raise unknown("quantity", name, names)
+    axes = []
+    for name in names:
+        n = whole_number("a grid", f"levels of '{name}'", counts.get(name), at_least=1)
+        axes.append(np.linspace(0, 1, n) if n > 1 else np.array([0.5]))
+    return listed(space, "grid", _crossed(space, axes), checked_entropy(entropy))
+
+
+def corners(space: Space, entropy: int | None = None) -> Design:
+    """Cross both ends of every box, and all options of every choice: 2^d rows for d quantities.
+
+    Raises
+    ------
+    ParameterError
+        If an option of a choice has weight 0.
+    """
+    axes = [np.array([0.0, 1.0])] * len(space.quantities)
+    return listed(space, "corners", _crossed(space, axes), checked_entropy(entropy))
+
+
+def _crossed(space: Space, axes: Sequence[np.ndarray]) -> pd.DataFrame:
+    """Every combination of places in the boxes, and of options."""
+    options = [np.cumsum(c.weights) - np.array(c.weights) / 2 for c in space.choices]
+    impossible = [c.name for c in space.choices if min(c.weights) == 0]
+    if impossible:
+        raise ParameterError(f"options with weight 0 in {impossible}: leave them out of the space")
+    return boxed(space, np.array(list(itertools.product(*axes, *options))))
+
+
+def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> Design:
+    """Vary one quantity over its box, or one choice over its options, the others nominal.
+
+    Row 0 is all nominal; ``details["varied"]`` names what varies in each row.
+
+    Parameters
+    ----------
+    space : Space
+        With nominal values, see `resolve.resolved`.
+    levels : int, optional
+        Number of evenly spaced values per quantity, ends included.
+
+    Raises
+    ------
+    ParameterError
+        If `levels` is below 2.
+    SpaceError
+        If a quantity has no nominal value.
+    """
+    levels = whole_number("one at a time", "levels", levels, at_least=2)
+    middle = nominal(space)
+    made, varied = [middle], [""]
+    unit = np.tile(np.linspace(0, 1, levels)[:, None], len(space.names))
+    values = boxed(space, unit)
+    for quantity in space.quantities:
+        made += [{**middle, quantity.name: value} for value in values[quantity.name]]
+        varied += [quantity.name] * levels
+    for choice in space.choices:
+        others = [label for label in choice.options if label != choice.nominal]
+        made += [{**middle, choice.name: label} for label in others]
+        varied += [choice.name] * len(others)
+    table = pd.DataFrame(made, columns=space.names)
+    return listed(
+        space, "one at a time", table, checked_entropy(entropy), {"varied": tuple(varied)}
+    )

@@ -1,0 +1,153 @@
+"""What is uncertain: parameters and initial states with laws, and choices between blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from nlctl._errors import UsageError
+
+__all__ = ["QUANTILES", "Choice", "SpaceError", "Uncertain"]
+
+QUANTILES = (0.001, 0.999)
+"""Ends of the box of a law without finite support: it holds 99.8 % of the law."""
+
+
+class SpaceError(UsageError):
+    """A space that contradicts itself or the diagram; the message names the quantity."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Uncertain:
+    """A number that is not known exactly.
+
+    Attributes
+    ----------
+    name : str
+        Qualified parameter, ``"actuator.b_r"`` or ``"controller.lambdas[0]"``, or initial state,
+        ``"plant.x1(0)"``.
+    law : frozen distribution of scipy.stats
+        Has ``ppf`` and ``support``.  By default uniform on `bounds`.
+    bounds : tuple of 2 floats, optional
+        Ends of the `box`.
+    nominal : float, optional
+        What the box is scaled about, and what the other quantities hold while one varies.  By
+        default the diagram's own value, see `resolve.resolved`.
+    unit : str
+        By default the diagram's.
+
+    Raises
+    ------
+    SpaceError
+        If there is neither law nor bounds, the law is not frozen, the bounds are no interval, or
+        the nominal value lies outside of them.
+    """
+
+    name: str
+    law: Any = None
+    bounds: tuple[float, float] | None = None
+    nominal: float | None = None
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if self.law is None:
+            if self.bounds is None:
+                raise SpaceError(f"'{self.name}' needs a law (scipy.stats) or bounds, got neither")
+            low, high = _interval(self.name, self.bounds)
+            object.__setattr__(self, "law", stats.uniform(low, high - low))
+        if not (hasattr(self.law, "ppf") and hasattr(self.law, "dist")):
+            raise SpaceError(
+                f"'{self.name}' needs a frozen law such as scipy.stats.norm(0.5, 0.1), "
+                f"got {self.law!r}"
+            )
+        low, high = self.box
+        if self.nominal is not None and not low <= self.nominal <= high:
+            raise SpaceError(
+                f"'{self.name}' needs a nominal value in its box [{low:g}, {high:g}], "
+                f"got {self.nominal:g}"
+            )
+
+    @property
+    def box(self) -> tuple[float, float]:
+        """What corners, grids and screening use: the bounds, where given.
+
+        Otherwise the support of the law, or its `QUANTILES` where that is infinite.
+        """
+        support = self.law.support()
+        ends = np.where(np.isfinite(support), support, self.law.ppf(QUANTILES))
+        return _interval(self.name, ends if self.bounds is None else self.bounds)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the law is one of whole numbers."""
+        return isinstance(self.law.dist, stats.rv_discrete)
+
+    @property
+    def is_initial(self) -> bool:
+        """Whether this is an initial state."""
+        return self.name.endswith("(0)")
+
+    @property
+    def law_text(self) -> str:
+        """The law as text, ``uniform on [0.3, 0.7]`` or ``norm(0, 0.1)`` in SciPy's parameters."""
+        if self.law.dist.name == "uniform":
+            low, high = self.law.support()
+            return f"uniform on [{low:g}, {high:g}]"
+        given = [f"{v:g}" for v in self.law.args]
+        given += [f"{k}={v:g}" for k, v in self.law.kwds.items()]
+        return f"{self.law.dist.name}({', '.join(given)})"
+
+
+def _interval(name: str, bounds: Sequence[float] | np.ndarray) -> tuple[float, float]:
+    if np.size(bounds) != 2 or not np.all(np.isfinite(bounds)) or not bounds[0] < bounds[1]:
+        raise SpaceError(f"'{name}' needs finite bounds (low, high) with low < high, got {bounds}")
+    return float(bounds[0]), float(bounds[1])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """One of several blocks: another controller, actuator or reference.
+
+    Attributes
+    ----------
+    name : str
+        Keyword of the function that builds the diagram, ``"actuator"``.
+    options : mapping
+        ``{label: record or python-control system}``.
+    nominal : str
+        Label that holds while other quantities vary; by default the first.
+    weights : tuple of float
+        Probability of each option; by default all alike.
+
+    Raises
+    ------
+    SpaceError
+        If there is no option, the nominal label is none of them, or the weights are no
+        probabilities.
+    """
+
+    name: str
+    options: Mapping[str, Any]
+    nominal: str = ""
+    weights: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        labels = list(self.options)
+        if not labels:
+            raise SpaceError(f"choice '{self.name}' needs at least one option, got none")
+        if self.nominal not in ("", *labels):
+            raise SpaceError(
+                f"choice '{self.name}' needs a nominal option among {labels}, got '{self.nominal}'"
+            )
+        object.__setattr__(self, "nominal", self.nominal or labels[0])
+        weights = self.weights or (1 / len(labels),) * len(labels)
+        if len(weights) != len(labels) or min(weights) < 0 or not np.isclose(sum(weights), 1):
+            raise SpaceError(
+                f"choice '{self.name}' needs {len(labels)} weights >= 0 that add up to 1, "
+                f"got {self.weights}"
+            )
+        object.__setattr__(self, "weights", tuple(weights))

@@ -1,0 +1,182 @@
+"""Everything that is uncertain in a study, and its values at points of the unit cube."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl._errors import ParameterError
+
+from .quantity import Choice, SpaceError, Uncertain
+
+__all__ = [
+    "Space",
+    "arguments",
+    "boxed",
+    "combinations",
+    "nominal",
+    "sampled",
+    "scaled",
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Space:
+    """Everything that is uncertain in a study, independent of each other.
+
+    Attributes
+    ----------
+    quantities : tuple of Uncertain
+    choices : tuple of Choice
+    scale : float
+        Every number is moved towards or away from its nominal value by this factor,
+        nominal + scale (value - nominal); choices are not scaled.
+
+    Raises
+    ------
+    SpaceError
+        If nothing is uncertain, two names are equal, the scale is negative, or a scale other than
+        1 meets a quantity without nominal value.
+    """
+
+    quantities: tuple[Uncertain, ...] = ()
+    choices: tuple[Choice, ...] = ()
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.names:
+            raise SpaceError("a space needs at least one quantity or choice, got none")
+        twice = {name for name in self.names if self.names.count(name) > 1}
+        if twice:
+            raise SpaceError(f"a space needs each name once, got twice: {sorted(twice)}")
+        if not (np.isfinite(self.scale) and self.scale >= 0):
+            raise SpaceError(f"a space needs a finite scale >= 0, got {self.scale}")
+        for quantity in self.quantities if self.scale != 1 else ():
+            _nominal_of(quantity)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the quantities, then of the choices: the columns of every table."""
+        return [part.name for part in (*self.quantities, *self.choices)]
+
+    @property
+    def laws(self) -> dict[str, str]:
+        """The law of every quantity and choice, as text."""
+        about = "" if self.scale == 1 else f", scaled by {self.scale:g} about the nominal value"
+        laws = {q.name: q.law_text + about for q in self.quantities}
+        for choice in self.choices:
+            weights = zip(choice.options, choice.weights, strict=True)
+            laws[choice.name] = "one of " + ", ".join(f"{k} ({w:.3g})" for k, w in weights)
+        return laws
+
+
+def _nominal_of(quantity: Uncertain) -> float:
+    if quantity.nominal is None:
+        raise SpaceError(
+            f"'{quantity.name}' has no nominal value: give one, or take the diagram's with "
+            "resolved(space, diagram)"
+        )
+    return quantity.nominal
+
+
+def nominal(space: Space) -> dict[str, Any]:
+    """Return ``{name: nominal value or label}``.
+
+    Raises
+    ------
+    SpaceError
+        If a quantity has none.
+    """
+    numbers = {q.name: _nominal_of(q) for q in space.quantities}
+    return numbers | {c.name: c.nominal for c in space.choices}
+
+
+def scaled(space: Space, factor: float) -> Space:
+    """Return the space with all deviations from the nominal values multiplied by `factor`."""
+    return replace(space, scale=space.scale * factor)
+
+
+def sampled(space: Space, unit: np.ndarray) -> pd.DataFrame:
+    """Turn points of the unit cube into values, each coordinate by its law's quantile function.
+
+    Uniform points become draws of the laws.
+
+    Parameters
+    ----------
+    unit : ndarray of shape (n, len(space.names))
+        In [0, 1]; 0 and 1 stand for the nearest inner floating-point numbers, so that a law with
+        infinite support gives finite values.
+
+    Raises
+    ------
+    ParameterError
+        If the shape is another, or a coordinate lies outside.
+    """
+    inner = np.clip(_checked(space, unit), 2.0**-54, 1 - 2.0**-53)
+
+    def drawn(quantity: Uncertain, u: np.ndarray) -> np.ndarray:
+        return quantity.law.ppf(u)
+
+    return _table(space, inner, drawn)
+
+
+def boxed(space: Space, unit: np.ndarray) -> pd.DataFrame:
+    """Turn points of the unit cube into values, linearly between the ends of each box.
+
+    Arguments and errors as in `sampled`; whole numbers are rounded.
+    """
+
+    def between(quantity: Uncertain, u: np.ndarray) -> np.ndarray:
+        low, high = quantity.box
+        return low + u * (high - low)
+
+    return _table(space, _checked(space, unit), between)
+
+
+def _checked(space: Space, unit: np.ndarray) -> np.ndarray:
+    unit = np.asarray(unit, dtype=float)
+    if unit.ndim != 2 or unit.shape[1] != len(space.names):
+        raise ParameterError(
+            f"points of this space need shape (n, {len(space.names)}), got {unit.shape}"
+        )
+    if not np.all((unit >= 0) & (unit <= 1)):  # false for NaN
+        raise ParameterError("points of the unit cube need coordinates in [0, 1]")
+    return unit
+
+
+def _table(space: Space, unit: np.ndarray, value: Any) -> pd.DataFrame:
+    columns: dict[str, np.ndarray] = {}
+    for quantity, u in zip(space.quantities, unit.T, strict=False):
+        values = value(quantity, u)
+        if space.scale != 1:
+            values = _nominal_of(quantity) + space.scale * (values - _nominal_of(quantity))
+        columns[quantity.name] = np.rint(values) if quantity.is_whole else values
+    for choice, u in zip(space.choices, unit.T[len(space.quantities) :], strict=True):
+        ends = np.cumsum(choice.weights)[:-1]
+        columns[choice.name] = np.array(list(choice.options))[np.searchsorted(ends, u, "right")]
+    return pd.DataFrame(columns)
+
+
+def arguments(space: Space, table: pd.DataFrame) -> dict[str, dict[str, np.ndarray]]:
+    """Return the ``params`` and ``initial_state`` of `nlctl.ensemble_response` for these rows.
+
+    Choices are left out: rows with the same labels share a diagram, see `resolve.diagrams`.
+    """
+    params, states = {}, {}
+    for quantity in space.quantities:
+        values = table[quantity.name].to_numpy(dtype=float)
+        if quantity.is_initial:
+            states[quantity.name.removesuffix("(0)")] = values
+        else:
+            params[quantity.name] = values.astype(int) if quantity.is_whole else values
+    return {"params": params, "initial_state": states}
+
+
+def combinations(space: Space) -> list[dict[str, str]]:
+    """Return every combination of the choices' labels; one empty one without choices."""
+    labels = itertools.product(*(choice.options for choice in space.choices))
+    return [dict(zip([c.name for c in space.choices], row, strict=True)) for row in labels]

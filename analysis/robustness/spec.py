@@ -1,0 +1,162 @@
+"""Requirements: named formulas, and the margins that a response leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+
+from .formula import Formula, Signals, horizon, signals_of, trace
+
+__all__ = ["FAILED", "Requirement", "Spec", "margin", "margins", "unfinished_margin"]
+
+FAILED = 1e6
+"""No margin of a run that reached its end is below -FAILED, and none of another run above it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Requirement:
+    """A named formula that has to hold at the start of a response.
+
+    It is also a metric of `nlctl.ensemble_response`, if it looks at one signal.
+
+    Attributes
+    ----------
+    key : str
+        Short name for tables and files.
+    formula : Formula
+        See `formula.in_band`, `formula.always`, `formula.eventually` and ``&``, ``|``, ``~``.
+    meaning : str
+        In words, for the report.
+    until : float
+        Time (s) that a run has to reach and that windows without an end stop at.  A run that ends
+        before has failed.
+    """
+
+    key: str
+    formula: Formula
+    until: float
+    meaning: str = ""
+
+    start = -np.inf
+    end = np.inf
+    unit = "1"
+
+    def __post_init__(self) -> None:
+        need = horizon(self.formula)
+        if not need <= self.until < np.inf:
+            raise ParameterError(
+                f"requirement '{self.key}' needs a finite end of the response of at least "
+                f"{need:g} s, as far as it looks ahead ({self.formula}), got {self.until:g} s"
+            )
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the signals that it looks at."""
+        return signals_of(self.formula)
+
+    @property
+    def signal(self) -> str:
+        """Name of its only signal.
+
+        Raises
+        ------
+        ParameterError
+            If there are several.
+        """
+        if len(self.signals) != 1:
+            raise ParameterError(
+                f"requirement '{self.key}' looks at the signals {', '.join(self.signals)}: give "
+                "all of them to margin(requirement, t, signals)"
+            )
+        return self.signals[0]
+
+    def function(self, t: np.ndarray, *samples: np.ndarray) -> float:
+        """Return the margin, with the samples in the order of `signals`."""
+        return margin(self, t, dict(zip(self.signals, samples, strict=True)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spec:
+    """Requirements that all have to hold.
+
+    Raises
+    ------
+    ParameterError
+        If there is none, or two have the same key.
+    """
+
+    requirements: tuple[Requirement, ...]
+
+    def __post_init__(self) -> None:
+        keys = [requirement.key for requirement in self.requirements]
+        if not keys or len(set(keys)) < len(keys) or "spec" in keys:
+            raise ParameterError(
+                "a spec needs at least one requirement, each with its own key other than 'spec', "
+                f"got {keys}"
+            )
+
+
+def unfinished_margin(time: float, until: float) -> float:
+    """Return the margin of a run that ended at `time` (s) before the end `until` (s).
+
+        -FAILED (2 - time / until), time confined to [0, until]
+
+    It lies in [-2 FAILED, -FAILED], the lower the earlier the run ended, and below that of every
+    run that reached its end; a time that is NaN counts as 0.
+    """
+    reached = np.clip(np.nan_to_num(time / until), 0.0, 1.0) if until > 0 else 0.0
+    return float(-FAILED * (2 - reached))
+
+
+def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.ndarray]) -> float:
+    """Return by how much a response meets a requirement; > 0 holds.
+
+    Dimensionless, see `formula.in_band`.  A response that ends before ``requirement.until``, or
+    has a sample that is not finite before in a signal that counts, gets `unfinished_margin` of the
+    last time that was good.
+
+    Parameters
+    ----------
+    t : ndarray of shape (m,)
+        Increasing times (s).
+    signals : mapping
+        Samples of shape (m,) by name.
+
+    Raises
+    ------
+    ParameterError
+        If the response starts after t = 0.
+    UnknownNameError
+        If a signal is missing.
+    """
+    until = requirement.until
+    for name in requirement.signals:
+        if name not in signals:
+            raise unknown("signal", name, signals, f"in requirement '{requirement.key}'")
+    rows = np.array([t, *(signals[name] for name in requirement.signals)], dtype=float)
+    good = np.all(np.isfinite(rows), axis=0)
+    t, *samples = rows if good.all() else rows[:, : np.argmin(good)]
+    if t.size and t[0] > 0:
+        raise ParameterError(
+            f"requirement '{requirement.key}' counts time from 0, the response starts at {t[0]:g} s"
+        )
+    if t.size == 0 or t[-1] < until * (1 - 1e-12):
+        return unfinished_margin(t[-1] if t.size else 0.0, until)
+    finite = Signals(t, dict(zip(requirement.signals, samples, strict=True)), until)
+    with np.errstate(over="ignore", invalid="ignore"):  # samples near the largest number
+        value = trace(requirement.formula, finite, 0.0, 0.0).y[0]
+    return float(np.fmax(value, -FAILED))  # NaN becomes -FAILED
+
+
+def margins(spec: Spec, t: np.ndarray, signals: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """Return the margin of every requirement by key, and the least of them as ``"spec"``.
+
+    Arguments and errors as in `margin`.
+    """
+    values = {r.key: margin(r, t, signals) for r in spec.requirements}
+    return values | {"spec": float(min(values.values()))}
