@@ -63,6 +63,11 @@ class Metric:
     start: float = 0.0
     end: float = np.inf
 
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """What `function` takes, after the times."""
+        return (self.signal,)
+
 
 def over(t: np.ndarray, y: np.ndarray, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the samples with start <= t <= end.

@@ -298,11 +298,6 @@ def test_a_requirement_is_a_metric_of_an_ensemble():
             "in requirement 'r'; nearest: 'ee'",
         ),
         (lambda: value(SMALL, t=T + 1, until=5, e=T), nlctl.ParameterError, "starts at 1 s"),
-        (
-            lambda: Requirement(key="r", formula=SMALL & in_band("u", upper=1), until=1).signal,
-            nlctl.ParameterError,
-            "looks at the signals e, u",
-        ),
     ],
 )
 def test_requirements_that_make_no_sense_are_refused(make, error, message):

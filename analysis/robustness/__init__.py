@@ -1,6 +1,7 @@
 """Robustness studies: how sure, how far, what breaks it, what drives it."""
 
 from .design import Design, from_table, independent, row_seed, rows, seed_number
+from .experiment import Experiment, Prepared, evaluate, prepare
 from .formula import always, eventually, in_band
 from .guarantee import (
     NoGuaranteeError,
@@ -23,7 +24,9 @@ from .tracking import tracking_metrics
 __all__ = [
     "Choice",
     "Design",
+    "Experiment",
     "NoGuaranteeError",
+    "Prepared",
     "Requirement",
     "SequentialTest",
     "Space",
@@ -40,6 +43,7 @@ __all__ = [
     "diagrams",
     "differences",
     "elementary_effects",
+    "evaluate",
     "eventually",
     "from_table",
     "grid",
@@ -53,6 +57,7 @@ __all__ = [
     "morris",
     "nominal",
     "one_at_a_time",
+    "prepare",
     "regional",
     "resolved",
     "row_seed",

@@ -22,7 +22,7 @@ FAILED = 1e6
 class Requirement:
     """A named formula that has to hold at the start of a response.
 
-    It is also a metric of `nlctl.ensemble_response`, if it looks at one signal.
+    It is also a metric of `nlctl.ensemble_response`.
 
     Attributes
     ----------
@@ -58,22 +58,6 @@ class Requirement:
     def signals(self) -> tuple[str, ...]:
         """Names of the signals that it looks at."""
         return signals_of(self.formula)
-
-    @property
-    def signal(self) -> str:
-        """Name of its only signal.
-
-        Raises
-        ------
-        ParameterError
-            If there are several.
-        """
-        if len(self.signals) != 1:
-            raise ParameterError(
-                f"requirement '{self.key}' looks at the signals {', '.join(self.signals)}: give "
-                "all of them to margin(requirement, t, signals)"
-            )
-        return self.signals[0]
 
     def function(self, t: np.ndarray, *samples: np.ndarray) -> float:
         """Return the margin, with the samples in the order of `signals`."""

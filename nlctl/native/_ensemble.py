@@ -27,13 +27,20 @@ if TYPE_CHECKING:
 class MetricLike(Protocol):
     """What an ensemble asks of a metric; see `analysis.metrics.Metric`."""
 
-    key: str
-    signal: str
-    start: float
-    end: float
+    @property
+    def key(self) -> str: ...
 
     @property
-    def function(self) -> Callable[[np.ndarray, np.ndarray], float]: ...
+    def start(self) -> float: ...
+
+    @property
+    def end(self) -> float: ...
+
+    @property
+    def signals(self) -> Sequence[str]: ...
+
+    @property
+    def function(self) -> Callable[..., float]: ...  # (t, samples of the first signal, ...)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +125,7 @@ def ensemble_response(
     times = checked_times(timepts)
     every = members(compiled, params or {}, initial_state or {})
     labels = compiled.system.output_labels
-    for signal in (*keep, *(m.signal for m in metrics)):
+    for signal in (*keep, *(s for m in metrics for s in m.signals)):
         if signal not in labels:
             raise unknown("signal", signal, labels)
     u = input_array(inputs, compiled.system.ninputs or 0, times)
@@ -185,8 +192,8 @@ def _row(run: Trajectory, labels: Sequence[str], metrics: Sequence[MetricLike]) 
         value = np.nan
         if done.status is Status.OK:
             inside = (run.time >= metric.start) & (run.time <= metric.end)
-            y = run.outputs[labels.index(metric.signal)]
-            value = metric.function(run.time[inside], y[inside])
+            samples = (run.outputs[labels.index(signal)][inside] for signal in metric.signals)
+            value = metric.function(run.time[inside], *samples)
         row[metric.key] = value
     return row
 

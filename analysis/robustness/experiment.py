@@ -1,0 +1,210 @@
+"""What is simulated for each row of a design, and what is measured on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import control as ct
+import numpy as np
+import pandas as pd
+
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+from nlctl._param import checked_times
+from nlctl.native import Compiled, Status, ensemble_response
+from nlctl.native import compile as compiled
+
+from ..metrics import Metric
+from .resolve import diagrams, resolved
+from .space import Space, arguments
+from .spec import Spec, unfinished_margin
+
+__all__ = ["Experiment", "Prepared", "evaluate", "prepare"]
+
+RUN_COLUMNS = ("status", "time", "steps")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Experiment:
+    """A loop, what is uncertain in it, and what is asked of it.
+
+    Attributes
+    ----------
+    space : Space
+    build : callable
+        Returns the diagram, with one keyword per choice of the space, such as
+        `nlctl.paper.example_1`.
+    spec : Spec
+    timepts : ndarray of shape (m,)
+        Times in s at which signals are sampled, from 0; requirements and metrics see these
+        samples.
+    metrics : tuple of Metric
+    inputs : array_like or float
+        Inputs of the diagram, the same for all rows.
+    rtol, atol : float
+        Tolerances of the integrator.
+    max_steps : int
+        A run that needs more steps has failed.
+    method : str
+        As in `nlctl.input_output_response`.
+
+    Raises
+    ------
+    ParameterError
+        If times do not start at 0, a requirement looks beyond the last one, or two numbers or
+        quantities have the same name.
+    """
+
+    space: Space
+    build: Callable[..., ct.InputOutputSystem]
+    spec: Spec
+    timepts: np.ndarray
+    metrics: tuple[Metric, ...] = ()
+    inputs: Any = 0.0
+    rtol: float = 1e-6
+    atol: float = 1e-8
+    max_steps: int = 1_000_000
+    method: str = "auto"
+
+    def __post_init__(self) -> None:
+        times = checked_times(self.timepts)
+        object.__setattr__(self, "timepts", times)
+        if times[0] != 0:
+            raise ParameterError(f"an experiment needs times from 0 s, got {times[0]:g} s")
+        for requirement in self.spec.requirements:
+            if requirement.until > times[-1]:
+                raise ParameterError(
+                    f"requirement '{requirement.key}' needs a response until "
+                    f"{requirement.until:g} s, the experiment ends at {times[-1]:g} s"
+                )
+        names = [*self.space.names, *RUN_COLUMNS, *(m.key for m in self.metrics)]
+        names += [r.key for r in self.spec.requirements]
+        twice = sorted({name for name in (*names, "spec") if (*names, "spec").count(name) > 1})
+        if twice:
+            raise ParameterError(f"an experiment needs each column once, got twice: {twice}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prepared:
+    """An experiment whose diagrams are machine code; made by `prepare`, travels to processes.
+
+    Attributes
+    ----------
+    experiment : Experiment
+        Its space has full names, and units and nominal values from the nominal diagram.
+    loops : tuple of (labels, Compiled)
+        One for each combination of the choices.
+    """
+
+    experiment: Experiment
+    loops: tuple[tuple[Mapping[str, str], Compiled], ...]
+
+
+def prepare(experiment: Experiment) -> Prepared:
+    """Build and compile every diagram of an experiment, and hold names and values against them.
+
+    Raises
+    ------
+    UsageError
+        As in `resolve.diagrams` and `nlctl.compile`.
+    UnknownNameError
+        If a requirement or a metric asks for a signal that a diagram lacks.
+    """
+    space = experiment.space
+    built = diagrams(space, experiment.build)
+    middle = {choice.name: choice.nominal for choice in space.choices}
+    full = resolved(space, next(diagram for labels, diagram in built if labels == middle))
+    for _, diagram in built:
+        resolved(full, diagram)  # the full names must be known to every diagram
+        for asked in (*experiment.spec.requirements, *experiment.metrics):
+            for signal in asked.signals:
+                if signal not in diagram.output_labels:
+                    raise unknown("signal", signal, diagram.output_labels, f"for '{asked.key}'")
+    loops = tuple((labels, compiled(diagram)) for labels, diagram in built)
+    return Prepared(experiment=replace(experiment, space=full), loops=loops)
+
+
+def evaluate(
+    prepared: Prepared,
+    table: pd.DataFrame,
+    *,
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> pd.DataFrame:
+    """Simulate rows and take their margins and metrics.
+
+    A row's result does not depend on the other rows, on their order or on `threads`.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    table : pandas.DataFrame
+        One column for each name of the space, such as `design.rows` returns; others are ignored.
+    threads : int, optional
+        Number of threads; by default one per core.
+    progress : callable, optional
+        Called with the number of rows that are finished.
+
+    Returns
+    -------
+    pandas.DataFrame
+        With the index of `table`: its columns of the space, ``status``, ``time`` (s) reached,
+        ``steps``, metrics (NaN for a failed run), the margin of each requirement by its key
+        (`spec.unfinished_margin` for a failed run) and their least as ``spec``.  Rows that
+        Ctrl-C kept from finishing are missing.
+    """
+    parts, finished = [], 0
+    for labels, loop in prepared.loops:
+        same = [table[name] == label for name, label in labels.items()]
+        rows = table.loc[np.logical_and.reduce(same)] if same else table
+        if len(rows):
+            notify = None if progress is None else partial(_forward, progress, finished)
+            parts.append(_run(prepared.experiment, loop, rows, threads, notify))
+            finished += len(rows)
+            if len(parts[-1]) < len(rows):
+                break
+    results = pd.concat(parts) if parts else pd.DataFrame(index=table.index[:0])
+    order = table.index.intersection(results.index, sort=False)
+    space = table.loc[order, prepared.experiment.space.names]
+    return pd.concat([space, results.loc[order]], axis=1)
+
+
+def _forward(progress: Callable[[int], object], before: int, count: int) -> None:
+    progress(before + count)
+
+
+def _run(
+    experiment: Experiment,
+    loop: Compiled,
+    rows: pd.DataFrame,
+    threads: int | None,
+    progress: Callable[[int], object] | None,
+) -> pd.DataFrame:
+    requirements = experiment.spec.requirements
+    varied = arguments(experiment.space, rows)
+    found: pd.DataFrame = ensemble_response(
+        loop,
+        experiment.timepts,
+        experiment.inputs,
+        varied["initial_state"],
+        params=varied["params"],
+        metrics=(*experiment.metrics, *requirements),
+        threads=threads,
+        rtol=experiment.rtol,
+        atol=experiment.atol,
+        max_steps=experiment.max_steps,
+        method=experiment.method,
+        progress=progress,
+    ).table
+    columns = [*RUN_COLUMNS, *(m.key for m in (*experiment.metrics, *requirements))]
+    found = found.loc[:, columns].set_axis(rows.index[found.index.to_numpy()])
+    failed = found["status"] != Status.OK.name
+    end = float(experiment.timepts[-1])
+    graded = [unfinished_margin(time, end) for time in found.loc[failed, "time"]]
+    for requirement in requirements:
+        found.loc[failed, requirement.key] = graded
+    found["spec"] = np.min(found.loc[:, [r.key for r in requirements]].to_numpy(), axis=1)
+    return found
