@@ -14,9 +14,9 @@ import control as ct
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 
+from ._layout.figure import Drawing
 from ._layout.records import FONT, Box, Layout, Node, Route, Text, Wire, bundle, measured, strokes
 from ._layout.routes import arrange
 
@@ -175,7 +175,7 @@ def lay_out(diagram: ct.InterconnectedSystem) -> Layout:
 
 def draw(
     diagram: ct.InterconnectedSystem, *, title: str | None = None, expand: bool = False
-) -> Figure:
+) -> Drawing:
     """Draw a block diagram, in the order of the signal flow from left to right.
 
     Signals between the same two blocks share an arrow; ``-y`` and ``2 y`` carry their gain.
@@ -193,8 +193,9 @@ def draw(
 
     Returns
     -------
-    matplotlib.figure.Figure
-        9 inches wide; save it with ``figure.savefig("loop.svg")``.
+    Drawing
+        A `matplotlib.figure.Figure`, 9 inches wide or as wide as the diagram needs, that shows
+        itself in a notebook; save it with ``figure.savefig("loop.svg")``.
 
     Raises
     ------
@@ -204,7 +205,7 @@ def draw(
     panels = list(_panels(diagram, title or "", "", expand))
     width = max([WIDTH, *(panel.layout.width + 2 * MARGIN for panel in panels)])
     height = sum(panel.height for panel in panels)
-    figure = Figure(figsize=(width / 72, height / 72), facecolor="white")
+    figure = Drawing(figsize=(width / 72, height / 72), facecolor="white")
     bottom = height
     for panel in panels:
         bottom -= panel.height

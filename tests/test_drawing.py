@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import itertools
 from concurrent.futures import ThreadPoolExecutor
+from xml.etree import ElementTree
 
 import control as ct
 import matplotlib
@@ -521,3 +522,12 @@ def test_expand_shows_the_inside_of_nested_diagrams():
 def test_what_is_not_a_diagram_is_refused(thing):
     with pytest.raises(TypeError, match=rf"{type(thing).__name__}.*interconnect"):
         draw(thing)
+
+
+def test_a_notebook_shows_the_drawing_as_vectors():
+    """IPython asks an object for its representations: valid SVG with every path, twice alike."""
+    shown = [draw(adaptive_loop(), expand=True)._repr_html_() for _ in range(2)]
+    assert shown[0] == shown[1]
+    root = ElementTree.fromstring(shown[0]).find("{http://www.w3.org/2000/svg}svg")
+    assert root is not None
+    assert len(root.findall(".//{http://www.w3.org/2000/svg}path")) > 50
