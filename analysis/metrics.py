@@ -1,16 +1,18 @@
 """Numbers of a response: one function, one number, with unit and meaning.
 
-Every function takes sample times and samples, and numba can compile it:
-``numba.njit(nogil=True)(peak)`` keeps no thread of an ensemble waiting.  Peaks between samples are
-found by a parabola, integrals by Simpson's rule, the rest by straight lines between samples.  A
-response with NaN has the number NaN, or one that is no finite number.
+Every function takes sample times and samples, and numba can compile it, see `machine_code`.  Peaks
+between samples are found by a parabola, integrals by Simpson's rule, the rest by straight lines
+between samples.  A response with NaN has the number NaN, or one that is no finite number.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
+import numba
 import numpy as np
 
 from nlctl._equation import equation
@@ -22,6 +24,7 @@ __all__ = [
     "highest",
     "integral",
     "lowest",
+    "machine_code",
     "over",
     "peak",
     "reversals",
@@ -267,3 +270,20 @@ def reversals(t, y, above=0.0):
             count += direction > 0
             direction, low = -1, value
     return count
+
+
+def machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function of this module, or one with arguments given by `partial`, as machine code.
+
+    It keeps no thread of an ensemble waiting, and agrees with the original to rounding.  Other
+    functions are returned as they are.
+    """
+    if isinstance(function, functools.partial):
+        return functools.partial(machine_code(function.func), *function.args, **function.keywords)
+    own = globals().get(getattr(function, "__name__", ""))
+    return _compiled(function) if own is function else function
+
+
+@functools.cache
+def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    return numba.njit(nogil=True, cache=True, error_model="numpy")(function)

@@ -83,6 +83,18 @@ def test_closed_form_of_every_member(loop):
     np.testing.assert_allclose(made.signals["y"], wanted, atol=1e-8)
 
 
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
+@pytest.mark.parametrize("count", [1, 2, 9])
+def test_every_method_reaches_the_closed_form(loop, method, count):
+    """The stiff method takes members one by one, the other one side by side."""
+    x0 = np.linspace(-2, 0.9, count)
+    tight = {"keep": ["y"], "rtol": 1e-8, "atol": 1e-10, "method": method}
+    made = nlctl.ensemble_response(loop, T, 0, {"x1": x0}, **tight)
+    wanted = x0[:, None] / (x0[:, None] + (1 - x0[:, None]) * np.exp(T))
+    assert list(made.table["status"]) == ["OK"] * count
+    np.testing.assert_allclose(made.signals["y"], wanted, atol=1e-6)
+
+
 def test_a_diverged_member_is_a_status_in_its_row(loop):
     """From 1.5 the state escapes at t = ln 3; the other members are untouched."""
     made = nlctl.ensemble_response(loop, T, 0, {"x1": [0.5, 1.5, 0.2]}, metrics=[END], keep=["y"])

@@ -17,7 +17,7 @@ from nlctl._param import checked_times
 from nlctl.native import Compiled, Status, ensemble_response
 from nlctl.native import compile as compiled
 
-from ..metrics import Metric
+from ..metrics import Metric, machine_code
 from .resolve import diagrams, resolved
 from .space import Space, arguments
 from .spec import Spec, unfinished_margin
@@ -166,7 +166,7 @@ def evaluate(
             finished += len(rows)
             if len(parts[-1]) < len(rows):
                 break
-    results = pd.concat(parts) if parts else pd.DataFrame(index=table.index[:0])
+    results = pd.concat(parts) if parts else _empty(prepared.experiment, table.index)
     order = table.index.intersection(results.index, sort=False)
     space = table.loc[order, prepared.experiment.space.names]
     return pd.concat([space, results.loc[order]], axis=1)
@@ -191,7 +191,7 @@ def _run(
         experiment.inputs,
         varied["initial_state"],
         params=varied["params"],
-        metrics=(*experiment.metrics, *requirements),
+        metrics=(*map(_fast, experiment.metrics), *requirements),
         threads=threads,
         rtol=experiment.rtol,
         atol=experiment.atol,
@@ -208,3 +208,12 @@ def _run(
         found.loc[failed, requirement.key] = graded
     found["spec"] = np.min(found.loc[:, [r.key for r in requirements]].to_numpy(), axis=1)
     return found
+
+
+def _fast(metric: Metric) -> Metric:
+    return replace(metric, function=machine_code(metric.function))
+
+
+def _empty(experiment: Experiment, index: pd.Index) -> pd.DataFrame:
+    numbers = (m.key for m in (*experiment.metrics, *experiment.spec.requirements))
+    return pd.DataFrame(columns=[*RUN_COLUMNS, *numbers, "spec"], index=index[:0])

@@ -15,13 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
 
-from .piecewise import Trace, joined, largest, with_vertices
+from .piecewise import Trace, extremes, joined, largest, with_vertices
 
 __all__ = [
     "Always",
@@ -195,11 +196,13 @@ def parts_of(formula: Formula) -> Iterator[Formula]:
         yield from parts_of(part)
 
 
+@cache
 def signals_of(formula: Formula) -> tuple[str, ...]:
     """Return the names of the signals that a formula looks at, in alphabetical order."""
     return tuple(sorted({part.signal for part in parts_of(formula) if isinstance(part, Band)}))
 
 
+@cache
 def horizon(formula: Formula) -> float:
     """Return how far (s) a formula looks ahead at least."""
     if isinstance(formula, Always | Eventually):
@@ -255,20 +258,37 @@ def trace(formula: Formula, signals: Signals, low: float, high: float) -> Trace:
             return -trace(opposite, signals, low, high)
         case Eventually():
             start, end = formula.start, formula.end
-            last = min(high + end, signals.until - horizon(formula.part))
-            inner = trace(formula.part, signals, low + start, max(last, low + start))
+            last = max(min(high + end, signals.until - horizon(formula.part)), low + start)
+            band = getattr(formula.part, "part", None)
+            if low == high and isinstance(formula.part, Not) and isinstance(band, Band):
+                worst = _worst(band, signals, low + start, last)
+                return Trace(np.array([low]), np.array([worst]))
+            inner = trace(formula.part, signals, low + start, last)
             return largest(inner, low, high, start, end)
     raise TypeError(f"no formula: {formula!r}")
 
 
-def _band(band: Band, signals: Signals, low: float, high: float) -> Trace:
+def _near(band: Band, signals: Signals, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and samples of the band's signal in [low, high], with a few more around."""
     if band.signal not in signals.samples:
         raise unknown("signal", band.signal, signals.samples)
-    t = signals.t
-    i, j = np.searchsorted(t, low, "right"), np.searchsorted(t, high, "left")
+    i, j = np.searchsorted(signals.t, low, "right"), np.searchsorted(signals.t, high, "left")
     near = slice(max(i - 3, 0), j + 3)  # with the neighbours that vertices need
-    y = with_vertices(t[near], signals.samples[band.signal][near]).between(low, high)
-    sides = [] if np.isinf(band.upper) else [Trace(y.t, (y.y - band.upper) / band.scale)]
-    if np.isfinite(band.lower):
-        sides.append(Trace(y.t, (band.lower - y.y) / band.scale))
-    return -joined(sides)
+    return signals.t[near], signals.samples[band.signal][near]
+
+
+def _beyond(band: Band, y: np.ndarray) -> list[np.ndarray]:
+    """Return by how much values lie above the upper bound, and below the lower one."""
+    sides = [] if np.isinf(band.upper) else [(y - band.upper) / band.scale]
+    return sides if np.isinf(band.lower) else [*sides, (band.lower - y) / band.scale]
+
+
+def _band(band: Band, signals: Signals, low: float, high: float) -> Trace:
+    y = with_vertices(*_near(band, signals, low, high)).between(low, high)
+    return -joined([Trace(y.t, beyond) for beyond in _beyond(band, y.y)])
+
+
+def _worst(band: Band, signals: Signals, low: float, high: float) -> float:
+    """Return the largest violation in [low, high]: an extreme value has it."""
+    values = np.array(extremes(*_near(band, signals, low, high), low, high))
+    return float(np.max(_beyond(band, values)))

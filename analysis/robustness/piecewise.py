@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from ..metrics import vertex
 
-__all__ = ["Trace", "higher", "joined", "largest", "with_vertices"]
+__all__ = ["Trace", "extremes", "higher", "joined", "largest", "with_vertices"]
 
 
 @dataclass(frozen=True)
@@ -57,15 +58,32 @@ def with_vertices(t: np.ndarray, y: np.ndarray) -> Trace:
 
     Peaks between samples are then seen as `analysis.metrics.highest` sees them.
     """
+    at, place, value = _vertices(t, y)
+    return Trace(np.insert(t, at, place), np.insert(y, at, value)) if at.size else Trace(t, y)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _vertices(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the vertices between samples: before which sample each is, when, and its value."""
     d = np.diff(y)
     i = np.nonzero(d[:-1] * d[1:] < 0)[0] + 1
     if i.size == 0:
-        return Trace(t, y)
+        return i, t[:0], y[:0]
     offset, value = vertex(t[i] - t[i - 1], t[i + 1] - t[i], y[i - 1], y[i], y[i + 1])
     place = t[i] + offset
     new = (place != t[i]) & (place > t[i - 1]) & (place < t[i + 1])
-    at = (i + (offset > 0))[new]
-    return Trace(np.insert(t, at, place[new]), np.insert(y, at, value[new]))
+    return (i + (offset > 0))[new], place[new], value[new]
+
+
+def extremes(t: np.ndarray, y: np.ndarray, low: float, high: float) -> tuple[float, float]:
+    """Return the least and the largest value of ``with_vertices(t, y)`` in [low, high]."""
+    i, j = np.searchsorted(t, low, "left"), np.searchsorted(t, high, "right")
+    if t[i] != low or t[j - 1] != high:  # ends between samples
+        inside = with_vertices(t, y).between(low, high).y
+        return float(np.min(inside)), float(np.max(inside))
+    _, place, value = _vertices(t, y)
+    inside = np.concatenate([y[i:j], value[(place > low) & (place < high)]])
+    return float(np.min(inside)), float(np.max(inside))
 
 
 def crossings(t0, t1, a0, a1, b0, b1) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,14 @@ from .guarantee import (
     violations_of,
 )
 
-__all__ = ["SequentialTest", "confidence_sequence", "decide", "log_evidence", "sequence_bounds"]
+__all__ = [
+    "SequentialTest",
+    "confidence_sequence",
+    "decide",
+    "decision",
+    "log_evidence",
+    "sequence_bounds",
+]
 
 PRIOR = 0.5
 """Both parameters of the Beta distribution that alternatives are mixed with (Jeffreys')."""
@@ -178,9 +185,18 @@ def decide(
     n = np.arange(1, k.size + 1)
     decided = np.nonzero(log_evidence(k, n, threshold) >= limit)[0]
     i = int(decided[0]) if decided.size else k.size - 1
-    side: Literal["below", "above"] = "below" if k[i] / n[i] < threshold else "above"
+    return decision(design, int(k[i]), int(n[i]), threshold, confidence)
+
+
+def decision(
+    design: Design, violations: int, runs: int, threshold: float, confidence: float = 0.99
+) -> SequentialTest:
+    """Return what these counts of the first rows of a design decide, as in `decide`."""
+    k, n = checked_counts(violations, runs)
+    is_decided = log_evidence(k, n, threshold) >= -np.log(1 - checked_confidence(confidence))
+    side: Literal["below", "above"] = "below" if k / n < threshold else "above"
     return SequentialTest(
         threshold=threshold,
-        decision=side if decided.size else "undecided",
-        statement=_statement(design, int(k[i]), int(n[i]), confidence),
+        decision=side if is_decided else "undecided",
+        statement=_statement(design, k, n, confidence),
     )

@@ -164,7 +164,7 @@ def _group(
 ) -> Iterator[Trajectory]:
     """Run up to WIDTH members side by side; yield them in their order."""
     x0, p = every.batch(numbers, WIDTH)
-    if machine(every.compiled, p, WIDTH).width == 1:
+    if settings.method == "rodas5p" or machine(every.compiled, p, WIDTH).width == 1:
         for j in range(len(numbers)):
             yield trajectory(every.compiled, times, inputs, x0[:, j], p[:, j], settings)
         return
@@ -188,13 +188,15 @@ def _row(run: Trajectory, labels: Sequence[str], metrics: Sequence[MetricLike]) 
         "time": done.time,
         "steps": done.accepted + done.rejected,
     }
+    if done.status is not Status.OK:
+        return row | {metric.key: np.nan for metric in metrics}
+    asked = {signal for metric in metrics for signal in metric.signals}
+    samples = {signal: run.outputs[labels.index(signal)].copy() for signal in asked}
     for metric in metrics:
-        value = np.nan
-        if done.status is Status.OK:
-            inside = (run.time >= metric.start) & (run.time <= metric.end)
-            samples = (run.outputs[labels.index(signal)][inside] for signal in metric.signals)
-            value = metric.function(run.time[inside], *samples)
-        row[metric.key] = value
+        first = np.searchsorted(run.time, metric.start, "left")
+        inside = slice(first, np.searchsorted(run.time, metric.end, "right"))
+        given = (samples[signal][inside] for signal in metric.signals)
+        row[metric.key] = metric.function(run.time[inside], *given)
     return row
 
 

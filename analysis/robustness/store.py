@@ -1,0 +1,263 @@
+"""A sweep's folder: chunk files in Parquet, each written in one step, so that a kill costs little.
+
+study.json        what is run, see `identity`
+chunks/000000000-000000999.parquet
+                  rows 0 to 999; the file exists only when it is whole
+.lock             held by the operating system for the process that works here
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import socket
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.dataset as ds
+import pyarrow.parquet as pq
+from filelock import FileLock, Timeout
+
+from nlctl._errors import UsageError
+from nlctl._files import replace_file
+
+from .columns import Columns, typed
+from .identity import differences_of
+
+__all__ = ["Store", "StoreError", "claimed", "opened", "put", "stored", "table_of", "taken_up"]
+
+
+class StoreError(UsageError):
+    """A folder that a sweep cannot be kept in; the message names it and says what is kept."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Store:
+    """A folder with chunks of one study.
+
+    Attributes
+    ----------
+    folder : Path
+    identity : mapping
+        See `identity.identity_of`.
+    columns : mapping
+        See `columns.columns_of`.
+    """
+
+    folder: Path
+    identity: Mapping[str, Any]
+    columns: Columns
+
+    @property
+    def chunks(self) -> Path:
+        """Where the chunk files are."""
+        return self.folder / "chunks"
+
+    @property
+    def size(self) -> int:
+        """Number of rows of the design."""
+        return self.identity["design"]["size"]
+
+
+@contextmanager
+def claimed(store: Store, *, resume: bool = False) -> Iterator[None]:
+    """Hold a folder for this process alone, with the study's identity in it.
+
+    The lock is the operating system's: it ends with the process, however that ends.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be written, another process works in it, it holds chunks and `resume`
+        is False, or it belongs to another study; the message says what differs.
+    """
+    try:
+        store.chunks.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(store.folder / ".lock", timeout=0)
+        lock.acquire()
+    except Timeout:
+        raise StoreError(
+            f"'{store.folder}' is in use by {_owner(store)}: wait until it ends, or take another "
+            "folder"
+        ) from None
+    except OSError as error:
+        raise StoreError(f"cannot write to '{store.folder}': {error.strerror or error}") from error
+    try:
+        _write(store, ".owner", f"process {os.getpid()} on {socket.gethostname()}".encode())
+        _identify(store, resume)
+        yield
+    finally:
+        lock.release()
+
+
+def _owner(store: Store) -> str:
+    try:
+        return (store.folder / ".owner").read_text(encoding="utf-8")
+    except OSError:
+        return "another process"
+
+
+def _identify(store: Store, resume: bool) -> None:
+    """Write who a folder belongs to, or compare."""
+    path, begun = store.folder / "study.json", bool(_ranges(store))
+    if begun and not resume:
+        raise StoreError(
+            f"'{store.folder}' holds rows of a study already: continue it with resume=True "
+            "(--resume), or take another folder"
+        )
+    if begun:
+        changed = differences_of(opened(store.folder).identity, store.identity)
+        if changed:
+            more = f", and {len(changed) - 5} more" if len(changed) > 5 else ""
+            raise StoreError(
+                f"'{store.folder}' holds another study: {'; '.join(changed[:5])}{more}. Continue "
+                "it with what it was begun with, or take another folder"
+            )
+        return
+    content = {"format": 1, "identity": store.identity, "columns": store.columns}
+    _write(store, path.name, json.dumps(content, indent=1).encode())
+
+
+def opened(folder: str | os.PathLike[str]) -> Store:
+    """Return the store that a folder holds.
+
+    Raises
+    ------
+    StoreError
+        If it holds none.
+    """
+    path = Path(folder) / "study.json"
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return Store(folder=path.parent, identity=content["identity"], columns=content["columns"])
+    except (OSError, ValueError, KeyError) as error:
+        raise StoreError(f"'{path}' is no study of a sweep: {error}") from error
+
+
+def _write(store: Store, name: str, content: bytes | memoryview) -> None:
+    """Write a file in one step, and not before it is on the disk."""
+
+    def write(file: Any) -> None:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+    try:
+        replace_file(store.folder / name, write)
+    except OSError as error:
+        kept = sum(map(len, _ranges(store)))
+        raise StoreError(
+            f"cannot write '{store.folder / name}': {error.strerror or error}. {kept} of "
+            f"{store.size} rows are kept there; make room and continue with resume=True (--resume)"
+        ) from error
+
+
+def put(store: Store, frame: pd.DataFrame) -> None:
+    """Write consecutive rows as one chunk; floats keep their bits.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be written; the message says what is kept.
+    """
+    columns = {"row": frame.index.to_numpy()} | {name: frame[name].array for name in frame}
+    arrays = {name: pa.array(v, from_pandas=False) for name, v in columns.items()}  # NaN, not null
+    labels: Any = [name for name, kind in store.columns.items() if not isinstance(kind, str)]
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        pa.table(arrays), sink, compression="zstd", use_dictionary=labels, write_page_checksum=True
+    )
+    first, last = frame.index[0], frame.index[-1]
+    name = f"chunks/{first:09d}-{last:09d}.parquet"
+    _write(store, name, memoryview(sink.getvalue()))
+
+
+def _ranges(store: Store) -> list[range]:
+    """Return the rows of every chunk file, in order."""
+    found = []
+    for path in sorted(store.chunks.glob("*.parquet")):
+        name = re.fullmatch(r"(\d+)-(\d+)", path.stem)
+        if name:
+            found.append(range(int(name[1]), int(name[2]) + 1))
+    return sorted(found, key=lambda numbers: numbers.start)
+
+
+def _path(store: Store, numbers: range) -> Path:
+    return store.chunks / f"{numbers[0]:09d}-{numbers[-1]:09d}.parquet"
+
+
+def stored(store: Store) -> int:
+    """Return the number of rows in the folder."""
+    return sum(map(len, _ranges(store)))
+
+
+def taken_up(store: Store) -> Iterator[tuple[range, np.ndarray | str]]:
+    """Go through the chunks that are there, and clear what a killed process has left.
+
+    Yields
+    ------
+    (range, margins)
+        Rows of a chunk that was read to its end, and their margins ``spec``.
+    (range, message)
+        Rows of a chunk that is damaged: its file has been renamed.
+    """
+    for left in (*store.folder.glob(".*.json.*"), *store.chunks.glob(".*.parquet.*")):
+        left.unlink(missing_ok=True)
+    end = 0
+    for numbers in _ranges(store):
+        path = _path(store, numbers)
+        try:
+            frame = _read(store, [path])
+            if numbers.start < end or numbers.stop > store.size:
+                raise ValueError("its rows are not where they belong")
+            if not np.array_equal(frame.index, numbers):
+                raise ValueError("it holds other rows than its name says")
+            margins = frame["spec"].to_numpy()
+        except (OSError, ValueError, KeyError) as error:  # pyarrow's errors are ValueErrors
+            damaged = path.with_suffix(".damaged")
+            os.replace(path, damaged)
+            reason = str(error).partition("\n")[0]
+            yield numbers, f"'{path}' is damaged ({reason}): kept as {damaged.name}, run again"
+            continue
+        end = numbers.stop
+        yield numbers, margins
+
+
+def table_of(store: Store, columns: Sequence[str] | None = None) -> pd.DataFrame:
+    """Read the rows that are there, in order; only some columns where asked.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be read.
+    """
+    try:
+        return _read(store, [_path(store, numbers) for numbers in _ranges(store)], columns)
+    except (OSError, ValueError) as error:
+        raise StoreError(
+            f"cannot read the chunks in '{store.chunks}': {error}. Run damaged ones again with "
+            "resume=True (--resume)"
+        ) from error
+
+
+def _read(
+    store: Store, paths: Sequence[Path], columns: Sequence[str] | None = None
+) -> pd.DataFrame:
+    chosen = {name: store.columns[name] for name in columns or store.columns}
+    if not paths:
+        return typed(
+            pd.DataFrame(columns=list(chosen), index=pd.Index([], name="row", dtype="int64")),
+            chosen,
+        )
+    options = ds.ParquetFragmentScanOptions(page_checksum_verification=True)
+    layout = ds.ParquetFileFormat(default_fragment_scan_options=options)
+    found = ds.dataset([str(path) for path in paths], format=layout)
+    frame = found.to_table(columns=["row", *chosen]).to_pandas().set_index("row")
+    return typed(frame, chosen)
