@@ -7,16 +7,25 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import SymmetricalLogLocator
 
 from nlctl.functions import nussbaum
 
+from .lyapunov.long_run import LongRun
+from .lyapunov.signals import Margin
 from .reproduction import TAIL, Run
 
 __all__ = [
     "actuator_path",
     "adaptation",
+    "bounds",
+    "burst",
     "control_input",
+    "equality_residuals",
     "error_comparison",
+    "inequality_margins",
+    "long_zeta",
+    "lyapunov_bound",
     "nussbaum_gain",
     "overview",
     "tracking",
@@ -145,4 +154,146 @@ def overview(time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Figure:
     top.set(ylabel="output, error")
     middle.set(ylabel="input")
     bottom.set(xlabel=TIME, ylabel="$\\zeta$, $\\hat\\delta$")
+    return figure
+
+
+def burst(run: LongRun) -> Figure:
+    """A long run until its gain loses the sign: zeta and |e|, and the end of both, with r and u."""
+    figure = Figure(figsize=(9.0, 4.8), layout="constrained")
+    (whole, end), (error, signals) = figure.subplots(2, 2, sharex="col", width_ratios=(1.5, 1))
+    time, s = run.time, run.signals
+    for ax in (whole, end, error, signals):
+        _style(ax)
+    for ax, across in ((whole, time), (end, left := run.time[-1] + 1e-5 - time)):
+        ax.axhline(run.lobe.high, color=GREY, linewidth=1.0, linestyle="--")
+        ax.plot(across, s["zeta"], "-", color=BLUE, linewidth=1.4)
+    for p, (colour, style) in zip(run.predictions, STYLES[2:], strict=False):
+        for ax in (whole, error):
+            ax.axvline(p.burst_by_balance, color=colour, linestyle=style, linewidth=1.6)
+        label = f"foretold after {p.time:g} s, {100 * p.share:.2g} % of the lobe spent"
+        whole.plot(p.time, p.zeta, "o", linestyle=style, color=colour, markersize=5, label=label)
+    for ax in (whole, error):
+        ax.axvline(run.burst, color=ORANGE, linewidth=1.6, label="happened")
+    whole.legend(frameon=False, loc="lower center")
+    error.semilogy(*envelope(time, np.abs(s["e"])), color=BLUE, linewidth=1.4)
+    shown = left <= 100.0
+    for (name, label), (colour, style) in zip(
+        (("e", "$|e_1|$"), ("r", "$|r|$"), ("u", "$|u|$")), STYLES, strict=False
+    ):
+        signals.loglog(
+            left[shown], np.abs(s[name][shown]), style, color=colour, linewidth=1.2, label=label
+        )
+    signals.set(xlim=(100.0, 1e-5), ylim=(1e-3, None), xlabel="time left until the end (s)")
+    signals.legend(frameon=False, loc="upper left")
+    end.set_ylim(float(np.min(s["zeta"][shown])) - 0.01, run.lobe.high + 0.05)
+    whole.set(ylabel="$\\zeta$")
+    error.set(xlabel=TIME, ylabel="largest $|e_1|$ per period")
+    return figure
+
+
+def envelope(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi) -> np.ndarray:
+    """Return the largest value of y in each whole window, at the middle of the windows."""
+    number = np.floor((time - time[0]) / window).astype(int)
+    starts = np.flatnonzero(np.diff(number, prepend=-1))
+    largest = np.maximum.reduceat(y, starts)
+    return np.array([time[0] + (number[starts] + 0.5) * window, largest])[:, :-1]
+
+
+def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
+    """The Nussbaum argument of long runs that do not burst, and where it is foretold to stop."""
+    figure, (ax,) = _axes()
+    for (label, run), (colour, style) in zip(runs.items(), STYLES, strict=False):
+        ax.plot(run.time, run.signals["zeta"], style, color=colour, linewidth=1.4, label=label)
+        for prediction in run.predictions[-1:]:
+            if prediction.rest is not None:
+                ax.axhline(prediction.rest, color=colour, linewidth=1.0, linestyle=":")
+    ax.axhline(next(iter(runs.values())).lobe.high, color=GREY, linewidth=1.0, linestyle="--")
+    ax.legend(frameon=False, loc="lower right")
+    ax.set(xlabel=TIME, ylabel="$\\zeta$")
+    return figure
+
+
+def lyapunov_bound(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Figure:
+    """V over time against what bounds it; a bound that is infinite is named in the legend."""
+    figure, (ax,) = _axes()
+    for (label, y), (colour, style) in zip(curves.items(), STYLES, strict=False):
+        named = label if np.any(np.isfinite(y)) else f"{label}: infinite"
+        ax.semilogy(t, np.where(y > 0, y, np.nan), style, color=colour, linewidth=1.4, label=named)
+    _, top = ax.get_ylim()
+    ax.set_ylim(max(ax.get_ylim()[0], 1e-5 * top), top)
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    ax.set(xlabel=TIME, ylabel="energy")
+    return figure
+
+
+def inequality_margins(margins: Sequence[Margin]) -> Figure:
+    """Margin of each inequality over time, one panel each; a dot where it is least."""
+    figure, axes = _panels(margins)
+    for ax, margin in zip(axes, margins, strict=True):
+        t, low = _least(margin.t, margin.margin)
+        linear = 1e-3 * (float(np.nanmax(np.abs(low), initial=0.0)) or 1.0)
+        ticks = SymmetricalLogLocator(base=10, linthresh=linear)
+        ticks.set_params(numticks=4)
+        ax.set_yscale("symlog", linthresh=linear)
+        ax.yaxis.set_major_locator(ticks)
+        ax.axhline(0.0, color=GREY, linewidth=0.8)
+        colour = BLUE if margin.holds else ORANGE
+        ax.scatter([margin.at], [margin.least], s=16, color=colour, zorder=3, clip_on=False)
+        ax.plot(t, low, "-", color=colour, linewidth=1.1)
+    return figure
+
+
+def equality_residuals(margins: Sequence[Margin]) -> Figure:
+    """Distance between the sides of each equation over its size, and the tolerance."""
+    figure, axes = _panels(margins, sharey=True)
+    for ax, margin in zip(axes, margins, strict=True):
+        t, low = _least(margin.t, margin.margin)
+        colour = BLUE if margin.holds else ORANGE
+        ax.semilogy(t, np.maximum(-low / margin.scale, 1e-18), "-", color=colour, linewidth=1.1)
+        ax.axhline(margin.tolerance, color=GREY, linewidth=1.0)
+    return figure
+
+
+def _panels(margins: Sequence[Margin], *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
+    """Three panels in a row, one for each margin, with its number as the title."""
+    rows = -(-len(margins) // 3)
+    figure = Figure(figsize=(9.0, 1.5 * rows + 0.3), layout="constrained")
+    axes = list(np.ravel(figure.subplots(rows, 3, sharex=True, sharey=sharey, squeeze=False)))
+    for ax in axes[len(margins) :]:
+        ax.set_axis_off()
+    for ax, margin in zip(axes, margins, strict=False):
+        _style(ax)
+        ax.set_title(margin.equation, fontsize=9, loc="left")
+    for ax in axes[: len(margins)][-3:]:
+        ax.set_xlabel(TIME)
+        ax.tick_params(labelbottom=True)
+    return figure, axes[: len(margins)]
+
+
+def _least(t: np.ndarray, y: np.ndarray, count: int = 600) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least value of each of `count` stretches, NaN where one is, with its time."""
+    pieces = np.array_split(np.arange(y.size), min(count, y.size))
+    at = np.array([piece[int(np.argmin(y[piece]))] for piece in pieces])
+    return t[at], y[at]
+
+
+def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
+    """Numbers with their kind as bars on a logarithmic axis, what is proved in a colour of its own.
+
+    Kinds are "proved", "along this run" and "what happens"; numbers that are not finite are left
+    out.
+    """
+    shown = {name: pair for name, pair in values.items() if np.isfinite(pair[0])}
+    numbers = [number for number, _ in shown.values()]
+    figure = Figure(figsize=(9.0, 0.3 * len(shown) + 0.6), layout="constrained")
+    ax = figure.subplots()
+    _style(ax)
+    for kind, colour in (("proved", GREEN), ("along this run", BLUE), ("what happens", GREY)):
+        places = [i for i, (_, own) in enumerate(shown.values()) if own == kind]
+        bars = ax.barh(places, [numbers[i] for i in places], 0.55, color=colour, label=kind)
+        ax.bar_label(bars, fmt="%.4g", padding=4)
+    ax.set_yticks(range(len(shown)), list(shown))
+    ax.set(xscale="log", xlim=(0.5 * min(numbers), 3 * max(numbers)))
+    ax.invert_yaxis()
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     return figure

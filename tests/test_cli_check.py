@@ -1,9 +1,27 @@
 """`nlctl check`: the ledger on the command line."""
 
+import dataclasses
+import io
+import itertools
 import json
+import shlex
 
+import numpy as np
 import pytest
+from rich.console import Console
 from test_cli import nlctl
+
+from analysis.lyapunov.ledger import ledger
+from nlctl import paper
+from nlctl._check import random_start, replay, show_ledger, summary, worst_lines
+from nlctl._diagram import initial_state, state_names
+from nlctl._errors import ParameterError, UnknownNameError
+
+
+@pytest.fixture(scope="module")
+def found():
+    """A short run of Example 1."""
+    return ledger(paper.example_1(), 1.0)
 
 
 def check(*arguments):
@@ -30,13 +48,111 @@ def test_a_violation_is_exit_code_1():
     assert "violated" in said
 
 
-def test_an_ensemble_names_its_worst_member():
-    """Five members from random states; every line says how many runs stand behind it."""
-    code, said, _ = check("example-1", "--ensemble", "5", "--horizon", "5", "--seed", "3")
+def test_a_diverging_run_is_exit_code_1():
+    """From zeta(0) = 4.5 the run is lost at once: a violated line, not a calm table."""
+    code, said, _ = check("example-1", "--set", "law.zeta(0)=4.5", "--horizon", "1", "--json")
+    assert code == 1
+    lines = {line["key"]: line for line in json.loads(said)["lines"]}
+    assert lines["run"]["status"] == "violated"
+
+
+def test_the_worst_run_of_an_ensemble_can_be_run_again():
+    """The printed command starts where the member started: its largest |r| is the same state."""
+    options = ("--horizon", "3", "--ensemble", "4", "--seed", "3", "--set", "law.beta=3.5")
+    code, said, _ = check("example-1", *options)
     assert code == 0
-    assert "5 runs" in said.splitlines()[0]
-    again = check("example-1", "--ensemble", "5", "--horizon", "5", "--seed", "3")[1]
-    assert said == again
+    assert "4 runs" in said.splitlines()[0]
+    command = shlex.split(said.splitlines()[-1])
+    assert command[:2] == ["nlctl", "check"]
+    states = []
+    for arguments in (("example-1", *options), command[2:]):
+        lines = json.loads(check(*arguments, "--json")[1])["lines"]
+        states.append(next(line["state"] for line in lines if line["key"] == "(36)"))
+    one, again = states
+    assert again == pytest.approx(one, rel=1e-9)
+
+
+def test_random_states_are_the_plants_and_lie_within_the_spread():
+    """Each state fills its interval around what was set; the rest stays; a seed repeats."""
+    loop, start = paper.example_2(), {"plant.x2": 0.7, "law.zeta": 1.5}
+    drawn = random_start(loop, start, 500, 0.2, 5)
+    assert set(drawn) == {"plant.x1", "plant.x2", "plant.x3", "controller.law.zeta"}
+    assert drawn["controller.law.zeta"] == 1.5
+    nominal = dict(zip(state_names(loop), initial_state(loop, start), strict=True))
+    for name in ("plant.x1", "plant.x2", "plant.x3"):
+        away = drawn[name] - nominal[name]
+        assert np.max(np.abs(away)) <= 0.2
+        assert np.max(away) > 0.19
+        assert np.min(away) < -0.19
+    again = random_start(loop, start, 500, 0.2, 5)
+    np.testing.assert_array_equal(again["plant.x1"], drawn["plant.x1"])
+    other = random_start(loop, start, 500, 0.2, 6)
+    assert not np.any(other["plant.x1"] == drawn["plant.x1"])
+
+
+@pytest.mark.parametrize("spread", [0.0, -1.0, np.inf, np.nan])
+def test_a_spread_that_draws_nothing_is_refused(spread):
+    """Zero, negative, infinite, NaN."""
+    with pytest.raises(ParameterError, match="finite spread > 0"):
+        random_start(paper.example_1(), {}, 3, spread, 0)
+
+
+def test_random_start_refuses_a_state_that_does_not_exist():
+    """With the nearest name."""
+    with pytest.raises(UnknownNameError, match=r"plant\.x2"):
+        random_start(paper.example_1(), {"plant.x3": 0.0}, 3, 0.1, 0)
+
+
+def test_replay_keeps_every_digit_and_every_kind_of_parameter():
+    """Vectors and truth values go through as they were typed."""
+    typed = ["filtered_error.lambdas=1,2", "plant.integrate_w=true", "plant.x1(0)=9"]
+    start = {"plant.x1": np.array([0.1, 1 / 3]), "law.zeta": 1.25}
+    parts = shlex.split(replay("example-1", 0.1, typed, start, 1))
+    assert float(parts[parts.index("--horizon") + 1]) == 0.1
+    told = dict(a.split("=") for o, a in itertools.pairwise(parts) if o == "--set")
+    assert told["filtered_error.lambdas"] == "1,2"
+    assert told["plant.integrate_w"] == "true"
+    assert float(told["plant.x1(0)"]) == 1 / 3
+    assert float(told["law.zeta(0)"]) == 1.25
+
+
+def test_worst_lines_hold_every_run_that_violates_something(found):
+    """One line per run, the first in the order of the proof; without any, that of (36)."""
+    assert worst_lines(found) == [found["(36)"]]
+    broken = {"(9)": 2, "A2": 1, "(31)": 2}
+    lines = tuple(
+        dataclasses.replace(x, status="violated", member=broken[x.key]) if x.key in broken else x
+        for x in found.lines
+    )
+    worst = worst_lines(dataclasses.replace(found, lines=lines))
+    assert [(x.key, x.member) for x in worst] == [("A2", 1), ("(9)", 2)]
+
+
+def test_the_terminal_table_shows_every_line_with_its_brackets(found):
+    """Formulas with brackets are text, not markup; colours are for terminals only."""
+    screen = io.StringIO()
+    show_ledger(found, Console(file=screen, force_terminal=True, width=250))
+    shown = screen.getvalue()
+    for line in found.lines:
+        assert line.statement in shown
+        assert line.key in shown
+    assert "\x1b[" in shown
+    assert "V' <= -alpha_1 V + [k G N + 1] zeta' + alpha_0" in shown
+
+
+def test_elsewhere_the_table_is_the_ledgers_own_text(found, capsys):
+    """One line per statement, for grep."""
+    show_ledger(found, Console(file=io.StringIO()))
+    assert capsys.readouterr().out == f"{found}\n"
+
+
+def test_summary_counts_every_line_once_and_names_what_fails(found):
+    """Statements of the paper that fail are named apart from corrected ones."""
+    said = summary(found)
+    counts = said.splitlines()[1].partition(":")[2].split(",")
+    assert sum(int(part.split()[0]) for part in counts) == len(found.lines)
+    assert "none of the corrected statements" in said
+    assert "Lemma 1" in said.splitlines()[-1]
 
 
 @pytest.mark.parametrize(
@@ -45,6 +161,8 @@ def test_an_ensemble_names_its_worst_member():
         (["example-3"], "unknown example 'example-3'"),
         (["example-1", "--set", "robust.sgma_2=0"], "nearest: 'controller.robust.sigma_2'"),
         (["example-1", "--horizon", "-1"], "horizon > 0, got -1"),
+        (["example-1", "--ensemble", "2", "--spread", "0"], "finite spread > 0, got 0"),
+        (["example-1", "--ensemble", "-2"], "--ensemble"),
     ],
 )
 def test_bad_input_is_exit_code_2(arguments, message):

@@ -33,7 +33,7 @@ LEMMA = (
 )
 NO_BOUND = (
     "boundedness for all t, (33)-(36) and 'semi-globally uniformly ultimately bounded' do not "
-    "follow; what holds is checked over the horizon, and 2.3 (b), (c)."
+    "follow; what holds is checked over the horizon, and lines (b), (c)."
 )
 
 

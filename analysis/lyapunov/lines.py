@@ -188,7 +188,7 @@ def inequality_lines(run: Run, found: Constants) -> list[Line]:
         if margin.equation in LITERAL:
             broken = f"{100 * margin.share_violated:.3g} % of {margin.t.size} samples violate it"
             line = _line(margin, run.signals, "checked", broken)
-            why = "q cos(w t) is no function of x; counted to d instead, the line above holds."
+            why = "q cos(w t) is no function of x; counted to d instead, the corrected line holds."
             lines.append(
                 dataclasses.replace(
                     line,

@@ -1,0 +1,286 @@
+"""The report's part on the proof: what was computed is shown, nothing is made to look better."""
+
+import dataclasses
+import functools
+import json
+import re
+
+import numpy as np
+import pytest
+from test_report import made_up_runs, outline
+
+import nlctl
+from analysis import figures
+from analysis.lyapunov.long_run import long_run
+from analysis.lyapunov.nussbaum import antiderivative
+from analysis.lyapunov.parts import read_parts
+from analysis.lyapunov.signals import equality, inequality
+from analysis.report import Figure, Paragraph, Report, Section, Table, render_html, render_json
+from analysis.report import lyapunov_text as text
+from analysis.report.lyapunov_evidence import far_runs_in_background
+from analysis.report.lyapunov_part import LONG_RUN, evidence, lyapunov_sections
+from analysis.report.paper_report import paper_report
+
+
+@functools.cache
+def found():
+    """Both examples; Example 2 over a shorter run."""
+    return {1: evidence(nlctl.paper.example_1()), 2: evidence(nlctl.paper.example_2(), 5.0)}
+
+
+@functools.cache
+def part():
+    """The part that is made of them."""
+    return lyapunov_sections(found())
+
+
+def tables(sections):
+    return [item for section in sections for item in section.items if isinstance(item, Table)]
+
+
+def rows_by_key(number):
+    """Rows of an example's ledger, and the table that each stands in."""
+    sections = {section.key: section for section in part()}
+    shown = {}
+    for place, table in enumerate(tables([sections[f"proof-{number}"]])):
+        for row in table.rows:
+            assert row[0] not in shown
+            shown[row[0]] = (place, *row)
+    return shown
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_every_line_of_the_ledger_is_shown_once_with_its_status(number):
+    """Nothing is left out, and the status is that of the ledger."""
+    shown = rows_by_key(number)
+    assert {key: row[2] for key, row in shown.items()} == {
+        line.key: line.status for line in found()[number].ledger.lines
+    }
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_proved_checked_and_violated_lines_stand_in_tables_of_their_own(number):
+    """A reader cannot take a checked line for a proved one: the caption says what it is."""
+    section = next(s for s in part() if s.key == f"proof-{number}")
+    stands = {}
+    for table in tables([section]):
+        stands.setdefault(table.caption, set()).update(row[1] for row in table.rows)
+        assert table.status == "status"
+    assert stands[text.PROVED] == {"proved", "computed"}
+    assert stands[text.CHECKED] == {"checked"}
+    assert stands[text.FAILING] == {"violated"}
+    assert stands[text.OPEN] <= {"undecided", "not applicable"}
+    assert text.VIOLATED not in stands
+
+
+def test_a_violated_line_comes_first_and_says_what_follows():
+    """A fault planted in the ledger appears as violated, in the first table and in the text."""
+    one = found()[2]
+    broken = tuple(
+        dataclasses.replace(x, status="violated", follows="THE END") if x.key == "(31)" else x
+        for x in one.ledger.lines
+    )
+    bad = dataclasses.replace(one, ledger=dataclasses.replace(one.ledger, lines=broken))
+    section = next(s for s in lyapunov_sections({2: bad}) if s.key == "proof-2")
+    first = tables([section])[0]
+    assert first.caption == text.VIOLATED
+    (row,) = first.rows
+    assert row[:2] == ("(31)", "violated")
+    assert row[-1].endswith("THE END")
+    assert "Corrected statements violated: (31)." in section.items[0].text
+
+
+def test_the_bound_of_34_is_half_the_square_of_C_0():  # noqa: N802
+    """Two ways to one number: the figure's level, and C_0 of the conservatism."""
+    for one in found().values():
+        level = one.curves["level (34), $C_0^2/2$"]
+        np.testing.assert_allclose(level, one.conservatism.C_0**2 / 2, rtol=1e-6)
+        np.testing.assert_allclose(
+            np.max(one.curves["$r^2/2$"]), one.ledger.max_r**2 / 2, rtol=5e-3
+        )
+        assert np.all(one.curves["$V$"] >= one.curves["$r^2/2$"])
+        shares = sum(s.value for s in one.conservatism.shares)
+        assert shares == pytest.approx(one.conservatism.C_0**2 / 2, rel=1e-6)
+
+
+def test_the_creep_is_that_of_200_seconds_and_of_what_it_says():
+    """The table says what was computed; the text names the commands for what was not."""
+    first = part()[0]
+    words = " ".join(i.text for i in first.items if isinstance(i, Paragraph))
+    assert LONG_RUN in words
+    (table,) = tables([first])
+    assert "after 200 s" in table.caption
+    for row, one in zip(table.rows, found().values(), strict=True):
+        assert one.creep.time == 200.0
+        assert row[3] == one.creep.verdict
+    assert found()[2].creep.verdict == "creeps"
+    assert 7e3 < found()[2].creep.burst < 1.1e4  # within a quarter, a fiftieth of the way
+
+
+def test_commands_in_the_text_are_python():
+    """They can be pasted into a shell: two quotes, and code that compiles."""
+    words = " ".join(i.text for i in part()[0].items if isinstance(i, Paragraph))
+    commands = re.findall(r'python -c "([^"]*)"', words)
+    assert len(commands) == 2
+    for command in commands:
+        compile(command, "command", "exec")
+
+
+def test_the_part_is_in_the_papers_report_when_there_is_evidence():
+    """With it: sections, figures, valid page, the same numbers in JSON.  Without: as before."""
+    report = paper_report(made_up_runs(), found())
+    parsed = outline(render_html(report))
+    assert len(parsed.ids) == len(set(parsed.ids))
+    for key in (
+        "proof",
+        "proof-1",
+        "proof-2-constants",
+        "proof-1-V-title",
+        "proof-2-margins-title",
+    ):
+        assert key in parsed.ids
+    content = json.loads(render_json(report), parse_constant=lambda name: pytest.fail(name))
+    assert "proof-2-bound" in content["sections"]
+    assert "proof" not in {section.key for section in paper_report(made_up_runs()).sections}
+    assert lyapunov_sections({}) == []
+
+
+def test_all_constants_are_shown_with_their_provenance():
+    """As in the record, and without the box in every row."""
+    section = next(s for s in part() if s.key == "proof-1-constants")
+    (table,) = tables([section])
+    entries = found()[1].ledger.constants.entries
+    assert [row[0] for row in table.rows] == [text.pretty(c.symbol) for c in entries]
+    assert [row[3] for row in table.rows] == [c.provenance for c in entries]
+    assert {"proved", "computed"} <= {row[3] for row in table.rows}
+
+
+def test_a_short_dip_of_a_margin_is_in_its_figure():
+    """One violating sample among thousands, and a NaN, survive the thinning."""
+    t = np.linspace(0, 20, 5001)
+    for value in (-3.0, np.nan):
+        high = np.ones_like(t)
+        high[3333] = value
+        margin = inequality("(0)", "0 <= 1", t, 0.0, high, scale=1.0)
+        drawn = figures.inequality_margins([margin]).axes[0].lines[-1].get_ydata()
+        assert np.min(drawn) == value or np.isnan(np.min(drawn))
+        assert np.isnan(np.min(drawn)) == np.isnan(value)
+
+
+def test_residuals_are_relative_and_a_nan_is_a_gap():
+    """An equation off by 2 of 4 shows one half; rounding is not below the axis."""
+    t = np.linspace(0, 1, 11)
+    figure = figures.equality_residuals([equality("(0)", "4 = 2", t, 4.0, 2.0)])
+    np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), np.full(11, 0.5))
+    drawn = figures.equality_residuals([equality("(0)", "1 = nan", t, 1.0, np.nan, scale=1.0)])
+    assert np.all(np.isnan(drawn.axes[0].lines[0].get_ydata()))
+
+
+def test_a_bound_that_is_infinite_is_drawn_and_not_an_error():
+    """Without decay the level of (34) is infinite; the finite curves are still seen."""
+    t = np.linspace(0, 1, 11)
+    figure = figures.lyapunov_bound(t, {"V": 1 + t, "bound": np.full_like(t, np.inf)})
+    report = Report(
+        title="t", verdict="v", claims=[], command="c",
+        sections=[Section(key="s", title="s", items=[])],
+    )  # fmt: skip
+    assert figure.axes[0].get_yscale() == "log"
+    assert render_html(report)
+
+
+@functools.cache
+def burst():
+    """Example 2, started just below the end of its lobe, where it bursts within a minute."""
+    return long_run(nlctl.paper.example_2(), 60.0, start={"law.zeta": 2.9917})
+
+
+def test_a_burst_feeds_on_the_integral_of_the_nussbaum_function():
+    """Beyond 3, r^2/2 grows by k G times the integral of N, k G within its global bounds."""
+    run = burst()
+    assert run.lobe.high == pytest.approx(3.0)
+    assert 0 < run.burst < run.lost < 60.0
+    zeta, r = run.signals["zeta"], np.abs(run.signals["r"])
+    before, after = run.time < run.burst, run.time > run.burst
+    assert np.all(zeta[before] < 3.0)
+    assert np.all(zeta[after] > 3.0 - 1e-9)
+    assert r[-1] > 10 * np.max(r[before][-1000:])
+    parts = read_parts(nlctl.paper.example_2())
+    lower, upper = antiderivative(parts.law.N)(np.array([3.0, zeta[-1]]))
+    slope, G = 1.2, (1.0, 3.0 * 1.2)  # of the backlash; (2 + cos x1)(1 + 0.2 sin(v)^2)
+    assert slope * G[0] < r[-1] ** 2 / 2 / (upper - lower) < 1.01 * slope * G[1]
+
+
+def test_a_run_that_does_not_burst_has_no_time_of_it():
+    """Twenty seconds as published: nothing is lost, and there is nothing to foretell it from."""
+    run = long_run(nlctl.paper.example_2(), 20.0)
+    assert np.isnan(run.burst)
+    assert run.lost is None
+    assert run.time[-1] == 20.0
+    assert run.predictions == ()
+
+
+def test_a_long_run_foretells_from_its_beginning_alone():
+    """From 200 s of a run of 210 s at one tolerance: the same as from 200 s at another."""
+    run = long_run(nlctl.paper.example_2(), 210.0, rtol=1e-6)
+    (told,) = run.predictions
+    wanted = found()[2].creep
+    assert told.time == 200.0
+    assert told.verdict == "creeps"
+    assert told.burst_by_balance == pytest.approx(wanted.burst_by_balance, rel=1e-3)
+    assert run.calm < 0.06
+
+
+def test_the_burst_is_at_the_top_of_the_part():
+    """First the sentence with its time, then the figure with the time and what was foretold."""
+    run = dataclasses.replace(burst(), predictions=(found()[2].creep,) * 2)
+    first = lyapunov_sections(found(), {"2": run})[0]
+    words, figure, *_ = first.items
+    assert isinstance(words, Paragraph)
+    assert f"t = {run.burst:.1f} s" in words.text
+    assert f"foretold for {run.predictions[0].burst_by_balance:.0f} s" in words.text
+    assert isinstance(figure, Figure)
+    lines = [line.get_xdata() for line in figure.figure.axes[0].lines]
+    marks = {float(x[0]) for x in lines if len(x) == 2 and x[0] == x[1]}
+    assert marks == {run.burst, run.predictions[0].burst_by_balance}
+
+
+def test_without_a_burst_none_is_claimed():
+    """A run that ends calmly is told as such."""
+    run = dataclasses.replace(
+        long_run(nlctl.paper.example_2(), 20.0), predictions=(found()[2].creep,)
+    )
+    first = lyapunov_sections(found(), {"2": run})[0]
+    assert first.items[0].text.startswith("No burst within 20 s")
+    assert "proof-burst" not in {i.key for i in first.items if isinstance(i, Figure)}
+
+
+def test_whoever_leaves_early_does_not_wait_for_the_long_runs():
+    """An error, or Ctrl-C, in the body ends the runs in the background."""
+    with pytest.raises(ZeroDivisionError), far_runs_in_background() as far:
+        raise ZeroDivisionError
+    assert isinstance(far.exception(), InterruptedError)
+
+
+def test_the_envelope_is_the_largest_value_of_each_whole_window():
+    """A spike counts in its own window only, and a part of a window is left out."""
+    t = np.linspace(0, 10, 101)
+    y = np.where(t == 4.5, 7.0, 1.0)
+    at, largest = figures.envelope(t, y, 3.0)
+    np.testing.assert_allclose(at, [1.5, 4.5, 7.5])
+    np.testing.assert_array_equal(largest, [1, 7, 1])
+
+
+@pytest.mark.parametrize(
+    ("plain", "shown"),
+    [
+        ("V' <= -alpha_1 V + [k G N + 1] zeta' + alpha_0", "V′ ≤ −α₁ V + [k G N + 1] ζ′ + α₀"),
+        ("-m(u) b, or -u", "−m(u) b, or −u"),
+        ("the lobe's 'own' 5-fold", "the lobe's 'own' 5-fold"),
+        ("(33)-(36)", "(33)–(36)"),
+        ("eps_u* Omega", "ε_u* Omega"),
+        ("delta~ delta_hat'/gamma", "δ̃ δ̂′/γ"),
+    ],
+)
+def test_statements_are_shown_with_the_letters_of_the_paper(plain, shown):
+    """Words stay words."""
+    assert text.pretty(plain) == shown
