@@ -10,22 +10,28 @@ from ._errors import (
     UnknownNameError,
 )
 from ._param import param, record
-from .actuators import Backlash, DeadZone
+from .actuators import Backlash, DeadZone, Gain, Saturation, cascade
 from .controllers import (
+    PID,
     AdaptiveWeights,
     DeadZoneNussbaumLaw,
     FilteredError,
+    FixedGainLaw,
     GaussianBasis,
     KnownSignLaw,
     LeakyNussbaumLaw,
     MonotoneNussbaumLaw,
     NussbaumLaw,
     RobustTerm,
+    SlidingModeLaw,
     Zero,
+    ablations,
     adaptive_neural,
     diagonal_centres,
     grid_centres,
     latin_hypercube_centres,
+    replaced,
+    sliding_mode,
 )
 from .drawing import draw
 from .native import (
@@ -41,6 +47,7 @@ from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOf
 from .response import EngineWarning, input_output_response
 
 __all__ = [
+    "PID",
     "AdaptiveWeights",
     "AlgebraicLoopError",
     "AmbiguousNameError",
@@ -57,8 +64,10 @@ __all__ = [
     "Ensemble",
     "FilteredError",
     "FilteredStep",
+    "FixedGainLaw",
     "ForcedDuffing",
     "FunctionReference",
+    "Gain",
     "GaussianBasis",
     "Genesio",
     "KnownSignLaw",
@@ -68,12 +77,16 @@ __all__ = [
     "ParameterError",
     "PureFeedback",
     "RobustTerm",
+    "Saturation",
+    "SlidingModeLaw",
     "SumOfSines",
     "UnknownNameError",
     "Zero",
+    "ablations",
     "actuators",
     "adaptive_neural",
     "block",
+    "cascade",
     "compile",
     "controllers",
     "diagonal_centres",
@@ -93,5 +106,7 @@ __all__ = [
     "plants",
     "record",
     "references",
+    "replaced",
+    "sliding_mode",
     "state_names",
 ]

@@ -1,14 +1,23 @@
-"""Actuators with uncertain nonlinearity, v = k(u, t) u + eps_u (2): dead zone and backlash."""
+"""Actuators with uncertain nonlinearity, v = k(u, t) u + eps_u (2): dead zone and backlash.
+
+Saturation does not obey (2), and a gain of the wrong sign breaks Assumption 1: both are here to
+see what a controller makes of them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
+import control as ct
 import numpy as np
 
+from ._diagram import as_system, interconnect
 from ._equation import equation
-from ._errors import ParameterError
+from ._errors import DiagramError, ParameterError
 from ._param import as_numbers, param, record
 
-__all__ = ["Backlash", "DeadZone"]
+__all__ = ["Backlash", "DeadZone", "Gain", "Saturation", "cascade"]
 
 
 @record
@@ -156,3 +165,91 @@ class Backlash:
         (u1,) = u
         low, high = play_band(u1, p)
         return memory - low, memory - high
+
+
+@record
+class Gain:
+    """Linear actuator.
+
+    v = k u
+
+    With k = -1 behind another actuator the sign of the input gain is turned round.
+    """
+
+    k: float = param(1.0, unit="1", meaning="gain")
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ()
+    feedthrough = True
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The gain."""
+        return (p.k * u[0],)
+
+
+@record
+class Saturation:
+    """Symmetric saturation, v = min(max(u, -limit), limit).
+
+    No k >= k_1 > 0 keeps eps_u of (2) bounded for it: the paper's theory does not cover it.
+    """
+
+    limit: float = param(10.0, unit="1", meaning="largest |v|", above=0)
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ()
+    feedthrough = True
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The characteristic v(u)."""
+        return (np.minimum(np.maximum(u[0], -p.limit), p.limit),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where it begins to saturate."""
+        return u[0] + p.limit, u[0] - p.limit
+
+
+def cascade(stages: Mapping[str, Any], *, name: str = "actuator") -> ct.InterconnectedSystem:
+    """Join actuators in series: the output v of each is the input u of the next.
+
+    Parameters
+    ----------
+    stages : mapping
+        ``{"limit": Saturation(), "dead_zone": DeadZone()}``, in the order of the signal flow;
+        each has the input u and the output v.  Parameters are then
+        ``"actuator.dead_zone.b_r"``.
+    name : str, optional
+
+    Returns
+    -------
+    control.InterconnectedSystem
+        From u to v; it stands in the place of an actuator.
+
+    Raises
+    ------
+    DiagramError
+        If there is no stage, or one has other signals.
+    """
+    systems, last = [], len(stages) - 1
+    for i, (key, stage) in enumerate(stages.items()):
+        system = as_system(stage, key).copy(name=key)
+        if (system.input_labels, system.output_labels) != (["u"], ["v"]):
+            raise DiagramError(
+                f"cascade needs stages from u to v, '{key}' goes from "
+                f"{system.input_labels} to {system.output_labels}"
+            )
+        system.update_names(
+            inputs=[f"v{i}" if i else "u"], outputs=["v" if i == last else f"v{i + 1}"]
+        )
+        systems.append(system)
+    if not systems:
+        raise DiagramError("cascade needs at least one stage, got none")
+    return interconnect(systems, inputs=["u"], outputs=["v"], name=name)

@@ -19,7 +19,8 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["analysis.metrics", "analysis.lyapunov", "analysis.robustness", "analysis.reproduction"],
     ["analysis.figures", "analysis.report"],
     ["analysis.studies"],
-    ["nlctl._terminal", "nlctl.cli"],
+    ["nlctl._terminal", "nlctl._check", "nlctl._sweep_progress", "nlctl.cli"]
+    + ["nlctl.cli_report", "nlctl.cli_studies"],
 ]
 COMMAND_LINE = LAYERS[-1]
 BLOCK_MODULES = LAYERS[1]

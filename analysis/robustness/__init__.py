@@ -1,6 +1,9 @@
 """Robustness studies: how sure, how far, what breaks it, what drives it."""
 
+from .burst import BurstForecast
+from .compare import Comparison, compare, crossed
 from .confirm import Confirmation, confirm
+from .contenders import contenders
 from .degradation import Degradation, degradation_curve
 from .design import Design, from_table, independent, row_seed, rows, seed_number
 from .experiment import Experiment, Prepared, evaluate, prepare
@@ -32,7 +35,9 @@ from .watch import Progress, until_decided
 from .worst_case import WorstCase, worst_case
 
 __all__ = [
+    "BurstForecast",
     "Choice",
+    "Comparison",
     "Confirmation",
     "Degradation",
     "Design",
@@ -57,9 +62,12 @@ __all__ = [
     "arguments",
     "boundary",
     "clopper_pearson",
+    "compare",
     "confidence_sequence",
     "confirm",
+    "contenders",
     "corners",
+    "crossed",
     "decide",
     "degradation_curve",
     "diagrams",

@@ -6,7 +6,7 @@ import multiprocessing
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -86,7 +86,7 @@ def computed_here(
     *,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
-) -> Iterator[Chunk]:
+) -> Generator[Chunk, None, None]:
     """Yield chunk after chunk, until no more are wanted."""
     for numbers in chunks:
         if not wanted():
@@ -103,7 +103,7 @@ def computed_elsewhere(
     wanted: Callable[[], bool],
     *,
     threads: int | None = None,
-) -> Iterator[Chunk]:
+) -> Generator[Chunk, None, None]:
     """Yield chunks as the executor finishes them.
 
     Two per worker are in flight at most.  When no more are wanted, or one has failed, those that

@@ -48,6 +48,7 @@ def tune(
     limited: Metric,
     limit: float,
     generations: int = 40,
+    max_steps: int = 10_000,
     seed: int = 0,
 ) -> Tuned:
     """Search the gains with the least cost that keep another metric within its limit.
@@ -67,6 +68,8 @@ def tune(
         What is made small, and what has to stay at or below `limit`.
     limit : float
     generations : int, optional
+    max_steps : int, optional
+        Steps of a simulation beyond which gains are refused as too stiff.
     seed : int, optional
 
     Raises
@@ -84,7 +87,7 @@ def tune(
         nonlocal runs
         gains = dict(zip(names, np.exp(points), strict=True))
         table = ensemble_response(
-            loop, timepts, params=gains, metrics=(cost, limited), max_steps=10_000
+            loop, timepts, params=gains, metrics=(cost, limited), max_steps=max_steps
         ).table
         runs += len(table)
         excess = np.fmin(np.maximum(table[limited.key].to_numpy() / limit - 1, 0), LOST)

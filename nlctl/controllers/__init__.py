@@ -1,9 +1,11 @@
-"""The adaptive neural controller and its pieces."""
+"""The adaptive neural controller and its pieces, and baselines to compare it with."""
 
+from .ablations import FixedGainLaw, ablations, replaced
 from .adaptive import Zero, adaptive_neural
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
 from .nussbaum import NussbaumLaw
+from .pid import PID
 from .rbf import (
     AdaptiveWeights,
     GaussianBasis,
@@ -13,21 +15,28 @@ from .rbf import (
 )
 from .remedies import DeadZoneNussbaumLaw, LeakyNussbaumLaw, MonotoneNussbaumLaw
 from .robust import RobustTerm
+from .sliding_mode import SlidingModeLaw, sliding_mode
 
 __all__ = [
+    "PID",
     "AdaptiveWeights",
     "DeadZoneNussbaumLaw",
     "FilteredError",
+    "FixedGainLaw",
     "GaussianBasis",
     "KnownSignLaw",
     "LeakyNussbaumLaw",
     "MonotoneNussbaumLaw",
     "NussbaumLaw",
     "RobustTerm",
+    "SlidingModeLaw",
     "Zero",
+    "ablations",
     "adaptive_neural",
     "binomial_lambdas",
     "diagonal_centres",
     "grid_centres",
     "latin_hypercube_centres",
+    "replaced",
+    "sliding_mode",
 ]

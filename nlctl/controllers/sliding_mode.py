@@ -1,0 +1,79 @@
+"""Sliding mode with a boundary layer: the usual robust baseline."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from .._diagram import as_system, interconnect
+from .._equation import equation
+from .._param import param, record
+from .filtered_error import FilteredError
+
+__all__ = ["SlidingModeLaw", "sliding_mode"]
+
+
+@record
+class SlidingModeLaw:
+    """Switching law with a boundary layer, and nothing known of the plant but the sign.
+
+        u = -K sat(r / phi),   sat(y) = min(max(y, -1), 1)
+
+    (Slotine, Li, Applied Nonlinear Control, 1991, section 7.2, with the filtered error r of (14)
+    as the sliding variable s and no model in the equivalent control.)  Outside of the layer |u| = K
+    drives r inwards if K dominates the disturbance, within it the law is a proportional gain
+    K / phi.  It assumes an input gain whose sign is known and positive.
+    """
+
+    K: float = param(12.0, unit="1", meaning="control input outside of the layer", above=0)
+    phi: float = param(0.1, unit="1", meaning="half width of the boundary layer of r", above=0)
+
+    inputs = ("r",)
+    outputs = ("u",)
+    states = ()
+    feedthrough = True
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The law."""
+        (r,) = u
+        return (-p.K * np.minimum(np.maximum(r / p.phi, -1.0), 1.0),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """The edges of the layer."""
+        (r,) = u
+        return r + p.phi, r - p.phi
+
+
+def sliding_mode(
+    filtered_error: Any = None, law: Any = None, *, name: str = "controller"
+) -> ct.InterconnectedSystem:
+    """Join a sliding-mode controller: filtered error (14) -> law.
+
+    It takes x1, ..., xn and yd, yd1, ..., ydn as the paper's controller does, and delivers e, r, u.
+
+    Parameters
+    ----------
+    filtered_error : FilteredError, optional
+        Its lambdas are the slope of the sliding surface, and their number gives the order.
+    law : record, optional
+        `SlidingModeLaw` by default.
+    name : str, optional
+
+    Raises
+    ------
+    DiagramError
+        If a replaced piece lacks a signal.
+    """
+    blocks = {
+        "filtered_error": FilteredError() if filtered_error is None else filtered_error,
+        "law": SlidingModeLaw() if law is None else law,
+    }
+    systems = [as_system(piece, key) for key, piece in blocks.items()]
+    signals = systems[0].input_labels
+    return interconnect(systems, inputs=signals, outputs=["e", "r", "u"], name=name)
