@@ -17,10 +17,10 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.paper"],
     ["nlctl.native", "nlctl.response"],
     ["analysis.metrics", "analysis.lyapunov", "analysis.robustness", "analysis.reproduction"],
-    ["analysis.figures", "analysis.report"],
+    ["analysis.figures", "analysis.robustness_figures", "analysis.report"],
     ["analysis.studies"],
     ["nlctl._terminal", "nlctl._check", "nlctl._sweep_progress", "nlctl.cli"]
-    + ["nlctl.cli_report", "nlctl.cli_studies"],
+    + ["nlctl.cli_report", "nlctl.cli_studies", "nlctl.cli_study_report"],
 ]
 COMMAND_LINE = LAYERS[-1]
 BLOCK_MODULES = LAYERS[1]

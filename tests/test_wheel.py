@@ -38,6 +38,8 @@ def test_wheel_holds_both_packages_and_their_data(wheel):
         *("nlctl/__init__.py", "nlctl/__init__.pyi", "nlctl/py.typed", "nlctl/controllers/rbf.py"),
         *("analysis/py.typed", "analysis/reproduction/expected.csv"),
         *("analysis/report/templates/report.html", "analysis/report/templates/report.css"),
+        *("analysis/report/templates/report.js", "analysis/report/templates/gallery.html"),
+        *("analysis/report/fonts/nlctl-math.woff2", "analysis/report/fonts/OFL.txt"),
     ):
         assert name in names
     assert any(name.endswith("LICENSE") for name in names)

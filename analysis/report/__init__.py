@@ -1,7 +1,10 @@
 """Reports: sections as data, one template, one self-contained page."""
 
+from .browser import write_pdf
+from .compare import compare
 from .document import Claim, Equation, Figure, Paragraph, Report, Section, Table
-from .render import render_html, render_json, write_report
+from .gallery import write_gallery
+from .render import file_hashes, render_html, render_json, write_report
 
 __all__ = [
     "Claim",
@@ -11,7 +14,11 @@ __all__ = [
     "Report",
     "Section",
     "Table",
+    "compare",
+    "file_hashes",
     "render_html",
     "render_json",
+    "write_gallery",
+    "write_pdf",
     "write_report",
 ]

@@ -48,7 +48,10 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """A matplotlib figure with its caption and a description for those who cannot see it."""
+    """A matplotlib figure with its caption and a description for those who cannot see it.
+
+    `key` is its anchor, unless a section or another figure has it already.
+    """
 
     key: str
     caption: str
@@ -71,13 +74,27 @@ class Section:
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One line of the verdict: claim, what was measured, the limit, and where the evidence is."""
+    """One line of the verdict: claim, what was measured, the limit, and where the evidence is.
+
+    Attributes
+    ----------
+    evidence : str
+        Key of the section or figure that shows it.
+    margin : str
+        How far the measured value is from the limit.
+    status : str
+        What kind of statement it is, such as ``"proved"``, ``"checked"`` or ``"undecided"``;
+        where it is empty, the page says that the claim holds or fails.  A claim that does not
+        hold is drawn as failed, or as open where its status says so; never as one that holds.
+    """
 
     text: str
     measured: str
     limit: str
     holds: bool
     evidence: str
+    margin: str = ""
+    status: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,6 +113,11 @@ class Report:
         Versions of what made it.
     numbers : mapping
         Every number of the report, for ``report.json``.
+    methods, limits, references : sequence of str
+        Paragraphs on how it was found and what it does not show, and the sources; a DOI in them
+        (``doi 10...``) becomes a link, the only kind that leads out of the page.
+    files : mapping
+        Name and SHA-256 of each data file beside the page (`analysis.report.file_hashes`).
     """
 
     title: str
@@ -105,3 +127,7 @@ class Report:
     command: str
     provenance: Mapping[str, str] = field(default_factory=dict)
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    methods: Sequence[str] = ()
+    limits: Sequence[str] = ()
+    references: Sequence[str] = ()
+    files: Mapping[str, str] = field(default_factory=dict)

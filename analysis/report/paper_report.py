@@ -12,23 +12,32 @@ from nlctl._diagram import leaves
 from nlctl.drawing import draw
 
 from .. import figures
+from ..lyapunov.long_run import LongRun
 from ..reproduction import CASES, HORIZON, METRICS, TAIL, Check, Run, checks
 from . import paper_text as text
 from .document import Figure, Paragraph, Report, Section, Table
+from .lyapunov_part import Evidence, lyapunov_sections
 from .paper_claims import claims, verdict
 
 __all__ = ["paper_report"]
 
 Runs = Mapping[str, Run]
+Proofs = Mapping[int, Evidence]
+Far = Mapping[str, LongRun]
+PACKAGES = ("nlctl", "control", "numpy", "scipy", "matplotlib", "python-flint", "cvxpy")
 
 
-def paper_report(runs: Runs) -> Report:
+def paper_report(runs: Runs, proofs: Proofs | None = None, far: Far | None = None) -> Report:
     """Compose the reproduction report from the runs of `analysis.reproduction.CASES`.
 
     Parameters
     ----------
     runs : mapping
         Result of `analysis.reproduction.run_all`.
+    proofs : mapping, optional
+        What `analysis.report.lyapunov_part.evidence` found, by number of the example.
+    far : mapping, optional
+        Runs far beyond 20 s, of `analysis.report.lyapunov_evidence.far_runs_in_background`.
 
     Returns
     -------
@@ -44,20 +53,15 @@ def paper_report(runs: Runs) -> Report:
             *_example(1, runs, compared),
             *_example(2, runs, compared),
             _exchange(runs),
+            *lyapunov_sections(proofs or {}, far),
             _choices(runs),
             _numerics(),
             _limits(runs),
         ],
         command="nlctl report",
-        provenance=provenance(),
+        provenance={"Python": platform.python_version()} | {p: version(p) for p in PACKAGES},
         numbers={key: dict(run.metrics) for key, run in runs.items()},
     )
-
-
-def provenance() -> dict[str, str]:
-    """Return the versions of what computes and draws."""
-    packages = ("nlctl", "control", "numpy", "scipy", "matplotlib")
-    return {"Python": platform.python_version()} | {name: version(name) for name in packages}
 
 
 def _model() -> Section:
@@ -77,6 +81,7 @@ def _model() -> Section:
 def _example(number: int, runs: Runs, compared: Sequence[Check]) -> list[Section]:
     run = runs[str(number)]
     diagram = run.case.diagram
+    blocks = ", ".join(system.name for system in diagram.syslist)
     key = f"example-{number}"
     return [
         Section(
@@ -87,7 +92,7 @@ def _example(number: int, runs: Runs, compared: Sequence[Check]) -> list[Section
                 Figure(
                     key=f"{key}-diagram",
                     caption="The closed loop as simulated, and the inside of its controller.",
-                    description=_describe_diagram(diagram),
+                    description=f"Block diagram of {diagram.name} with the blocks {blocks}.",
                     figure=draw(diagram, expand=True),
                 ),
                 *_time_histories(key, run),
@@ -106,11 +111,6 @@ def _example(number: int, runs: Runs, compared: Sequence[Check]) -> list[Section
             items=[_check_table(number, compared)],
         ),
     ]
-
-
-def _describe_diagram(diagram: ct.InterconnectedSystem) -> str:
-    names = ", ".join(system.name for system in diagram.syslist)
-    return f"Block diagram of {diagram.name} with the blocks {names}."
 
 
 def _time_histories(key: str, run: Run) -> list[Figure]:
@@ -234,10 +234,8 @@ def _choices(runs: Runs) -> Section:
         items=[
             Paragraph(
                 text="Each row changes one reading of the paper and leaves the rest as it is. "
-                f"None raises max |e₁| (t ≥ {TAIL:g} s) by more than a quarter."
-                if _same_verdict(shown)
-                else "Each row changes one reading of the paper and leaves the rest as it is. "
-                f"At least one raises max |e₁| (t ≥ {TAIL:g} s) by more than a quarter."
+                f"{'None' if _same_verdict(shown) else 'At least one'} raises max |e₁| "
+                f"(t ≥ {TAIL:g} s) by more than a quarter."
             ),
             _metric_table(
                 "One row per reading; the first row of each example is the default.",

@@ -1,101 +1,74 @@
 """Report -> one self-contained HTML file, and ``report.json`` beside it.
 
-Text is escaped by Jinja2.  The only markup that passes unescaped is what this module makes
-itself: figures drawn by matplotlib and formulas from the LaTeX in our own source.
+Text is escaped by Jinja2.  The only markup that passes unescaped is what this package makes
+itself: figures (`svg`), formulas through a whitelist (`formula`), the page's own style and
+script (`page`).  The page's content policy allows exactly those two, by hash, and nothing from
+outside.
 """
 
 from __future__ import annotations
 
-import html
-import io
+import hashlib
 import json
-import math
 import os
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from latex2mathml.converter import convert
-from markupsafe import Markup
+import numpy as np
 
-from nlctl import drawing
-from nlctl._files import replace_file
+from nlctl._errors import ParameterError
 
-from .. import figures
-from .document import Equation, Figure, Paragraph, Report, Table
+from .document import Figure, Item, Report, Table
+from .outline import evidence, kind, place, summary
+from .page import fill, to_bytes, write_files
+from .svg import shapes_svg, svg
 
-__all__ = ["render_html", "render_json", "write_report"]
+__all__ = ["file_hashes", "render_html", "render_json", "write_report"]
 
-# Colours of the figures that follow the page's theme, by the page's own names for them.
-THEME = {
-    "#000000": "currentColor",
-    drawing.INK: "currentColor",
-    drawing.GREY: "var(--soft)",
-    drawing.FILL: "var(--panel)",
-    figures.GREY: "var(--soft)",
+TITLES = {
+    "methods": "How it was found",
+    "limits": "Limits of validity",
+    "references": "References",
+    "provenance": "How to make this report again",
 }
-SVG_SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": 9.0}
-
-
-def svg(figure: Figure) -> Markup:
-    """Return a figure as inline SVG, the same bytes every time.
-
-    Ids get the figure's key in front, so that figures on one page do not refer to each other's
-    parts; ink, grey and fill take the page's colours, so that dark pages work.
-    """
-    buffer = io.StringIO()
-    with mpl.rc_context(SVG_SETTINGS):
-        figure.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r'\bid="', f'id="{figure.key}-', text)
-    text = re.sub(r'(href="|url\()#', rf"\g<1>#{figure.key}-", text)
-    for colour, themed in THEME.items():
-        text = text.replace(colour, themed)
-    head = f'<svg role="img" aria-labelledby="{figure.key}-title {figure.key}-desc" '
-    names = (
-        f'<title id="{figure.key}-title">{html.escape(figure.caption)}</title>'
-        f'<desc id="{figure.key}-desc">{html.escape(figure.description)}</desc>'
-    )
-    text = re.sub(r"<svg ([^>]*)>", lambda m: f"{head}{m.group(1)}>{names}", text, count=1)
-    return Markup(text)
-
-
-def mathml(equation: Equation) -> Markup:
-    """Return a formula as MathML."""
-    return Markup(convert(equation.latex, display="block"))
-
-
-def cell(value: Any) -> str:
-    """Return a table cell's text: numbers with the digits that a reader can use."""
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return str(value)
-
-
-def _kind(item: object) -> str:
-    return type(item).__name__.lower()
-
-
-def _environment() -> Environment:
-    environment = Environment(
-        loader=PackageLoader("analysis.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"svg": svg, "mathml": mathml, "cell": cell, "kind": _kind}
-    return environment
 
 
 def render_html(report: Report) -> str:
     """Return the report as one HTML page without references to anything outside."""
-    return _environment().get_template("report.html").render(report=report)
+    placed = place(report)
+    light, told = summary(report.claims)
+    shapes: dict[str, str] = {}
+    drawings = {
+        anchor: svg(item, anchor, shapes)
+        for part in placed
+        for anchor, _, item in part.items
+        if isinstance(item, Figure)
+    }
+    digest = hashlib.sha256(to_bytes(render_json(report))).hexdigest()
+    return fill(
+        "report.html",
+        report=report,
+        placed=placed,
+        drawings=drawings,
+        shapes=shapes_svg(shapes),
+        evidence=evidence(placed),
+        extra={k: t for k, t in TITLES.items() if getattr(report, k) or k == "provenance"},
+        light=light,
+        told=told,
+        margins=any(claim.margin for claim in report.claims),
+        made_by=_pairs("What made it.", ("part", "version"), report.provenance),
+        beside=_pairs(
+            "Files beside this page.",
+            ("file", "SHA-256"),
+            {"report.json": digest, **report.files},
+        ),
+    )
+
+
+def _pairs(caption: str, columns: tuple[str, str], values: Mapping[str, str]) -> Table:
+    return Table(caption=caption, columns=columns, rows=list(values.items()))
 
 
 def render_json(report: Report) -> str:
@@ -105,12 +78,19 @@ def render_json(report: Report) -> str:
         "verdict": report.verdict,
         "claims": [vars(claim) for claim in report.claims],
         "sections": {
-            section.key: {"title": section.title, "items": [_plain(i) for i in section.items]}
-            for section in report.sections
+            part.anchor: {
+                "title": part.section.title,
+                "items": [_plain(item) for _, _, item in part.items],
+            }
+            for part in place(report)
         },
         "numbers": report.numbers,
         "command": report.command,
-        "provenance": dict(report.provenance),
+        "methods": report.methods,
+        "limits": report.limits,
+        "references": report.references,
+        "provenance": report.provenance,
+        "files": report.files,
     }
     return json.dumps(_json_value(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -121,14 +101,19 @@ def _json_value(value: Any) -> Any:
         return {str(k): _json_value(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [_json_value(v) for v in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else str(float(value))
-    return value
+    if isinstance(value, np.ndarray):
+        return _json_value(value.tolist())
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, Integral):
+        return int(value)
+    if isinstance(value, Real):
+        return float(value) if np.isfinite(float(value)) else str(float(value))
+    return value if value is None else str(value)
 
 
-def _plain(item: Paragraph | Equation | Table | Figure) -> dict[str, Any]:
-    content = {k: v for k, v in vars(item).items() if k != "figure"}
-    return {"kind": _kind(item)} | content
+def _plain(item: Item) -> dict[str, Any]:
+    return {"kind": kind(item)} | {k: v for k, v in vars(item).items() if k != "figure"}
 
 
 def write_report(report: Report, folder: str | os.PathLike[str]) -> Path:
@@ -151,11 +136,24 @@ def write_report(report: Report, folder: str | os.PathLike[str]) -> Path:
         If the folder cannot be written to.
     """
     folder = Path(folder)
-    pages: Sequence[tuple[str, str]] = (
-        ("report.json", render_json(report)),
-        ("index.html", render_html(report)),
-    )
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in pages:
-        replace_file(folder / name, lambda file, text=text: file.write(text.encode()))
+    write_files(folder, {"report.json": render_json(report), "index.html": render_html(report)})
     return folder / "index.html"
+
+
+def file_hashes(paths: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
+    """Return name and SHA-256 of data files, for `Report.files`.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    ParameterError
+        If two files have one name: they could not both lie beside the page.
+    """
+    hashes: dict[str, str] = {}
+    for path in map(Path, paths):
+        if path.name in hashes:
+            raise ParameterError(f"two data files of the report are called '{path.name}'")
+        with path.open("rb") as file:
+            hashes[path.name] = hashlib.file_digest(file, "sha256").hexdigest()
+    return hashes

@@ -1,0 +1,153 @@
+"""What differs between two reports: verdict, claims, numbers, tables."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from nlctl._errors import ParameterError, UsageError
+
+from .outline import sort_key
+
+__all__ = ["Difference", "compare", "read_report"]
+
+ABSENT = "absent"
+PARTS = ("title", "verdict", "claims", "numbers", "sections")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """One thing that two reports say differently; ``"absent"`` where only one says it."""
+
+    where: str
+    first: Any
+    second: Any
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.first} -> {self.second}"
+
+
+def compare(
+    first: str | os.PathLike[str], second: str | os.PathLike[str], rtol: float = 0.0
+) -> list[Difference]:
+    """Compare what two reports claim, measure and list.
+
+    Provenance, command, prose and hashes of files are left out: they may differ between two
+    machines that find the same.
+
+    Parameters
+    ----------
+    first, second : path
+        Files ``report.json``, or the folders that hold them.
+    rtol : float
+        Numbers closer than this, relative to the larger, count as equal.
+
+    Returns
+    -------
+    list of Difference
+        Empty if the reports agree.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    UsageError
+        If a file is no report, or `rtol` is negative.
+    """
+    if not 0 <= rtol < math.inf:
+        raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
+    one, two = (_flat(read_report(path)) for path in (first, second))
+    return [
+        Difference(where=where, first=one.get(where, ABSENT), second=two.get(where, ABSENT))
+        for where in dict.fromkeys([*one, *two])
+        if where not in one or where not in two or not _same(one[where], two[where], rtol)
+    ]
+
+
+def read_report(path: str | os.PathLike[str]) -> Mapping[str, Any]:
+    """Return the content of a ``report.json``, given as file or as its folder.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    UsageError
+        If it is no report.
+    """
+    path = Path(path)
+    path = path / "report.json" if path.is_dir() else path
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise UsageError(f"'{path}' is no report: {error}") from None
+    missing = [part for part in PARTS if not isinstance(content, dict) or part not in content]
+    if missing:
+        raise UsageError(f"'{path}' is no report: it has no '{missing[0]}'")
+    return content
+
+
+def _flat(report: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all that is compared, by the name of the place where it stands."""
+    found = {"title": report["title"], "verdict": report["verdict"]}
+    claims = report["claims"]
+    for name, claim in zip(_names([c["text"] for c in claims]), claims, strict=True):
+        found |= {f"claim '{name}', {k}": v for k, v in claim.items() if k != "text"}
+    found |= _leaves("numbers", report["numbers"])
+    for key, section in report["sections"].items():
+        tables = [item for item in section["items"] if item["kind"] == "table"]
+        for number, table in enumerate(tables, 1):
+            found |= _cells(f"section '{key}', table {number}", table)
+    return found
+
+
+def _leaves(where: str, value: Any) -> dict[str, Any]:
+    if isinstance(value, dict):
+        return {k: v for n in value for k, v in _leaves(f"{where}.{n}", value[n]).items()}
+    if isinstance(value, list):
+        return {k: v for i, x in enumerate(value) for k, v in _leaves(f"{where}[{i}]", x).items()}
+    return {where: value}
+
+
+def _cells(where: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the cells of a table by row and column; rows are told by their first cells."""
+    found = {f"{where}, columns": list(table["columns"])}
+    columns = _names(table["columns"])
+    for name, row in zip(_row_names(table["rows"]), table["rows"], strict=True):
+        for place, value in enumerate(row):
+            column = columns[place] if place < len(columns) else str(place + 1)
+            found[f"{where}, row '{name}', column '{column}'"] = value
+    return found
+
+
+def _row_names(rows: Sequence[Sequence[Any]]) -> list[str]:
+    """Return a name for each row: as few of its first cells as tell the rows apart."""
+    for width in (1, 2, 3):
+        names = [" | ".join(map(str, row[:width])) for row in rows]
+        if len(set(names)) == len(names):
+            return names
+    return _names([str(row[0]) if row else "" for row in rows])
+
+
+def _names(texts: Sequence[str]) -> list[str]:
+    """Return the texts, with a number behind those that come again."""
+    seen: Counter[str] = Counter()
+    names = []
+    for text in texts:
+        seen[text] += 1
+        names.append(text if seen[text] == 1 else f"{text} ({seen[text]})")
+    return names
+
+
+def _same(a: Any, b: Any, rtol: float) -> bool:
+    """Whether two values say the same; numbers in text count as numbers."""
+    if a == b and type(a) is type(b):
+        return True
+    if rtol and (x := sort_key(a)) and (y := sort_key(b)):
+        return math.isclose(float(x), float(y), rel_tol=rtol)
+    return not isinstance(a, bool | str) and not isinstance(b, bool | str) and a == b

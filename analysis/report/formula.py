@@ -1,0 +1,119 @@
+"""LaTeX -> MathML, through a whitelist: what is not known to be harmless is shown as its source."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+from latex2mathml.converter import convert_to_element
+from markupsafe import Markup
+
+from .document import Equation
+
+__all__ = ["ATTRIBUTES", "ELEMENTS", "mathml"]
+
+ELEMENTS = frozenset(
+    (
+        *("math", "mfrac", "mi", "mn", "mo", "mover", "mpadded", "mphantom", "mroot", "mrow"),
+        *("mspace", "msqrt", "mstyle", "msub", "msubsup", "msup", "mtable", "mtd", "mtext", "mtr"),
+        *("munder", "munderover"),
+    )
+)
+ATTRIBUTES = frozenset(
+    (
+        *("accent", "accentunder", "columnspan", "depth", "display", "displaystyle", "fence"),
+        *("form", "height", "largeop", "linebreak", "linethickness", "lspace", "mathvariant"),
+        *("maxsize", "minsize", "movablelimits", "rowspan", "rspace", "scriptlevel", "separator"),
+        *("stretchy", "symmetric", "voffset", "width"),
+    )
+)
+IGNORED = frozenset(["mathbackground", "mathcolor", "xmlns"])  # the page has its own colours
+ACCENTS = {"^": "ˆ", "~": "˜", "¯": "¯", "˙": "˙", "¨": "¨", "→": "→"}
+UPRIGHT = frozenset("ΓΔΘΛΞΠΣΥΦΨΩ")
+SIGNS = frozenset("+−±-")
+CLOSING = frozenset(")]}⟩‖|!…")
+OPERANDS = frozenset(["mfrac", "mi", "mn", "mover", "msqrt", "msub", "msubsup", "msup"])
+THIN, WIDE = "0.167em", "0.8em"
+FUNCTION = re.compile("[A-Za-z]{2,}")
+
+
+class NotMathError(ValueError):
+    """An element or attribute that has no place in a formula."""
+
+
+def mathml(equation: Equation) -> Markup:
+    """Return a formula as MathML; one that cannot be read or trusted, as its LaTeX source."""
+    try:
+        root = convert_to_element(equation.latex, display="block")
+        for element in root.iter():
+            _check(element)
+    except Exception:  # the parser fails in many ways, and none may cost the report
+        return Markup("<code>{}</code>").format(equation.latex)
+    for element in list(root.iter()):
+        _accent(element)
+        _set_row(element)
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def _check(element: ElementTree.Element) -> None:
+    """Refuse what is not on the lists; make text of character references."""
+    if element.tag not in ELEMENTS:
+        raise NotMathError(f"<{element.tag}> is no element of a formula")
+    for name in list(element.attrib):
+        value = element.attrib.pop(name)
+        if name == "columnalign" and value in ("left", "right"):
+            element.set("class", value)  # Chromium aligns cells by CSS only
+        elif name in ATTRIBUTES:
+            element.set(name, value)
+        elif name not in IGNORED:
+            raise NotMathError(f"'{name}' is no attribute of a formula")
+    if element.text:
+        element.text = re.sub(
+            "&#x([0-9A-F]{4,6});", lambda found: chr(int(found[1], 16)), element.text
+        )
+    if element.tag in ("mi", "mo") and (element.text or "").startswith("\\"):
+        raise NotMathError(f"{element.text} is an unknown command")
+    if element.tag == "mo" and FUNCTION.fullmatch(element.text or ""):
+        element.tag = "mi"  # names like min are no operators
+    if element.tag == "mi" and (element.text or "") in UPRIGHT:
+        element.set("mathvariant", "normal")
+
+
+def _accent(element: ElementTree.Element) -> None:
+    """Say that a hat is a hat, so that it sits on its letter; keep scripts off hats and ∫."""
+    if element.tag == "mover" and len(element) == 2 and element[1].text in ACCENTS:
+        element.set("accent", "true")
+        element[1].text = ACCENTS[element[1].text]
+        if element[0].tag == "mi":
+            element[1].set("stretchy", "false")
+    if element.tag in ("msup", "msubsup"):
+        lean = {"mover": THIN, "∫": WIDE}.get(element[0].text or element[0].tag)
+        if lean:
+            high = ElementTree.Element("mrow")
+            high.extend([ElementTree.Element("mspace", width=lean), element[-1]])
+            element[-1] = high
+
+
+def _set_row(row: ElementTree.Element) -> None:
+    """Set signs that belong to their number close to it, and names of functions apart."""
+    if row.tag not in ("math", "mrow", "mtd", "mstyle"):
+        return
+    parts = list(row)
+    for place in range(len(parts) - 1, 0, -1):
+        before, here = parts[place - 1], parts[place]
+        if here.tag == "mo" and here.text in SIGNS and _opens(before):
+            here.set("form", "prefix")
+        name, last = _name(here), _name(before)
+        if (name and before.tag not in ("mo", "mspace")) or (last and here.tag in OPERANDS):
+            row.insert(place, ElementTree.Element("mspace", width=THIN))
+
+
+def _opens(element: ElementTree.Element) -> bool:
+    return element.tag == "mo" and element.text not in CLOSING
+
+
+def _name(element: ElementTree.Element) -> bool:
+    """Whether an element is the name of a function, perhaps with an exponent."""
+    if element.tag in ("msup", "msub") and len(element):
+        return _name(element[0])
+    return element.tag == "mi" and bool(FUNCTION.fullmatch(element.text or ""))

@@ -1,0 +1,85 @@
+"""An index page over several reports."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from nlctl._errors import UsageError
+
+from .compare import read_report
+from .document import Claim
+from .outline import summary
+from .page import fill, write_files
+
+__all__ = ["Entry", "entries", "write_gallery"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """One report of a gallery: its folder, what it says, and its traffic light."""
+
+    folder: str
+    title: str
+    verdict: str
+    light: str
+    told: str
+    readable: bool = False
+
+    @property
+    def link(self) -> str:
+        """Address of the report's page, seen from the gallery."""
+        return quote(f"{self.folder}/index.html", errors="surrogateescape")
+
+
+def entries(folder: str | os.PathLike[str]) -> list[Entry]:
+    """Return the reports below a folder, by the names of their folders.
+
+    A ``report.json`` that cannot be read, or has no page beside it, is listed as such.
+
+    Raises
+    ------
+    UsageError
+        If there is no report.
+    """
+    folder = Path(folder)
+    files = sorted(p for p in folder.rglob("report.json") if p.parent != folder)
+    if not files:
+        raise UsageError(f"no report (a folder with report.json) below '{folder}'")
+    return [_entry(path.parent, path.parent.relative_to(folder).as_posix()) for path in files]
+
+
+def _entry(folder: Path, name: str) -> Entry:
+    try:
+        report = read_report(folder)
+        light, told = summary([Claim(**claim) for claim in report["claims"]])
+        if not (folder / "index.html").is_file():
+            raise UsageError("a page is missing")
+    except (UsageError, OSError, TypeError):
+        reason = "report.json is damaged, or there is no index.html beside it."
+        return Entry(folder=name, title=name, verdict=reason, light="fail", told="Cannot be read.")
+    return Entry(
+        folder=name,
+        title=str(report["title"]),
+        verdict=str(report["verdict"]),
+        light=light,
+        told=told,
+        readable=True,
+    )
+
+
+def write_gallery(folder: str | os.PathLike[str]) -> Path:
+    """Write FOLDER/index.html: every report below it with its verdict and a link.
+
+    Raises
+    ------
+    UsageError
+        If there is no report.
+    OSError
+        If the folder cannot be written to.
+    """
+    page = fill("gallery.html", entries=entries(folder))
+    write_files(Path(folder), {"index.html": page})
+    return Path(folder) / "index.html"

@@ -1,0 +1,205 @@
+"""Where everything stands on the page: unique anchors, cells of tables, colours of statuses."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from .document import Claim, Equation, Figure, Item, Paragraph, Report, Section, Table
+
+__all__ = [
+    "Cell",
+    "Placed",
+    "cells",
+    "claim_status",
+    "evidence",
+    "is_long",
+    "kind",
+    "light",
+    "numeric",
+    "place",
+    "shown",
+    "sort_key",
+    "summary",
+]
+
+SHELL = frozenset(["claims", "contents", "provenance", "files"])  # anchors of the page itself
+LONG = 32  # characters of a word that must be broken to fit a column
+
+# Statuses by the look of their badge.  What is proved never looks like what is sampled.
+LIGHTS = {
+    "pass": ("pass", "passes", "hold", "holds", "ok", "reached", "confirmed"),
+    "proved": ("proved", "computed"),
+    "checked": ("checked", "sampled"),
+    "caution": ("undecided", "open", "inconclusive", "not confirmed"),
+    "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
+}
+_LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in statuses}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """One cell of a table as shown: text, number to sort by, look of its badge."""
+
+    text: str
+    value: str = ""
+    badge: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placed:
+    """A section with its anchor, the level of its heading, and its items with theirs."""
+
+    anchor: str
+    level: int
+    section: Section
+    items: Sequence[tuple[str, str, Item]]
+
+
+def place(report: Report) -> list[Placed]:
+    """Give every section, table and figure an anchor that no other part of the page has."""
+    taken = set(SHELL)
+    taken |= {name for name in ("methods", "limits", "references") if getattr(report, name)}
+    headings = [_anchor(section.key, taken, ()) for section in report.sections]
+    placed = []
+    for section, heading in zip(report.sections, headings, strict=True):
+        items = []
+        for item in section.items:
+            wanted = item.key if isinstance(item, Figure) else f"{heading}-{kind(item)}"
+            anchor = _anchor(wanted, taken, ("-title", "-desc")) if _has_anchor(item) else ""
+            items.append((anchor, kind(item), item))
+        level = min(max(section.level, 2), 6)
+        placed.append(Placed(anchor=heading, level=level, section=section, items=items))
+    return placed
+
+
+def evidence(placed: Sequence[Placed]) -> Mapping[str, str]:
+    """Return the anchor of each key that a claim may name; a section's wins over a figure's."""
+    figures = {i.key: a for p in placed for a, _, i in p.items if isinstance(i, Figure)}
+    return figures | {p.section.key: p.anchor for p in reversed(placed)}
+
+
+def kind(item: Item) -> str:
+    """Return what an item is, as the template and ``report.json`` call it."""
+    names = {Paragraph: "paragraph", Equation: "equation", Table: "table", Figure: "figure"}
+    return names[type(item)]
+
+
+def _has_anchor(item: Item) -> bool:
+    return isinstance(item, Table | Figure)
+
+
+def _anchor(key: str, taken: set[str], endings: Sequence[str]) -> str:
+    """Return `key` as an id: a few harmless characters, and a number where it is taken."""
+    plain = unicodedata.normalize("NFKD", key)
+    base = re.sub(r"[^A-Za-z0-9_.-]+", "-", plain).strip("-")[:60] or "part"
+    number, name = 1, base
+    while not taken.isdisjoint({name, *(name + end for end in endings)}):
+        number += 1
+        name = f"{base}-{number}"
+    taken |= {name, *(name + end for end in endings)}
+    return name
+
+
+def cells(table: Table) -> list[list[Cell]]:
+    """Return the rows of a table as they are shown, all of one length."""
+    width = max([len(table.columns), *map(len, table.rows)])
+    titles = [*table.columns, *[""] * (width - len(table.columns))]
+    return [
+        [
+            _cell(value, bool(table.status) and title == table.status)
+            for title, value in zip_longest(titles, row, fillvalue="")
+        ]
+        for row in table.rows
+    ]
+
+
+def numeric(table: Table) -> list[bool]:
+    """Return for each column whether all its cells are numbers."""
+    rows = cells(table)
+    if not rows:
+        return [False] * len(table.columns)
+    return [all(cell.value for cell in column) for column in zip(*rows, strict=True)]
+
+
+def _cell(value: Any, is_status: bool) -> Cell:
+    text = shown(value)
+    if is_status:
+        return Cell(text=text, badge=light(text))
+    return Cell(text=text, value=sort_key(value))
+
+
+def is_long(text: str) -> bool:
+    """Whether a text has a word that no column is wide enough for."""
+    return max(map(len, text.split()), default=0) > LONG
+
+
+def shown(value: Any) -> str:
+    """Return a cell's text: numbers with the digits that a reader can use."""
+    if isinstance(value, float | np.floating):
+        return f"{value:.6g}"
+    return "" if value is None else str(value)
+
+
+def sort_key(value: Any) -> str:
+    """Return the number that a cell holds, as a browser reads it; empty where it is none."""
+    if isinstance(value, bool | np.bool_):
+        return ""
+    if isinstance(value, str):
+        try:
+            value = float(value.strip().replace("−", "-"))
+        except ValueError:
+            return ""
+    if not isinstance(value, Real):
+        return ""
+    return {"inf": "Infinity", "-inf": "-Infinity", "nan": "NaN"}.get(
+        repr(float(value)), repr(float(value))
+    )
+
+
+def light(status: str) -> str:
+    """Return the look of a status: pass, proved, checked, caution, fail, or neutral."""
+    return _LIGHT_OF.get(status.strip().lower(), "neutral")
+
+
+def claim_status(claim: Claim) -> tuple[str, str]:
+    """Return a claim's status and its look; one that does not hold never looks well."""
+    status = claim.status or ("holds" if claim.holds else "fails")
+    look = light(status)
+    if not claim.holds and look != "caution":
+        return status if look == "fail" else "fails", "fail"
+    return status, look
+
+
+def summary(claims: Sequence[Claim]) -> tuple[str, str]:
+    """Return the report's traffic light, and the sentence that it stands for.
+
+    Parameters
+    ----------
+    claims : sequence of Claim
+
+    Returns
+    -------
+    look, sentence : str
+    """
+    statuses = [claim_status(claim) for claim in claims]
+    looks = [look for _, look in statuses]
+    failed, open_ = looks.count("fail"), looks.count("caution")
+    if failed:
+        return "fail", f"{failed} of {len(claims)} claims {'fails' if failed == 1 else 'fail'}."
+    if open_:
+        return "caution", f"{open_} of {len(claims)} claims {'is' if open_ == 1 else 'are'} open."
+    if not claims:
+        return "neutral", "No claims are made."
+    kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
+    told = ", ".join(f"{number} {status}" for status, number in kinds.items())
+    hold = "The claim holds" if len(claims) == 1 else f"All {len(claims)} claims hold"
+    return "pass", f"{hold}: {told}." if told else f"{hold}."

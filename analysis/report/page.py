@@ -1,0 +1,89 @@
+"""The shell of a page: Jinja2 environment, own style and script, content policy, writing."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from nlctl._files import replace_file
+
+from .formula import mathml
+from .math_font import font_face
+from .outline import cells, claim_status, is_long, numeric
+
+__all__ = ["fill", "parts", "to_bytes", "write_files"]
+
+DOI = re.compile(r"(?:\bdoi:?\s*|https://doi\.org/)(10\.\d{4,9}/[\w.()/:-]*\w)", re.IGNORECASE)
+CONTROL = {code: "\ufffd" for code in [*range(32), *range(127, 160)] if chr(code) not in "\t\n\r"}
+
+
+def fill(template: str, **content: object) -> str:
+    """Return a template filled in, with the page's style and script, and the policy for them."""
+    style, script = font_face() + _own("report.css"), _own("report.js")
+    page = _environment().get_template(template)
+    text = page.render(
+        style=Markup(style), script=Markup(script), policy=_policy(style, script), **content
+    )
+    return text.translate(CONTROL)
+
+
+def _policy(style: str, script: str) -> str:
+    """Return the content policy: this style, this script, pictures and fonts in the page."""
+    return (
+        f"default-src 'none'; style-src '{_digest(style)}'; script-src '{_digest(script)}'; "
+        "img-src data:; font-src data:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _digest(text: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+def _own(name: str) -> str:
+    return files("analysis.report").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("analysis.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "cells": cells,
+        "claim_status": claim_status,
+        "long": is_long,
+        "mathml": mathml,
+        "numeric": numeric,
+        "parts": parts,
+    }
+    return environment
+
+
+def parts(text: str) -> list[tuple[str, str]]:
+    """Split a text at its DOIs: pairs of plain text and the DOI after it, or nothing."""
+    plain, *found = DOI.split(text)
+    texts, dois = [plain, *found[1::2]], [*found[0::2], ""]
+    return [(f"{t}doi " if d else t, d) for t, d in zip(texts, dois, strict=True)]
+
+
+def to_bytes(text: str) -> bytes:
+    """Return a text as UTF-8; halves of characters, which have no UTF-8, are spelt out."""
+    return text.encode(errors="backslashreplace")
+
+
+def write_files(folder: Path, texts: dict[str, str]) -> None:
+    """Write texts as files of a folder, which is made where it does not exist."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        replace_file(folder / name, lambda file, text=text: file.write(to_bytes(text)))

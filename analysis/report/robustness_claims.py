@@ -1,0 +1,164 @@
+"""The verdict on a study, and the claims behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from nlctl._errors import UsageError
+
+from ..robustness.guarantee import _down, _up, check_iid
+from .document import Claim
+from .robustness_text import DID_NOT_END, margin_text
+
+if TYPE_CHECKING:
+    from analysis.studies.result import Finding, Result
+
+__all__ = ["asked_of", "claims", "refusal", "verdict"]
+
+STATEMENTS = ("probability", "sequential")
+
+
+def asked_of(result: Result) -> dict[str, Any]:
+    """Return what the study file asks of each analysis that is done, by key of its finding."""
+    pairs = zip(result.findings, result.study.analysis, strict=False)  # the rest is not done
+    return {finding.key: asked for finding, asked in pairs}
+
+
+def verdict(result: Result) -> str:
+    """Return the report's first sentences: what fails, and the statement with its assumptions."""
+    told = []
+    failing = [finding.claim for finding in result.claims if not finding.holds]
+    if not result.complete:
+        told.append(result.verdict)
+    elif failing:
+        told.append(f"What does not hold: {'; '.join(failing)}.")
+    statements = [f.sentence for f in result.findings if f.kind in STATEMENTS]
+    if statements:
+        told.append(statements[0])
+    elif refused := refusal(result):
+        told.append(f"There is no statement about a probability: {refused}.")
+    else:
+        told.append("The study asks for no statement about a probability.")
+    return " ".join(told)
+
+
+def refusal(result: Result) -> str:
+    """Return why the rows of the main table support no guarantee; empty if they may."""
+    if result.rows is None or result.rows.design is None:
+        return ""
+    try:
+        check_iid(result.rows.design)
+    except UsageError as refused:
+        return str(refused)
+    return ""
+
+
+def claims(result: Result, prefix: str = "") -> list[Claim]:
+    """Return what the study claims, with what was found.
+
+    A claim that holds was sampled, never proved.
+    """
+    asked = asked_of(result)
+    return [
+        Claim(
+            text=finding.claim,
+            holds=bool(finding.holds),
+            evidence=f"{prefix}{finding.key}",
+            **(MEASURED.get(finding.kind, _sentence)(finding, asked[finding.key])),
+        )
+        for finding in result.claims
+    ]
+
+
+def _sentence(finding: Finding, asked: Any) -> dict[str, str]:
+    return {"measured": finding.sentence, "limit": finding.claim, "status": "sampled"}
+
+
+def _probability(finding: Finding, asked: Any) -> dict[str, str]:
+    n = finding.numbers
+    return {
+        "measured": f"{n['violations']} of {n['runs']} runs; at most {_up(n['upper'])} with "
+        f"confidence {100 * n['confidence']:g} %",
+        "limit": f"≤ {asked.limit:g}",
+        "margin": f"{asked.limit - n['upper']:.3g}",
+        "status": "sampled",
+    }
+
+
+def _sequential(finding: Finding, asked: Any) -> dict[str, str]:
+    n = finding.numbers
+    undecided = n["decision"] == "undecided"
+    return {
+        "measured": f"{n['violations']} of {n['runs']} runs; {_down(n['lower'])} to "
+        f"{_up(n['upper'])} with confidence {100 * n['confidence']:g} %",
+        "limit": f"< {asked.limit:g}",
+        "margin": f"{asked.limit - n['upper']:.3g}",
+        "status": "undecided" if undecided else "sampled",
+    }
+
+
+def _worst_case(finding: Finding, asked: Any) -> dict[str, str]:
+    n = finding.numbers
+    doubted = not finding.holds and not n.get("is_confirmed", True)
+    ended = margin_text(n["margin"]) == DID_NOT_END
+    return {
+        "measured": "a run that did not reach its end"
+        if ended
+        else f"lowest margin found: {margin_text(n['margin'])}",
+        "limit": f"> {asked.limit:g}",
+        "margin": "" if ended else f"{n['margin'] - asked.limit:.3g}",
+        "status": "not confirmed" if doubted else "sampled",
+    }
+
+
+def _radius(finding: Finding, asked: Any) -> dict[str, str]:
+    n = finding.numbers
+    found = f"violation at size {n['upper']:.4g}"
+    if n["witness"] is None:
+        found = f"no violation found up to size {n['largest']:.4g}"
+    return {
+        "measured": found,
+        "limit": f"≥ {asked.limit:g}",
+        "margin": f"{min(n['upper'], n['largest']) - asked.limit:.3g}",
+        "status": "sampled",
+    }
+
+
+def _degradation(finding: Finding, asked: Any) -> dict[str, str]:
+    row = finding.tables["curve"].loc[asked.at]
+    return {
+        "measured": f"{row['violations']:.0f} of {row['runs']:.0f} runs at size {asked.at:g}; at "
+        f"most {_up(row['upper'])} with confidence {100 * asked.confidence:g} %",
+        "limit": f"≤ {asked.limit:g}",
+        "margin": f"{asked.limit - row['upper']:.3g}",
+        "status": "sampled",
+    }
+
+
+def _compare(finding: Finding, asked: Any) -> dict[str, str]:
+    a, b = asked.better
+    metric = next(iter(asked.metrics))
+    pairs = finding.tables["differences"].loc[metric]
+    row, text = (
+        (pairs.loc[(a, b)], f"{a} − {b}")
+        if (a, b) in pairs.index
+        else (pairs.loc[(b, a)], f"{b} − {a}")
+    )
+    level = 1 - asked.confidence
+    return {
+        "measured": f"median of {text} in {metric}: {row['median']:.4g}, p = {row['p_holm']:.2g}",
+        "limit": f"p ≤ {level:.2g}, {asked.metrics[metric]} is better",
+        "margin": f"{level - row['p_holm']:.2g}",
+        "status": "sampled",
+    }
+
+
+MEASURED: dict[str, Callable[..., dict[str, str]]] = {
+    "probability": _probability,
+    "sequential": _sequential,
+    "worst case": _worst_case,
+    "radius": _radius,
+    "degradation": _degradation,
+    "compare": _compare,
+}

@@ -1,0 +1,123 @@
+"""Some rows of a study simulated again, with their signals kept: what its fans are drawn from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl.native import Status, ensemble_response
+
+from ..robustness.evaluation import as_table, margins_of
+from ..robustness.experiment import Prepared
+from ..robustness.space import arguments, nominal
+
+__all__ = ["Histories", "histories"]
+
+MOST = 4  # signals
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Histories:
+    """Signals of some rows.
+
+    Attributes
+    ----------
+    time : ndarray of shape (m,)
+        In s.
+    signals : dict of ndarray of shape (rows, m)
+        What the spec looks at, NaN after the end of a run.
+    nominal, worst : dict of ndarray of shape (m,)
+        The same of the nominal values, and of the row with the lowest margin that is known.
+    margin : float
+        That margin.
+    ended : int
+        How many of the rows did not reach their end.
+    """
+
+    time: np.ndarray
+    signals: Mapping[str, np.ndarray]
+    nominal: Mapping[str, np.ndarray]
+    worst: Mapping[str, np.ndarray]
+    margin: float
+    ended: int
+
+
+def histories(
+    prepared: Prepared,
+    table: pd.DataFrame,
+    witness: tuple[Mapping[str, Any], float] | None = None,
+    *,
+    most: int = 200,
+    threads: int | None = None,
+) -> Histories:
+    """Simulate the first rows of a table again, the nominal one, and the worst one.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        With nominal values.
+    table : pandas.DataFrame
+        Rows with their margins ``spec``.  Of independent draws the first ones are such as well.
+    witness : (row, margin), optional
+        Of a search; it is the worst row if its margin is lower than all of the table.
+    most : int, optional
+        Number of rows.
+    threads : int, optional
+
+    Raises
+    ------
+    SpaceError
+        If a quantity has no nominal value.
+    """
+    space = prepared.experiment.space
+    margins = margins_of(table)
+    lowest = int(np.argmin(margins))
+    worst, margin = table.iloc[lowest].to_dict(), float(margins[lowest])
+    if witness is not None and not witness[1] >= margin:
+        worst, margin = dict(witness[0]), float(witness[1])
+    count = min(most, len(table))
+    both = as_table(space, [nominal(space), {name: worst[name] for name in space.names}])
+    rows = pd.concat([both, table.loc[:, space.names].iloc[:count]], ignore_index=True)
+    signals, status = _kept(prepared, rows, threads)
+    return Histories(
+        time=np.asarray(prepared.experiment.timepts, dtype=float),
+        signals={name: samples[2:] for name, samples in signals.items()},
+        nominal={name: samples[0] for name, samples in signals.items()},
+        worst={name: samples[1] for name, samples in signals.items()},
+        margin=margin,
+        ended=int(np.sum(status[2:] != Status.OK.name)),
+    )
+
+
+def _kept(
+    prepared: Prepared, rows: pd.DataFrame, threads: int | None
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Return signals and status of rows; rows with the same labels share a diagram."""
+    study = prepared.experiment
+    names = _signals(study.spec.requirements)
+    kept = {name: np.full((len(rows), len(study.timepts)), np.nan) for name in names}
+    status = np.full(len(rows), "", dtype=object)
+    for labels, loop in prepared.loops:
+        same = np.logical_and.reduce(
+            [np.ones(len(rows), dtype=bool), *(rows[n] == label for n, label in labels.items())]
+        )
+        if same.any():
+            varied = arguments(study.space, rows.loc[same])
+            found = ensemble_response(
+                loop, study.timepts, study.inputs, varied["initial_state"],
+                params=varied["params"], keep=names, threads=threads, rtol=study.rtol,
+                atol=study.atol, max_steps=study.max_steps, method=study.method,
+            )  # fmt: skip
+            status[same] = found.table["status"].to_numpy()
+            for name in names:
+                kept[name][same] = found.signals[name]
+    return kept, status
+
+
+def _signals(requirements: Sequence[Any]) -> list[str]:
+    """Return the signals that the spec looks at, each once."""
+    return list(dict.fromkeys(s for r in requirements for s in r.signals))[:MOST]

@@ -1,0 +1,168 @@
+"""matplotlib figure -> inline SVG: the same bytes every time, in the page's colours."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Mapping
+from typing import Any
+from xml.etree import ElementTree
+
+import matplotlib as mpl
+from markupsafe import Markup
+
+from nlctl import drawing
+
+from .. import figures
+from .document import Figure
+
+__all__ = ["shapes_svg", "svg"]
+
+# Colours of the figures that follow the page's theme, by the page's own names for them.
+THEME = {
+    "#000000": "currentColor",
+    drawing.INK: "currentColor",
+    drawing.GREY: "var(--soft)",
+    drawing.FILL: "var(--panel)",
+    figures.GREY: "var(--soft)",
+}
+SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": 9.0}
+WIDE = 450.0  # points; a phone shows wider figures in a box that scrolls
+DECIMALS = re.compile(r"-?\d+\.\d{2,}")
+CURVED = re.compile("[CQ]")
+PLACE = re.compile(r"translate\([^)]*\)|^[-\d.]+$")
+URL = re.compile(r"url\(#([^)]*)\)")
+
+
+def svg(figure: Figure, key: str, shapes: dict[str, str]) -> Markup:
+    """Return a figure as inline SVG, the same bytes every time.
+
+    Letters and markers are drawn from `shapes`, which all figures of a page share.  Of the other
+    ids only those that are referred to stay, with `key` in front.  Styles become attributes,
+    because the page's content policy forbids inline styles; ink, grey and fill take the page's
+    colours, so that dark pages work.
+
+    Parameters
+    ----------
+    figure : Figure
+    key : str
+        Unique on the page.
+    shapes : dict
+        Definition of each shape, and its id; new ones are added.
+    """
+    buffer = io.BytesIO()
+    with mpl.rc_context(SETTINGS):
+        figure.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+    root = ElementTree.fromstring(buffer.getvalue())
+    for element in root.iter():
+        _plain(element)
+    shared = _share(root, shapes)
+    referred = {name for e in root.iter() for v in e.attrib.values() for name in URL.findall(v)}
+    for element in root.iter():
+        _rename(element, key, shared, referred)
+    _unwrap(root)
+    attributes = {"role": "img", "aria-labelledby": f"{key}-title {key}-desc"}
+    if float(root.get("width", "0pt").removesuffix("pt")) > WIDE:
+        attributes["class"] = "wide"
+    root.attrib = attributes | {k: v for k, v in root.attrib.items() if k != "version"}
+    title = ElementTree.Element("title", id=f"{key}-title")
+    description = ElementTree.Element("desc", id=f"{key}-desc")
+    title.text, description.text = figure.caption, figure.description
+    root[:] = [title, description, *root]
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def shapes_svg(shapes: Mapping[str, str]) -> Markup:
+    """Return the shapes that the figures of a page are drawn from, as an SVG without size."""
+    paths = "".join(text.replace("<path", f'<path id="{name}"', 1) for text, name in shapes.items())
+    return Markup(
+        f'<svg class="shapes" aria-hidden="true" width="0" height="0"><defs>{paths}</defs></svg>'
+    )
+
+
+def _plain(element: ElementTree.Element) -> None:
+    """Drop namespaces, styles and addresses; set colours of the theme."""
+    element.tag = _local(element.tag)
+    attributes = {_local(name): value for name, value in element.attrib.items()}
+    for rule in attributes.pop("style", "").split(";"):
+        name, colon, value = rule.partition(":")
+        if colon:
+            attributes[name.strip()] = value.strip()
+    target = attributes.pop("href", "")
+    if target.startswith(("#", "data:image/png;")):
+        attributes["href"] = "".join(target.split())
+    if "d" in attributes:
+        attributes["d"] = _short_path(attributes["d"])
+    for name in {"x", "y", "transform"} & attributes.keys():
+        attributes[name] = PLACE.sub(lambda m: DECIMALS.sub(_hundredths, m[0]), attributes[name])
+    if attributes.get("fill") == "#ffffff" and "stroke" in attributes:
+        attributes["fill"] = "var(--page)"  # frames of legends, faces of markers; not white text
+    element.attrib = {
+        name: THEME.get(value.lower(), " ".join(value.split()))
+        for name, value in attributes.items()
+    }
+    element.text = None  # letters are paths
+    element.tail = "\n"
+
+
+def _share(root: ElementTree.Element, shapes: dict[str, str]) -> dict[str, str]:
+    """Move letters and markers to the shapes of the page; return their ids, old and new."""
+    shared = {}
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag in ("metadata", "style"):
+                parent.remove(child)
+            elif parent.tag == "defs" and child.tag == "path":
+                parent.remove(child)
+                old = child.attrib.pop("id", "")
+                text = ElementTree.tostring(child, encoding="unicode")
+                shared[old] = shapes.setdefault(text, f"g:{len(shapes) + 1}")
+    for parent in list(root.iter()):
+        parent[:] = [child for child in parent if child.tag != "defs" or len(child)]
+    return shared
+
+
+def _rename(
+    element: ElementTree.Element, key: str, shared: Mapping[str, str], referred: set[str]
+) -> None:
+    """Make ids and the references to them those of the page."""
+    attributes = element.attrib
+    if attributes.get("href", "").startswith("#"):
+        target = attributes.pop("href")[1:]
+        if target in shared:
+            attributes["href"] = f"#{shared[target]}"
+    own = attributes.pop("id", None)
+    if own in referred:
+        attributes["id"] = f"{key}-{own}"
+    for name, value in attributes.items():
+        attributes[name] = URL.sub(rf"url(#{key}-\1)", value)
+
+
+def _unwrap(element: ElementTree.Element) -> None:
+    """Put the content of groups that say nothing in their place."""
+    children = []
+    for child in element:
+        _unwrap(child)
+        children += list(child) if child.tag == "g" and not child.attrib else [child]
+    element[:] = children
+
+
+def _short_path(path: str) -> str:
+    """Return path data in fewer characters: curves to a hundredth of a point, lines to a tenth."""
+    path = " ".join(path.split())
+    if CURVED.search(path):
+        return DECIMALS.sub(_hundredths, path)
+    return DECIMALS.sub(_tenths, path).replace(" L ", " ")  # after a move, a line is understood
+
+
+def _tenths(number: re.Match[str]) -> str:
+    return f"{float(number[0]):.1f}".removesuffix(".0")
+
+
+def _hundredths(number: re.Match[str]) -> str:
+    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
+
+
+def _local(name: str) -> str:
+    """Return a name without its namespace."""
+    return name.rpartition("}")[2]

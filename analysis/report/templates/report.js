@@ -1,0 +1,84 @@
+"use strict";
+// Without this script everything is readable; with it tables sort and filter, figures enlarge.
+const make = (tag, text, parent) => {
+  const element = document.createElement(tag);
+  element.textContent = text;
+  parent?.append(element);
+  return element;
+};
+
+// A cell's number if it has one, else its text; numbers first, NaN and empty cells last.
+const keyOf = (row, column) => {
+  const cell = row.cells[column];
+  const value = cell?.dataset.value;
+  return value === undefined ? (cell?.textContent.trim() ?? "") : Number(value);
+};
+const isLast = (key) => key === "" || Number.isNaN(key);
+const compare = (a, b, direction) => {
+  if (isLast(a) || isLast(b)) return isLast(a) - isLast(b);
+  if (typeof a !== typeof b) return typeof a === "number" ? -1 : 1;
+  if (typeof a === "number") return direction * (a < b ? -1 : a > b ? 1 : 0);
+  return direction * a.localeCompare(b, "en", { numeric: true });
+};
+
+for (const table of document.querySelectorAll("table.data")) {
+  const body = table.tBodies[0];
+  const heads = [...table.tHead.rows[0].cells];
+  heads.forEach((head, column) => {
+    if (body.rows.length < 3 || head.className === "plain") return;
+    const button = make("button", "");
+    button.type = "button";
+    button.append(...head.childNodes);
+    head.append(button);
+    button.addEventListener("click", () => {
+      const direction = head.getAttribute("aria-sort") === "ascending" ? -1 : 1;
+      heads.forEach((other) => other.removeAttribute("aria-sort"));
+      head.setAttribute("aria-sort", direction === 1 ? "ascending" : "descending");
+      const rows = [...body.rows].map((row) => [keyOf(row, column), row]);
+      rows.sort((a, b) => compare(a[0], b[0], direction));
+      body.append(...rows.map(([, row]) => row));
+    });
+  });
+  if (table.classList.contains("many")) {
+    const bar = make("div", "");
+    bar.className = "filter";
+    const input = make("input", "", make("label", "Filter rows", bar));
+    input.type = "search";
+    const count = make("span", "", bar);
+    count.setAttribute("role", "status");
+    table.parentElement.before(bar);
+    input.addEventListener("input", () => {
+      const words = input.value.toLowerCase().split(/\s+/).filter(Boolean);
+      const rows = [...body.rows];
+      for (const row of rows) {
+        const text = row.textContent.toLowerCase();
+        row.hidden = !words.every((word) => text.includes(word));
+      }
+      const left = rows.filter((row) => !row.hidden).length;
+      count.textContent = words.length ? `${left} of ${rows.length} rows` : "";
+    });
+  }
+}
+
+const dialog = make("dialog", "", document.body);
+dialog.setAttribute("aria-label", "Enlarged figure");
+const close = make("button", "Close", dialog);
+close.addEventListener("click", () => dialog.close());
+let home = null;
+const enlarge = (drawing) => {
+  if (home) return;
+  home = drawing.parentElement;
+  dialog.append(drawing);
+  dialog.showModal();
+};
+dialog.addEventListener("close", () => {
+  home.prepend(dialog.querySelector(".drawing"));
+  home = null;
+});
+for (const figure of document.querySelectorAll("figure")) {
+  const drawing = figure.querySelector(".drawing");
+  const button = make("button", "Enlarge", figure.querySelector("figcaption"));
+  button.setAttribute("aria-label", `Enlarge figure ${figure.id}`);
+  button.addEventListener("click", () => enlarge(drawing));
+  drawing.addEventListener("click", () => enlarge(drawing));
+}

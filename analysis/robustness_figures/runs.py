@@ -1,0 +1,159 @@
+"""Figures of many runs: their margins, how sure one is after how many, and their signals.
+
+A run violates the spec unless its margin is > 0: NaN, and margins of runs that did not reach their
+end, are drawn as violations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from ..figures import BLUE, GREY, ORANGE, TIME, _axes, _style
+from .labels import plain
+
+__all__ = ["CLIP", "fans", "margins", "quantile", "running_estimate", "shown"]
+
+CLIP = 2.0
+"""Margins below -CLIP are drawn at -CLIP: beyond, how far says little."""
+BANDS = ((0.0, 1.0, 0.2), (0.05, 0.95, 0.35), (0.25, 0.75, 0.6))  # quantiles, opacity
+STRETCHES = 240  # of time, in which the ends of a band are drawn as lines
+
+
+def shown(values: object) -> np.ndarray:
+    """Return margins as they are drawn: clipped at -CLIP, NaN there as well."""
+    y = np.asarray(values, dtype=float)
+    return np.maximum(np.where(np.isnan(y), -np.inf, y), -CLIP)
+
+
+def margins(values: np.ndarray) -> Figure:
+    """How many runs have which margin, and the share of runs with at most that margin."""
+    figure = Figure(figsize=(9.0, 2.8), layout="constrained")
+    counts, part = figure.subplots(1, 2)
+    y = shown(values)
+    violated = ~(y > 0)
+    low, high = min(float(y.min()), 0.0), max(float(y.max()), 0.0)
+    width = (high - low or 1.0) / 40
+    edges = width * np.arange(np.floor(low / width) - 1, np.ceil(high / width) + 2)  # 0 is an edge
+    counts.hist(y[~violated], edges, color=BLUE, label="holds")
+    if violated.any():
+        at = np.minimum(y[violated], -width / 2)  # a margin of 0 is a violation
+        counts.hist(at, edges, color=ORANGE, hatch="///", edgecolor="white", label="violates")
+    counts.legend(frameon=False)
+    counts.set(xlabel="margin (1)", ylabel="runs")
+    ordered = np.sort(y)
+    share = np.arange(1, y.size + 1) / y.size
+    part.step(ordered, share, where="post", color=BLUE, linewidth=1.4)
+    rate = float(np.mean(violated))
+    if rate:
+        below = ordered <= 0
+        part.fill_between(ordered[below], share[below], step="post", color=ORANGE, alpha=0.5)
+    part.axvline(0.0, color=GREY, linewidth=1.0, linestyle="--")
+    part.set(xlabel="margin (1)", ylabel="share of runs", ylim=(0.0, 1.02))
+    part.yaxis.set_major_formatter(PercentFormatter(1.0))
+    for ax in (counts, part):
+        _style(ax)
+    counts.yaxis.set_major_locator(MaxNLocator(integer=True))
+    return figure
+
+
+def running_estimate(curve: pd.DataFrame, limit: float | None = None) -> Figure:
+    """Share of violations after n runs, and bounds that hold at all n together.
+
+    Parameters
+    ----------
+    curve : DataFrame
+        Columns rate, low, high, indexed by the number of runs.
+    limit : float, optional
+        Of the claim.
+    """
+    figure, (ax,) = _axes()
+    n = curve.index.to_numpy()
+    ax.fill_between(n, curve["low"], curve["high"], color=BLUE, alpha=0.2, linewidth=0)
+    ax.plot(n, curve["rate"], color=BLUE, linewidth=1.4)
+    if limit is not None:
+        ax.axhline(limit, color=ORANGE, linewidth=1.2, linestyle="--", label="limit")
+        ax.legend(frameon=False)
+    top = float(np.max(curve["high"].to_numpy()[n >= min(30, n[-1])]))
+    ax.set(xscale="log", xlabel="runs", ylabel="probability of a violation")
+    top = min(1.0, 1.2 * max(top, limit or 0.0)) or 1.0
+    ax.set_ylim(-0.03 * top, top)
+    return figure
+
+
+def fans(
+    time: np.ndarray,
+    signals: Mapping[str, np.ndarray],
+    nominal: Mapping[str, np.ndarray],
+    worst: Mapping[str, np.ndarray],
+) -> Figure:
+    """Bands that hold all, 90 % and 50 % of the runs, with the nominal and the worst run.
+
+    Where a run has ended early it counts as lying beyond both ends of every band.
+
+    Parameters
+    ----------
+    time : ndarray of shape (m,)
+    signals : mapping
+        Samples of shape (runs, m) by name, NaN after a run has ended.
+    nominal, worst : mapping
+        Samples of shape (m,) by name.
+    """
+    figure, axes = _axes(rows=len(signals), height=2.2)
+    nodes = np.unique(np.linspace(0, time.size - 1, STRETCHES + 1).astype(int))
+    for ax, (name, samples) in zip(axes, signals.items(), strict=True):
+        lines = np.array([nominal[name], worst[name]])
+        low, high = _limits(np.concatenate([samples, lines]))
+        for start, end, opacity in BANDS:
+            lower = -envelope(-quantile(samples, start, -np.inf), nodes)
+            upper = envelope(quantile(samples, end, np.inf), nodes)
+            band = np.clip([lower, upper], low, high)
+            inside = f"{100 * (end - start):.0f} % of the runs"
+            ax.fill_between(
+                time[nodes], *band, color=BLUE, alpha=opacity, linewidth=0, label=inside
+            )
+        ax.plot(time, np.clip(worst[name], low, high), "--", color=ORANGE, label="worst run")
+        ax.plot(time, np.clip(nominal[name], low, high), color=GREY, label="nominal")
+        ax.set_ylabel(plain(name), parse_math=False)
+    axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    axes[-1].set_xlabel(TIME)
+    return figure
+
+
+def quantile(samples: np.ndarray, part: float, missing: float) -> np.ndarray:
+    """Return a quantile over the runs (axis 0), one of their values; NaN counts as `missing`.
+
+    It is the next value outwards: upwards if `missing` is positive, otherwise downwards.
+    """
+    ordered = np.sort(np.where(np.isnan(samples), missing, samples), axis=0)
+    place = part * (len(ordered) - 1)
+    return ordered[int(np.ceil(place) if missing > 0 else np.floor(place))]
+
+
+def envelope(y: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Return values at some samples so that the lines between them lie nowhere below `y`.
+
+    Parameters
+    ----------
+    y : ndarray of shape (m,)
+    nodes : ndarray of int, shape (k,)
+        Increasing from 0 to m - 1.
+    """
+    most = np.maximum.reduceat(y, nodes[:-1])
+    most[-1] = max(most[-1], y[-1])
+    return np.maximum(np.append(most[0], most), np.append(most, most[-1]))
+
+
+def _limits(samples: np.ndarray) -> tuple[float, float]:
+    """Return the range that is drawn: of all samples, unless few of them lie far outside."""
+    finite = samples[np.isfinite(samples)]
+    if not finite.size:
+        return -1.0, 1.0
+    inner = np.quantile(finite, (0.005, 0.995))
+    spread = float(inner[1] - inner[0]) or 1.0
+    low, high = max(finite.min(), inner[0] - spread), min(finite.max(), inner[1] + spread)
+    return float(low), float(high)

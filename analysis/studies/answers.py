@@ -1,0 +1,167 @@
+"""One analysis of a study -> what it has found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from analysis.robustness import (
+    Design,
+    decide,
+    elementary_effects,
+    regional,
+    sobol_indices,
+    violation_probability,
+)
+from analysis.robustness.sweep import Sweep
+from nlctl._errors import UsageError
+
+from .analyses import Morris, Probability, Regional, Sequential, Sobol
+from .build import own_design
+from .comparison import comparison
+from .ground import Ground, column, made, statement_numbers
+from .result import Finding
+from .searches import degradation, failures, lowest_margin, radius
+
+__all__ = ["answer", "unanswered"]
+
+
+def answer(key: str, asked: Any, ground: Ground) -> Finding | None:
+    """Run one analysis.
+
+    Returns
+    -------
+    Finding
+        None if its rows are incomplete.
+
+    Raises
+    ------
+    UsageError
+        If the rows do not admit the analysis, such as a regional one where all rows pass.
+    KeyboardInterrupt
+        If Ctrl-C ended a search.
+    """
+    found = KINDS[asked.kind](asked, ground)
+    if found is None:
+        return None
+    return _headed(key, asked, found)
+
+
+def unanswered(key: str, asked: Any, error: UsageError) -> Finding:
+    """Return what stands in the place of an analysis that the rows or the loop do not admit."""
+    found = made(asked, f"Not answered: {error}.", claim="the analysis can be made", holds=False)
+    return _headed(key, asked, found)
+
+
+def _headed(key: str, asked: Any, found: Finding) -> Finding:
+    return replace(found, key=key, title=asked.title or key.replace("-", " ").capitalize())
+
+
+def _probability(asked: Probability, ground: Ground) -> Finding:
+    design, margins = ground.main
+    found = violation_probability(design, margins, asked.confidence, asked.side)
+    claim = "" if asked.limit is None else f"a violation has at most probability {asked.limit:g}"
+    return made(
+        asked,
+        str(found),
+        claim=claim,
+        holds=None if asked.limit is None else found.upper <= asked.limit,
+        runs=found.runs,
+        numbers=statement_numbers(found),
+    )
+
+
+def _sequential(asked: Sequential, ground: Ground) -> Finding:
+    design, margins = ground.main
+    test = decide(design, margins, asked.limit, asked.confidence)
+    return made(
+        asked,
+        str(test),
+        claim=f"the probability of a violation is below {asked.limit:g}",
+        holds=test.decision == "below",
+        runs=test.statement.runs,
+        numbers={"decision": test.decision, **statement_numbers(test.statement)},
+    )
+
+
+def _morris(asked: Morris, ground: Ground) -> Finding | None:
+    design, done = _own_rows(asked, ground)
+    if not done.complete:
+        return None
+    table = elementary_effects(design, column(done, asked.of))
+    order = ", ".join(table.nlargest(3, "mu_star").index)
+    return made(
+        asked,
+        f"Largest mean effects on '{asked.of}': {order} ({done.done} runs of a Morris design, "
+        f"which screens and proves nothing{_failed(done)}).",
+        runs=done.done,
+        numbers={"of": asked.of, "trajectories": asked.trajectories},
+        tables={"effects": table},
+    )
+
+
+def _sobol(asked: Sobol, ground: Ground) -> Finding | None:
+    design, done = _own_rows(asked, ground)
+    if not done.complete:
+        return None
+    table = sobol_indices(design, column(done, asked.of), asked.confidence)
+    largest = table.nlargest(3, "ST")["ST"].to_dict()
+    told = ", ".join(f"{name} ({share:.0%})" for name, share in largest.items())
+    return made(
+        asked,
+        f"Largest shares of the variance of '{asked.of}', interactions included: {told} "
+        f"({done.done} runs{_failed(done)}; intervals by bootstrap with confidence "
+        f"{100 * asked.confidence:g} % each).",
+        runs=done.done,
+        numbers={"of": asked.of, "confidence": asked.confidence},
+        tables={"indices": table},
+    )
+
+
+def _own_rows(asked: Any, ground: Ground) -> tuple[Design, Sweep]:
+    """Run the analysis' own design."""
+    design = own_design(asked, ground.prepared.experiment.space, ground.seed)
+    assert design is not None
+    return design, ground.run_design(design)
+
+
+def _failed(done: Sweep) -> str:
+    """Say how many rows did not reach their end: their margins are graded, far below others."""
+    count = np.count_nonzero(column(done, "status") != "OK")
+    return f", {count} of which did not reach their end" if count else ""
+
+
+def _regional(asked: Regional, ground: Ground) -> Finding:
+    design, margins = ground.main
+    passed = int(np.count_nonzero(margins > 0))
+    if passed in (0, margins.size):
+        which = "passes" if passed else "fails"
+        sentence = f"Every one of {margins.size} rows {which}: nothing sets failures apart."
+        return made(asked, sentence, runs=margins.size)
+    table = regional(design, margins)
+    largest = table.nlargest(3, "statistic")["statistic"].to_dict()
+    told = ", ".join(f"{name} ({value:.2g})" for name, value in largest.items())
+    return made(
+        asked,
+        f"What sets {margins.size - passed} failing rows most apart from {passed} passing ones "
+        f"(distance of the two distributions, 0 to 1): {told}.",
+        runs=margins.size,
+        tables={"differences": table},
+    )
+
+
+KINDS: dict[str, Callable[..., Finding | None]] = {
+    "probability": _probability,
+    "sequential": _sequential,
+    "morris": _morris,
+    "sobol": _sobol,
+    "regional": _regional,
+    "worst case": lowest_margin,
+    "degradation": degradation,
+    "radius": radius,
+    "failure map": failures,
+    "compare": comparison,
+}

@@ -1,0 +1,239 @@
+"""Study file -> experiment and design."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.metrics import Metric
+from analysis.robustness import (
+    Choice,
+    Design,
+    Experiment,
+    Requirement,
+    Space,
+    Spec,
+    corners,
+    grid,
+    independent,
+    latin_hypercube,
+    morris,
+    one_at_a_time,
+    saltelli,
+    sobol,
+    tracking_metrics,
+)
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+
+from .analyses import Morris, Sobol
+from .formula_text import parse_formula
+from .parts import DEFAULT, loop_function, option, uncertain
+from .schema import Choices, Rows, Study
+
+__all__ = [
+    "choice",
+    "experiment",
+    "labels",
+    "loop",
+    "main_design",
+    "metrics_of",
+    "own_design",
+    "requirement",
+    "times",
+]
+
+MOST_SAMPLES = 10_000_000
+METRIC = ("key", "signals", "unit", "meaning", "function", "start", "end")
+SIGNALS = ("error", "control", "actuated", "weights", "gain")
+
+
+def loop(study: Study, folder: Path) -> partial[Any]:
+    """Return the function that builds the diagram, with the study's options set.
+
+    Raises
+    ------
+    UsageError
+        If it does not exist, or an option is refused.
+    """
+    options = {key: option(value, folder) for key, value in study.options.items()}
+    return partial(loop_function(study.loop, folder), **options)
+
+
+def choice(name: str, choices: Choices, build: Callable[..., Any], folder: Path) -> Choice:
+    """Return the choice that a table under ``[choices]`` describes.
+
+    Raises
+    ------
+    UsageError
+        If an option is refused, or nominal label or weights do not fit.
+    """
+    options = {
+        label: _default(name, build) if value == DEFAULT else option(value, folder)
+        for label, value in choices.options.items()
+    }
+    return replace(labels(name, choices), options=options)
+
+
+def labels(name: str, choices: Choices) -> Choice:
+    """Return a choice with its options as they stand in the file.
+
+    Raises
+    ------
+    UsageError
+        If nominal label or weights do not fit.
+    """
+    for label in choices.weights:
+        if label not in choices.options:
+            raise unknown("option", label, choices.options, f"in the weights of '{name}'")
+    weights = tuple(choices.weights.get(label, 0.0) for label in choices.options)
+    return Choice(
+        name=name,
+        options=choices.options,
+        nominal=choices.nominal,
+        weights=weights if choices.weights else (),
+    )
+
+
+def _default(name: str, build: Callable[..., Any]) -> Any:
+    keyword = inspect.signature(build).parameters.get(name)
+    if keyword is None or keyword.default is inspect.Parameter.empty:
+        raise ParameterError(f"the loop has no default for '{name}'")
+    return keyword.default
+
+
+def times(study: Study) -> np.ndarray:
+    """Return the sample times 0, step, ..., end.
+
+    Raises
+    ------
+    ParameterError
+        If the step is no whole part of the end, or far too short.
+    """
+    end, step = study.time.end, study.time.step
+    if end / step > MOST_SAMPLES:
+        raise ParameterError(
+            f"a run has at most {MOST_SAMPLES:,} samples, got {end:g} s / {step:g} s"
+        )
+    count = round(end / step)
+    if count < 2 or abs(count * step - end) > 1e-9 * end:
+        raise ParameterError(f"the end needs to be a multiple of the step, got {end:g} / {step:g}")
+    return np.linspace(0.0, end, count + 1)
+
+
+def requirement(study: Study, key: str) -> Requirement:
+    """Return a requirement of the study.
+
+    Raises
+    ------
+    UsageError
+        If the formula cannot be read, or looks beyond its end.
+    """
+    rule = study.spec[key]
+    until = study.time.end if rule.until is None else rule.until
+    return Requirement(
+        key=key, formula=parse_formula(rule.formula), until=until, meaning=rule.meaning
+    )  # fmt: skip
+
+
+def metrics_of(study: Study, folder: Path, signals: frozenset[str]) -> tuple[Metric, ...]:
+    """Return the metrics of the study; names that it leaves to us must be among `signals`.
+
+    Raises
+    ------
+    UsageError
+        If another metric of the study is refused, or is none.
+    """
+    if study.metrics is None:
+        return ()
+    asked = study.metrics
+    known = inspect.signature(tracking_metrics).parameters
+    names = {key: getattr(asked, key) for key in SIGNALS}
+    for key, given in names.items():
+        if given is None:
+            names[key] = known[key].default if known[key].default in signals else ""
+    start = study.time.end / 2 if asked.start is None else asked.start
+    usual = tracking_metrics(start=start, band=asked.band, swing=asked.swing, **names)
+    return (*usual, *(_metric(value, folder) for value in asked.more))
+
+
+def _metric(value: Any, folder: Path) -> Metric:
+    made = option(value, folder)
+    missing = [part for part in METRIC if not hasattr(made, part)]
+    if missing:
+        raise ParameterError(
+            f"a metric needs {', '.join(METRIC)}, what {value.get('function')} returns lacks "
+            f"{', '.join(missing)}; see analysis.metrics.Metric"
+        )
+    return made
+
+
+def experiment(study: Study, folder: Path, signals: frozenset[str]) -> Experiment:
+    """Return what is simulated for each row.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Of the study file.
+    signals : frozenset of str
+        Outputs that all diagrams of the study have.
+
+    Raises
+    ------
+    UsageError
+        As in the functions above.
+    """
+    build = loop(study, folder)
+    space = Space(
+        quantities=tuple(uncertain(name, law) for name, law in study.space.items()),
+        choices=tuple(choice(name, c, build, folder) for name, c in study.choices.items()),
+    )
+    return Experiment(
+        space=space,
+        build=build,
+        spec=Spec(requirements=tuple(requirement(study, key) for key in study.spec)),
+        timepts=times(study),
+        metrics=metrics_of(study, folder, signals),
+        **study.solver.model_dump(),
+    )
+
+
+def main_design(rows: Rows, space: Space, seed: int) -> Design:
+    """Return the rows of the main table.
+
+    Raises
+    ------
+    ParameterError
+        If a size is missing, or one is given that the design does not take.
+    """
+    sized = {"i.i.d.": independent, "Sobol'": sobol, "Latin hypercube": latin_hypercube}
+    takes = "size" if rows.design in sized else "levels" if rows.design == "grid" else ""
+    for key in ("size", "levels"):
+        if (getattr(rows, key) is None) == (key == takes):
+            verb = "needs" if key == takes else "takes no"
+            raise ParameterError(f"a design of kind '{rows.design}' {verb} {key}")
+    if rows.size is not None:
+        return sized[rows.design](space, rows.size, seed)
+    if rows.levels is not None:
+        return grid(space, rows.levels, seed)
+    return corners(space, seed) if rows.design == "corners" else one_at_a_time(space, entropy=seed)
+
+
+def own_design(asked: Any, space: Space, seed: int) -> Design | None:
+    """Return the rows that an analysis runs itself, where they are known in advance.
+
+    Raises
+    ------
+    ParameterError
+        If the analysis does not suit the space.
+    """
+    if isinstance(asked, Morris):
+        return morris(space, asked.trajectories, asked.levels, seed)
+    return saltelli(space, asked.size, seed) if isinstance(asked, Sobol) else None

@@ -1,0 +1,211 @@
+"""A study held against its loop: every name, every formula, every analysis."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import control as ct
+
+from analysis.metrics import Metric
+from analysis.robustness import Experiment, Requirement, Space, Uncertain, resolved
+from analysis.robustness.guarantee import check_iid
+from analysis.robustness.space import combinations
+from nlctl._errors import UsageError
+from nlctl._names import unknown
+
+from .analyses import Compare, Map
+from .build import (
+    SIGNALS,
+    choice,
+    experiment,
+    loop,
+    main_design,
+    metrics_of,
+    own_design,
+    requirement,
+    times,
+)
+from .comparison import alternatives, widened
+from .parts import check_keyword, loop_function, option, uncertain
+from .problems import Place, Problem
+from .schema import Study
+
+__all__ = ["bound", "keyed"]
+
+T = TypeVar("T")
+NEED_ROWS = ("probability", "sequential", "regional")
+
+
+class _Notes:
+    """Mistakes that are found one after the other."""
+
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
+
+    def add(self, place: Place, message: str) -> None:
+        self.problems.append(Problem(place=place, message=message))
+
+    def attempt(self, place: Place, make: Callable[..., T], *arguments: Any) -> T | None:
+        """Return what `make` returns; a mistake that it names is noted instead."""
+        try:
+            return make(*arguments)
+        except UsageError as error:
+            self.add(place, str(error))
+            return None
+
+
+def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]:
+    """Return the experiment of a study, and all mistakes; None if there are any.
+
+    Errors of another kind than `UsageError` come from the user's own functions and pass.
+    """
+    notes = _Notes()
+    notes.attempt(("time",), times, study)
+    requirements = [
+        made
+        for key in study.spec
+        if (made := notes.attempt(("spec", key), requirement, study, key)) is not None
+    ]
+    quantities = {
+        name: notes.attempt(("space", name), uncertain, name, law)
+        for name, law in study.space.items()
+    }
+    diagrams = _diagrams(study, folder, notes)
+    signals = frozenset.intersection(*(frozenset(d.output_labels) for d in diagrams or [_Empty]))
+    for diagram in diagrams:
+        _check_names(study, diagram, quantities, requirements, notes)
+    metrics = notes.attempt(("metrics",), metrics_of, study, folder, signals) if diagrams else None
+    _check_analyses(study, metrics, notes)
+    if notes.problems or not diagrams:
+        return None, _unique(notes.problems)
+    made = notes.attempt((), experiment, study, folder, signals)
+    if made is not None:
+        _check_designs(study, made, diagrams[0], folder, notes)
+    return made, _unique(notes.problems)
+
+
+class _Empty:
+    """Stands for a loop that could not be built."""
+
+    output_labels = ()
+
+
+def _unique(problems: Sequence[Problem]) -> list[Problem]:
+    """Leave out what several diagrams have in common."""
+    return list(dict.fromkeys(problems))
+
+
+def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputSystem]:
+    """Build the diagram of every combination of options that can be made."""
+    before = len(notes.problems)
+    function = notes.attempt(("loop",), loop_function, study.loop, folder)
+    for key, value in study.options.items():
+        if function is not None:
+            notes.attempt(("options", key), check_keyword, function, key)
+        notes.attempt(("options", key), option, value, folder)
+    if len(notes.problems) > before:
+        return []
+    build = loop(study, folder)
+    made = []
+    for name, asked in study.choices.items():
+        notes.attempt(("choices", name), check_keyword, build.func, name)
+        found = notes.attempt(("choices", name), choice, name, asked, build, folder)
+        made += [] if found is None else [found]
+    if len(notes.problems) > before:
+        return []
+    options = {c.name: c.options for c in made}
+    every = combinations(Space(choices=tuple(made))) if made else [{}]
+    built = []
+    for labels in every:
+        chosen = {name: options[name][label] for name, label in labels.items()}
+        system = notes.attempt(("loop",), partial(build, **chosen))
+        built += [] if system is None else [system]
+    return built
+
+
+def _check_names(
+    study: Study,
+    diagram: ct.InputOutputSystem,
+    quantities: Mapping[str, Uncertain | None],
+    requirements: Sequence[Requirement],
+    notes: _Notes,
+) -> None:
+    for name, quantity in quantities.items():
+        if quantity is not None:
+            notes.attempt(
+                ("space", name), resolved, Space(quantities=(quantity,)), diagram
+            )  # fmt: skip
+    for asked in requirements:
+        for signal in asked.signals:
+            if signal not in diagram.output_labels:
+                error = unknown("signal", signal, diagram.output_labels)
+                notes.add(("spec", asked.key), str(error))
+    for key in SIGNALS:
+        signal = getattr(study.metrics, key, None)
+        if signal and signal not in diagram.output_labels:
+            notes.add(("metrics", key), str(unknown("signal", signal, diagram.output_labels)))
+
+
+def keyed(study: Study) -> dict[str, Any]:
+    """Return the analyses by key: their own, or their kind, numbered where it is not alone."""
+    named: dict[str, Any] = {}
+    taken = {asked.key for asked in study.analysis}
+    for asked in study.analysis:
+        plain = asked.kind.replace(" ", "-")
+        key = asked.key or plain
+        numbers = itertools.count(2)
+        while key in named or (key in taken and not asked.key):
+            key = f"{plain}-{next(numbers)}"
+        named[key] = asked
+    return named
+
+
+def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Notes) -> None:
+    """Look at what can be said without the loop; `metrics` are None if they are not known."""
+    columns = ("spec", *study.spec, *(metric.key for metric in metrics or ()))
+    seen = {"rows"}
+    for i, asked in enumerate(study.analysis):
+        if asked.key in seen:
+            notes.add(("analysis", i, "key"), f"needs a key of its own, '{asked.key}' is taken")
+        seen |= {asked.key} - {""}
+        if asked.kind in NEED_ROWS and study.runs is None:
+            notes.add(("analysis", i), f"'{asked.kind}' looks at the main table: add [runs]")
+        of = getattr(asked, "of", "spec")
+        if metrics is not None and of not in columns:
+            notes.add(("analysis", i, "of"), str(unknown("column", of, columns)))
+        for key, name in _quantities_of(asked):
+            if name not in study.space:
+                notes.add(("analysis", i, key), str(unknown("quantity", name, study.space)))
+
+
+def _check_designs(
+    study: Study, made: Experiment, diagram: ct.InputOutputSystem, folder: Path, notes: _Notes
+) -> None:
+    """Make every design that is known in advance, and hold the analyses against it."""
+    space, main = resolved(made.space, diagram), None
+    if study.runs is not None:
+        main = notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
+    for i, asked in enumerate(study.analysis):
+        if main is not None and asked.kind in ("probability", "sequential"):
+            notes.attempt(("analysis", i), check_iid, main)
+        if isinstance(asked, Compare):
+            notes.attempt(("analysis", i), _check_options, study, made, asked, folder)
+        notes.attempt(("analysis", i), own_design, asked, space, study.study.seed)
+
+
+def _quantities_of(asked: Any) -> list[tuple[str, str]]:
+    """Return the quantities that an analysis names, each with the key that it stands under."""
+    named = [("quantities", name) for name in getattr(asked, "quantities", ())]
+    return [("x", asked.x), ("y", asked.y)] if isinstance(asked, Map) else named
+
+
+def _check_options(study: Study, made: Experiment, asked: Compare, folder: Path) -> None:
+    wide = widened(made, asked, alternatives(asked, made.build, folder), study, folder)
+    columns = [metric.key for metric in wide.metrics]
+    for metric in asked.metrics:
+        if metric not in columns:
+            raise unknown("metric", metric, columns, "of all options")

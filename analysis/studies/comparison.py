@@ -1,0 +1,149 @@
+"""Options of one keyword of the loop, compared on the same samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from analysis.robustness import (
+    Choice,
+    Experiment,
+    Space,
+    Spec,
+    diagrams,
+    from_table,
+    independent,
+    prepare,
+)
+from analysis.robustness.compare import Comparison, compare, crossed
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+
+from .analyses import Compare
+from .build import choice, metrics_of
+from .ground import Ground, made
+from .parts import option
+from .result import Finding
+from .schema import Choices, Study
+
+__all__ = ["alternatives", "comparison", "widened"]
+
+
+def alternatives(asked: Compare, build: Callable[..., Any], folder: Path) -> Choice:
+    """Return what is compared, as a choice.
+
+    Raises
+    ------
+    UsageError
+        If an option is refused, or a label does not exist.
+    """
+    if "function" in asked.options:
+        options = option(asked.options, folder)
+        if not isinstance(options, dict):
+            raise ParameterError(
+                f"options from a function need one that returns them by label, "
+                f"{asked.options['function']} returns {type(options).__name__}"
+            )
+        every = Choice(name=asked.keyword, options=options)
+    else:
+        every = choice(asked.keyword, Choices(options=asked.options), build, folder)  # type: ignore[call-arg]
+    labels = asked.only or tuple(every.options)
+    for label in (*labels, *(asked.better or ())):
+        if label not in (every.options if label in labels else labels):
+            raise unknown("option", label, labels if label not in labels else every.options)
+    return Choice(name=asked.keyword, options={label: every.options[label] for label in labels})
+
+
+def widened(
+    experiment: Experiment, asked: Compare, options: Choice, study: Study, folder: Path
+) -> Experiment:
+    """Return the experiment with the options in its space, and the requirements that count.
+
+    Metrics of signals that only some options have are left out.
+
+    Raises
+    ------
+    UsageError
+        If the loop has no such keyword, or a quantity, a requirement or its signal does not exist
+        with every option.
+    """
+    others = tuple(c for c in experiment.space.choices if c.name != options.name)
+    space = Space(quantities=experiment.space.quantities, choices=(*others, options))
+    built = diagrams(space, experiment.build)
+    signals = frozenset.intersection(*(frozenset(d.output_labels) for _, d in built))
+    counting = {r.key: r for r in experiment.spec.requirements}
+    for key in asked.requirements:
+        if key not in counting:
+            raise unknown("requirement", key, counting)
+    spec = Spec(requirements=tuple(counting[key] for key in asked.requirements or counting))
+    for requirement in spec.requirements:
+        lacking = [signal for signal in requirement.signals if signal not in signals]
+        if lacking:
+            raise ParameterError(
+                f"requirement '{requirement.key}' looks at '{lacking[0]}', which not every option "
+                "has: name those that count with requirements = [...]"
+            )
+    metrics = metrics_of(study, folder, signals)
+    return replace(experiment, space=space, spec=spec, metrics=metrics)
+
+
+def comparison(asked: Compare, ground: Ground) -> Finding | None:
+    """Run every sample with every option; None if rows are missing."""
+    own = ground.prepared.experiment
+    options = alternatives(asked, own.build, ground.folder)
+    experiment = widened(own, asked, options, ground.study, ground.folder)
+    prepared = prepare(experiment)
+    space = prepared.experiment.space
+    others = tuple(c for c in space.choices if c.name != options.name)
+    design = independent(replace(space, choices=others), asked.runs, ground.seed)
+    rows = from_table(space, crossed(design, options), entropy=ground.seed)
+    done = ground.run_design(rows, prepared)
+    if not done.complete:
+        return None
+    table = done.table.astype({c.name: str for c in space.choices})
+    found = compare(design, options, table, asked.metrics, confidence=asked.confidence)
+    claim, holds = _claim(asked, found)
+    return made(
+        asked,
+        _sentence(asked, found),
+        claim=claim,
+        holds=holds,
+        runs=len(table),
+        numbers={"keyword": asked.keyword, "samples": found.size, "confidence": found.confidence}
+        | {"requirements": [r.key for r in experiment.spec.requirements]},
+        tables={
+            "ranking": found.ranking,
+            "violations": found.violations,
+            "differences": found.differences,
+            "wins": found.wins,
+        },
+    )
+
+
+def _sentence(asked: Compare, found: Comparison) -> str:
+    metric = next(iter(asked.metrics))
+    told = "; ".join(
+        f"{label}: {row['violations']:.0f} violations, median {metric} "
+        f"{row[f'median {metric}']:.4g}"
+        for label, row in found.ranking.to_dict("index").items()
+    )
+    spec = f" (requirements {', '.join(asked.requirements)})" if asked.requirements else ""
+    return (
+        f"{asked.keyword.capitalize()} on the same {found.size} samples{spec}, best first: {told}."
+    )
+
+
+def _claim(asked: Compare, found: Comparison) -> tuple[str, bool | None]:
+    """Return the claim that one option is better than another, and whether it holds."""
+    if asked.better is None:
+        return "", None
+    (metric, better), (a, b) = next(iter(asked.metrics.items())), asked.better
+    pairs = found.differences.loc[metric]
+    sign = 1 if (a, b) in pairs.index else -1
+    row = pairs.loc[(a, b) if sign == 1 else (b, a)]
+    difference = sign * float(row["median"])
+    is_better = difference < 0 if better == "smaller" else difference > 0
+    holds = is_better and float(row["p_holm"]) <= 1 - asked.confidence
+    return f"{a} is better than {b} in {metric}, at the level {1 - asked.confidence:.2g}", holds

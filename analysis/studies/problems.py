@@ -1,0 +1,203 @@
+"""Mistakes in a study file: all of them at once, each with its place."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from nlctl._errors import UsageError
+from nlctl._names import unknown
+
+__all__ = ["Place", "Problem", "StudyError", "line_numbers", "place_text", "schema_problems"]
+
+Place = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """One mistake.
+
+    Attributes
+    ----------
+    place : tuple
+        Keys and list indices that lead to it.
+    message : str
+    line : int, optional
+        Line of the file, from 1; None for what is not in the file.
+    """
+
+    place: Place
+    message: str
+    line: int | None = None
+
+    def plain(self) -> dict[str, Any]:
+        """Return it as JSON can hold it."""
+        place = list(self.place)
+        return {"place": place, "text": place_text(self.place), "line": self.line} | {
+            "message": self.message
+        }
+
+    def __str__(self) -> str:
+        line = "" if self.line is None else f"line {self.line}, "
+        return f"{line}{place_text(self.place)}: {self.message}"
+
+
+class StudyError(UsageError):
+    """A study file that cannot be run; the message lists every mistake.
+
+    Attributes
+    ----------
+    problems : tuple of Problem
+    """
+
+    def __init__(self, source: str, problems: Sequence[Problem]) -> None:
+        count = f"{len(problems)} mistake{'s' if len(problems) > 1 else ''}"
+        super().__init__("\n  ".join([f"{source} has {count}:", *map(str, problems)]))
+        self.problems = tuple(problems)
+
+
+def place_text(place: Place) -> str:
+    """Return a place as it is written in TOML: ``space."actuator.b_r".uniform``."""
+    text = ""
+    for part in place:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            plain = part.replace("_", "").replace("-", "")
+            name = part if plain.isascii() and plain.isalnum() else f'"{part}"'
+            text += f".{name}" if text else name
+    return text or "the file"
+
+
+def line_numbers(text: str) -> dict[Place, int]:
+    """Return the line of every key that a line of a TOML file begins with.
+
+    A statement is the least number of lines that TOML can read by themselves: a header, or a key
+    with its value.
+    """
+    lines = text.splitlines()
+    found: dict[Place, int] = {}
+    counts: dict[Place, int] = {}
+    table: Place = ()
+    i = 0
+    while i < len(lines):
+        end, statement = _statement(lines, i)
+        path = _path(statement)
+        if lines[i].lstrip().startswith("["):
+            if lines[i].lstrip().startswith("[["):
+                counts[path] = counts.get(path, -1) + 1
+            path = table = _indexed(path, counts)
+        else:
+            path = (*table, *path)
+        for depth in range(1, len(path) + 1):
+            found.setdefault(path[:depth], i + 1)
+        i = end
+    return found
+
+
+def _indexed(path: Place, counts: Mapping[Place, int]) -> Place:
+    """Put in the index of the list entry that a header belongs to."""
+    place: list[str | int] = []
+    for depth, part in enumerate(path, 1):
+        place.append(part)
+        if path[:depth] in counts:
+            place.append(counts[path[:depth]])
+    return tuple(place)
+
+
+def _statement(lines: Sequence[str], start: int) -> tuple[int, dict[str, Any]]:
+    for end in range(start + 1, len(lines) + 1):
+        try:
+            return end, tomllib.loads("\n".join(lines[start:end]))
+        except tomllib.TOMLDecodeError:
+            continue
+    return start + 1, {}
+
+
+def _path(statement: Any) -> Place:
+    """Return the dotted key of a statement; a value that is a table ends it as well."""
+    path: list[str | int] = []
+    while isinstance(statement, dict | list) and len(statement) == 1:
+        if isinstance(statement, list):
+            statement = statement[0]
+            continue
+        ((key, statement),) = statement.items()
+        path.append(key)
+    return tuple(path)
+
+
+def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -> list[Problem]:
+    """Return what pydantic found, with places as in the file and the nearest name of each key."""
+    found = []
+    for one in error.errors(include_url=False):
+        context = one.get("ctx", {})
+        absent = one["type"] in ("missing", "extra_forbidden")
+        place = _in_file(one["loc"], data, absent)
+        message = one["msg"][0].lower() + one["msg"][1:]
+        if one["type"] == "extra_forbidden":
+            names = _keys_at(model, one["loc"][:-1])
+            message = str(unknown("key", str(one["loc"][-1]), names))
+        elif one["type"] == "missing":
+            message = "is missing"
+        elif one["type"] == "union_tag_not_found":
+            place, message = (*place, "kind"), "is missing"
+        elif one["type"] == "union_tag_invalid":
+            tags = context["expected_tags"].replace("'", "").split(", ")
+            place, message = (*place, "kind"), str(unknown("kind", str(context["tag"]), tags))
+        elif "input" in one and not isinstance(one["input"], dict | list):
+            message = f"{message}, got {one['input']!r}"
+        found.append(Problem(place=place, message=message))
+    return found
+
+
+def _in_file(loc: Place, data: Any, absent: bool) -> Place:
+    """Drop the names of union members that pydantic puts between keys and behind them.
+
+    Only if `absent` may the last part be a key that is not there.
+    """
+    place: list[str | int] = []
+    for i, part in enumerate(loc):
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            if i < len(loc) - 1 or not absent:
+                continue
+        place.append(part)
+    return tuple(place)
+
+
+def _keys_at(annotation: Any, loc: Place) -> list[str]:
+    """Return the fields of the model that a place of pydantic's leads to."""
+    models = list(_models(annotation))
+    for part in loc:
+        inner: list[Any] = []
+        for model in models:
+            if part in model.model_fields:
+                inner += _models(model.model_fields[str(part)].annotation)
+        tagged = [m for m in models if part in get_args(_tag(m))]
+        models = inner or tagged or models  # a key of a dict, an index: the same models
+    return [name for model in models for name in model.model_fields]
+
+
+def _tag(model: type[BaseModel]) -> Any:
+    return model.model_fields["kind"].annotation if "kind" in model.model_fields else None
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the models in an annotation."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models(part)
+
+
+def nearest_line(lines: Mapping[Place, int], place: Place) -> int | None:
+    """Return the line of a place, or of the innermost table around it that has one."""
+    for depth in range(len(place), 0, -1):
+        if place[:depth] in lines:
+            return lines[place[:depth]]
+    return None

@@ -1,0 +1,190 @@
+"""One row of a run again, bit for bit, with everything that can be seen of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from analysis.figures import BLUE, ORANGE, TIME
+from analysis.robustness import Experiment, Prepared, arguments, evaluate, prepare
+from analysis.robustness.formula import Band, parts_of
+from analysis.robustness.sweep import load
+from nlctl._errors import ParameterError
+from nlctl.native import ensemble_response
+
+from .analyses import Compare
+from .check import keyed
+from .comparison import alternatives, widened
+from .plain import RunFolderError, as_json
+from .read import StudyFile
+from .run import rerun_file
+
+__all__ = ["Replay", "replay", "replay_figure"]
+
+MOST = 8  # panels of a figure
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Replay:
+    """A row that was run again.
+
+    Attributes
+    ----------
+    row : int
+    stored, again : dict
+        The row of the folder, and what came out now.
+    differences : tuple of str
+        Columns in which a bit differs.
+    experiment : Experiment
+    time : ndarray of shape (m,)
+    signals : dict of ndarray of shape (m,)
+        All outputs; NaN after the end of a run that diverged.
+    """
+
+    row: int
+    stored: Mapping[str, Any]
+    again: Mapping[str, Any]
+    differences: tuple[str, ...]
+    experiment: Experiment
+    time: np.ndarray
+    signals: Mapping[str, np.ndarray]
+
+    def plain(self) -> dict[str, Any]:
+        """Return the two rows and whether they are the same, as JSON can hold them."""
+        content = {key: getattr(self, key) for key in ("row", "stored", "again", "differences")}
+        return as_json({"same": not self.differences, **content})
+
+    def __str__(self) -> str:
+        margins = ", ".join(
+            f"{r.key} {self.again[r.key]:.6g}" for r in self.experiment.spec.requirements
+        )
+        told = f"Row {self.row}: {self.again['status']}, margins {margins}."
+        if not self.differences:
+            count = len(self.again)
+            return f"{told} All {count} columns are those of the folder, bit for bit."
+        first = self.differences[0]
+        return (
+            f"{told} {len(self.differences)} columns differ from the folder, the first is "
+            f"'{first}', {self.stored[first]!r} there and {self.again[first]!r} now: another "
+            "version of a library, or another processor?"
+        )
+
+
+def replay(folder: Path, row: int, part: str = "") -> Replay:
+    """Run one row of a run folder again.
+
+    Parameters
+    ----------
+    folder : Path
+    row : int
+    part : str, optional
+        Key of an analysis that keeps rows of its own; by default the main table.
+
+    Raises
+    ------
+    RunFolderError, StudyError
+        If the folder holds no run, or the loop no longer fits the study.
+    ParameterError
+        If the row is not there.
+    """
+    file = rerun_file(folder)
+    table = _table(folder, part)
+    if row not in table.index:
+        where = f"of '{part}'" if part else "of the main table"
+        raise ParameterError(f"row {row} {where} is not there: it has {len(table)} rows")
+    prepared = prepare(_experiment(file, part))
+    chosen = table.loc[[row], prepared.experiment.space.names]
+    chosen = chosen.astype({c.name: str for c in prepared.experiment.space.choices})
+    stored = table.loc[row].to_dict()
+    again = evaluate(prepared, chosen).iloc[0].to_dict()
+    time, signals = _signals(prepared, chosen)
+    return Replay(
+        row=row,
+        stored=stored,
+        again=again,
+        differences=tuple(name for name in again if not _same(stored[name], again[name])),
+        experiment=prepared.experiment,
+        time=time,
+        signals=signals,
+    )
+
+
+def _table(folder: Path, part: str) -> pd.DataFrame:
+    here = folder / part / "rows"
+    if here.with_suffix(".parquet").exists():
+        return pd.read_parquet(here.with_suffix(".parquet"))
+    if (here / "study.json").exists():
+        return load(here).table
+    raise RunFolderError(f"'{folder / part}' keeps no rows")
+
+
+def _experiment(file: StudyFile, part: str) -> Experiment:
+    """Return what the rows of a part were run with."""
+    asked = keyed(file.study).get(part)
+    if isinstance(asked, Compare):
+        options = alternatives(asked, file.experiment.build, file.folder)
+        return widened(file.experiment, asked, options, file.study, file.folder)
+    return file.experiment
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values are equal to the last bit; NaN equals NaN."""
+    if isinstance(one, str) or isinstance(other, str):
+        return one == other
+    return np.float64(one).tobytes() == np.float64(other).tobytes() or (one != one != other)
+
+
+def _signals(prepared: Prepared, row: pd.DataFrame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return all outputs of a row over time."""
+    experiment = prepared.experiment
+    labels = {c.name: row[c.name].iloc[0] for c in experiment.space.choices}
+    loop = next(loop for chosen, loop in prepared.loops if dict(chosen) == labels)
+    given = arguments(experiment.space, row)
+    found = ensemble_response(
+        loop,
+        experiment.timepts,
+        experiment.inputs,
+        keep=loop.system.output_labels,
+        rtol=experiment.rtol,
+        atol=experiment.atol,
+        max_steps=experiment.max_steps,
+        method=experiment.method,
+        params=given["params"],
+        initial_state=given["initial_state"],
+    )
+    return found.time, {name: samples[0] for name, samples in found.signals.items()}
+
+
+def replay_figure(made: Replay) -> Figure:
+    """Draw the signals that requirements look at, with their bounds, above the other outputs.
+
+    The bounds are drawn over the whole time; when they count, the titles say.
+    """
+    bounds: dict[str, set[float]] = {}
+    texts: dict[str, list[str]] = {}
+    for requirement in made.experiment.spec.requirements:
+        for band in parts_of(requirement.formula):
+            if isinstance(band, Band):
+                ends = {end for end in (band.lower, band.upper) if np.isfinite(end)}
+                bounds.setdefault(band.signal, set()).update(ends)
+        for signal in requirement.signals:
+            texts.setdefault(signal, []).append(f"{requirement.key}: {requirement.formula}")
+    names = [*bounds, *(name for name in made.signals if name not in bounds)][:MOST]
+    figure = Figure(figsize=(9.0, 1.7 * len(names)), layout="constrained")
+    axes = np.ravel(figure.subplots(len(names), 1, sharex=True))
+    for ax, name in zip(axes, names, strict=True):
+        ax.plot(made.time, made.signals[name], color=BLUE, linewidth=1.2)
+        for end in bounds.get(name, ()):
+            ax.axhline(end, color=ORANGE, linestyle="--", linewidth=1.0)
+        ax.set_ylabel(name)
+        ax.set_title("; ".join(texts.get(name, ())), fontsize="small", loc="left")
+        ax.grid(True, alpha=0.25, linewidth=0.6)
+        ax.margins(x=0.01)
+    axes[-1].set_xlabel(TIME)
+    return figure

@@ -1,0 +1,143 @@
+"""What a study has found: the records that a report is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from analysis.robustness.sweep import Sweep
+
+from .plain import as_json
+from .schema import Study
+
+__all__ = ["Finding", "Result"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Finding:
+    """What one analysis found.
+
+    Attributes
+    ----------
+    key, kind, title : str
+        Name of its folder, kind of analysis, heading.
+    sentence : str
+        What was found, with what it rests on.
+    claim : str
+        What the study claimed; empty without a claim.
+    holds : bool or None
+        Whether the claim holds; None without a claim.
+    runs : int
+        Number of simulations that it rests on.
+    numbers : mapping
+        Bounds, margins, rows: what the sentence says, as numbers and texts.
+    tables : mapping
+        DataFrames by name.
+    """
+
+    key: str
+    kind: str
+    title: str
+    sentence: str
+    claim: str = ""
+    holds: bool | None = None
+    runs: int = 0
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    tables: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+
+    def plain(self) -> dict[str, Any]:
+        """Return everything but the tables, as JSON can hold it."""
+        content = {key: value for key, value in vars(self).items() if key != "tables"}
+        return as_json(content) | {"tables": sorted(self.tables)}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Result:
+    """A study and what it has found; nothing is run to read it.
+
+    Attributes
+    ----------
+    folder : Path
+    study : Study
+        The study file, with the settings of the command line.
+    quantities : DataFrame
+        One row per uncertain quantity or choice: law, box (low, high), nominal, unit.
+    requirements : DataFrame
+        One row per requirement: formula, until (s), meaning.
+    metrics : DataFrame
+        One row per metric: signal, unit, meaning.
+    rows : Sweep or None
+        The main table; None if the study has none.  ``rows.table`` reads it from the disk.
+    findings : tuple of Finding
+        In the order of the file.
+    complete : bool
+        Whether all analyses are done.
+    interrupted : bool
+        Whether Ctrl-C ended the run that returned this; not kept in the folder.
+    notes : tuple of str
+        What the user has to know, such as lost workers.
+    """
+
+    folder: Path
+    study: Study
+    quantities: pd.DataFrame
+    requirements: pd.DataFrame
+    metrics: pd.DataFrame
+    rows: Sweep | None
+    findings: tuple[Finding, ...]
+    complete: bool
+    interrupted: bool = False
+    notes: tuple[str, ...] = ()
+
+    @property
+    def claims(self) -> tuple[Finding, ...]:
+        """The findings that the study makes a claim about."""
+        return tuple(finding for finding in self.findings if finding.holds is not None)
+
+    @property
+    def holds(self) -> bool:
+        """Whether no claim fails; True without claims."""
+        return all(finding.holds for finding in self.claims)
+
+    @property
+    def verdict(self) -> str:
+        """The outcome in one sentence."""
+        if not self.complete:
+            count = f"{len(self.findings)} of {len(self.study.analysis)} analyses are done"
+            return f"Incomplete: {count}."
+        if not self.claims:
+            return "The study makes no claims."
+        failing = [finding.key for finding in self.claims if not finding.holds]
+        if failing:
+            return f"{len(failing)} of {len(self.claims)} claims fail: {', '.join(failing)}."
+        return (
+            f"All {len(self.claims)} claims hold." if len(self.claims) > 1 else "The claim holds."
+        )
+
+    def __getitem__(self, key: str) -> Finding:
+        """Return the finding with this key."""
+        return next(finding for finding in self.findings if finding.key == key)
+
+    def plain(self) -> dict[str, Any]:
+        """Return everything but the tables, as JSON can hold it."""
+        tables = {
+            name: getattr(self, name).reset_index().to_dict("records")
+            for name in ("quantities", "requirements", "metrics")
+        }
+        rows = None if self.rows is None else {"done": self.rows.done}
+        return as_json(
+            {
+                "title": self.study.study.title,
+                "question": self.study.study.question,
+                "verdict": self.verdict,
+                "holds": self.holds,
+                "complete": self.complete,
+                "notes": self.notes,
+                "rows": rows,
+                **tables,
+            }
+        ) | {"findings": [finding.plain() for finding in self.findings]}

@@ -1,0 +1,291 @@
+"""Study -> folder of results: the rows, then one analysis after the other, each kept when done."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from filelock import FileLock, Timeout
+
+from analysis.robustness import Design, Prepared, evaluate, nominal, prepare
+from analysis.robustness.store import StoreError
+from analysis.robustness.sweep import Sweep, load, sweep
+from analysis.robustness.watch import Progress, until_decided
+from nlctl._errors import UsageError
+from nlctl._files import replace_file
+
+from .answers import answer, unanswered
+from .build import main_design
+from .check import NEED_ROWS, keyed
+from .folder import METRIC_COLUMNS, load_finding, save_finding
+from .ground import Ground
+from .plain import RunFolderError, read_json, write_json
+from .read import StudyFile, read_study
+from .result import Finding, Result
+from .schema import Study
+from .written import from_toml, to_toml
+
+__all__ = ["Watch", "rerun_file", "run"]
+
+Watch = Callable[[str], AbstractContextManager[Callable[[Progress], object] | None]]
+"""``watch(title)`` is entered around every sweep and gives its `progress`."""
+
+
+def _unwatched(title: str) -> AbstractContextManager[None]:
+    return nullcontext()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Way:
+    """How rows are run."""
+
+    executor: Executor | None
+    threads: int | None
+    watch: Watch
+
+
+def run(
+    file: StudyFile,
+    folder: Path,
+    *,
+    resume: bool = False,
+    executor: Executor | None = None,
+    threads: int | None = None,
+    watch: Watch = _unwatched,
+) -> Result:
+    """Run a study and keep everything in a folder.
+
+    What is done is kept: after Ctrl-C, a kill or a full disk, ``resume=True`` goes on from there
+    and ends with the same results, bit for bit (the column ``wall_time`` aside).
+
+    Parameters
+    ----------
+    file : StudyFile
+    folder : Path
+        See `result` for what is in it.
+    resume : bool, optional
+        Whether to take up what the folder holds.
+    executor : concurrent.futures.Executor, optional
+        Where rows are run whose number is known in advance; searches run here.
+    threads : int, optional
+        As in `analysis.robustness.sweep`.
+    watch : callable, optional
+        See `Watch`.
+
+    Returns
+    -------
+    Result
+        Not ``complete`` after Ctrl-C (then ``interrupted``), or if workers were lost.
+
+    Raises
+    ------
+    RunFolderError
+        If the folder holds a run and `resume` is False, or one of another study, or another
+        process works in it.
+    StoreError
+        If a file cannot be written.
+    """
+    with _held(file, folder, resume):
+        prepared = prepare(file.experiment)
+        way = _Way(executor=executor, threads=threads, watch=watch)
+        result = _through(file, prepared, folder, way)
+        write_json(folder / "results.json", result.plain())
+    return result
+
+
+def _through(file: StudyFile, prepared: Prepared, folder: Path, way: _Way) -> Result:
+    """Run the main table, then every analysis that is not done yet."""
+    study = file.study
+    rows, notes, findings = None, [], []
+    interrupted = False
+    complete = True
+    if study.runs is not None:
+        rows = _main_rows(study, prepared, folder, way)
+        notes += rows.notes
+        complete, interrupted = rows.complete or bool(rows.decided), rows.interrupted
+    for key, asked in keyed(study).items() if complete else ():
+        finding = load_finding(folder, key)
+        if finding is None:
+            own: list[Sweep] = []
+            ground = _ground(file, prepared, rows, folder / key, way, own)
+            try:
+                finding = answer(key, asked, ground)
+            except KeyboardInterrupt:
+                interrupted = True
+            except StoreError:
+                raise
+            except UsageError as error:  # costs this analysis, not what others have found
+                finding = unanswered(key, asked, error)
+            notes += [note for done in own for note in done.notes]
+            interrupted = interrupted or any(done.interrupted for done in own)
+            if finding is None:
+                complete = False
+                break
+            save_finding(folder, finding)
+        findings.append(finding)
+    return _result(study, prepared, folder, rows, findings, complete, interrupted, notes)
+
+
+def _main_rows(study: Study, prepared: Prepared, folder: Path, way: _Way) -> Sweep:
+    """Run the main table, or as much of it as the analyses need."""
+    assert study.runs is not None
+    design = main_design(study.runs, prepared.experiment.space, study.study.seed)
+    users = {key: a for key, a in keyed(study).items() if a.kind in NEED_ROWS}
+    if len(users) == 1 and (found := next(iter(users.values()))).kind == "sequential":
+        if load_finding(folder, next(iter(users))) is not None:
+            return replace(load(folder / "rows", design), decided=True)
+        stop = until_decided(design, found.limit, found.confidence)
+        return _swept(prepared, design, folder / "rows", way, "rows", stop=stop)
+    return _swept(prepared, design, folder / "rows", way, "rows")
+
+
+def _ground(
+    file: StudyFile,
+    prepared: Prepared,
+    rows: Sweep | None,
+    folder: Path,
+    way: _Way,
+    own: list[Sweep],
+) -> Ground:
+    middle = nominal(prepared.experiment.space)
+
+    def simulate(table: pd.DataFrame) -> pd.DataFrame:
+        fixed = {name: value for name, value in middle.items() if name not in table.columns}
+        return evaluate(prepared, table.assign(**fixed), threads=way.threads)
+
+    def run_design(design: Design, of: Prepared | None = None) -> Sweep:
+        own.append(_swept(of or prepared, design, folder / "rows", way, folder.name))
+        return own[-1]
+
+    return Ground(
+        study=file.study,
+        folder=file.folder,
+        prepared=prepared,
+        rows=rows,
+        simulate=simulate,
+        run_design=run_design,
+    )
+
+
+def _swept(
+    prepared: Prepared,
+    design: Design,
+    folder: Path,
+    way: _Way,
+    title: str,
+    stop: Callable[[Progress], Any] | None = None,
+) -> Sweep:
+    with way.watch(title) as progress:
+        return sweep(
+            prepared,
+            design,
+            folder,
+            executor=way.executor,
+            threads=way.threads,
+            progress=progress,
+            resume=True,
+            stop=stop,
+        )
+
+
+@contextmanager
+def _held(file: StudyFile, folder: Path, resume: bool) -> Iterator[None]:
+    """Hold the folder for this process alone, with the study in it."""
+    lock = FileLock(folder / ".lock", timeout=0)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock.acquire()
+    except Timeout:
+        raise RunFolderError(f"'{folder}' is in use by another process") from None
+    except OSError as error:
+        raise RunFolderError(f"cannot write to '{folder}': {error.strerror or error}") from error
+    try:
+        _identify(file, folder, resume)
+        yield
+    finally:
+        lock.release()
+
+
+def _identify(file: StudyFile, folder: Path, resume: bool) -> None:
+    path = folder / "study.toml"
+    if path.exists():
+        if not resume:
+            raise RunFolderError(
+                f"'{folder}' holds a run already: continue it with --resume, or take another "
+                "folder with --out"
+            )
+        changed = _changed(from_toml(path.read_text(encoding="utf-8")), file.study)
+        if changed:
+            raise RunFolderError(
+                f"'{folder}' holds a run of another study ({', '.join(changed)} differ): take "
+                "another folder with --out"
+            )
+        return
+    origin = os.path.relpath(file.folder.resolve(), folder.resolve())
+    write_json(folder / "run.json", {"format": 1, "study_folder": Path(origin).as_posix()})
+    replace_file(path, lambda out: out.write(to_toml(file.study).encode()))
+
+
+def _changed(before: Study, now: Study) -> list[str]:
+    return [name for name in type(now).model_fields if getattr(before, name) != getattr(now, name)]
+
+
+def rerun_file(folder: Path) -> StudyFile:
+    """Return the study of a run folder, held against its loop again.
+
+    Raises
+    ------
+    RunFolderError
+        If the folder holds no run.
+    StudyError
+        If the loop has changed so that the study no longer fits.
+    """
+    content = read_json(folder / "run.json")
+    return read_study(folder / "study.toml", folder=folder / content["study_folder"])
+
+
+def _result(
+    study: Study,
+    prepared: Prepared,
+    folder: Path,
+    rows: Sweep | None,
+    findings: Sequence[Finding],
+    complete: bool,
+    interrupted: bool,
+    notes: Sequence[str],
+) -> Result:
+    experiment, space = prepared.experiment, prepared.experiment.space
+    quantities = [
+        {"name": q.name, "law": q.law_text, "low": q.box[0], "high": q.box[1], "unit": q.unit}
+        | {"nominal": q.nominal}
+        for q in space.quantities
+    ]
+    quantities += [
+        {"name": c.name, "law": space.laws[c.name], "nominal": c.nominal} for c in space.choices
+    ]
+    requirements = [
+        {"key": r.key, "formula": str(r.formula), "until": r.until, "meaning": r.meaning}
+        for r in experiment.spec.requirements
+    ]
+    metrics = [
+        {"key": m.key, "signal": ", ".join(m.signals), "unit": m.unit, "meaning": m.meaning}
+        for m in experiment.metrics
+    ]
+    return Result(
+        folder=folder,
+        study=study,
+        quantities=pd.DataFrame(quantities).set_index("name"),
+        requirements=pd.DataFrame(requirements).set_index("key"),
+        metrics=pd.DataFrame(metrics, columns=METRIC_COLUMNS).set_index("key"),
+        rows=rows,
+        findings=tuple(findings),
+        complete=complete,
+        interrupted=interrupted,
+        notes=tuple(notes),
+    )

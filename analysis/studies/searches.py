@@ -1,0 +1,164 @@
+"""Analyses that search, or look at sizes one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.robustness import Space, independent, nominal
+from analysis.robustness.confirm import confirm
+from analysis.robustness.degradation import degradation_curve
+from analysis.robustness.failure_map import boundary, failure_map
+from analysis.robustness.guarantee import assumptions
+from analysis.robustness.largest_scale import largest_scale
+from analysis.robustness.radius import robustness_radius
+from analysis.robustness.shrink import shrink
+from analysis.robustness.worst_case import worst_case
+
+from .analyses import Degradation, Map, Radius, WorstCase
+from .ground import Ground, made, statement_numbers
+from .result import Finding
+
+__all__ = ["degradation", "failures", "lowest_margin", "radius"]
+
+
+def lowest_margin(asked: WorstCase, ground: Ground) -> Finding:
+    """Search for the lowest margin; confirm and shrink a violation."""
+    space = ground.space(asked.quantities)
+    found = worst_case(ground.simulate, space, asked.runs, entropy=ground.seed)
+    if not found.is_finished:
+        raise KeyboardInterrupt
+    told = [str(found)]
+    numbers: dict[str, Any] = {"margin": found.margin, "witness": found.witness}
+    numbers |= {"found_by": found.found_by, "runs": found.runs, "all_corners": found.all_corners}
+    results = found.results.assign(searcher=found.searchers)
+    tables = {"rows": results, "best": pd.DataFrame({"margin": found.best_so_far})}
+    count = found.design.size
+    if found.is_violated:
+        row = nominal(ground.space()) | found.witness
+        again = confirm(ground.prepared, row, python_control=asked.python_control)
+        told.append(str(again))
+        numbers |= {"is_confirmed": again.is_confirmed, "spread": again.spread}
+        tables["replays"] = again.replays
+        if asked.shrink:
+            small = shrink(ground.simulate, space, found.witness)
+            told.append(str(small))
+            numbers["shrunk"] = vars(small)
+            count += small.runs
+    return made(
+        asked,
+        " ".join(told),
+        claim="" if asked.limit is None else f"no margin is {asked.limit:g} or lower",
+        holds=None if asked.limit is None else bool(found.margin > asked.limit),
+        runs=count,
+        numbers=numbers,
+        tables=tables,
+    )
+
+
+def degradation(asked: Degradation, ground: Ground) -> Finding:
+    """Bound the probability of a violation at every size."""
+    space = ground.space(asked.quantities)
+    found = degradation_curve(
+        ground.simulate,
+        space,
+        asked.factors,
+        asked.runs,
+        entropy=ground.seed,
+        confidence=asked.confidence,
+        simultaneous=asked.simultaneous,
+    )
+    bounds = dict(zip(found.factors, found.statements, strict=True))
+    told = "; ".join(
+        f"at {factor:g} {one.violations} of {one.runs} (at most {one.upper:.2g})"
+        for factor, one in bounds.items()
+    )
+    together = "together" if asked.simultaneous else "each by itself"
+    claim, holds = "", None
+    if asked.limit is not None:
+        claim = f"a violation has at most probability {asked.limit:g} at the size {asked.at:g}"
+        holds = bounds[asked.at].upper <= asked.limit
+    return made(
+        asked,
+        f"Violations with all deviations scaled: {told}. The bounds hold with confidence "
+        f"{100 * asked.confidence:g} %, {together}. Assumed: "
+        f"at each size {'; '.join(assumptions(independent(space, asked.runs, ground.seed)))}.",
+        claim=claim,
+        holds=holds,
+        runs=sum(one.runs for one in found.statements),
+        numbers={"confidence": asked.confidence, "simultaneous": asked.simultaneous},
+        tables={"curve": found.table},
+    )
+
+
+def radius(asked: Radius, ground: Ground) -> Finding:
+    """Search for the smallest size with a violation."""
+    space = ground.space(asked.quantities)
+    experiment = replace(ground.prepared.experiment, space=space)
+    largest, why = largest_scale(replace(ground.prepared, experiment=experiment), asked.largest)
+    found = robustness_radius(
+        ground.simulate,
+        space,
+        largest,
+        limit=why,
+        runs=asked.runs,
+        tolerance=asked.tolerance,
+        draws=asked.draws,
+        confidence=asked.confidence,
+        entropy=ground.seed,
+    )
+    numbers: dict[str, Any] = {"upper": found.upper, "searched": found.searched}
+    numbers |= {"largest": found.largest, "margin": found.margin, "witness": found.witness}
+    if found.statement is not None:
+        numbers["statement"] = statement_numbers(found.statement)
+    return made(
+        asked,
+        str(found),
+        claim="" if asked.limit is None else f"no violation is found below size {asked.limit:g}",
+        holds=None if asked.limit is None else found.upper >= asked.limit,
+        runs=found.runs + (0 if found.statement is None else found.statement.runs),
+        numbers=numbers,
+        tables={"steps": found.steps},
+    )
+
+
+def failures(asked: Map, ground: Ground) -> Finding:
+    """Map the margin over the plane of two quantities."""
+    x, y = ground.space((asked.x, asked.y)).quantities
+    plane = (
+        x if asked.x_bounds is None else replace(x, bounds=asked.x_bounds),
+        y if asked.y_bounds is None else replace(y, bounds=asked.y_bounds),
+    )
+    found = failure_map(
+        ground.simulate,
+        Space(quantities=plane),
+        x.name,
+        y.name,
+        cells=asked.cells,
+        levels=asked.levels,
+        most=asked.runs,
+    )
+    edge = boundary(found)
+    bad = int(np.count_nonzero(~(found.table["spec"].to_numpy() > 0)))
+    if bad in (0, len(found.table)):
+        where = "every point violates" if bad else "no point violates"
+        told = f"{where} the spec"
+    else:
+        told = f"{bad} of {len(found.table)} points violate the spec"
+    fine = "" if found.is_finished else "; refinement ended with the number of runs"
+    return made(
+        asked,
+        f"In the plane of {found.x} and {found.y}, the others nominal, {told}; cells at the "
+        f"boundary have sides {found.cell[0]:.3g} and {found.cell[1]:.3g}{fine}. Points were "
+        "chosen near the boundary, so their share is no probability.",
+        runs=len(found.table),
+        numbers={"x": found.x, "y": found.y, "cell": list(found.cell)},
+        tables={
+            "points": found.table,
+            "triangles": pd.DataFrame(found.triangles, columns=["a", "b", "c"]),
+            "boundary": edge,
+        },
+    )

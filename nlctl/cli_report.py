@@ -1,0 +1,185 @@
+"""The commands about reports: make, show, compare, list them."""
+
+from __future__ import annotations
+
+import json as json_text
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .cli_studies import INCOMPLETE, exit_codes
+
+Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    for command in (report, compare, gallery):
+        app.command()(command)
+
+
+def report(
+    study: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="STUDY",
+            help="A study file (.toml), which is run or taken up, or the folder of a run. "
+            "Without it, the paper: both examples, the proof, and a quick study of each.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the report; reports/paper, or that of the run."),
+    ] = None,
+    jobs: Annotated[int, typer.Option(min=0, help="Processes or threads; 0: one per core.")] = 0,
+    open_: Open = False,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
+) -> None:
+    """Write a report, one page that needs nothing else.  Exit 1 if a claim of it fails."""
+    with exit_codes(json=False):
+        made, page, code = (
+            _paper(out or Path("reports/paper"), jobs, pdf=pdf)
+            if study is None
+            else _study(study, out, jobs, pdf=pdf)
+        )
+        print(made)
+        finish_report(page, pdf=pdf, open_=open_)
+        if code:
+            raise typer.Exit(code)
+
+
+def _paper(out: Path, jobs: int, *, pdf: bool) -> tuple[str, Path, int]:
+    """Reproduce the paper; return the verdict, the page and the exit code."""
+    from analysis.report.lyapunov_evidence import evidence, far_runs_in_background
+    from analysis.report.paper_report import paper_report
+    from analysis.report.render import write_report
+    from analysis.reproduction import CASES, checks, run_all
+
+    from . import paper
+    from ._terminal import progress_bar
+    from .native._ensemble import cores
+
+    check_report_options(out, pdf=pdf)
+    with far_runs_in_background() as far:
+        with progress_bar("simulating", len(CASES)) as advance:
+            runs = run_all(CASES, jobs=jobs or min(cores(), len(CASES)), done=lambda _: advance(1))
+        proofs = {}
+        with progress_bar("checking the proof", 2) as advance:
+            for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
+                proofs[number] = evidence(loop)
+                advance(1)
+        with progress_bar("running far beyond 20 s", 1):
+            made = paper_report(runs, proofs, far.result())
+    page = write_report(made, out)
+    return made.verdict, page, int(not all(check.passed for check in checks(runs)))
+
+
+def _study(study: Path, out: Path | None, jobs: int, *, pdf: bool) -> tuple[str, Path, int]:
+    """Report a study; return the verdict, the page and the exit code."""
+    from ._sweep_progress import sweep_bar
+    from .cli_study_report import report_study
+
+    check_report_options(out or study.parent, pdf=pdf)
+    page, result = report_study(study, out, threads=jobs or None, watch=sweep_bar)
+    code = int(not result.holds) if result.complete else INCOMPLETE
+    return result.verdict, page, code
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(help="report.json, or the folder that holds it.")],
+    second: Annotated[Path, typer.Argument(help="Another one.")],
+    rtol: Annotated[float, typer.Option(help="Numbers this close count as equal.")] = 0.0,
+    json: Json = False,
+) -> None:
+    """Say what differs between two reports; exit 1 if anything does."""
+    if not compare_reports(first, second, rtol=rtol, as_json=json):
+        raise typer.Exit(1)
+
+
+def gallery(
+    folder: Annotated[Path, typer.Argument(help="Folder with reports below it.")],
+    open_: Open = False,
+) -> None:
+    """Write FOLDER/index.html: every report below it with its verdict."""
+    write_gallery_of(folder, open_=open_)
+
+
+def check_report_options(out: Path, *, pdf: bool) -> None:
+    """Refuse, before anything is computed, what could not be written afterwards.
+
+    Raises
+    ------
+    UsageError
+        If `out` cannot be written to, or a PDF is wanted and no browser is installed.
+    """
+    from ._terminal import check_writable
+
+    check_writable(out)
+    if pdf:
+        from analysis.report.browser import find_browser
+
+        find_browser()
+
+
+def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
+    """Print where the page is; print it to PDF and show it, as wanted.
+
+    Raises
+    ------
+    UsageError
+        If the PDF cannot be made; the page exists all the same.
+    """
+    from analysis.report.browser import open_page, write_pdf
+
+    print(page)
+    if pdf:
+        print(write_pdf(page, page.with_name("report.pdf")))
+    if open_ and not open_page(page):
+        print("no browser was found to show it")
+
+
+def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:
+    """Print what differs between two reports, one thing a line; return whether nothing does.
+
+    Raises
+    ------
+    UsageError, OSError
+        If a file is no report, or cannot be read.
+    """
+    from analysis.report.compare import compare
+
+    found = compare(first, second, rtol=rtol)
+    if as_json:
+        print(
+            json_text.dumps(
+                [vars(difference) for difference in found], indent=1, ensure_ascii=False
+            )
+        )
+        return not found
+    for difference in found:
+        print(difference)
+    count = "no difference" if not found else f"{len(found)} differences"
+    print("1 difference" if len(found) == 1 else count)
+    return not found
+
+
+def write_gallery_of(folder: Path, *, open_: bool) -> None:
+    """Write the index page over the reports below a folder, and print where it is.
+
+    Raises
+    ------
+    UsageError
+        If there is no report, or the folder cannot be written to.
+    """
+    from analysis.report.browser import open_page
+    from analysis.report.gallery import write_gallery
+
+    from ._terminal import check_writable
+
+    check_writable(folder)
+    page = write_gallery(folder)
+    print(page)
+    if open_ and not open_page(page):
+        print("no browser was found to show it")

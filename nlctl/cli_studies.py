@@ -1,0 +1,242 @@
+"""The commands about study files.  Like `nlctl.cli` it only reads arguments and prints.
+
+Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or an invalid study, 3 an internal error or
+one of the user's own functions, 4 incomplete and resumable, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import errno
+import json as json_text
+import shlex
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+FAILS, INVALID, INTERNAL, INCOMPLETE, INTERRUPTED = 1, 2, 3, 4, 130
+
+StudyPath = Annotated[Path, typer.Argument(metavar="STUDY", help="The study file, .toml.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace what stands in the file: runs.size=100, "
+        'space."actuator.b_r".uniform=[0.3,0.6], analysis.0.confidence=0.9.',
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+Jobs = Annotated[int, typer.Option(min=0, help="Threads or processes; 0: one per core.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    for command in (run, validate, replay, schema):
+        app.command()(command)
+
+
+def run(
+    study: StudyPath,
+    set_: Settings = None,
+    resume: Annotated[bool, typer.Option(help="Go on with what the folder holds.")] = False,
+    jobs: Jobs = 0,
+    executor: Annotated[
+        str, typer.Option(help="threads, processes, or dask:ADDRESS of a scheduler.")
+    ] = "threads",
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the results; reports/NAME by default.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Run a study, print what it found, and keep everything in a folder."""
+    with exit_codes(json):
+        from analysis.studies import read_study
+        from analysis.studies import run as run_study
+
+        from ._sweep_progress import sweep_bar
+
+        folder = Path("reports") / study.stem if out is None else out
+        file = read_study(study, set_ or [])
+        with _executor(executor, jobs) as pool:
+            try:
+                result = run_study(
+                    file,
+                    folder,
+                    resume=resume,
+                    executor=pool,
+                    threads=jobs or None if pool is None else None,
+                    watch=sweep_bar,
+                )
+            except (OSError, ValueError) as error:
+                if not _is_full(error):
+                    raise
+                _fail(error, json)
+                raise typer.Exit(INCOMPLETE) from None
+        _show(result, json)
+        if not result.complete:
+            options = [part for text in set_ or [] for part in ("--set", text)]
+            options += [] if out is None else ["--out", str(out)]
+            options += [] if executor == "threads" else ["--executor", executor]
+            options += ["--jobs", str(jobs)] if jobs else []
+            again = shlex.join(["nlctl", "run", str(study), "--resume", *options])
+            print(f"continue with: {again}", file=sys.stderr)
+            raise typer.Exit(INTERRUPTED if result.interrupted else INCOMPLETE)
+        if not result.holds:
+            raise typer.Exit(FAILS)
+
+
+def validate(study: StudyPath, set_: Settings = None, jobs: Jobs = 0, json: Json = False) -> None:
+    """Check a study file, and say how many runs, how much time and disk it will take."""
+    with exit_codes(json):
+        from analysis.studies import plan, read_study
+
+        found = plan(read_study(study, set_ or []), jobs or None)
+        if json:
+            content = {"valid": True, **vars(found), "total": found.total}
+            print(json_text.dumps(content, indent=1))
+            return
+        print(f"{study} is a valid study.")
+        for key, count in found.runs.items():
+            print(f"  {key}: {'at most ' if key in found.at_most else ''}{count} runs")
+        print(
+            f"In all {found.total} runs, about {_duration(found.seconds)} on this machine, and "
+            f"at most about {found.size / 1e6:.2g} MB on disk."
+        )
+
+
+def replay(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
+    row: Annotated[int, typer.Argument(min=0, help="Number of the row.")],
+    part: Annotated[
+        str, typer.Option(help="An analysis that keeps rows of its own, such as worst-case.")
+    ] = "",
+    plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
+    json: Json = False,
+) -> None:
+    """Run one row again, compare it with the stored one bit for bit, and plot its signals."""
+    with exit_codes(json):
+        from analysis.studies import replay as replay_row
+        from analysis.studies import replay_figure
+
+        from ._files import replace_file
+        from ._terminal import check_figure, check_writable
+
+        if plot is not None:
+            check_figure(plot)
+            check_writable(plot.parent)
+        made = replay_row(folder, row, part)
+        if plot is not None:
+            figure = replay_figure(made)
+            replace_file(plot, lambda file: figure.savefig(file, format=plot.suffix[1:].lower()))
+        if json:
+            print(json_text.dumps(made.plain(), indent=1))
+        else:
+            print(made)
+        if made.differences:
+            raise typer.Exit(FAILS)
+
+
+def schema() -> None:
+    """Print the JSON schema of study files, for editors."""
+    from analysis.studies import Study
+
+    print(json_text.dumps(Study.model_json_schema(), indent=1))
+
+
+@contextmanager
+def exit_codes(json: bool) -> Iterator[None]:
+    """Turn what goes wrong into one message and an exit code."""
+    from ._errors import DivergedError, UsageError
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        print("nlctl: interrupted", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
+    except (UsageError, DivergedError, OSError) as error:
+        _fail(error, json)
+        raise typer.Exit(INVALID) from None
+    except (typer.Exit, typer.Abort):
+        raise
+    except Exception as error:
+        traceback.print_exc()
+        if json:
+            print(json_text.dumps({"error": f"{type(error).__name__}: {error}"}))
+        raise typer.Exit(INTERNAL) from None
+
+
+def _fail(error: Exception, json: bool) -> None:
+    """Print one message: as JSON where that was asked for."""
+    if not json:
+        print(f"nlctl: {error}", file=sys.stderr)
+        return
+    content: dict[str, Any] = {"error": str(error)}
+    problems = getattr(error, "problems", None)
+    if problems is not None:
+        content |= {"valid": False, "problems": [problem.plain() for problem in problems]}
+    print(json_text.dumps(content, indent=1))
+
+
+def _is_full(error: BaseException | None) -> bool:
+    """Whether a disk or a quota is full: what is kept can be continued."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+            return True
+        error = error.__cause__
+    return False
+
+
+@contextmanager
+def _executor(text: str, jobs: int) -> Iterator[Any]:
+    """Yield the executor that an option names; None for the engine's own threads."""
+    from ._errors import ParameterError
+
+    if text == "threads":
+        yield None
+    elif text == "processes":
+        import multiprocessing
+        from concurrent.futures import ProcessPoolExecutor
+
+        from .native._ensemble import cores
+
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(jobs or cores(), mp_context=context) as pool:
+            yield pool
+    elif text.startswith("dask:"):
+        try:
+            from distributed import Client
+        except ImportError:
+            raise ParameterError(
+                "dask:ADDRESS needs the extra: pip install nlctl[cluster]"
+            ) from None
+        with Client(text.removeprefix("dask:"), timeout="10s") as client:
+            yield client.get_executor()
+    else:
+        raise ParameterError(f"--executor needs threads, processes or dask:ADDRESS, got '{text}'")
+
+
+def _show(result: Any, json: bool) -> None:
+    """Print the verdict, then every finding in its own words."""
+    for note in result.notes:
+        print(f"nlctl: {note}", file=sys.stderr)
+    if json:
+        print(json_text.dumps(result.plain(), indent=1, ensure_ascii=False, allow_nan=False))
+        return
+    print(f"{result.study.study.title}\n{result.verdict}")
+    for finding in result.findings:
+        print(f"\n{finding.title}\n  {finding.sentence}")
+        if finding.claim:
+            print(f"  Claim: {finding.claim}: {'holds' if finding.holds else 'FAILS'}.")
+    print(f"\n{result.folder}")
+
+
+def _duration(seconds: float) -> str:
+    """Return a time in words."""
+    if seconds < 120:
+        return f"{max(seconds, 1):.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

@@ -1,0 +1,97 @@
+"""The body of ``nlctl report study.toml`` and ``nlctl report RUN``: a study's results as a page."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from analysis.report.document import Section
+    from analysis.report.robustness_histories import Histories
+    from analysis.studies.result import Result
+    from analysis.studies.run import Watch
+
+__all__ = ["quick_part", "report_study"]
+
+
+def report_study(
+    path: Path,
+    out: Path | None = None,
+    *,
+    threads: int | None = None,
+    watch: Watch | None = None,
+) -> tuple[Path, Result]:
+    """Write the report of a study.
+
+    Parameters
+    ----------
+    path : Path
+        A study file, which is run in ``reports/<name>`` or taken up there, or the folder of a run.
+    out : Path, optional
+        Folder of the report; by default that of the run.
+    threads : int, optional
+    watch : callable, optional
+        Shows how far the rows are, see `analysis.studies.run.Watch`.
+
+    Returns
+    -------
+    page : Path
+    result : Result
+
+    Raises
+    ------
+    UsageError
+        If the study has mistakes, or the folder holds no run, or another one.
+    """
+    from analysis.report.render import write_report
+    from analysis.report.robustness_part import study_report
+    from analysis.studies import load_result
+
+    result = _run(path, threads, watch) if path.suffix == ".toml" else load_result(path)
+    command = f"nlctl report {shlex.quote(path.as_posix())}"
+    made = study_report(result, _histories(result, threads), command)
+    if out is not None:  # the data stay with the run
+        data = Path(os.path.relpath(result.folder, out))
+        made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})
+    return write_report(made, result.folder if out is None else out), result
+
+
+def quick_part(
+    paths: Sequence[Path], *, threads: int | None = None, watch: Watch | None = None
+) -> list[Section]:
+    """Run short studies in ``reports/<name>``, and return them as a part of another report.
+
+    Arguments and errors as in `report_study`.
+    """
+    from analysis.report.robustness_part import study_part
+
+    results = [_run(path, threads, watch) for path in paths]
+    return study_part([(result, _histories(result, threads)) for result in results])
+
+
+def _run(path: Path, threads: int | None, watch: Watch | None) -> Result:
+    from analysis.studies import read_study, run
+
+    folder = Path("reports") / path.stem
+    how: dict[str, Any] = {} if watch is None else {"watch": watch}
+    return run(read_study(path), folder, resume=True, threads=threads, **how)
+
+
+def _histories(result: Result, threads: int | None) -> Histories | None:
+    """Simulate some rows of the main table again; None without rows."""
+    from analysis.report.robustness_histories import histories
+    from analysis.robustness import prepare
+    from analysis.studies.run import rerun_file
+
+    if result.rows is None or not result.rows.done:
+        return None
+    searched = [f.numbers for f in result.findings if f.kind == "worst case"]
+    witness = min(
+        ((n["witness"], n["margin"]) for n in searched), key=lambda pair: pair[1], default=None
+    )
+    prepared = prepare(rerun_file(result.folder).experiment)
+    return histories(prepared, result.rows.table, witness, threads=threads)

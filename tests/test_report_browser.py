@@ -1,0 +1,242 @@
+"""The page in a real browser: nothing fetched, nothing executed, sorting, filtering, reading."""
+
+import math
+import shutil
+
+import pytest
+from test_report import made_up_runs
+from test_report_page import HOSTILE, every_kind
+
+from analysis.report import write_gallery, write_pdf, write_report
+from analysis.report.browser import BROWSERS
+from analysis.report.paper_report import paper_report
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=f"none of {', '.join(BROWSERS)} is there")
+
+PAGES = ("plain", "hostile", "long", "paper", "gallery")
+PHONE = 390
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_api.sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=CHROMIUM, args=["--disable-quic"])
+        yield running
+        running.close()
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    """Reports with plain names, with all hostile ones, a very long one; the paper's; a gallery."""
+    folder = tmp_path_factory.mktemp("reports")
+    hostile = " ".join(text for name, text in HOSTILE.items() if name != "long")
+    made = {
+        "plain": write_report(every_kind(), folder / "plain"),
+        "hostile": write_report(every_kind(hostile, hostile), folder / "<b>hostile & #1"),
+        "long": write_report(every_kind(HOSTILE["long"], HOSTILE["long"]), folder / "long"),
+        "paper": write_report(paper_report(made_up_runs()), folder / "paper"),
+    }
+    return made | {"gallery": write_gallery(folder)}
+
+
+@pytest.fixture
+def visit(browser, pages):
+    """Open a page; console errors and requests are collected in the lists ``seen`` of it."""
+    contexts = []
+
+    def go(name, *, width=1200, scheme="light", scripts=True):
+        context = browser.new_context(
+            viewport={"width": width, "height": 900},
+            color_scheme=scheme,
+            java_script_enabled=scripts,
+        )
+        contexts.append(context)
+        page = context.new_page()
+        page.seen = []
+        page.on("console", lambda m: page.seen.append(m.text) if m.type != "log" else None)
+        page.on("pageerror", lambda error: page.seen.append(str(error)))
+        page.on("dialog", lambda dialog: page.seen.append(dialog.message))
+        own = pages[name].as_uri()
+        page.on("request", lambda r: None if r.url == own else page.seen.append(r.url))
+        page.goto(own)
+        return page
+
+    yield go
+    for context in contexts:
+        context.close()
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_nothing_is_fetched_and_the_console_is_silent(visit, name):
+    """Fonts and pictures are data inside the page, and the policy blocks nothing that is ours."""
+    page = visit(name)
+    page.evaluate("document.fonts.ready")
+    assert [url for url in page.seen if not url.startswith("data:")] == []
+
+
+@pytest.mark.parametrize("name", [name for name in PAGES if name != "long"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_no_violation(visit, name, scheme):
+    """Contrast, names, roles, headings, keyboard, in both colour schemes."""
+    inside = {"exclude": [["svg > g"]]}  # an image by its role: what it is drawn of has none
+    found = axe.Axe().run(visit(name, scheme=scheme), context=inside, options=None).response
+    assert "color-contrast" in {rule["id"] for rule in found["passes"]}
+    assert [(v["id"], [n["html"][:300] for n in v["nodes"]][:3]) for v in found["violations"]] == []
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_phone_does_not_scroll_sideways(visit, name):
+    """Wide tables, formulas and figures scroll in boxes of their own."""
+    page = visit(name, width=PHONE)
+    assert page.evaluate("document.scrollingElement.scrollWidth") <= PHONE
+
+
+@pytest.mark.parametrize("name", ["hostile", "long"])
+def test_hostile_names_do_nothing_and_are_shown(visit, name):
+    """Not on loading, not on sorting, filtering and enlarging."""
+    page = visit(name)
+    page.evaluate("document.querySelectorAll('main button').forEach(b => b.click())")
+    page.evaluate("document.querySelectorAll('dialog').forEach(d => d.close())")
+    assert page.evaluate("window.__pwned") is None
+    text = page.evaluate("document.body.textContent")
+    for key, part in HOSTILE.items():
+        if (key == "long") == (name == "long"):
+            assert part in text
+    assert page.evaluate("document.querySelectorAll('img, main script').length") == 0
+
+
+def column(page, place):
+    """Visible texts of one column of the long table."""
+    return page.evaluate(
+        "i => [...document.querySelector('table.many').tBodies[0].rows].filter(r => !r.hidden)"
+        ".map(r => r.cells[i].textContent)",
+        place,
+    )
+
+
+def test_a_click_or_a_key_sorts_by_number_and_again_downwards(visit):
+    """Ten comes after nine; NaN stays last both ways; the header says what was done."""
+    page = visit("plain")
+    before = column(page, 1)
+    heads = page.locator("table.many").first.locator("th")
+    head = heads.nth(1)
+    head.locator("button").click()
+    assert head.get_attribute("aria-sort") == "ascending"
+    upwards = [float(text) for text in column(page, 1)]
+    numbers = [x for x in upwards if not math.isnan(x)]
+    assert numbers == sorted(numbers)
+    assert all(map(math.isnan, upwards[len(numbers) :]))
+    head.locator("button").focus()
+    page.keyboard.press("Enter")
+    assert head.get_attribute("aria-sort") == "descending"
+    downwards = [float(text) for text in column(page, 1)]
+    assert downwards[: len(numbers)] == sorted(numbers, reverse=True)
+    assert all(map(math.isnan, downwards[len(numbers) :]))
+    heads.nth(0).locator("button").click()
+    assert head.get_attribute("aria-sort") is None
+    assert column(page, 1) == before
+
+
+def test_the_filter_leaves_rows_with_all_its_words(visit):
+    """And says how many; an empty filter shows all again.  Short tables have none."""
+    page = visit("plain")
+    rows = column(page, 2)
+    box = page.get_by_label("Filter rows").first
+    box.fill("ROW 3 fail")
+    shown = column(page, 2)
+    assert 0 < len(shown) < 14
+    assert {f"row {i}" for i in range(40) if i % 3 == 0 and "3" in str(i)} <= set(shown)
+    assert all("3" in column(page, 0)[i] + column(page, 1)[i] for i in range(len(shown)))
+    assert set(column(page, 3)) == {"fail"}
+    assert f"{len(shown)} of 40 rows" in page.locator(".filter").first.text_content()
+    box.fill("")
+    assert column(page, 2) == rows
+    assert page.locator(".filter").count() == page.locator("table.many").count()
+
+
+def test_everything_is_readable_without_scripts(visit):
+    """The same text, all rows, all figures, and no button that does nothing."""
+    with_scripts, without = visit("plain"), visit("plain", scripts=False)
+    assert without.locator("button, input").count() == 0
+    assert without.locator("tbody tr").count() == with_scripts.locator("tbody tr").count()
+    for place in range(without.locator("figure svg").count()):
+        assert without.locator("figure svg").nth(place).bounding_box()["height"] > 100
+    parts = without.locator("td, th, p, li, h1, h2, h3, caption, figcaption, pre")
+    written, seen = parts.all_text_contents(), parts.all_inner_texts()
+    assert ["".join(text.split()) for text in seen] == ["".join(text.split()) for text in written]
+
+
+def luminance(page, element, what):
+    """Relative luminance of a computed colour (WCAG 2.2)."""
+    colour = page.evaluate(
+        "([e, w]) => getComputedStyle(document.querySelector(e))[w]", [element, what]
+    )
+    parts = [int(p) / 255 for p in colour.removeprefix("rgb(").removesuffix(")").split(",")]
+    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+@pytest.mark.parametrize(
+    ("scheme", "media", "is_dark"),
+    [("light", "screen", False), ("dark", "screen", True), ("dark", "print", False)],
+)
+def test_dark_pages_are_dark_and_paper_is_white(visit, scheme, media, is_dark):
+    """Text and the lines of figures stand out from the page in each of them."""
+    page = visit("plain", scheme=scheme)
+    page.emulate_media(media=media, color_scheme=scheme)
+    ground, ink = (luminance(page, "body", w) for w in ("backgroundColor", "color"))
+    assert (ground < 0.05) is is_dark
+    assert ground > 0.99 or is_dark
+    light, dark = max(ground, ink), min(ground, ink)
+    assert (light + 0.05) / (dark + 0.05) > 7
+    axis = "figure svg path[stroke=currentColor]"
+    assert luminance(page, axis, "stroke") == ink
+    assert page.locator("nav").is_visible() is (media == "screen")
+    assert page.locator("th button").first.is_visible()
+    assert page.locator("figcaption button").first.is_visible() is (media == "screen")
+
+
+def test_figures_enlarge_and_return(visit):
+    """The dialog holds the figure itself, and its place gets it back; so does the Escape key."""
+    page = visit("plain")
+    before = page.locator("main").inner_html()
+    button = page.locator("figcaption button").first
+    small = page.locator("figure svg").first.bounding_box()["width"]
+    for leave in ("Close", "Escape"):
+        button.click()
+        assert page.locator("dialog svg").is_visible()
+        assert page.locator("dialog svg").bounding_box()["width"] > small
+        if leave == "Close":
+            page.get_by_role("button", name="Close").click()
+        else:
+            page.keyboard.press("Escape")
+        page.locator("dialog svg").wait_for(state="detached")
+        assert page.locator("main").inner_html() == before
+
+
+def test_the_brace_of_cases_spans_its_rows_and_the_hat_sits_on_its_letter(visit):
+    """What the math font is there for."""
+    page = visit("plain")
+    page.evaluate("document.fonts.ready")
+    assert page.evaluate("document.fonts.check('16px \"nlctl Math\"')")
+    height = "e => document.querySelector(e).getBoundingClientRect().height"
+    assert page.evaluate(height, "math mo[fence=true]") > 0.9 * page.evaluate(height, "mtable")
+    assert page.evaluate(height, "math mtable") > 2 * page.evaluate(height, "mtr mi")
+    gap = page.evaluate(
+        "() => { const m = document.querySelector('mover');"
+        "const [w, hat] = [...m.children].map(c => c.getBoundingClientRect());"
+        "return [w.top - hat.top, w.height, m.getBoundingClientRect().height]; }"
+    )
+    assert gap[2] < 2 * gap[1]
+
+
+def test_a_page_is_printed_to_pdf(pages, tmp_path):
+    """Through the same Chromium, without its address and date in the margins."""
+    made = write_pdf(pages["plain"], tmp_path / "report.pdf")
+    content = made.read_bytes()
+    assert content.startswith(b"%PDF-")
+    assert content.count(b"/Type /Page\n") >= 2
+    assert [p.name for p in tmp_path.iterdir()] == ["report.pdf"]
