@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -82,10 +83,12 @@ def _run(path: Path, threads: int | None, watch: Watch | None) -> Result:
 
 
 def _histories(result: Result, threads: int | None) -> Histories | None:
-    """Simulate some rows of the main table again; None without rows."""
+    """Simulate some rows of the main table again; None without rows, or if the loop has gone."""
     from analysis.report.robustness_histories import histories
     from analysis.robustness import prepare
     from analysis.studies.run import rerun_file
+
+    from ._errors import UsageError
 
     if result.rows is None or not result.rows.done:
         return None
@@ -93,5 +96,9 @@ def _histories(result: Result, threads: int | None) -> Histories | None:
     witness = min(
         ((n["witness"], n["margin"]) for n in searched), key=lambda pair: pair[1], default=None
     )
-    prepared = prepare(rerun_file(result.folder).experiment)
+    try:
+        prepared = prepare(rerun_file(result.folder).experiment)
+    except UsageError as error:  # what was found is shown all the same
+        print(f"nlctl: the report has no fans: {error}", file=sys.stderr)
+        return None
     return histories(prepared, result.rows.table, witness, threads=threads)

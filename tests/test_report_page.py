@@ -32,7 +32,8 @@ from analysis.report import (
 )
 from analysis.report.outline import LIGHTS, claim_status, light, place, sort_key, summary
 from analysis.report.page import parts
-from analysis.report.svg import _short_path, shapes_svg, svg
+from analysis.report.svg import shapes_svg, svg
+from analysis.report.svg_compact import short_path
 from nlctl._errors import UsageError
 
 HOSTILE = {
@@ -224,15 +225,24 @@ def test_frames_of_legends_follow_the_theme_and_white_text_stays_white():
 
 @given(st.lists(st.tuples(st.floats(-900, 900), st.floats(-900, 900)), min_size=2, max_size=9))
 def test_short_paths_go_through_the_same_points(points):
-    """Lines to a tenth of a point, curves to a hundredth; both shorter than before."""
+    """Lines in steps that add up to a tenth of a point, curves to a hundredth; both shorter."""
     pairs = [f"{x:.6f} {y:.6f}" for x, y in points]
-    for joint, error in ((" \nL ", 0.0501), (" \nQ 0.125 0.125 ", 0.00501)):
-        path = "M " + joint.join(pairs)
-        short = _short_path(path)
-        read = [float(n) for n in re.findall(r"-?[\d.]+", short)]
-        written = [float(n) for n in re.findall(r"-?[\d.]+", path)]
-        np.testing.assert_allclose(read, written, atol=error)
-        assert len(short) <= len(path)
+    lines, curves = ("M " + joint.join(pairs) for joint in (" \nL ", " \nQ 0.125 0.125 "))
+    short = short_path(lines + " z")
+    steps = np.array([float(n) for n in re.findall(r"-?[\d.]+", short)]).reshape(-1, 2)
+    np.testing.assert_allclose(np.cumsum(steps, axis=0), points, atol=0.0501)
+    assert short[0] == "m"
+    assert len(short) <= len(lines)
+    read, written = (
+        [float(n) for n in re.findall(r"-?[\d.]+", path)] for path in (short_path(curves), curves)
+    )
+    np.testing.assert_allclose(read, written, atol=0.00501)
+
+
+def test_a_closed_path_goes_on_from_where_it_began():
+    """Two squares in one path, the second written after the first has been closed."""
+    squares = "M 1 1 L 2 1 L 2 2 z M 5 5 L 6 5 L 6 6 z"
+    assert short_path(squares) == "m1 1 1 0 0 1zm4 4 1 0 0 1z"
 
 
 def test_letters_are_drawn_once_for_all_figures_of_a_page():

@@ -63,7 +63,8 @@ def histories(
     table : pandas.DataFrame
         Rows with their margins ``spec``.  Of independent draws the first ones are such as well.
     witness : (row, margin), optional
-        Of a search; it is the worst row if its margin is lower than all of the table.
+        Of a search; it is the worst row if its margin is lower than all of the table.  What it
+        leaves out is nominal.
     most : int, optional
         Number of rows.
     threads : int, optional
@@ -78,7 +79,7 @@ def histories(
     lowest = int(np.argmin(margins))
     worst, margin = table.iloc[lowest].to_dict(), float(margins[lowest])
     if witness is not None and not witness[1] >= margin:
-        worst, margin = dict(witness[0]), float(witness[1])
+        worst, margin = nominal(space) | dict(witness[0]), float(witness[1])
     count = min(most, len(table))
     both = as_table(space, [nominal(space), {name: worst[name] for name in space.names}])
     rows = pd.concat([both, table.loc[:, space.names].iloc[:count]], ignore_index=True)

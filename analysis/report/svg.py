@@ -15,6 +15,7 @@ from nlctl import drawing
 
 from .. import figures
 from .document import Figure
+from .svg_compact import compact, shared_shape, short_path
 
 __all__ = ["shapes_svg", "svg"]
 
@@ -29,8 +30,8 @@ THEME = {
 SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": 9.0}
 WIDE = 450.0  # points; a phone shows wider figures in a box that scrolls
 DECIMALS = re.compile(r"-?\d+\.\d{2,}")
-CURVED = re.compile("[CQ]")
 PLACE = re.compile(r"translate\([^)]*\)|^[-\d.]+$")
+TAG = re.compile(r"<(\w+)")
 URL = re.compile(r"url\(#([^)]*)\)")
 
 
@@ -60,7 +61,7 @@ def svg(figure: Figure, key: str, shapes: dict[str, str]) -> Markup:
     referred = {name for e in root.iter() for v in e.attrib.values() for name in URL.findall(v)}
     for element in root.iter():
         _rename(element, key, shared, referred)
-    _unwrap(root)
+    compact(root, shapes)
     attributes = {"role": "img", "aria-labelledby": f"{key}-title {key}-desc"}
     if float(root.get("width", "0pt").removesuffix("pt")) > WIDE:
         attributes["class"] = "wide"
@@ -74,9 +75,9 @@ def svg(figure: Figure, key: str, shapes: dict[str, str]) -> Markup:
 
 def shapes_svg(shapes: Mapping[str, str]) -> Markup:
     """Return the shapes that the figures of a page are drawn from, as an SVG without size."""
-    paths = "".join(text.replace("<path", f'<path id="{name}"', 1) for text, name in shapes.items())
+    named = "".join(TAG.sub(rf'<\1 id="{name}"', text, count=1) for text, name in shapes.items())
     return Markup(
-        f'<svg class="shapes" aria-hidden="true" width="0" height="0"><defs>{paths}</defs></svg>'
+        f'<svg class="shapes" aria-hidden="true" width="0" height="0"><defs>{named}</defs></svg>'
     )
 
 
@@ -91,8 +92,6 @@ def _plain(element: ElementTree.Element) -> None:
     target = attributes.pop("href", "")
     if target.startswith(("#", "data:image/png;")):
         attributes["href"] = "".join(target.split())
-    if "d" in attributes:
-        attributes["d"] = _short_path(attributes["d"])
     for name in {"x", "y", "transform"} & attributes.keys():
         attributes[name] = PLACE.sub(lambda m: DECIMALS.sub(_hundredths, m[0]), attributes[name])
     if attributes.get("fill") == "#ffffff" and "stroke" in attributes:
@@ -115,8 +114,8 @@ def _share(root: ElementTree.Element, shapes: dict[str, str]) -> dict[str, str]:
             elif parent.tag == "defs" and child.tag == "path":
                 parent.remove(child)
                 old = child.attrib.pop("id", "")
-                text = ElementTree.tostring(child, encoding="unicode")
-                shared[old] = shapes.setdefault(text, f"g:{len(shapes) + 1}")
+                child.set("d", short_path(child.get("d", "")))
+                shared[old] = shared_shape(ElementTree.tostring(child, encoding="unicode"), shapes)
     for parent in list(root.iter()):
         parent[:] = [child for child in parent if child.tag != "defs" or len(child)]
     return shared
@@ -136,27 +135,6 @@ def _rename(
         attributes["id"] = f"{key}-{own}"
     for name, value in attributes.items():
         attributes[name] = URL.sub(rf"url(#{key}-\1)", value)
-
-
-def _unwrap(element: ElementTree.Element) -> None:
-    """Put the content of groups that say nothing in their place."""
-    children = []
-    for child in element:
-        _unwrap(child)
-        children += list(child) if child.tag == "g" and not child.attrib else [child]
-    element[:] = children
-
-
-def _short_path(path: str) -> str:
-    """Return path data in fewer characters: curves to a hundredth of a point, lines to a tenth."""
-    path = " ".join(path.split())
-    if CURVED.search(path):
-        return DECIMALS.sub(_hundredths, path)
-    return DECIMALS.sub(_tenths, path).replace(" L ", " ")  # after a move, a line is understood
-
-
-def _tenths(number: re.Match[str]) -> str:
-    return f"{float(number[0]):.1f}".removesuffix(".0")
 
 
 def _hundredths(number: re.Match[str]) -> str:
