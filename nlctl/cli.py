@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import traceback
 from pathlib import Path
 from typing import Annotated
 
@@ -221,7 +222,10 @@ register_studies(app)
 
 
 def main() -> None:
-    """Run the command line; what the user can put right ends in one sentence and exit code 2."""
+    """Run the command line; what the user can put right ends in one sentence and exit code 2.
+
+    What he cannot, an internal error, ends with its trace and exit code 3.
+    """
     from ._errors import DivergedError, UsageError
 
     try:
@@ -229,3 +233,6 @@ def main() -> None:
     except (UsageError, DivergedError, OSError) as error:
         print(f"nlctl: {error}", file=sys.stderr)
         raise SystemExit(2) from None
+    except Exception:
+        traceback.print_exc()
+        raise SystemExit(3) from None

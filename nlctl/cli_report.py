@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json as json_text
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from .cli_studies import INCOMPLETE, exit_codes
+
+QUICK = ("example-1-quick", "example-2-quick")  # the studies of the paper's report
 
 Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
@@ -34,13 +36,17 @@ def report(
         typer.Option(help="Folder of the report; reports/paper, or that of the run."),
     ] = None,
     jobs: Annotated[int, typer.Option(min=0, help="Processes or threads; 0: one per core.")] = 0,
+    far: Annotated[
+        bool,
+        typer.Option("--far", help="Run Example 2 to its burst instead of showing the record."),
+    ] = False,
     open_: Open = False,
     pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
 ) -> None:
     """Write a report, one page that needs nothing else.  Exit 1 if a claim of it fails."""
     with exit_codes(json=False):
         made, page, code = (
-            _paper(out or Path("reports/paper"), jobs, pdf=pdf)
+            _paper(out or Path("reports/paper"), jobs, far=far, pdf=pdf)
             if study is None
             else _study(study, out, jobs, pdf=pdf)
         )
@@ -50,19 +56,21 @@ def report(
             raise typer.Exit(code)
 
 
-def _paper(out: Path, jobs: int, *, pdf: bool) -> tuple[str, Path, int]:
+def _paper(out: Path, jobs: int, *, far: bool, pdf: bool) -> tuple[str, Path, int]:
     """Reproduce the paper; return the verdict, the page and the exit code."""
     from analysis.report.lyapunov_evidence import evidence, far_runs_in_background
     from analysis.report.paper_report import paper_report
     from analysis.report.render import write_report
-    from analysis.reproduction import CASES, checks, run_all
+    from analysis.reproduction import CASES, checks, numerics, run_all
 
     from . import paper
+    from ._sweep_progress import sweep_bar
     from ._terminal import progress_bar
+    from .cli_study_report import quick_part
     from .native._ensemble import cores
 
     check_report_options(out, pdf=pdf)
-    with far_runs_in_background() as far:
+    with far_runs_in_background(whole=far) as long_runs:
         with progress_bar("simulating", len(CASES)) as advance:
             runs = run_all(CASES, jobs=jobs or min(cores(), len(CASES)), done=lambda _: advance(1))
         proofs = {}
@@ -70,8 +78,15 @@ def _paper(out: Path, jobs: int, *, pdf: bool) -> tuple[str, Path, int]:
             for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
                 proofs[number] = evidence(loop)
                 advance(1)
+        studies = quick_part(QUICK, out, threads=jobs or None, watch=sweep_bar)
         with progress_bar("running far beyond 20 s", 1):
-            made = paper_report(runs, proofs, far.result())
+            made = paper_report(
+                runs,
+                proofs=proofs,
+                far=long_runs.result(),
+                studies=studies,
+                numerics=numerics(),
+            )
     page = write_report(made, out)
     return made.verdict, page, int(not all(check.passed for check in checks(runs)))
 
@@ -81,19 +96,20 @@ def _study(study: Path, out: Path | None, jobs: int, *, pdf: bool) -> tuple[str,
     from ._sweep_progress import sweep_bar
     from .cli_study_report import report_study
 
-    check_report_options(out or study.parent, pdf=pdf)
+    kept = Path("reports") / study.stem if study.suffix == ".toml" else study
+    check_report_options(out or kept, pdf=pdf)
     page, result = report_study(study, out, threads=jobs or None, watch=sweep_bar)
     code = int(not result.holds) if result.complete else INCOMPLETE
     return result.verdict, page, code
 
 
 def compare(
-    first: Annotated[Path, typer.Argument(help="report.json, or the folder that holds it.")],
+    first: Annotated[Path, typer.Argument(help="report.json, its folder, or that of a run.")],
     second: Annotated[Path, typer.Argument(help="Another one.")],
     rtol: Annotated[float, typer.Option(help="Numbers this close count as equal.")] = 0.0,
     json: Json = False,
 ) -> None:
-    """Say what differs between two reports; exit 1 if anything does."""
+    """Say what differs between two reports or two runs of studies; exit 1 if anything does."""
     if not compare_reports(first, second, rtol=rtol, as_json=json):
         raise typer.Exit(1)
 
@@ -141,7 +157,9 @@ def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
 
 
 def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:
-    """Print what differs between two reports, one thing a line; return whether nothing does.
+    """Print what differs, one thing a line; return whether nothing does.
+
+    Two folders without reports are compared by the results of their runs.
 
     Raises
     ------
@@ -149,14 +167,15 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
         If a file is no report, or cannot be read.
     """
     from analysis.report.compare import compare
+    from analysis.studies import run_differences
 
-    found = compare(first, second, rtol=rtol)
+    runs = [p.is_dir() and not (p / "report.json").exists() for p in (first, second)]
+    found: list[Any] = (
+        run_differences(first, second) if all(runs) else compare(first, second, rtol=rtol)
+    )
     if as_json:
-        print(
-            json_text.dumps(
-                [vars(difference) for difference in found], indent=1, ensure_ascii=False
-            )
-        )
+        told = [text if isinstance(text, str) else vars(text) for text in found]
+        print(json_text.dumps(told, indent=1, ensure_ascii=False))
         return not found
     for difference in found:
         print(difference)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -62,15 +63,32 @@ def report_study(
 
 
 def quick_part(
-    paths: Sequence[Path], *, threads: int | None = None, watch: Watch | None = None
+    names: Sequence[str],
+    folder: Path,
+    *,
+    threads: int | None = None,
+    watch: Watch | None = None,
 ) -> list[Section]:
-    """Run short studies in ``reports/<name>``, and return them as a part of another report.
+    """Run studies that come with nlctl, and return them as a part of another report.
 
-    Arguments and errors as in `report_study`.
+    Parameters
+    ----------
+    names : sequence of str
+        See `analysis.studies.shipped`.
+    folder : Path
+        Each study is run in ``folder/name``; a run that is there is replaced.
+    threads, watch
+        As in `report_study`.
     """
     from analysis.report.robustness_part import study_part
+    from analysis.studies import read_study, run, shipped
 
-    results = [_run(path, threads, watch) for path in paths]
+    how: dict[str, Any] = {"threads": threads} | ({} if watch is None else {"watch": watch})
+    results = []
+    for name in names:
+        if (folder / name / "run.json").exists():
+            shutil.rmtree(folder / name)
+        results.append(run(read_study(shipped(name)), folder / name, **how))
     return study_part([(result, _histories(result, threads)) for result in results])
 
 

@@ -11,8 +11,9 @@ from test_report import made_up_runs, outline
 
 import nlctl
 from analysis import figures
-from analysis.lyapunov.long_run import long_run
-from analysis.lyapunov.nussbaum import antiderivative
+from analysis.lyapunov.far_record import continued, read_record, thinned, write_record
+from analysis.lyapunov.long_run import LongRun, long_run
+from analysis.lyapunov.nussbaum import antiderivative, lobe_around
 from analysis.lyapunov.parts import read_parts
 from analysis.lyapunov.signals import equality, inequality
 from analysis.report import Figure, Paragraph, Report, Section, Table, render_html, render_json
@@ -128,7 +129,7 @@ def test_commands_in_the_text_are_python():
 
 def test_the_part_is_in_the_papers_report_when_there_is_evidence():
     """With it: sections, figures, valid page, the same numbers in JSON.  Without: as before."""
-    report = paper_report(made_up_runs(), found())
+    report = paper_report(made_up_runs(), proofs=found())
     parsed = outline(render_html(report))
     assert len(parsed.ids) == len(set(parsed.ids))
     for key in (
@@ -284,3 +285,53 @@ def test_the_envelope_is_the_largest_value_of_each_whole_window():
 def test_statements_are_shown_with_the_letters_of_the_paper(plain, shown):
     """Words stay words."""
     assert text.pretty(plain) == shown
+
+
+def test_a_thinned_run_has_the_same_burst_and_the_same_largest_error(tmp_path):
+    """Found again from a hundredth of the samples, also after a trip through the file."""
+    t = np.append(np.arange(0, 1900, 0.01), 1901 - np.geomspace(1, 1e-5, 900))
+    zeta = 2 + np.where(t < 1900.5, t / 2000, 0.95 + 2 * (t - 1900.5))
+    signals = {"zeta": zeta, "e": 0.05 * np.sin(0.5 * t + 0.1), "r": np.cos(t), "u": np.sin(t)}
+    run = LongRun(
+        loop="example_2", horizon=2000.0, rtol=1e-6, time=t, signals=signals, predictions=(),
+        lobe=lobe_around(2.0), lost=1901.0,
+    )  # fmt: skip
+    thin = thinned(run)
+    assert thin.time.size < run.time.size / 100
+    assert thin.burst == run.burst
+    assert thin.calm == run.calm
+    write_record(thin, tmp_path / "run.csv")
+    again = read_record(run, tmp_path / "run.csv")
+    assert (again.loop, again.rtol, again.lost) == ("example_2", 1e-6, 1901.0)
+    assert again.burst == pytest.approx(run.burst, abs=1e-5)
+    np.testing.assert_allclose(again.signals["r"], thin.signals["r"], rtol=1e-6)
+
+
+def test_the_kept_record_goes_on_where_a_run_of_today_ends():
+    """1000 s of Example 2 end where the record is, and a record of another loop is refused."""
+    today = long_run(nlctl.paper.example_2(), 1000.0)
+    record = read_record(today)
+    whole = continued(today, record)
+    assert np.all(np.diff(whole.time) > 0)
+    assert 9.1e3 < whole.burst < 9.5e3
+    assert whole.calm < 0.06
+    early, late = (p.burst_by_balance for p in whole.predictions)
+    assert early == pytest.approx(whole.burst, rel=0.05)
+    assert late == pytest.approx(whole.burst, rel=0.05)
+    other = dataclasses.replace(today, signals={k: v + 0.01 for k, v in today.signals.items()})
+    with pytest.raises(ValueError, match="make it again"):
+        continued(other, record)
+
+
+def test_the_verdict_and_the_claims_say_what_becomes_of_the_loop():
+    """A burst is in the first sentences, and the paper's theorem is a claim that fails."""
+    run = read_record(long_run(nlctl.paper.example_2(), 210.0))
+    report = paper_report(made_up_runs(), proofs=found(), far={"2": run})
+    assert "loses the sign of its gain at 9212 s" in report.verdict
+    claims = {claim.text: claim for claim in report.claims}
+    assert not claims["The paper's theorem: all signals stay bounded for all time"].holds
+    proved = [c for c in report.claims if c.status == "proved"]
+    assert len(proved) == 2
+    assert all(c.holds for c in proved)
+    anchors = {section.key for section in report.sections}
+    assert {c.evidence for c in report.claims if c.evidence.startswith("proof")} <= anchors

@@ -36,7 +36,9 @@ CALM = (
 )
 FAR_CAPTION = (
     "Runs of this report far beyond 20 s. Foretold: from the first 200 s and from the first "
-    "1000 s of the same run. max |e₁|: from 200 s on, until a second before the burst."
+    "1000 s of the same run. max |e₁|: from 200 s on, until a second before the burst. What comes "
+    "after 1000 s of Example 2 is a record of the same computation, kept with the program and "
+    "continued from where today's run ends; nlctl report --far computes all of it again."
 )
 CREEP = (
     "While ζ crosses an interval between two zeros of N, a lobe, it uses up the lobe's budget, the "

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
+from ..lyapunov.long_run import LongRun
 from ..reproduction import HORIZON, TAIL, Check, Run
 from . import paper_text as text
 from .document import Claim
+from .lyapunov_evidence import Evidence
 
 
-def verdict(compared: Sequence[Check]) -> str:
-    """Return the report's first sentence."""
+def verdict(compared: Sequence[Check], far: Mapping[str, LongRun]) -> str:
+    """Return the report's first sentence, and what became of the loops far beyond 20 s."""
     total = len(compared)
     missed = [c for c in compared if not c.passed]
     if missed:
@@ -20,10 +24,12 @@ def verdict(compared: Sequence[Check]) -> str:
             f"{worst.metric.meaning} of case {worst.expectation.case} "
             f"({worst.value:.8g} instead of {worst.expectation.printed})."
         )
-    return (
+    reproduced = (
         f"Both examples are reproduced: all {total} figures are reached, and the same controller "
         f"follows the reference through a dead zone and through backlash over {HORIZON:g} s."
     )
+    bursts = [f"{_loop(run)} loses the sign of its gain at {run.burst:.0f} s" for run in _lost(far)]
+    return f"{reproduced} But not for all time: {'; '.join(bursts)}." if bursts else reproduced
 
 
 def claims(runs: Mapping[str, Run], compared: Sequence[Check]) -> list[Claim]:
@@ -72,3 +78,51 @@ def _holds(key: str, metric: str, compared: Sequence[Check]) -> bool:
 def _limit(key: str, metric: str, compared: Sequence[Check]) -> str:
     expected = _of(key, metric, compared).expectation
     return f"{expected.printed} ± {expected.tolerance:.0e}"
+
+
+def _lost(far: Mapping[str, LongRun]) -> list[LongRun]:
+    return [run for run in far.values() if np.isfinite(run.burst)]
+
+
+def _loop(run: LongRun) -> str:
+    return run.loop.replace("_", " ").capitalize()
+
+
+def proof_claims(proofs: Mapping[int, Evidence], far: Mapping[str, LongRun]) -> list[Claim]:
+    """Return what the paper's proof claims, and what nlctl proves in its place."""
+    found = [
+        Claim(
+            text="The paper's theorem: all signals stay bounded for all time",
+            measured=f"{_loop(run)} as published loses the sign of its gain at "
+            f"{run.burst:.0f} s; Lemma 1, which the proof rests on, is false",
+            limit="bounded for all t",
+            holds=False,
+            evidence="proof",
+            status="violated",
+        )
+        for run in _lost(far)
+    ]
+    for number, one in proofs.items():
+        lines, bound = one.ledger, one.certificate.C_0
+        checked = [line for line in lines.lines if line.reading == "corrected"]
+        found += [
+            Claim(
+                text=f"Example {number}: the proof's steps, as far as they can be corrected, hold "
+                f"along the run of {HORIZON:g} s",
+                measured=f"{len(checked) - len(lines.violated)} of {len(checked)} lines",
+                limit=f"{len(checked)}",
+                holds=lines.holds,
+                evidence=f"proof-{number}",
+                status="checked" if lines.holds else "violated",
+            ),
+            Claim(
+                text=f"Example {number} with a law that knows the sign of the gain: a bound for "
+                "all time",
+                measured=f"|r| ≤ {bound:.3f}, max |r| of a run {one.certified_max_r:.3f}",
+                limit="proved by interval arithmetic",
+                holds=bool(np.isfinite(bound)),
+                evidence=f"proof-{number}-bound",
+                status="proved" if np.isfinite(bound) else "undecided",
+            ),
+        ]
+    return found

@@ -7,27 +7,36 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 
 import control as ct
+import pandas as pd
 
 from nlctl._diagram import leaves
 from nlctl.drawing import draw
 
 from .. import figures
 from ..lyapunov.long_run import LongRun
-from ..reproduction import CASES, HORIZON, METRICS, TAIL, Check, Run, checks
+from ..reproduction import CASES, HORIZON, TAIL, Check, Run, checks
 from . import paper_text as text
 from .document import Figure, Paragraph, Report, Section, Table
 from .lyapunov_part import Evidence, lyapunov_sections
-from .paper_claims import claims, verdict
+from .paper_claims import claims, proof_claims, verdict
+from .paper_closing import closing_sections, metric_table
 
 __all__ = ["paper_report"]
 
 Runs = Mapping[str, Run]
-Proofs = Mapping[int, Evidence]
-Far = Mapping[str, LongRun]
-PACKAGES = ("nlctl", "control", "numpy", "scipy", "matplotlib", "python-flint", "cvxpy")
+PACKAGES = (
+    "nlctl", "control", "numpy", "scipy", "numba", "matplotlib", "pandas", "python-flint", "cvxpy",
+)  # fmt: skip
 
 
-def paper_report(runs: Runs, proofs: Proofs | None = None, far: Far | None = None) -> Report:
+def paper_report(
+    runs: Runs,
+    *,
+    proofs: Mapping[int, Evidence] | None = None,
+    far: Mapping[str, LongRun] | None = None,
+    studies: Sequence[Section] = (),
+    numerics: pd.DataFrame | None = None,
+) -> Report:
     """Compose the reproduction report from the runs of `analysis.reproduction.CASES`.
 
     Parameters
@@ -38,6 +47,10 @@ def paper_report(runs: Runs, proofs: Proofs | None = None, far: Far | None = Non
         What `analysis.report.lyapunov_part.evidence` found, by number of the example.
     far : mapping, optional
         Runs far beyond 20 s, of `analysis.report.lyapunov_evidence.far_runs_in_background`.
+    studies : sequence of Section, optional
+        The part on robustness, see `analysis.report.robustness_part.study_part`.
+    numerics : pandas.DataFrame, optional
+        Result of `analysis.reproduction.numerics`.
 
     Returns
     -------
@@ -46,21 +59,22 @@ def paper_report(runs: Runs, proofs: Proofs | None = None, far: Far | None = Non
     compared = checks(runs)
     return Report(
         title="Adaptive neural control with an uncertain actuator: the paper reproduced",
-        verdict=verdict(compared),
-        claims=claims(runs, compared),
+        verdict=verdict(compared, far or {}),
+        claims=[*claims(runs, compared), *proof_claims(proofs or {}, far or {})],
         sections=[
             _model(),
             *_example(1, runs, compared),
             *_example(2, runs, compared),
             _exchange(runs),
             *lyapunov_sections(proofs or {}, far),
-            _choices(runs),
-            _numerics(),
-            _limits(runs),
+            *studies,
+            *closing_sections(runs, numerics),
         ],
         command="nlctl report",
         provenance={"Python": platform.python_version()} | {p: version(p) for p in PACKAGES},
         numbers={key: dict(run.metrics) for key, run in runs.items()},
+        methods=text.METHODS,
+        references=text.REFERENCES,
     )
 
 
@@ -69,7 +83,6 @@ def _model() -> Section:
         key="model",
         title="Plant class and controller",
         items=[
-            Paragraph(text=text.CITATION),
             Paragraph(text="The plant is a chain of integrators with a non-affine last equation:"),
             text.PLANT_CLASS,
             Paragraph(text="The controller, with the paper's equation numbers:"),
@@ -181,19 +194,6 @@ def _check_table(number: int, compared: Sequence[Check]) -> Table:
     )
 
 
-def _metric_table(caption: str, cases: Sequence[Run]) -> Table:
-    keys = ("tail_max_e", "tail_rms_e", "max_u", "max_r", "zeta_end", "max_W", "max_delta_hat")
-    by_key = {m.key: m for m in METRICS}
-    return Table(
-        caption=caption,
-        columns=("example", "variant", *(by_key[k].meaning for k in keys)),
-        rows=[
-            (str(run.case.example), run.case.title, *(float(run.metrics[k]) for k in keys))
-            for run in cases
-        ],
-    )
-
-
 def _exchange(runs: Runs) -> Section:
     pairs = (("1", "1-backlash"), ("2", "2-dead-zone"))
     return Section(
@@ -205,7 +205,7 @@ def _exchange(runs: Runs) -> Section:
                 "drives. Each example runs with the other one's actuator; the controller and its "
                 "parameters stay the same."
             ),
-            _metric_table(
+            metric_table(
                 "With its own and with the other actuator.",
                 [runs[k] for pair in pairs for k in pair],
             ),
@@ -224,74 +224,3 @@ def _exchange(runs: Runs) -> Section:
             ),
         ],
     )
-
-
-def _choices(runs: Runs) -> Section:
-    shown = [r for r in runs.values() if r.case.group in ("published", "choice")]
-    return Section(
-        key="choices",
-        title="What the paper leaves open",
-        items=[
-            Paragraph(
-                text="Each row changes one reading of the paper and leaves the rest as it is. "
-                f"{'None' if _same_verdict(shown) else 'At least one'} raises max |e₁| "
-                f"(t ≥ {TAIL:g} s) by more than a quarter."
-            ),
-            _metric_table(
-                "One row per reading; the first row of each example is the default.",
-                sorted(shown, key=lambda r: (r.case.example, r.case.group != "published")),
-            ),
-        ],
-    )
-
-
-def _same_verdict(shown: Sequence[Run]) -> bool:
-    """Whether every reading tracks as well as the default, to a quarter of its error."""
-    base = {r.case.example: r.metrics["tail_max_e"] for r in shown if r.case.group == "published"}
-    return all(r.metrics["tail_max_e"] <= 1.25 * base[r.case.example] for r in shown)
-
-
-def _numerics() -> Section:
-    return Section(
-        key="numerics",
-        title="Numerics",
-        items=[
-            Paragraph(
-                text="All runs are machine code of the python-control diagrams, compiled by nlctl: "
-                "an explicit Runge-Kutta pair of orders 5(4) at relative tolerance 1e-9; steps "
-                "end at the corners of the dead zone. Peaks between samples are those of a "
-                "parabola. The tests repeat published cases in plain python-control."
-            ),
-            Paragraph(
-                text="The backlash is the play operator itself: within a step its memory stands "
-                "still or is carried along, and a step ends where it turns round or touches. (In "
-                "plain python-control, which has no hook for accepted steps, its memory relaxes "
-                "onto the play at 1000 1/s; the figures then hold to 5e-5.)"
-            ),
-        ],
-    )
-
-
-def _limits(runs: Runs) -> Section:
-    drift = {n: _drift(runs[str(n)]) for n in (1, 2)}
-    return Section(
-        key="limits",
-        title="What this does not show",
-        items=[
-            Paragraph(
-                text=f"The runs end at {HORIZON:g} s, as the paper's do. They show that all "
-                "signals stay bounded up to then; they do not show boundedness for all time. ζ "
-                f"still moves: from t = {TAIL:g} s to the end it changes by {drift[1]:+.3g} in "
-                f"Example 1 and by {drift[2]:+.3g} in Example 2, and N(ζ) changes its sign at 3."
-            ),
-            Paragraph(
-                text="The tracking error does not tend to zero in these runs: it stays at about "
-                f"{runs['1'].metrics['tail_max_e']:.2g} and {runs['2'].metrics['tail_max_e']:.2g} "
-                "for a reference of amplitude 1."
-            ),
-        ],
-    )
-
-
-def _drift(run: Run) -> float:
-    return float(run.signals["zeta"][-1] - run.signals["zeta"][run.time >= TAIL][0])

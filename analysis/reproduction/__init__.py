@@ -1,6 +1,7 @@
 """The reproduction of the paper: cases, runs, figures to reach."""
 
 from .cases import CASES, HORIZON, METRICS, TAIL, Case
+from .numerics import numerics
 from .run import (
     Check,
     Expectation,
@@ -25,6 +26,7 @@ __all__ = [
     "checks",
     "expectations",
     "measured",
+    "numerics",
     "run",
     "run_all",
     "sample_times",

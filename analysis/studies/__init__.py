@@ -9,6 +9,7 @@ from .replay import Replay, replay, replay_figure
 from .result import Finding, Result
 from .run import run
 from .schema import Study
+from .shipped import shipped
 from .written import from_toml, to_toml
 
 __all__ = [
@@ -29,5 +30,6 @@ __all__ = [
     "replay_figure",
     "run",
     "run_differences",
+    "shipped",
     "to_toml",
 ]
