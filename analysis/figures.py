@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import SymmetricalLogLocator
+from matplotlib.ticker import FixedLocator
 
 from nlctl.functions import nussbaum
 
@@ -231,11 +231,10 @@ def inequality_margins(margins: Sequence[Margin]) -> Figure:
     figure, axes = _panels(margins)
     for ax, margin in zip(axes, margins, strict=True):
         t, low = _least(margin.t, margin.margin)
-        linear = 1e-3 * (float(np.nanmax(np.abs(low), initial=0.0)) or 1.0)
-        ticks = SymmetricalLogLocator(base=10, linthresh=linear)
-        ticks.set_params(numticks=4)
-        ax.set_yscale("symlog", linthresh=linear)
-        ax.yaxis.set_major_locator(ticks)
+        largest = float(np.nanmax(np.abs(low), initial=0.0)) or 1.0
+        ax.set_yscale("symlog", linthresh=1e-3 * largest)
+        powers = 10.0 ** (np.floor(np.log10(largest)) + np.array([-2.0, 0.0]))
+        ax.yaxis.set_major_locator(FixedLocator([*-powers[::-1], 0.0, *powers]))
         ax.axhline(0.0, color=GREY, linewidth=0.8)
         colour = BLUE if margin.holds else ORANGE
         ax.scatter([margin.at], [margin.least], s=16, color=colour, zorder=3, clip_on=False)

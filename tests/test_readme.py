@@ -33,7 +33,7 @@ def test_the_loop_of_ones_own_runs_in_at_most_30_lines(tmp_path):
 def test_the_other_blocks_of_code_run():
     """They do what is said of them: machine code, an ensemble, the paper's examples."""
     later = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)[1:]
-    assert len(later) == 3
+    assert len(later) == 4
     names = {"nlctl": nlctl, "np": np}
     for code in later:
         exec(code, names)
@@ -42,6 +42,10 @@ def test_the_other_blocks_of_code_run():
     assert (names["many"].table["status"] == "OK").all()
     assert names["loop"].output_labels[:2] == ["y", "yd"]
     assert round(names["certificate"].C_0, 3) == 0.477
+    rows = names["rows"]
+    found = names["rb"].violation_probability(rows.design, rows.table["spec"])
+    assert found.violations == 0
+    assert round(found.upper, 3) == 0.009
     assert names["prediction"].burst == pytest.approx(9.4e3, rel=0.02)
     late = names["late"]
     zeta, e = (late.outputs[late.output_labels.index(name)] for name in ("zeta", "e"))

@@ -31,7 +31,7 @@ from analysis.robustness.spec import FAILED
 from analysis.robustness_figures.labels import plain
 from analysis.robustness_figures.runs import envelope
 from analysis.studies import load_result, read_study, run
-from nlctl.cli_study_report import quick_part, report_study
+from nlctl.cli_study_report import report_study
 
 LOOPS = '''
 import nlctl
@@ -565,7 +565,6 @@ def test_commands_write_the_report(tmp_path, monkeypatch, capsys):
     is_same = first.partition(shell)[0] == after.partition(shell)[0]
     assert is_same
     assert "nlctl report reports/study" in after
-    assert quick_part([path])[0].key == "robustness"
     path.with_name("loops.py").unlink()
     page, _ = report_study(found.folder, tmp_path / "page")
     assert "study_fans" not in page.read_text(encoding="utf-8")
