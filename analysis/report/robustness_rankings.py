@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["compare", "morris", "regional", "sobol"]
 
+MOST_PAIRS = 30  # rows of a table of pairs; of more, only those with the first option are shown
+
 
 def morris(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
     """Yield the elementary effects."""
@@ -101,10 +103,20 @@ def compare(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[
     yield _table(ranking, text.RANKING, titles)
     yield from _medians(t["differences"], result.metrics["unit"].to_dict(), key)
     columns = {c: c.replace("_", " ") for c in t["differences"].columns} | {"p_holm": "p (Holm)"}
-    yield _table(t["differences"], text.DIFFERENCES.format(confidence=confidence), columns)
+    pairs, only = _with_first(t["differences"], f"{finding.key}/differences.parquet")
+    yield _table(pairs, text.DIFFERENCES.format(confidence=confidence) + only, columns)
     columns = {c: c.replace("_", " ") for c in t["violations"].columns} | {"p_holm": "p (Holm)"}
-    yield _table(t["violations"], text.MCNEMAR, columns)
+    pairs, only = _with_first(t["violations"], f"{finding.key}/violations.parquet")
+    yield _table(pairs, text.MCNEMAR + only, columns)
     yield _table(t["wins"], text.WINS, {c: c for c in t["wins"].columns})
+
+
+def _with_first(pairs: pd.DataFrame, file: str) -> tuple[pd.DataFrame, str]:
+    """Return a table of pairs, of many only those with the first option, and what says so."""
+    first = pairs.index.get_level_values("a")[0]
+    if len(pairs) <= MOST_PAIRS:
+        return pairs, ""
+    return pairs.xs(first, level="a", drop_level=False), text.FIRST.format(first=first, file=file)
 
 
 def _medians(differences: pd.DataFrame, units: Mapping[Any, str], key: str) -> Iterator[Figure]:

@@ -85,6 +85,7 @@ DIFFERENCES = (
     "exact, and of the mean, by bootstrap (NaN where a run did not end). p: sign test; Holm: "
     "adjusted for the pairs of a metric."
 )
+FIRST = " Shown are the pairs with {first}; {file} in the run's folder has all."
 MEDIANS = (
     "Median of {first} minus the option named at the left, in {metric}, on the same samples; "
     "lines: exact intervals. Right of 0 {first} has the larger value. Arrows: infinite, because "
