@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -35,20 +36,23 @@ def report(
         Path | None,
         typer.Option(help="Folder of the report; reports/paper, or that of the run."),
     ] = None,
-    jobs: Annotated[int, typer.Option(min=0, help="Processes or threads; 0: one per core.")] = 0,
+    jobs: Annotated[int, typer.Option(min=0, help="Threads; 0: one per core.")] = 0,
     far: Annotated[
         bool,
         typer.Option("--far", help="Run Example 2 to its burst instead of showing the record."),
     ] = False,
     open_: Open = False,
     pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
+    interactive: Annotated[
+        bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
+    ] = False,
 ) -> None:
     """Write a report, one page that needs nothing else.  Exit 1 if a claim of it fails."""
     with exit_codes(json=False):
         made, page, code = (
-            _paper(out or Path("reports/paper"), jobs, far=far, pdf=pdf)
+            _paper(out or Path("reports/paper"), jobs, far=far, pdf=pdf, interactive=interactive)
             if study is None
-            else _study(study, out, jobs, pdf=pdf)
+            else _study(study, out, jobs, pdf=pdf, interactive=interactive)
         )
         print(made)
         finish_report(page, pdf=pdf, open_=open_)
@@ -56,7 +60,9 @@ def report(
             raise typer.Exit(code)
 
 
-def _paper(out: Path, jobs: int, *, far: bool, pdf: bool) -> tuple[str, Path, int]:
+def _paper(
+    out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool
+) -> tuple[str, Path, int]:
     """Reproduce the paper; return the verdict, the page and the exit code."""
     from analysis.report.lyapunov_evidence import evidence, far_runs_in_background
     from analysis.report.paper_report import paper_report
@@ -67,12 +73,11 @@ def _paper(out: Path, jobs: int, *, far: bool, pdf: bool) -> tuple[str, Path, in
     from ._sweep_progress import sweep_bar
     from ._terminal import progress_bar
     from .cli_study_report import quick_part
-    from .native._ensemble import cores
 
     check_report_options(out, pdf=pdf)
     with far_runs_in_background(whole=far) as long_runs:
         with progress_bar("simulating", len(CASES)) as advance:
-            runs = run_all(CASES, jobs=jobs or min(cores(), len(CASES)), done=lambda _: advance(1))
+            runs = run_all(CASES, done=lambda _: advance(1))  # machine code: processes cost more
         proofs = {}
         with progress_bar("checking the proof", 2) as advance:
             for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
@@ -87,18 +92,24 @@ def _paper(out: Path, jobs: int, *, far: bool, pdf: bool) -> tuple[str, Path, in
                 studies=studies,
                 numerics=numerics(),
             )
-    page = write_report(made, out)
+    if interactive:
+        made = replace(made, command=f"{made.command} --interactive")
+    page = write_report(made, out, interactive=interactive)
     return made.verdict, page, int(not all(check.passed for check in checks(runs)))
 
 
-def _study(study: Path, out: Path | None, jobs: int, *, pdf: bool) -> tuple[str, Path, int]:
+def _study(
+    study: Path, out: Path | None, jobs: int, *, pdf: bool, interactive: bool
+) -> tuple[str, Path, int]:
     """Report a study; return the verdict, the page and the exit code."""
     from ._sweep_progress import sweep_bar
     from .cli_study_report import report_study
 
     kept = Path("reports") / study.stem if study.suffix == ".toml" else study
     check_report_options(out or kept, pdf=pdf)
-    page, result = report_study(study, out, threads=jobs or None, watch=sweep_bar)
+    page, result = report_study(
+        study, out, threads=jobs or None, watch=sweep_bar, interactive=interactive
+    )
     code = int(not result.holds) if result.complete else INCOMPLETE
     return result.verdict, page, code
 

@@ -26,6 +26,7 @@ def report_study(
     *,
     threads: int | None = None,
     watch: Watch | None = None,
+    interactive: bool = False,
 ) -> tuple[Path, Result]:
     """Write the report of a study.
 
@@ -38,6 +39,8 @@ def report_study(
     threads : int, optional
     watch : callable, optional
         Shows how far the rows are, see `analysis.studies.run.Watch`.
+    interactive : bool, optional
+        As in `analysis.report.render_html`.
 
     Returns
     -------
@@ -54,12 +57,13 @@ def report_study(
     from analysis.studies import load_result
 
     result = _run(path, threads, watch) if path.suffix == ".toml" else load_result(path)
-    command = f"nlctl report {shlex.quote(path.as_posix())}"
+    command = f"nlctl report {shlex.quote(path.as_posix())}" + " --interactive" * interactive
     made = study_report(result, _histories(result, threads), command)
     if out is not None:  # the data stay with the run
         data = Path(os.path.relpath(result.folder, out))
         made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})
-    return write_report(made, result.folder if out is None else out), result
+    folder = result.folder if out is None else out
+    return write_report(made, folder, interactive=interactive), result
 
 
 def quick_part(

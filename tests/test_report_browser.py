@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 from test_report import made_up_runs
+from test_report_history import charted
 from test_report_page import HOSTILE, every_kind
 
 from analysis.report import write_gallery, write_pdf, write_report
@@ -16,7 +17,7 @@ axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe i
 CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=f"none of {', '.join(BROWSERS)} is there")
 
-PAGES = ("plain", "hostile", "long", "paper", "gallery")
+PAGES = ("plain", "hostile", "long", "paper", "gallery", "charts", "hostile charts")
 PHONE = 390
 
 
@@ -38,6 +39,8 @@ def pages(tmp_path_factory):
         "hostile": write_report(every_kind(hostile, hostile), folder / "<b>hostile & #1"),
         "long": write_report(every_kind(HOSTILE["long"], HOSTILE["long"]), folder / "long"),
         "paper": write_report(paper_report(made_up_runs()), folder / "paper"),
+        "charts": write_report(charted(), folder / "charts", interactive=True),
+        "hostile charts": write_report(charted(hostile), folder / "odd", interactive=True),
     }
     return made | {"gallery": write_gallery(folder)}
 
@@ -231,6 +234,131 @@ def test_the_brace_of_cases_spans_its_rows_and_the_hat_sits_on_its_letter(visit)
         "return [w.top - hat.top, w.height, m.getBoundingClientRect().height]; }"
     )
     assert gap[2] < 2 * gap[1]
+
+
+# How many points of the first chart have the colour of a curve.
+INK = """curve => {
+  const rgb = getComputedStyle(document.body).getPropertyValue(`--curve-${curve}`);
+  const wanted = [1, 3, 5].map(i => parseInt(rgb.trim().slice(i, i + 2), 16));
+  const canvas = document.querySelector("canvas");
+  const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  let found = 0;
+  for (let i = 0; i < data.length; i += 4)
+    found += data[i + 3] === 255 && wanted.every((c, j) => Math.abs(c - data[i + j]) < 9);
+  return found;
+}"""
+
+
+def is_drawn(page, curve, *, wanted=True):
+    """Wait until a curve is drawn in its colour, or is not."""
+    condition = "> 200" if wanted else "=== 0"
+    page.wait_for_function(f"curve => ({INK})(curve) {condition}", arg=curve)
+    return True
+
+
+def plot(page):
+    """Where the first chart's curves are on the screen."""
+    over = page.locator(".u-over").first
+    over.scroll_into_view_if_needed()
+    return over.bounding_box()
+
+
+def span(page):
+    """The times between which the first chart is drawn."""
+    return page.evaluate("[charts[0].scales.x.min, charts[0].scales.x.max]")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_charts_are_drawn_in_the_colours_of_the_page(visit, scheme):
+    """At first the signals that are to be shown; again when the page's colours change."""
+    page = visit("charts", scheme=scheme)
+    assert is_drawn(page, 0)
+    assert is_drawn(page, 1)
+    assert is_drawn(page, 2, wanted=False)
+    page.emulate_media(color_scheme="light" if scheme == "dark" else "dark")
+    assert is_drawn(page, 0)
+    page.emulate_media(media="print")
+    assert not page.locator(".history").first.is_visible()
+    assert page.locator("figure svg").first.is_visible()
+
+
+def test_signals_are_shown_and_hidden_by_key(visit):
+    """Each has a button with its name and its value."""
+    page = visit("charts")
+    buttons = page.locator(".signals").first.locator("button")
+    for place, before in ((0, "true"), (2, "false")):
+        button = buttons.nth(place)
+        assert f"wave {place}" in button.text_content()
+        assert button.get_attribute("aria-pressed") == before
+        button.focus()
+        page.keyboard.press("Enter")
+        assert button.get_attribute("aria-pressed") != before
+    assert is_drawn(page, 0, wanted=False)
+    assert is_drawn(page, 2)
+
+
+def test_values_are_told_by_pointer_and_by_key(visit):
+    """Both ways the samples themselves; gaps have no value."""
+    page = visit("charts")
+    slider = page.locator("input[type=range]").first
+    for _ in range(3):
+        slider.press("ArrowRight")
+    assert slider.input_value() == "3"
+    told = page.locator(".signals").first.locator(".value").all_text_contents()
+    t = 3 * 10 / 500
+    wanted = [(i + 1) * math.sin(t + i) for i in range(3)]
+    assert [float(x.replace("−", "-")) for x in told] == [float(f"{x:.6g}") for x in wanted]
+    assert slider.get_attribute("aria-valuetext").startswith("0.06 s, wave 0: plain 0.0599")
+    box = plot(page)
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 20)
+    assert slider.input_value() == "250"
+    odd = page.locator(".history").nth(1)
+    odd.locator("input[type=range]").press("End")
+    assert odd.locator(".signals .value").all_text_contents() == ["1e+300", "no value", "2"]
+
+
+def test_charts_zoom_by_pointer_and_by_key_and_return(visit):
+    """A drag selects a stretch, a double click shows the whole run again; so do the buttons."""
+    page = visit("charts")
+    whole = span(page)
+    assert whole == [0, 10]
+    box = plot(page)
+    left, middle = box["x"] + 0.2 * box["width"], box["x"] + 0.5 * box["width"]
+    page.mouse.move(left, box["y"] + 50)
+    page.mouse.down()
+    page.mouse.move(middle, box["y"] + 60, steps=5)
+    page.mouse.up()
+    assert span(page) == pytest.approx([2, 5], abs=0.05)
+    page.mouse.dblclick(middle, box["y"] + 50)
+    assert span(page) == whole
+    page.locator("input[type=range]").first.fill("250")
+    page.get_by_role("button", name="Zoom in").first.press("Enter")
+    assert span(page) == [2.5, 7.5]
+    page.get_by_role("button", name="Reset zoom").first.press("Enter")
+    assert span(page) == whole
+
+
+def test_charts_follow_the_width_of_the_page_and_need_scripts(visit):
+    """A narrow page has narrow ones, one without scripts has none, but the figure beside them."""
+    page = visit("charts")
+    wide = page.locator("canvas").first.bounding_box()["width"]
+    page.set_viewport_size({"width": PHONE, "height": 900})
+    page.wait_for_function("w => document.querySelector('canvas').clientWidth < w", arg=PHONE)
+    assert wide > 600
+    still = visit("charts", scripts=False)
+    assert still.locator("figure svg").first.is_visible()
+    assert not any(chart.is_visible() for chart in still.locator(".history").all())
+
+
+def test_hostile_names_of_signals_do_nothing_and_are_shown(visit):
+    """Nor does pressing what has such a name."""
+    page = visit("hostile charts")
+    for button in page.locator(".history button").all():
+        button.press("Enter")
+    assert page.evaluate("window.__pwned") is None
+    shown = page.locator(".signals button span").first.text_content()
+    assert all(text in shown for name, text in HOSTILE.items() if name != "long")
+    assert page.seen == []
 
 
 def test_a_page_is_printed_to_pdf(pages, tmp_path):

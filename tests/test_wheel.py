@@ -42,6 +42,9 @@ def test_wheel_holds_both_packages_and_their_data(wheel):
         "analysis/studies/reports/example-1-quick.toml",
         "analysis/lyapunov/example-2-burst.csv",
         *("analysis/report/fonts/nlctl-math.woff2", "analysis/report/fonts/OFL.txt"),
+        *("analysis/report/templates/history.js", "analysis/report/templates/history.css"),
+        *("analysis/report/vendor/uplot/uPlot.iife.min.js", "analysis/report/vendor/uplot/LICENSE"),
+        "analysis/report/vendor/uplot/uPlot.min.css",
     ):
         assert name in names
     assert any(name.endswith("LICENSE") for name in names)

@@ -2,7 +2,7 @@
 
 from .browser import write_pdf
 from .compare import compare
-from .document import Claim, Equation, Figure, Paragraph, Report, Section, Table
+from .document import Claim, Equation, Figure, History, Paragraph, Report, Section, Table
 from .gallery import write_gallery
 from .render import file_hashes, render_html, render_json, write_report
 
@@ -10,6 +10,7 @@ __all__ = [
     "Claim",
     "Equation",
     "Figure",
+    "History",
     "Paragraph",
     "Report",
     "Section",

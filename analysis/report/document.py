@@ -10,9 +10,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure as MatplotlibFigure
 
-__all__ = ["Claim", "Equation", "Figure", "Item", "Paragraph", "Report", "Section", "Table"]
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+from nlctl._param import checked_times
+
+__all__ = [
+    "Claim",
+    "Equation",
+    "Figure",
+    "History",
+    "Item",
+    "Paragraph",
+    "Report",
+    "Section",
+    "Table",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +74,55 @@ class Figure:
     figure: MatplotlibFigure
 
 
-Item = Paragraph | Equation | Table | Figure
+@dataclass(frozen=True, kw_only=True, eq=False)
+class History:
+    """Signals over time for a chart to zoom in and to read values from.
+
+    It is on the page only if that is asked for, and only where scripts run.  Hence it shows
+    nothing of its own: a figure beside it shows the same signals.
+
+    Attributes
+    ----------
+    key, caption, description : str
+        As those of a `Figure`.
+    time : array of shape (m,)
+        In s, increasing.
+    signals : mapping of str to array of shape (m,)
+        What is not finite is drawn as a gap.
+    unit : str
+        Unit of all signals.
+    shown : sequence of str
+        Signals that are drawn at first; all of them if it is empty.
+
+    Raises
+    ------
+    ParameterError
+        If the times do not increase, a signal is not as long as they are, or a name in `shown`
+        is that of no signal.
+    """
+
+    key: str
+    caption: str
+    description: str
+    time: Sequence[float] | np.ndarray
+    signals: Mapping[str, Sequence[float] | np.ndarray]
+    unit: str = ""
+    shown: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        wanted = checked_times(self.time).shape
+        for name, samples in self.signals.items():
+            if np.shape(samples) != wanted:
+                raise ParameterError(
+                    f"signal '{name}' of history '{self.key}' has shape {np.shape(samples)}, "
+                    f"its time {wanted}"
+                )
+        for name in self.shown:
+            if name not in self.signals:
+                raise unknown("signal", name, self.signals)
+
+
+Item = Paragraph | Equation | Table | Figure | History
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .document import Claim, Equation, Figure, Item, Paragraph, Report, Section, Table
+from .document import Claim, Figure, History, Item, Report, Section, Table
 
 __all__ = [
     "Cell",
@@ -65,7 +65,7 @@ class Placed:
 
 
 def place(report: Report) -> list[Placed]:
-    """Give every section, table and figure an anchor that no other part of the page has."""
+    """Give sections, tables, figures and histories anchors that nothing else on the page has."""
     taken = set(SHELL)
     taken |= {name for name in ("methods", "limits", "references") if getattr(report, name)}
     headings = [_anchor(section.key, taken, ()) for section in report.sections]
@@ -73,7 +73,7 @@ def place(report: Report) -> list[Placed]:
     for section, heading in zip(report.sections, headings, strict=True):
         items = []
         for item in section.items:
-            wanted = item.key if isinstance(item, Figure) else f"{heading}-{kind(item)}"
+            wanted = item.key if isinstance(item, Figure | History) else f"{heading}-{kind(item)}"
             anchor = _anchor(wanted, taken, ("-title", "-desc")) if _has_anchor(item) else ""
             items.append((anchor, kind(item), item))
         level = min(max(section.level, 2), 6)
@@ -89,12 +89,11 @@ def evidence(placed: Sequence[Placed]) -> Mapping[str, str]:
 
 def kind(item: Item) -> str:
     """Return what an item is, as the template and ``report.json`` call it."""
-    names = {Paragraph: "paragraph", Equation: "equation", Table: "table", Figure: "figure"}
-    return names[type(item)]
+    return type(item).__name__.lower()
 
 
 def _has_anchor(item: Item) -> bool:
-    return isinstance(item, Table | Figure)
+    return isinstance(item, Table | Figure | History)
 
 
 def _anchor(key: str, taken: set[str], endings: Sequence[str]) -> str:

@@ -21,12 +21,20 @@ from .outline import cells, claim_status, is_long, numeric
 __all__ = ["fill", "parts", "to_bytes", "write_files"]
 
 DOI = re.compile(r"(?:\bdoi:?\s*|https://doi\.org/)(10\.\d{4,9}/[\w.()/:-]*\w)", re.IGNORECASE)
+UPLOT = "vendor/uplot"
 CONTROL = {code: "\ufffd" for code in [*range(32), *range(127, 160)] if chr(code) not in "\t\n\r"}
 
 
-def fill(template: str, **content: object) -> str:
-    """Return a template filled in, with the page's style and script, and the policy for them."""
-    style, script = font_face() + _own("report.css"), _own("report.js")
+def fill(template: str, *, interactive: bool = False, **content: object) -> str:
+    """Return a template filled in, with the page's style and script, and the policy for them.
+
+    An interactive page has uPlot (MIT licence) in them, and what draws its charts.
+    """
+    style, script = font_face() + _own("templates/report.css"), _own("templates/report.js")
+    if interactive:
+        style += _own(f"{UPLOT}/uPlot.min.css") + "\n" + _own("templates/history.css")
+        licence = f"\n/*\n{_own(f'{UPLOT}/LICENSE')}\n*/\n"
+        script += licence + _own(f"{UPLOT}/uPlot.iife.min.js") + _own("templates/history.js")
     page = _environment().get_template(template)
     text = page.render(
         style=Markup(style), script=Markup(script), policy=_policy(style, script), **content
@@ -47,7 +55,7 @@ def _digest(text: str) -> str:
 
 
 def _own(name: str) -> str:
-    return files("analysis.report").joinpath("templates", name).read_text(encoding="utf-8")
+    return files("analysis.report").joinpath(name).read_text(encoding="utf-8")
 
 
 @cache

@@ -16,7 +16,7 @@ from .. import figures
 from ..lyapunov.long_run import LongRun
 from ..reproduction import CASES, HORIZON, TAIL, Check, Run, checks
 from . import paper_text as text
-from .document import Figure, Paragraph, Report, Section, Table
+from .document import Figure, History, Paragraph, Report, Section, Table
 from .lyapunov_part import Evidence, lyapunov_sections
 from .paper_claims import claims, proof_claims, verdict
 from .paper_closing import closing_sections, metric_table
@@ -109,6 +109,7 @@ def _example(number: int, runs: Runs, compared: Sequence[Check]) -> list[Section
                     figure=draw(diagram, expand=True),
                 ),
                 *_time_histories(key, run),
+                _interactive(number, run),
             ],
         ),
         Section(
@@ -154,6 +155,21 @@ def _time_histories(key: str, run: Run) -> list[Figure]:
         )
         for name, draw_figure, caption in plots
     ]
+
+
+def _interactive(number: int, run: Run) -> History:
+    names = ("y", "yd", "e", "u", "v", "zeta")
+    return History(
+        key=f"example-{number}-history",
+        caption=f"{text.TITLES[number]}: output y, reference yd, tracking error e, control input "
+        "u, output of the actuator v, argument of the Nussbaum gain zeta. All quantities are "
+        "dimensionless.",
+        description=f"Chart of {', '.join(names)} over {HORIZON:g} s; the figures above show the "
+        "same signals, the slider below tells their values.",
+        time=run.time,
+        signals={name: run.signals[name] for name in names},
+        shown=("y", "yd", "e", "zeta"),
+    )
 
 
 def _parameter_table(number: int, diagram: ct.InterconnectedSystem) -> Table:

@@ -20,13 +20,15 @@ import numpy as np
 
 from nlctl._errors import ParameterError
 
-from .document import Figure, Item, Report, Table
+from .document import Figure, History, Item, Report, Table
+from .history import chart
 from .outline import evidence, kind, place, summary
 from .page import fill, to_bytes, write_files
 from .svg import shapes_svg, svg
 
 __all__ = ["file_hashes", "render_html", "render_json", "write_report"]
 
+DRAWN = ("figure", "time", "signals")  # curves are on the page only
 TITLES = {
     "methods": "How it was found",
     "limits": "Limits of validity",
@@ -35,8 +37,15 @@ TITLES = {
 }
 
 
-def render_html(report: Report) -> str:
-    """Return the report as one HTML page without references to anything outside."""
+def render_html(report: Report, *, interactive: bool = False) -> str:
+    """Return the report as one HTML page without references to anything outside.
+
+    Parameters
+    ----------
+    report : Report
+    interactive : bool, optional
+        Whether its `History` items become charts, drawn by a script inside the page.
+    """
     placed = place(report)
     light, told = summary(report.claims)
     shapes: dict[str, str] = {}
@@ -46,9 +55,17 @@ def render_html(report: Report) -> str:
         for anchor, _, item in part.items
         if isinstance(item, Figure)
     }
+    charts = {
+        anchor: chart(item)
+        for part in placed
+        for anchor, _, item in part.items
+        if interactive and isinstance(item, History)
+    }
     digest = hashlib.sha256(to_bytes(render_json(report))).hexdigest()
     return fill(
         "report.html",
+        interactive=bool(charts),
+        charts=charts,
         report=report,
         placed=placed,
         drawings=drawings,
@@ -113,10 +130,12 @@ def _json_value(value: Any) -> Any:
 
 
 def _plain(item: Item) -> dict[str, Any]:
-    return {"kind": kind(item)} | {k: v for k, v in vars(item).items() if k != "figure"}
+    return {"kind": kind(item)} | {k: v for k, v in vars(item).items() if k not in DRAWN}
 
 
-def write_report(report: Report, folder: str | os.PathLike[str]) -> Path:
+def write_report(
+    report: Report, folder: str | os.PathLike[str], *, interactive: bool = False
+) -> Path:
     """Write ``index.html`` and ``report.json``; nothing is half written.
 
     Parameters
@@ -124,6 +143,8 @@ def write_report(report: Report, folder: str | os.PathLike[str]) -> Path:
     report : Report
     folder : path
         Made where it does not exist.
+    interactive : bool, optional
+        As in `render_html`; ``report.json`` is the same either way.
 
     Returns
     -------
@@ -136,7 +157,8 @@ def write_report(report: Report, folder: str | os.PathLike[str]) -> Path:
         If the folder cannot be written to.
     """
     folder = Path(folder)
-    write_files(folder, {"report.json": render_json(report), "index.html": render_html(report)})
+    page = render_html(report, interactive=interactive)
+    write_files(folder, {"report.json": render_json(report), "index.html": page})
     return folder / "index.html"
 
 

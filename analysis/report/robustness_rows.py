@@ -15,7 +15,7 @@ from .. import robustness_figures as figures
 from ..robustness.evaluation import margins_of
 from ..robustness.sequential import sequence_bounds
 from . import robustness_text as text
-from .document import Figure, Item, Paragraph, Table
+from .document import Figure, History, Item, Paragraph, Table
 from .robustness_claims import refusal
 from .robustness_histories import Histories
 from .robustness_text import margin_text
@@ -169,7 +169,7 @@ def _metrics(result: Result, table: pd.DataFrame) -> Table:
 
 
 def fan_items(kept: Histories, key: str) -> Iterator[Item]:
-    """Yield quantile fans of some rows with the nominal and the worst run."""
+    """Yield quantile fans of some rows with the nominal and the worst run, and these as charts."""
     count = len(next(iter(kept.signals.values())))
     ended = (
         f" {kept.ended} of them did not reach their end; from there on they count as lying beyond "
@@ -188,6 +188,18 @@ def fan_items(kept: Histories, key: str) -> Iterator[Item]:
         caption=caption,
         description=f"{caption} {_peaks(kept)}",
         figure=figures.fans(kept.time, kept.signals, kept.nominal, kept.worst),
+    )
+    runs = {"nominal": kept.nominal, "worst": kept.worst}
+    both = {f"{name}, {run}": runs[run][name] for name in kept.nominal for run in runs}
+    yield History(
+        key=f"{key}-history",
+        caption=f"The nominal run and the worst one that is known (margin {worst}), in the loop's "
+        "own units.",
+        description=f"Chart of {', '.join(kept.nominal)} in the nominal and in the worst run; the "
+        "figure above shows the same runs, the slider below tells their values.",
+        time=kept.time,
+        signals=both,
+        shown=list(both)[: len(runs)],
     )
 
 

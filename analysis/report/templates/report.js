@@ -75,8 +75,8 @@ dialog.addEventListener("close", () => {
   home.prepend(dialog.querySelector(".drawing"));
   home = null;
 });
-for (const figure of document.querySelectorAll("figure")) {
-  const drawing = figure.querySelector(".drawing");
+for (const drawing of document.querySelectorAll("figure > .drawing")) {
+  const figure = drawing.parentElement;
   const button = make("button", "Enlarge", figure.querySelector("figcaption"));
   button.setAttribute("aria-label", `Enlarge figure ${figure.id}`);
   button.addEventListener("click", () => enlarge(drawing));

@@ -1,0 +1,68 @@
+"""Interactive time histories: the samples of them that a page holds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .document import History
+
+__all__ = ["chart", "thinned"]
+
+COUNT = 2000  # samples of each signal on the page
+DIGITS = 6
+
+
+def chart(history: History) -> dict[str, Any]:
+    """Return what ``history.js`` draws a time history from, as JSON can hold it.
+
+    What is not finite becomes null, which is drawn as a gap.
+    """
+    time = np.asarray(history.time, dtype=float)
+    rows = [np.asarray(samples, dtype=float) for samples in history.signals.values()]
+    signals = np.array(rows).reshape(len(rows), len(time))
+    kept = thinned(signals)
+    return {
+        "names": list(history.signals),
+        "shown": [not history.shown or name in history.shown for name in history.signals],
+        "unit": history.unit,
+        "data": [_rounded(row[kept]) for row in (time, *signals)],
+    }
+
+
+def thinned(signals: np.ndarray, count: int = COUNT) -> np.ndarray:
+    """Choose the samples that show what long signals do.
+
+    Half of them are evenly spaced.  The others are the least and the largest value of each
+    signal in each of some stretches, and its first sample there that is not finite, so that
+    neither a peak nor a gap is lost.
+
+    Parameters
+    ----------
+    signals : ndarray of shape (n, m)
+    count : int, optional
+        How many at most; or half of them and three of each signal, where that is more.
+
+    Returns
+    -------
+    ndarray of int
+        Places in increasing order; all of them where there are not more than `count`.
+    """
+    number, length = signals.shape
+    if length <= count:
+        return np.arange(length)
+    finite = np.isfinite(signals)
+    kept = {*np.linspace(0, length - 1, count // 2).round().astype(int).tolist()}
+    stretches = max(1, count // 2 // (3 * max(1, number)))
+    for places in np.array_split(np.arange(length), stretches):
+        part, known = signals[:, places], finite[:, places]
+        lowest = np.where(known, part, np.inf).argmin(axis=1)
+        highest = np.where(known, part, -np.inf).argmax(axis=1)
+        for found in (lowest, highest, known.argmin(axis=1)):
+            kept |= {*places[found].tolist()}
+    return np.array(sorted(kept))
+
+
+def _rounded(samples: np.ndarray) -> list[float | None]:
+    return [float(f"{x:.{DIGITS}g}") if np.isfinite(x) else None for x in samples.tolist()]
