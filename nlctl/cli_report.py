@@ -64,18 +64,25 @@ def _paper(
     out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool
 ) -> tuple[str, Path, int]:
     """Reproduce the paper; return the verdict, the page and the exit code."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
     from analysis.report.lyapunov_evidence import evidence, far_runs_in_background
     from analysis.report.paper_report import paper_report
     from analysis.report.render import write_report
     from analysis.reproduction import CASES, checks, numerics, run_all
 
     from . import paper
-    from ._sweep_progress import sweep_bar
     from ._terminal import progress_bar
-    from .cli_study_report import quick_part
+    from .cli_study_report import run_shipped, studies_part
 
     check_report_options(out, pdf=pdf)
-    with far_runs_in_background(whole=far) as long_runs:
+    spawned = get_context("spawn")
+    with (
+        far_runs_in_background(whole=far) as long_runs,
+        ProcessPoolExecutor(1, mp_context=spawned) as beside,  # the studies, on the other core
+    ):
+        studying = beside.submit(run_shipped, QUICK, out, jobs or None)
         with progress_bar("simulating", len(CASES)) as advance:
             runs = run_all(CASES, done=lambda _: advance(1))  # machine code: processes cost more
         proofs = {}
@@ -83,15 +90,17 @@ def _paper(
             for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
                 proofs[number] = evidence(loop)
                 advance(1)
-        studies = quick_part(QUICK, out, threads=jobs or None, watch=sweep_bar)
-        with progress_bar("running far beyond 20 s", 1):
-            made = paper_report(
-                runs,
-                proofs=proofs,
-                far=long_runs.result(),
-                studies=studies,
-                numerics=numerics(),
-            )
+        with progress_bar("running far beyond 20 s, and the studies", 2) as advance:
+            far_away = long_runs.result()
+            advance(1)
+            studying.result()
+        made = paper_report(
+            runs,
+            proofs=proofs,
+            far=far_away,
+            studies=studies_part([out / name for name in QUICK], threads=jobs or None),
+            numerics=numerics(),
+        )
     if interactive:
         made = replace(made, command=f"{made.command} --interactive")
     page = write_report(made, out, interactive=interactive)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from analysis.studies.result import Result
     from analysis.studies.run import Watch
 
-__all__ = ["quick_part", "report_study"]
+__all__ = ["report_study", "run_shipped", "studies_part"]
 
 
 def report_study(
@@ -66,33 +66,33 @@ def report_study(
     return write_report(made, folder, interactive=interactive), result
 
 
-def quick_part(
-    names: Sequence[str],
-    folder: Path,
-    *,
-    threads: int | None = None,
-    watch: Watch | None = None,
-) -> list[Section]:
-    """Run studies that come with nlctl, and return them as a part of another report.
+def run_shipped(names: Sequence[str], folder: Path, threads: int | None = None) -> None:
+    """Run studies that come with nlctl, each in ``folder/name``; a run that is there is replaced.
 
-    Parameters
-    ----------
-    names : sequence of str
-        See `analysis.studies.shipped`.
-    folder : Path
-        Each study is run in ``folder/name``; a run that is there is replaced.
-    threads, watch
-        As in `report_study`.
+    It can be called in another process: what it finds is on the disk.
     """
-    from analysis.report.robustness_part import study_part
     from analysis.studies import read_study, run, shipped
 
-    how: dict[str, Any] = {"threads": threads} | ({} if watch is None else {"watch": watch})
-    results = []
     for name in names:
         if (folder / name / "run.json").exists():
             shutil.rmtree(folder / name)
-        results.append(run(read_study(shipped(name)), folder / name, **how))
+        run(read_study(shipped(name)), folder / name, threads=threads)
+
+
+def studies_part(folders: Sequence[Path], *, threads: int | None = None) -> list[Section]:
+    """Return runs of studies as a part of another report.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        See `run_shipped`.
+    threads : int, optional
+        For the rows that are simulated again to be drawn.
+    """
+    from analysis.report.robustness_part import study_part
+    from analysis.studies import load_result
+
+    results = [load_result(folder) for folder in folders]
     return study_part([(result, _histories(result, threads)) for result in results])
 
 
