@@ -13,6 +13,10 @@ class UnknownNameError(UsageError):
     """A parameter, state, signal or block of that name does not exist."""
 
 
+class UnknownKeywordError(UnknownNameError, TypeError):
+    """A record has no parameter of that name; Python's own kind of error as well."""
+
+
 class AmbiguousNameError(UsageError):
     """A name that means more than one thing in this diagram."""
 

@@ -17,7 +17,13 @@ import control as ct
 from ._errors import AmbiguousNameError, UnknownNameError
 
 
-def unknown(kind: str, name: str, known: Iterable[str], where: str = "") -> UnknownNameError:
+def unknown(
+    kind: str,
+    name: str,
+    known: Iterable[str],
+    where: str = "",
+    error: type[UnknownNameError] = UnknownNameError,
+) -> UnknownNameError:
     """Make the error for an unknown `name`: it says what exists, nearest first."""
     known = list(known)
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
@@ -25,7 +31,7 @@ def unknown(kind: str, name: str, known: Iterable[str], where: str = "") -> Unkn
         hint = "nearest: " + ", ".join(f"'{n}'" for n in near)
     else:
         hint = "known: " + (", ".join(f"'{n}'" for n in sorted(known)[:12]) or "none")
-    return UnknownNameError(f"unknown {kind} '{name}'{where and ' ' + where}; {hint}")
+    return error(f"unknown {kind} '{name}'{where and ' ' + where}; {hint}")
 
 
 def base_name(name: str) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import inspect
 import math
 import re
 from collections import namedtuple
@@ -15,7 +16,8 @@ from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 
-from ._errors import ParameterError
+from ._errors import ParameterError, UnknownKeywordError
+from ._names import unknown
 
 T = TypeVar("T")
 _KEY = "nlctl"
@@ -105,11 +107,24 @@ def record(cls: type[T]) -> type[T]:
     ------
     ParameterError
         When a record is made with a value that breaks a rule.
+    UnknownNameError
+        When it is made with a parameter that it does not have; also a `TypeError`.
     """
     if "__post_init__" not in cls.__dict__:
         cls.__post_init__ = check_params  # type: ignore[attr-defined]
         cls.__checked_at_birth__ = True  # type: ignore[attr-defined]
-    return dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    init, known = made.__init__, list(inspect.signature(made).parameters)
+
+    @functools.wraps(init)
+    def by_name(self: Any, *arguments: Any, **given: Any) -> None:
+        for name in given:
+            if name not in known:
+                raise unknown("parameter", name, known, f"of {made.__name__}", UnknownKeywordError)
+        init(self, *arguments, **given)
+
+    made.__init__ = by_name  # type: ignore[method-assign]
+    return made
 
 
 def ensure_checked(spec: Any) -> None:

@@ -1,6 +1,7 @@
 """Parameters: declared once, normalised, checked at birth and again when an override arrives."""
 
 import dataclasses
+import inspect
 import re
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nlctl
+from nlctl._errors import UnknownNameError
 from nlctl._param import (
     ParameterError,
     declared_params,
@@ -181,8 +183,15 @@ class TestKinds:
             Mixed().x = 2.0
         with pytest.raises(TypeError, match="positional"):
             Mixed(1.0)
-        with pytest.raises(TypeError, match="unexpected keyword argument 'y'"):
-            Mixed(y=1.0)
+
+    def test_a_misspelt_parameter_is_named_with_the_nearest(self):
+        """It is Python's kind of error and nlctl's; signatures stay readable."""
+        for kind in (TypeError, UnknownNameError):
+            with pytest.raises(kind, match="unknown parameter 'vectr' of Mixed; nearest: 'vector'"):
+                Mixed(vectr=[1.0])
+        assert list(inspect.signature(Mixed).parameters) == [
+            field.name for field in dataclasses.fields(Mixed)
+        ]
 
     def test_a_given_array_may_change_later(self):
         """A record does not share memory with the array that it was made from."""
