@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -14,6 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 
 from ._errors import ParameterError
+from ._files import replace_file
 from ._names import unknown
 from ._param import declared_params
 
@@ -48,11 +50,23 @@ def check_writable(folder: Path) -> None:
 
 
 def check_figure(path: Path) -> None:
-    """Refuse a figure format that cannot be written, or a folder that does not exist."""
+    """Refuse a figure format that cannot be written, or a folder that cannot be written to.
+
+    Raises
+    ------
+    ParameterError
+        With the path and the rule.
+    """
     if path.suffix.lower() not in FIGURE_FORMATS:
         raise ParameterError(
             f"cannot write figure '{path}': its name must end in {', '.join(FIGURE_FORMATS)}"
         )
+    check_writable(path.parent)
+
+
+def write_figure(path: Path, figure: Any) -> None:
+    """Write a matplotlib figure in one step, in the format that its name ends in."""
+    replace_file(path, lambda file: figure.savefig(file, format=path.suffix[1:].lower()))
 
 
 def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
@@ -68,21 +82,10 @@ def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
     Console().print(table)
 
 
-def block_records() -> dict[str, type]:
-    """Return every block record of nlctl by name."""
-    from . import actuators, controllers, plants, references
-
-    found = {}
-    for module in (plants, actuators, references, controllers):
-        for name in module.__all__:
-            thing = getattr(module, name)
-            if isinstance(thing, type) and dataclasses.is_dataclass(thing):
-                found[name] = thing
-    return found
-
-
 def show_blocks(name: str | None) -> None:
     """Print the parameter table of one block, or of all, and the examples."""
+    from ._catalogue import block_records
+
     records, console = block_records(), Console()
     if name is not None and name not in records:
         raise unknown("block", name, records)

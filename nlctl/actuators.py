@@ -16,6 +16,7 @@ from ._diagram import as_system, interconnect
 from ._equation import equation
 from ._errors import DiagramError, ParameterError
 from ._param import as_numbers, param, record
+from .functions import clip
 
 __all__ = ["Backlash", "DeadZone", "Gain", "Saturation", "cascade"]
 
@@ -85,7 +86,7 @@ def play_band(u, p):
 def play(u, memory, p):
     """The play operator: the memory, carried along by the nearer side of the gap."""
     low, high = play_band(u, p)
-    return np.minimum(np.maximum(memory, low), high)
+    return clip(memory, low, high)
 
 
 @record
@@ -208,7 +209,7 @@ class Saturation:
     @equation
     def output(t, x, u, p):
         """The characteristic v(u)."""
-        return (np.minimum(np.maximum(u[0], -p.limit), p.limit),)
+        return (clip(u[0], -p.limit, p.limit),)
 
     @staticmethod
     @equation

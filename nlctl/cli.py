@@ -41,17 +41,16 @@ def simulate(
     csv: Annotated[Path | None, typer.Option(help="Table of signals to write.")] = None,
 ) -> None:
     """Simulate an example, with parameters and initial states changed at will."""
-    from ._terminal import check_figure, check_writable, progress_bar, show_metrics
+    from ._terminal import check_figure, check_writable, progress_bar, show_metrics, write_figure
     from .response import input_output_response
 
     diagram = _diagram(example)
     params, initial = _assignments(diagram, set_ or [])
     times = _times(until, step)
-    for path in (plot, csv):
-        if path is not None:
-            check_writable(path.parent)
     if plot is not None:
         check_figure(plot)
+    if csv is not None:
+        check_writable(csv.parent)
     with progress_bar(f"simulating {example}", until) as advance:
         reached = [0.0]
 
@@ -69,7 +68,8 @@ def simulate(
     if plot is not None:
         from analysis.figures import overview
 
-        _write_figure(plot, overview(times, signals))
+        write_figure(plot, overview(times, signals))
+        print(plot)
 
 
 @app.command()
@@ -137,22 +137,18 @@ def diagram(
     expand: Annotated[bool, typer.Option(help="Show what is inside nested diagrams.")] = False,
 ) -> None:
     """Draw the block diagram of an example."""
-    from ._terminal import check_figure, check_writable
+    from ._terminal import check_figure, write_figure
     from .drawing import draw
 
     check_figure(out)
-    check_writable(out.parent)
-    _write_figure(out, draw(_diagram(example), expand=expand))
+    write_figure(out, draw(_diagram(example), expand=expand))
+    print(out)
 
 
 def _diagram(example: str):
-    from . import paper
-    from ._names import unknown
+    from .paper import named_example
 
-    examples = {"example-1": paper.example_1, "example-2": paper.example_2}
-    if example not in examples:
-        raise unknown("example", example, examples)
-    return examples[example]()
+    return named_example(example)()
 
 
 def _times(until: float, step: float):
@@ -208,13 +204,6 @@ def _write_csv(path: Path, times, signals) -> None:
 
     table = pd.DataFrame({"time": times} | signals)
     replace_file(path, lambda file: table.to_csv(file, index=False))
-
-
-def _write_figure(path: Path, figure) -> None:
-    from ._files import replace_file
-
-    replace_file(path, lambda file: figure.savefig(file, format=path.suffix[1:].lower()))
-    print(path)
 
 
 register_reports(app)

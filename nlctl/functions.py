@@ -1,4 +1,4 @@
-"""The scalar functions of the controller: Nussbaum functions, Gaussian basis, smooth sign."""
+"""Functions that blocks share: Nussbaum functions, Gaussian basis, smooth sign, clip, noise."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from ._errors import ParameterError
 
 __all__ = [
     "band_limited",
+    "clip",
     "gaussian",
     "nussbaum",
     "nussbaum_derivative",
@@ -69,6 +70,15 @@ def gaussian(Z, centres, widths):
 def smooth_sign(r, tau):
     """Smooth sign tanh(r / tau) of the robust term; |r| - r tanh(r/tau) <= 0.2785 tau, (29)."""
     return np.tanh(r / tau)
+
+
+@equation
+def clip(y, low, high):
+    """Clip y into [low, high], min(max(y, low), high); NaN stays NaN.
+
+    With minimum and maximum, which interval proofs know; `numpy.clip` they do not.
+    """
+    return np.minimum(np.maximum(y, low), high)
 
 
 def band_limited(

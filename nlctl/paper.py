@@ -6,6 +6,7 @@ other statements support.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Literal
 
 import control as ct
@@ -24,10 +25,10 @@ from .controllers import (
     diagonal_centres,
     grid_centres,
 )
-from .plants import ForcedDuffing, Genesio
+from .plants import ForcedDuffing, Genesio, coordinate_names
 from .references import SumOfSines
 
-__all__ = ["example_1", "example_2", "paper_centres"]
+__all__ = ["EXAMPLES", "example_1", "example_2", "named_example", "paper_centres"]
 
 _INTERNAL = ("r", "zeta", "delta_hat", "W_norm")  # a controller of another kind may lack these
 
@@ -175,6 +176,24 @@ def example_2(
     return _closed_loop(3, plant, actuator, controller, reference, sensor, name)
 
 
+EXAMPLES = {make.__name__: make for make in (example_1, example_2)}
+"""The examples by name, which is also that of their diagrams."""
+
+
+def named_example(name: str) -> Callable[..., ct.InterconnectedSystem]:
+    """Return the example that the command line and study files call ``"example-1"``.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such example.
+    """
+    known = {key.replace("_", "-"): make for key, make in EXAMPLES.items()}
+    if name not in known:
+        raise unknown("example", name, known)
+    return known[name]
+
+
 def _exclusive(block: str, given: Any, **choices: Any) -> None:
     """Refuse a choice that a replaced block would silently ignore."""
     ignored = [name for name, value in choices.items() if value is not None]
@@ -204,9 +223,8 @@ def _closed_loop(
         blocks["sensor"] = as_system(sensor, "sensor")
         blocks["controller"] = _behind(blocks["controller"], blocks["sensor"])
     available = [s for system in blocks.values() for s in system.output_labels]
-    states = [f"x{i}" for i in range(1, order + 1)]
     internal = [s for s in _INTERNAL if s in available]
-    outputs = ["y", "yd", "e", *internal[:1], "u", "v", *internal[1:], *states]
+    outputs = ["y", "yd", "e", *internal[:1], "u", "v", *internal[1:], *coordinate_names(order)]
     return interconnect(blocks, outputs=outputs, name=name)
 
 

@@ -60,6 +60,11 @@ def no_disturbance(x, t):
     return 0.0
 
 
+def coordinate_names(order: int) -> tuple[str, ...]:
+    """Return ("x1", ..., "xn")."""
+    return tuple(f"x{i}" for i in range(1, order + 1))
+
+
 @record
 class PureFeedback:
     """Pure-feedback plant (1) of any order, with functions of one's own.
@@ -109,7 +114,7 @@ class PureFeedback:
     @property
     def states(self) -> tuple[str, ...]:
         """Names x1, ..., xn."""
-        return tuple(f"x{i}" for i in range(1, self.order + 1))
+        return coordinate_names(self.order)
 
     @property
     def outputs(self) -> tuple[str, ...]:

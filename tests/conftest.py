@@ -1,6 +1,7 @@
-"""What several test modules share: hypothesis settings, and gains to make diagrams of."""
+"""What several test modules share: hypothesis settings, gains to make diagrams of, margins."""
 
 import control as ct
+import pandas as pd
 from hypothesis import settings
 
 import nlctl
@@ -61,3 +62,8 @@ def chain(join=ct.interconnect, *, k=(2.0, 3.0), takes="u", middle="m", delivers
     """Join two gains called first and second in series."""
     parts = [gain("first", k[0], takes, middle), gain("second", k[1], middle, delivers)]
     return join(parts, inputs=[takes], outputs=[delivers], **kwargs)
+
+
+def function(formula):
+    """What simulates nothing: the margin is a formula of the row."""
+    return lambda table: pd.DataFrame({"spec": formula(table)}, index=table.index)

@@ -1,44 +1,8 @@
-"""A cheap loop and a study of it, for the tests of study files."""
+"""A study of a cheap loop, for the tests of study files."""
 
 from pathlib import Path
 
-LOOP = '''
-"""x' = -rate x + gain x^3, from x(0)."""
-
-import nlctl
-
-
-@nlctl.record
-class Lag:
-    """x' = -rate x + gain x^3."""
-
-    rate: float = nlctl.param(1.0, unit="1/s", meaning="decay", above=0)
-    gain: float = nlctl.param(0.0, unit="1/s", meaning="growth")
-    inputs, outputs, states, initial = (), ("y", "z"), ("x",), {"x": 1.0}
-    feedthrough = False
-
-    @staticmethod
-    @nlctl.equation
-    def update(t, x, u, p):
-        return (-p.rate * x[0] + p.gain * x[0] ** 3,)
-
-    @staticmethod
-    @nlctl.equation
-    def output(t, x, u, p):
-        return x[0], 2 * x[0]
-
-
-def loop(lag=None, name="loop"):
-    return nlctl.interconnect({"lag": lag or Lag()}, outputs=["y", "z"], name=name)
-
-
-def lags():
-    return {"calm": Lag(gain=0.0), "lively": Lag(gain=0.2), "wild": Lag(gain=0.4)}
-
-
-def broken():
-    raise RuntimeError("no such luck")
-'''
+LOOP = Path(__file__).with_name("lag.py").read_text(encoding="utf-8")
 
 HEAD = """\
 loop = "loop.py:loop"

@@ -1,10 +1,10 @@
 """A cheap loop with a known answer for the tests of sweeps, and what they compare with."""
 
+import lag
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-import nlctl
 from analysis import metrics
 from analysis.metrics import Metric
 from analysis.robustness import Experiment, Requirement, Space, Spec, Uncertain, always, in_band
@@ -12,29 +12,9 @@ from analysis.robustness import Experiment, Requirement, Space, Spec, Uncertain,
 T = np.linspace(0, 2, 101)
 
 
-@nlctl.record
-class Lag:
-    """x' = -rate x + gain x^3."""
-
-    rate: float = nlctl.param(1.0, unit="1/s", meaning="decay")
-    gain: float = nlctl.param(0.0, unit="1/s", meaning="growth", above=-0.5)
-    inputs, outputs, states, initial = (), ("y",), ("x",), {"x": 1.0}
-    feedthrough = False
-
-    @staticmethod
-    @nlctl.equation
-    def update(t, x, u, p):
-        return (-p.rate * x[0] + p.gain * x[0] ** 3,)
-
-    @staticmethod
-    @nlctl.equation
-    def output(t, x, u, p):
-        return (x[0],)
-
-
 def loop(rate=1.0):
     """Return the diagram."""
-    return nlctl.interconnect({"lag": Lag(rate=rate)}, outputs=["y"])
+    return lag.loop(lag.Lag(rate=rate))
 
 
 def experiment(**changes):

@@ -14,9 +14,10 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     + ["nlctl._block", "nlctl._diagram", "nlctl.functions"]
     + ["nlctl._layout", "nlctl.drawing"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers"],
-    ["nlctl.paper"],
+    ["nlctl._catalogue", "nlctl.paper"],
     ["nlctl.native", "nlctl.response"],
-    ["analysis.metrics", "analysis.lyapunov", "analysis.robustness", "analysis.reproduction"],
+    ["analysis.metrics", "analysis.lyapunov", "analysis.robustness", "analysis.reproduction"]
+    + ["analysis.json_values"],
     ["analysis.figures", "analysis.robustness_figures", "analysis.report"],
     ["analysis.studies"],
     ["nlctl._terminal", "nlctl._check", "nlctl._sweep_progress", "nlctl.cli"]

@@ -11,6 +11,7 @@ from flint import arb
 from nlctl._diagram import leaves
 from nlctl._errors import ParameterError
 from nlctl._param import equation_arguments
+from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
 
 from .creep import Creep, creep
@@ -26,7 +27,7 @@ from .tracking import error_bounds, reference_bounds
 __all__ = ["closure", "conclusions", "creep_of"]
 
 SAFE = "zeta cannot cross its lobe before T"
-WINDOW = 50.0  # s; longer than the period of the paper's reference
+WINDOW = 4 * np.pi  # s; period of the paper's reference
 LEMMA = (
     "false on [0, inf): with zeta' = c1 c2/(2 + exp(zeta^2)), V = c1 + I and g = 1 its premise "
     "holds and zeta is unbounded"
@@ -181,7 +182,8 @@ def _creep(run: Run) -> Line:
             key="creep",
             statement=statement,
             status="undecided",
-            evidence=f"{run.signals.t[-1]:g} s show nothing of it: run {6 * WINDOW:g} s at least",
+            evidence=f"{run.signals.t[-1]:g} s show nothing of it: run "
+            f"{np.ceil(6 * WINDOW):g} s at least",
         )
     calm = found.verdict in ("settles", "turned round")
     burst = np.min([found.burst, found.burst_by_balance])
@@ -204,21 +206,21 @@ def closure(loop: ct.InterconnectedSystem, run: Run, found: Constants, given: Pr
     spec: Any = next(
         getattr(x.system, "current_spec", None) for x in leaves(loop) if x.path == path
     )
-    s, n = run.signals, len(given.lambdas) + 1
+    s, names = run.signals, coordinate_names(len(given.lambdas) + 1)
     C_0 = given.C_0(float(terms(s, given).V[0]), float(np.max(s["I"])))
     if not isinstance(spec, SumOfSines) or not np.isfinite(C_0):
         why = "C_0 is infinite" if not np.isfinite(C_0) else "no bound of the reference is known"
         return Line(key=key, statement=statement, status="undecided", evidence=why)
     yd = spec.output(float(s.t[0]), (), (), equation_arguments(spec))
-    e0 = [arb(float(s[f"x{i + 1}"][0])) - arb(float(yd[i]), 1e-12) for i in range(n)]
+    e0 = [arb(float(s[x][0])) - arb(float(y), 1e-12) for x, y in zip(names, yd, strict=False)]
     try:
         errors = error_bounds(given.lambdas, e0, arb(C_0))
     except ParameterError as error:
         return Line(key=key, statement=statement, status="undecided", evidence=str(error))
     reach = [float(e.upper()) + y for e, y in zip(errors, reference_bounds(spec), strict=False)]
-    sides = [found.box[f"x{i + 1}"] for i in range(n)]
+    sides = [found.box[x] for x in names]
     room = min(min(high, -low) - a for (low, high), a in zip(sides, reach, strict=True))
-    told = ", ".join(f"|x{i + 1}| <= {a:.4g}" for i, a in enumerate(reach))
+    told = ", ".join(f"|{x}| <= {a:.4g}" for x, a in zip(names, reach, strict=True))
     return Line(
         key=key,
         statement=statement,

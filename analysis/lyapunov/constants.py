@@ -10,6 +10,7 @@ import numpy as np
 
 from nlctl._errors import ParameterError
 from nlctl.functions import smooth_sign
+from nlctl.plants import coordinate_names
 
 from .ball import as_ball
 from .balls import Proof, Range, enclose, prove, upper
@@ -18,7 +19,7 @@ from .decomposition import Decomposition, decompose
 from .final_bound import KAPPA, alpha_0, alpha_1, initial_V, total_error
 from .parts import Parts, read_parts
 from .record import Constant, Constants, Provenance, bound, per_second
-from .sector import Sector, plant_terms, sector, state_names
+from .sector import Sector, plant_terms, sector
 from .weights import approximation_error, network_on_grid, tightest_weights
 
 __all__ = ["Constant", "Constants", "constants", "disturbance", "kappa", "visited_box"]
@@ -97,7 +98,7 @@ def constants(
         If the box lacks a side, W has the wrong length or its norm is above 1e5.
     """
     parts = read_parts(loop, start, params)
-    states = box.only(*state_names(parts.order))
+    states = box.only(*coordinate_names(parts.order))
     v = box["v"] if "v" in box.names else (-np.inf, np.inf)
     over_v = states.times("v", *v)
     bounds = sector(parts.plant, over_v, tol=tol)

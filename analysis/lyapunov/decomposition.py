@@ -15,6 +15,7 @@ import numpy as np
 from nlctl._errors import ParameterError, UsageError
 from nlctl._param import equation_arguments
 from nlctl.actuators import Backlash, DeadZone, play_band
+from nlctl.functions import clip
 
 from .balls import Box, Range, enclose
 
@@ -91,7 +92,7 @@ def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
 
     def part(u: Any, v: Any) -> Any:
         one, other = k_1 * u, k_2 * u
-        return np.minimum(np.maximum(v, np.minimum(one, other)), np.maximum(one, other))
+        return clip(v, np.minimum(one, other), np.maximum(one, other))
 
     return part
 

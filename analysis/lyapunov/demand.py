@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 from flint import arb
 
+from nlctl.plants import coordinate_names
+
 from .ball import as_ball
 from .balls import enclose, upper
 from .box import Box
 from .decomposition import Decomposition
 from .final_bound import total_error
 from .known_sign_loop import KnownSignLoop
-from .sector import plant_terms, sector, state_names
+from .sector import plant_terms, sector
 from .tracking import error_bounds, reference_bounds
 
 __all__ = ["Demand", "demand"]
@@ -72,7 +74,7 @@ def demand(loop: KnownSignLoop, split: Decomposition, C: float, *, tol: float = 
     errors = error_bounds(loop.lambdas, loop.e0, arb(C))
     wanted = reference_bounds(loop.reference)
     reach = tuple(upper(e + y) for e, y in zip(errors, wanted, strict=False))
-    low, names = tuple(-a for a in reach), state_names(len(reach))
+    low, names = tuple(-a for a in reach), coordinate_names(len(reach))
     box = Box(names=names, low=low, high=reach, how=f"|r| <= {C:.6g}")
 
     def over_all(name: str) -> Box:

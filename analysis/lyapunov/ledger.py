@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from nlctl._names import unknown
 
+from ..json_values import as_json
 from ..metrics import peak
 from .conclusions import conclusions, creep_of
 from .creep import Creep
@@ -85,7 +85,7 @@ class Ledger:
     def to_json(self) -> str:
         """Return the ledger as JSON; numbers that are not finite become null."""
         return json.dumps(
-            _plain(
+            as_json(
                 {
                     "loop": self.loop,
                     "holds": self.holds,
@@ -96,7 +96,8 @@ class Ledger:
                     "max_r": self.max_r,
                     "constants": [dataclasses.asdict(c) for c in self.constants.entries],
                     "lines": [dataclasses.asdict(line) for line in self.lines],
-                }
+                },
+                null=True,
             ),
             allow_nan=False,
             indent=1,
@@ -113,17 +114,6 @@ class Ledger:
                 meaning.setdefault(line.follows, []).append(line.key)
         rows += [f"  {', '.join(keys)}: {follows}" for follows, keys in meaning.items()]
         return "\n".join(rows)
-
-
-def _plain(thing: Any) -> Any:
-    """Return a value that JSON can hold."""
-    if isinstance(thing, Mapping):
-        return {str(k): _plain(v) for k, v in thing.items()}
-    if isinstance(thing, list | tuple):
-        return [_plain(v) for v in thing]
-    if isinstance(thing, float | np.floating):
-        return float(thing) if np.isfinite(thing) else None
-    return thing.item() if isinstance(thing, np.generic) else thing
 
 
 def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **settings: Any) -> Ledger:

@@ -10,13 +10,13 @@ import numpy as np
 
 from nlctl._errors import DiagramError
 from nlctl._param import equation_arguments
-from nlctl.plants import PureFeedback
+from nlctl.plants import PureFeedback, coordinate_names
 
 from .balls import Range, enclose
 from .box import Box
 from .slope import slope_in
 
-__all__ = ["Sector", "plant_terms", "sector", "state_names"]
+__all__ = ["Sector", "plant_terms", "sector"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,11 +74,6 @@ class Sector:
         return sum(half.boxes for half in (self.positive, self.negative) if half)
 
 
-def state_names(order: int) -> tuple[str, ...]:
-    """Return ("x1", ..., "xn")."""
-    return tuple(f"x{i}" for i in range(1, order + 1))
-
-
 def plant_terms(plant: Any) -> tuple[Callable[[Any, Any], Any], Callable[[Any, Any], Any]]:
     """Return f(x, v) and d(x, t) of a plant record of the class (1).
 
@@ -122,7 +117,7 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
         If the box lacks a side.
     """
     f, _ = plant_terms(plant)
-    names = state_names(len(plant.states))
+    names = coordinate_names(len(plant.states))
 
     def gain(point: tuple[Any, ...]) -> Any:
         *x, v = point

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 from nlctl import native
 from nlctl._errors import DivergedError, ParameterError
 from nlctl._names import unknown
+from nlctl.plants import coordinate_names
 from nlctl.response import input_output_response
 
 from ..metrics import peak
@@ -253,7 +254,7 @@ def _trial(search: _Search, gains: dict[str, float]) -> TrialBound:
 def _bounds(search: _Search, gains: Gains, box: Box, Q: float) -> tuple[float, float]:
     """C_0 and the ultimate bound with the tightest W on a box, eps* on a grid."""
     parts, n = search.parts, search.parts.order
-    states = box.only(*(f"x{i + 1}" for i in range(n)))
+    states = box.only(*coordinate_names(n))
     G_max = sector(parts.plant, box.only(*states.names, "v"), tol=TOLERANCE).G_max
     d = disturbance(parts.plant, states, (0.0, np.inf), tol=TOLERANCE).magnitude
     rest = float(total_error(G_max, search.split.eps_star, d, 0.0))

@@ -12,7 +12,6 @@ from ..metrics import Metric, final, highest, lowest, peak, rms
 
 HORIZON = 20.0
 TAIL = HORIZON / 2
-EXAMPLES = {1: paper.example_1, 2: paper.example_2}
 
 METRICS = (
     Metric(
@@ -79,7 +78,7 @@ class Case:
     @property
     def diagram(self) -> Any:
         """The diagram of this case."""
-        return EXAMPLES[self.example](**self.arguments)
+        return paper.EXAMPLES[f"example_{self.example}"](**self.arguments)
 
     @property
     def call(self) -> str:

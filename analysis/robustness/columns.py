@@ -8,7 +8,7 @@ import pandas as pd
 
 from nlctl.native import Status
 
-from .experiment import RUN_COLUMNS, Prepared
+from .experiment import Prepared
 
 __all__ = ["Columns", "columns_of", "typed"]
 
@@ -23,8 +23,7 @@ def columns_of(prepared: Prepared) -> Columns:
     time (s) that a row's chunk took over its number of rows.
     """
     experiment = prepared.experiment
-    keys = [m.key for m in (*experiment.metrics, *experiment.spec.requirements)]
-    numbers = (*experiment.space.names, *RUN_COLUMNS, *keys, "spec")
+    numbers = (*experiment.space.names, *experiment.measured)
     columns: dict[str, str | Sequence[str]] = dict.fromkeys(numbers, "float64")
     columns |= {choice.name: list(choice.options) for choice in experiment.space.choices}
     columns |= {"status": [status.name for status in Status], "steps": "int64"}

@@ -14,7 +14,7 @@ from nlctl.native import Status
 from nlctl.response import input_output_response
 
 from .evaluation import as_table
-from .experiment import Experiment, Prepared, evaluate
+from .experiment import Experiment, Prepared, by_diagram, evaluate
 from .space import arguments
 from .spec import margins, unfinished_margin
 
@@ -119,17 +119,12 @@ def _in_python_control(
     prepared: Prepared, experiment: Experiment, table: pd.DataFrame
 ) -> dict[str, Any]:
     experiment = replace(experiment, method=REFERENCE)
-    row = table.iloc[0]
-    system = next(
-        loop.system
-        for labels, loop in prepared.loops
-        if all(row[name] == label for name, label in labels.items())
-    )
+    ((loop, _),) = by_diagram(prepared, table)
     given = arguments(experiment.space, table)
     end = float(experiment.timepts[-1])
     try:
         response = input_output_response(
-            system,
+            loop.system,
             experiment.timepts,
             experiment.inputs,
             engine="python-control",
@@ -142,7 +137,7 @@ def _in_python_control(
     except DivergedError as error:
         margin = unfinished_margin(error.time, end)
         return _replay("python-control", experiment, Status.DIVERGED.name, error.time, margin)
-    signals = dict(zip(system.output_labels, np.atleast_2d(response.outputs), strict=True))
+    signals = dict(zip(loop.system.output_labels, np.atleast_2d(response.outputs), strict=True))
     margin = margins(experiment.spec, experiment.timepts, signals)["spec"]
     return _replay("python-control", experiment, Status.OK.name, end, margin)
 

@@ -40,8 +40,6 @@ class _Gains:
 
     Attributes
     ----------
-    build : callable
-        Makes the diagram.
     pid, sliding : dict
         Found by `tuned`.
     reached : float
@@ -52,7 +50,6 @@ class _Gains:
         Gains for which `analysis.lyapunov.certify` proves a bound.
     """
 
-    build: Callable[..., ct.InterconnectedSystem]
     pid: dict[str, float]
     sliding: dict[str, float]
     reached: float
@@ -62,9 +59,8 @@ class _Gains:
     law: dict[str, float]
 
 
-EXAMPLES = {
+GAINS = {
     "example_1": _Gains(
-        build=paper.example_1,
         pid={"k_p": 12.5, "k_i": 748.0, "k_d": 97.4, "T_f": 0.275},
         sliding={"K": 8.99, "phi": 0.027},
         reached=26.9,
@@ -74,7 +70,6 @@ EXAMPLES = {
         law={"N_0": 2.4},
     ),
     "example_2": _Gains(
-        build=paper.example_2,
         pid={"k_p": 1.39, "k_i": 0.152, "k_d": 5.56, "T_f": 0.00513},
         sliding={"K": 2.19, "phi": 0.0278},
         reached=7.79,
@@ -115,8 +110,8 @@ def contenders(example: str) -> dict[str, ct.InputOutputSystem]:
     UnknownNameError
         If there is no such example.
     """
-    published, gains = _published(example), _gains(example)
-    beta = _piece(published, "law").beta
+    published, gains = _published(example), GAINS[example]
+    beta = _part(published, "law").spec.beta
     laws = {
         "dead zone in zeta'": DeadZoneNussbaumLaw(beta=beta, r_0=gains.r_0),
         "leakage": LeakyNussbaumLaw(beta=beta),
@@ -128,7 +123,7 @@ def contenders(example: str) -> dict[str, ct.InputOutputSystem]:
         **baselines(example),
         "certified": replaced(
             published,
-            weights=AdaptiveWeights(nodes=_piece(published, "weights").nodes, **gains.weights),
+            weights=AdaptiveWeights(nodes=_part(published, "weights").spec.nodes, **gains.weights),
             robust=RobustTerm(**gains.robust),
             law=KnownSignLaw(**gains.law),
         ),
@@ -143,7 +138,7 @@ def baselines(example: str) -> dict[str, Any]:
     paper's max |u| in the same noise.  They know the sign of the input gain and have gains made
     for this plant; the paper's controller has neither.
     """
-    gains, surface = _gains(example), _piece(_published(example), "filtered_error")
+    surface, gains = _part(_published(example), "filtered_error").spec, GAINS[example]
     return {
         "PID": PID(**gains.pid, u_max=100.0),
         "sliding mode": sliding_mode(surface, SlidingModeLaw(**gains.sliding)),
@@ -152,8 +147,7 @@ def baselines(example: str) -> dict[str, Any]:
 
 def sensor(example: str, rms: float = 0.01, seed: int = 0) -> BandLimitedNoise:
     """Return measurement noise on all states of an example, 0 to 50 rad/s."""
-    order = _piece(_published(example), "filtered_error").order
-    states = tuple(f"x{i}" for i in range(1, order + 1))
+    states = _part(_build(example)(), "plant").spec.states
     return BandLimitedNoise(
         takes=states, delivers=tuple(f"{x}_measured" for x in states), rms=rms, seed=seed
     )
@@ -171,11 +165,11 @@ def tuned(example: str, *, generations: int = 40, seed: int = 0) -> dict[str, Tu
     dict
         `Tuned` by label; a few minutes of computing.
     """
-    build, times = _gains(example).build, np.linspace(0, 20, 2001)
+    build, times = _build(example), np.linspace(0, 20, 2001)
     by_key = {m.key: m for m in tracking_metrics(start=10, band=0.15, weights="", gain="")}
     cost, limited = by_key["iae"], by_key["peak_u"]
     published = compiled_loop(build(sensor=sensor(example)))
-    own = {"law.beta": np.array([_piece(_published(example), "law").beta])}
+    own = {"law.beta": np.array([_part(_published(example), "law").spec.beta])}
     row = ensemble_response(published, times, params=own, metrics=(limited,)).table.iloc[0]
     limit = float(row[limited.key])
     bounds = {
@@ -193,19 +187,17 @@ def tuned(example: str, *, generations: int = 40, seed: int = 0) -> dict[str, Tu
     return found
 
 
-def _gains(example: str) -> _Gains:
-    if example not in EXAMPLES:
-        raise unknown("example", example, EXAMPLES)
-    return EXAMPLES[example]
+def _build(example: str) -> Callable[..., ct.InterconnectedSystem]:
+    """Return what makes the diagram of an example."""
+    if example not in paper.EXAMPLES:
+        raise unknown("example", example, paper.EXAMPLES)
+    return paper.EXAMPLES[example]
 
 
 def _published(example: str) -> ct.InterconnectedSystem:
     """Return the paper's controller of an example."""
-    (found,) = (s for s in _gains(example).build().syslist if s.name == "controller")
-    return found
+    return _part(_build(example)(), "controller")
 
 
-def _piece(controller: ct.InterconnectedSystem, name: str) -> Any:
-    """Return the record of a piece of a controller."""
-    (piece,) = (s for s in controller.syslist if s.name == name)
-    return piece.spec
+def _part(diagram: ct.InterconnectedSystem, name: str) -> Any:
+    return diagram.syslist[diagram.syslist_index[name]]

@@ -22,6 +22,7 @@ __all__ = [
     "from_table",
     "independent",
     "listed",
+    "numbered",
     "row_seed",
     "rows",
     "seed_number",
@@ -103,6 +104,11 @@ def rows(design: Design, numbers: range) -> pd.DataFrame:
     for i, number in enumerate(numbers):
         unit[i] = np.random.default_rng(row_seed(design, number)).random(unit.shape[1])
     return sampled(design.space, unit).set_axis(index)
+
+
+def numbered(table: pd.DataFrame, first: int) -> pd.DataFrame:
+    """Return rows with the numbers `first`, `first` + 1, ... as their index."""
+    return table.set_axis(pd.RangeIndex(first, first + len(table), name="row"))
 
 
 def checked_entropy(entropy: int | None) -> int:

@@ -11,7 +11,7 @@ import pandas as pd
 from nlctl._errors import ParameterError
 
 from .quantity import Uncertain
-from .space import Space, nominal
+from .space import Space, moved, nominal
 
 __all__ = ["Evaluate", "as_table", "evaluated", "margins_of", "row_text", "towards_nominal"]
 
@@ -71,12 +71,12 @@ def towards_nominal(
     """
     middle = nominal(space)
 
-    def moved(quantity: Uncertain) -> float:
-        value = middle[quantity.name] + factor * (row[quantity.name] - middle[quantity.name])
+    def nearer(quantity: Uncertain) -> float:
+        value = moved(middle[quantity.name], row[quantity.name], factor)
         return float(np.rint(value)) if quantity.is_whole else float(value)
 
     return dict(row) | {
-        q.name: moved(q) for q in space.quantities if names is None or q.name in names
+        q.name: nearer(q) for q in space.quantities if names is None or q.name in names
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -14,17 +14,15 @@ import pandas as pd
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
 from nlctl._param import checked_times
-from nlctl.native import Compiled, Status, ensemble_response
+from nlctl.native import Compiled, Ensemble, Status, ensemble_response
 from nlctl.native import compile as compiled
 
 from ..metrics import Metric, machine_code
 from .resolve import diagrams, resolved
 from .space import Space, arguments
-from .spec import Spec, unfinished_margin
+from .spec import Requirement, Spec, unfinished_margin
 
-__all__ = ["Experiment", "Prepared", "evaluate", "prepare"]
-
-RUN_COLUMNS = ("status", "time", "steps")
+__all__ = ["Experiment", "Prepared", "by_diagram", "evaluate", "prepare", "simulate"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,11 +78,16 @@ class Experiment:
                     f"requirement '{requirement.key}' needs a response until "
                     f"{requirement.until:g} s, the experiment ends at {times[-1]:g} s"
                 )
-        names = [*self.space.names, *RUN_COLUMNS, *(m.key for m in self.metrics)]
-        names += [r.key for r in self.spec.requirements]
-        twice = sorted({name for name in (*names, "spec") if (*names, "spec").count(name) > 1})
+        names = [*self.space.names, *self.measured]
+        twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ParameterError(f"an experiment needs each column once, got twice: {twice}")
+
+    @property
+    def measured(self) -> list[str]:
+        """Columns that `evaluate` adds to those of the space."""
+        keys = [m.key for m in (*self.metrics, *self.spec.requirements)]
+        return ["status", "time", "steps", *keys, "spec"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,19 +160,58 @@ def evaluate(
         Ctrl-C kept from finishing are missing.
     """
     parts, finished = [], 0
+    for loop, rows in by_diagram(prepared, table):
+        notify = None if progress is None else partial(_forward, progress, finished)
+        parts.append(_run(prepared.experiment, loop, rows, threads, notify))
+        finished += len(rows)
+        if len(parts[-1]) < len(rows):
+            break
+    none = pd.DataFrame(columns=prepared.experiment.measured, index=table.index[:0])
+    results = pd.concat(parts) if parts else none
+    order = table.index.intersection(results.index, sort=False)
+    space = table.loc[order, prepared.experiment.space.names]
+    return pd.concat([space, results.loc[order]], axis=1)
+
+
+def by_diagram(prepared: Prepared, table: pd.DataFrame) -> Iterator[tuple[Compiled, pd.DataFrame]]:
+    """Yield each diagram that rows of a table ask for, with these rows: those with its labels."""
     for labels, loop in prepared.loops:
         same = [table[name] == label for name, label in labels.items()]
         rows = table.loc[np.logical_and.reduce(same)] if same else table
         if len(rows):
-            notify = None if progress is None else partial(_forward, progress, finished)
-            parts.append(_run(prepared.experiment, loop, rows, threads, notify))
-            finished += len(rows)
-            if len(parts[-1]) < len(rows):
-                break
-    results = pd.concat(parts) if parts else _empty(prepared.experiment, table.index)
-    order = table.index.intersection(results.index, sort=False)
-    space = table.loc[order, prepared.experiment.space.names]
-    return pd.concat([space, results.loc[order]], axis=1)
+            yield loop, rows
+
+
+def simulate(
+    experiment: Experiment,
+    loop: Compiled,
+    rows: pd.DataFrame,
+    *,
+    metrics: Sequence[Metric | Requirement] = (),
+    keep: Sequence[str] = (),
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Ensemble:
+    """Simulate rows of one diagram, see `by_diagram`, with the settings of an experiment.
+
+    `metrics` and the arguments after them are those of `nlctl.ensemble_response`.
+    """
+    varied = arguments(experiment.space, rows)
+    return ensemble_response(
+        loop,
+        experiment.timepts,
+        experiment.inputs,
+        varied["initial_state"],
+        params=varied["params"],
+        metrics=metrics,
+        keep=keep,
+        threads=threads,
+        rtol=experiment.rtol,
+        atol=experiment.atol,
+        max_steps=experiment.max_steps,
+        method=experiment.method,
+        progress=progress,
+    )
 
 
 def _forward(progress: Callable[[int], object], before: int, count: int) -> None:
@@ -184,23 +226,10 @@ def _run(
     progress: Callable[[int], object] | None,
 ) -> pd.DataFrame:
     requirements = experiment.spec.requirements
-    varied = arguments(experiment.space, rows)
-    found: pd.DataFrame = ensemble_response(
-        loop,
-        experiment.timepts,
-        experiment.inputs,
-        varied["initial_state"],
-        params=varied["params"],
-        metrics=(*map(_fast, experiment.metrics), *requirements),
-        threads=threads,
-        rtol=experiment.rtol,
-        atol=experiment.atol,
-        max_steps=experiment.max_steps,
-        method=experiment.method,
-        progress=progress,
-    ).table
-    columns = [*RUN_COLUMNS, *(m.key for m in (*experiment.metrics, *requirements))]
-    found = found.loc[:, columns].set_axis(rows.index[found.index.to_numpy()])
+    metrics = (*map(_fast, experiment.metrics), *requirements)
+    made = simulate(experiment, loop, rows, metrics=metrics, threads=threads, progress=progress)
+    found = made.table.reindex(columns=experiment.measured)
+    found = found.set_axis(rows.index[found.index.to_numpy()])
     failed = found["status"] != Status.OK.name
     end = float(experiment.timepts[-1])
     graded = [unfinished_margin(time, end) for time in found.loc[failed, "time"]]
@@ -214,8 +243,3 @@ def _fast(metric: Metric) -> Metric:
     if not isinstance(metric, Metric):  # what is like a metric runs as it is
         return metric
     return replace(metric, function=machine_code(metric.function))
-
-
-def _empty(experiment: Experiment, index: pd.Index) -> pd.DataFrame:
-    numbers = (m.key for m in (*experiment.metrics, *experiment.spec.requirements))
-    return pd.DataFrame(columns=[*RUN_COLUMNS, *numbers, "spec"], index=index[:0])

@@ -14,8 +14,9 @@ from nlctl._errors import ParameterError
 from nlctl._names import unknown
 from nlctl._param import whole_number
 
+from .design import numbered
 from .evaluation import Evaluate, evaluated, margins_of
-from .space import Space, boxed, nominal
+from .space import Space, boxed, ends, nominal
 
 __all__ = ["FailureMap", "boundary", "failure_map"]
 
@@ -111,17 +112,14 @@ def failure_map(
         quarters = {quarter for cell in chosen for quarter in _quarters(cell)}
         plane.add(quarters)
         leaves = leaves - set(chosen) | quarters
-    steps = cells << levels
-    (x_low, x_high), (y_low, y_high) = (
-        boxed(space, np.array([[0.0], [1.0]]).repeat(len(space.names), axis=1))[name]
-        for name in (x, y)
-    )
+    low, high = ends(space)[[x, y]].to_numpy()
+    x_side, y_side = ((high - low) / plane.steps).tolist()
     return FailureMap(
         x=x,
         y=y,
         table=plane.table,
         triangles=Delaunay(np.array(list(plane.margins), dtype=float)).simplices,
-        cell=((x_high - x_low) / steps, (y_high - y_low) / steps),
+        cell=(x_side, y_side),
         is_finished=not plane.near_boundary(leaves),
     )
 
@@ -171,9 +169,7 @@ class _Plane:
         for name, coordinates in zip(self.axes, np.transpose(new), strict=True):
             unit[:, self.space.names.index(name)] = coordinates / self.steps
         others = {k: v for k, v in self.given.items() if k not in self.axes}
-        first = len(self.margins)
-        rows = boxed(self.space, unit).assign(**others)
-        rows = rows.set_axis(pd.RangeIndex(first, first + len(rows), name="row"))
+        rows = numbered(boxed(self.space, unit).assign(**others), len(self.margins))
         results = evaluated(self.evaluate, rows)
         self.margins |= zip(new, margins_of(results), strict=True)
         self.tables.append(rows.assign(spec=results["spec"].to_numpy(), round=len(self.tables)))

@@ -24,6 +24,8 @@ __all__ = [
     "check_iid",
     "checked_confidence",
     "clopper_pearson",
+    "rounded_down",
+    "rounded_up",
     "runs_needed",
     "violation_probability",
     "violations_of",
@@ -61,11 +63,11 @@ class Violation:
     assumptions: tuple[str, ...]
 
     def __str__(self) -> str:
-        bounds = f"between {_down(self.lower)} and {_up(self.upper)}"
+        bounds = f"between {rounded_down(self.lower)} and {rounded_up(self.upper)}"
         if self.lower == 0:
-            bounds = f"at most {_up(self.upper)}"
+            bounds = f"at most {rounded_up(self.upper)}"
         elif self.upper == 1:
-            bounds = f"at least {_down(self.lower)}"
+            bounds = f"at least {rounded_down(self.lower)}"
         return (
             f"{self.violations} of {self.runs} runs violate the spec. With confidence "
             f"{100 * self.confidence:.10g} % the probability of a violation is {bounds} "
@@ -73,12 +75,13 @@ class Violation:
         )
 
 
-def _up(value: float) -> str:
-    """Four digits, rounded up so that the printed bound holds as well."""
+def rounded_up(value: float) -> str:
+    """Return an upper bound in four digits, rounded up so that it holds as printed."""
     return _rounded(value, np.ceil)
 
 
-def _down(value: float) -> str:
+def rounded_down(value: float) -> str:
+    """Return a lower bound in four digits, rounded down so that it holds as printed."""
     return _rounded(value, np.floor)
 
 

@@ -11,10 +11,11 @@ from typing import Any
 
 import control as ct
 
+from nlctl import paper
 from nlctl._names import unknown
 from nlctl.actuators import Backlash, DeadZone, Gain, Saturation, cascade
 
-from .contenders import EXAMPLES, contenders, sensor
+from .contenders import contenders, sensor
 
 __all__ = ["example_1", "example_2"]
 
@@ -81,7 +82,7 @@ def _loop(
             raise unknown("controller", controller, known)
         controller = known[controller]
     stages = {"saturation": Saturation(limit=limit), "gain": Gain(k=gain), "body": body}
-    return EXAMPLES[example].build(
+    return paper.EXAMPLES[example](
         controller=controller,
         actuator=cascade(stages),
         sensor=None if noise is None else sensor(example, noise),

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from .design import numbered
 from .evaluation import Evaluate, evaluated, margins_of
 from .patterns import corners
-from .space import Space, boxed
+from .space import Space, boxed, ends
 
 __all__ = ["Found", "corner_count", "search"]
 
@@ -55,8 +56,7 @@ class Found:
 
     def run(self, searcher: str, table: pd.DataFrame) -> np.ndarray:
         """Run rows, return their margins."""
-        first = self.margins.size
-        table = table.set_axis(pd.RangeIndex(first, first + len(table), name="row"))
+        table = numbered(table, self.margins.size)
         results = evaluated(self.evaluate, table)
         margins = margins_of(results)
         self.tables.append(table)
@@ -124,10 +124,9 @@ def _evolve(found: Found, rng: np.random.Generator, size: int, *, is_first: bool
 
 def _places(space: Space, table: pd.DataFrame) -> np.ndarray:
     """Return the places of rows in their boxes, the opposite of `boxed`."""
-    names = [quantity.name for quantity in space.quantities]
-    ends = boxed(space, np.array([[0.0], [1.0]]).repeat(len(space.names), axis=1))
-    low, high = ends[names].to_numpy(dtype=float)
-    return np.clip((table[names].to_numpy(dtype=float) - low) / (high - low), 0.0, 1.0)
+    box = ends(space)
+    low, high = box.to_numpy()
+    return np.clip((table[box.columns].to_numpy(dtype=float) - low) / (high - low), 0.0, 1.0)
 
 
 def _strategy(start: np.ndarray, size: int, rng: np.random.Generator) -> Any:

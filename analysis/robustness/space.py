@@ -18,6 +18,8 @@ __all__ = [
     "arguments",
     "boxed",
     "combinations",
+    "ends",
+    "moved",
     "nominal",
     "sampled",
     "scaled",
@@ -100,6 +102,11 @@ def scaled(space: Space, factor: float) -> Space:
     return replace(space, scale=space.scale * factor)
 
 
+def moved(middle: float, value: Any, factor: float) -> Any:
+    """Return a number or array with its distance to the nominal value, `middle`, multiplied."""
+    return middle + factor * (value - middle)
+
+
 def sampled(space: Space, unit: np.ndarray) -> pd.DataFrame:
     """Turn points of the unit cube into values, each coordinate by its law's quantile function.
 
@@ -137,6 +144,12 @@ def boxed(space: Space, unit: np.ndarray) -> pd.DataFrame:
     return _table(space, _checked(space, unit), between)
 
 
+def ends(space: Space) -> pd.DataFrame:
+    """Return the ends of the box of every quantity: a table of two rows, low and high."""
+    corners = boxed(space, np.repeat([[0.0], [1.0]], len(space.names), axis=1))
+    return corners.filter([quantity.name for quantity in space.quantities])
+
+
 def _checked(space: Space, unit: np.ndarray) -> np.ndarray:
     unit = np.asarray(unit, dtype=float)
     if unit.ndim != 2 or unit.shape[1] != len(space.names):
@@ -153,11 +166,11 @@ def _table(space: Space, unit: np.ndarray, value: Any) -> pd.DataFrame:
     for quantity, u in zip(space.quantities, unit.T, strict=False):
         values = value(quantity, u)
         if space.scale != 1:
-            values = _nominal_of(quantity) + space.scale * (values - _nominal_of(quantity))
+            values = moved(_nominal_of(quantity), values, space.scale)
         columns[quantity.name] = np.rint(values) if quantity.is_whole else values
     for choice, u in zip(space.choices, unit.T[len(space.quantities) :], strict=True):
-        ends = np.cumsum(choice.weights)[:-1]
-        columns[choice.name] = np.array(list(choice.options))[np.searchsorted(ends, u, "right")]
+        edges = np.cumsum(choice.weights)[:-1]
+        columns[choice.name] = np.array(list(choice.options))[np.searchsorted(edges, u, "right")]
     return pd.DataFrame(columns)
 
 

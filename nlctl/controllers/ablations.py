@@ -79,7 +79,7 @@ def ablations(
         "no network": W_hat^T psi = 0; "no robust term": delta_hat tanh(r/tau) = 0; "neither":
         both; "fixed gain": u = -kappa eta.
     """
-    (beta,) = (s.spec.beta for s in controller.syslist if s.name == "law")
+    beta = controller.syslist[controller.syslist_index["law"]].spec.beta
     no_network = {"weights": Zero(outputs=("W_psi", "W_norm"))}
     no_robust = {"robust": Zero(outputs=("robust", "delta_hat"))}
     return {

@@ -10,6 +10,8 @@ from .._diagram import as_system, interconnect
 from .._equation import equation
 from .._errors import ParameterError
 from .._param import record, whole_number
+from ..plants import coordinate_names
+from ..references import derivative_names
 from .filtered_error import FilteredError, binomial_lambdas
 from .nussbaum import NussbaumLaw
 from .rbf import AdaptiveWeights, GaussianBasis, diagonal_centres
@@ -116,9 +118,7 @@ def adaptive_neural(
         "robust": RobustTerm() if robust is None else robust,
         "law": NussbaumLaw() if law is None else law,
     }
-    signals = (
-        [f"x{i}" for i in range(1, order + 1)] + ["yd"] + [f"yd{i}" for i in range(1, order + 1)]
-    )
+    signals = [*coordinate_names(order), *derivative_names(order)]
     systems = [as_system(piece, key) for key, piece in pieces.items()]
     argument = ["zeta"] if "zeta" in systems[-1].output_labels else []  # KnownSignLaw has none
     return interconnect(

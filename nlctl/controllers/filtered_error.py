@@ -10,6 +10,7 @@ import numpy as np
 from .._equation import equation
 from .._errors import ParameterError
 from .._param import param, record
+from ..plants import coordinate_names
 from ..references import derivative_names
 
 __all__ = ["FilteredError", "binomial_lambdas"]
@@ -78,7 +79,7 @@ class FilteredError:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names x1, ..., xn, yd, yd1, ..., ydn."""
-        return (*(f"x{i}" for i in range(1, self.order + 1)), *derivative_names(self.order))
+        return (*coordinate_names(self.order), *derivative_names(self.order))
 
     outputs = ("e", "r", "Y_d")
 

@@ -19,6 +19,18 @@ def control_base(u, p):
     return p.beta * r + W_psi + robust + Y_d
 
 
+def gained(N: Callable[[float], float], base: Callable) -> Callable:
+    """Make the output equation of (23), u = N(zeta) eta and zeta, from N and eta = base(u, p)."""
+    N = equation(N)
+
+    @equation
+    def output(t, x, u, p):
+        (zeta,) = x
+        return N(zeta) * base(u, p), zeta
+
+    return output
+
+
 @record
 class NussbaumLaw:
     """Nussbaum control law (23), (24).
@@ -51,11 +63,4 @@ class NussbaumLaw:
     @cached_property
     def output(self) -> Callable:
         """Equation (23)."""
-        N = equation(self.N)
-
-        @equation
-        def output(t, x, u, p):
-            (zeta,) = x
-            return N(zeta) * control_base(u, p), zeta
-
-        return output
+        return gained(self.N, control_base)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from .._equation import equation
 from .._param import param, record
+from ..functions import clip
 
 __all__ = ["PID"]
 
@@ -22,7 +21,7 @@ def unlimited(x, u, p):
 @equation
 def limited(w, p):
     """The control input that is asked for, within the limit."""
-    return np.minimum(np.maximum(w, -p.u_max), p.u_max)
+    return clip(w, -p.u_max, p.u_max)
 
 
 @record

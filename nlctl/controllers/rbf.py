@@ -11,6 +11,7 @@ from .._equation import equation
 from .._errors import ParameterError
 from .._param import param, record, whole_number
 from ..functions import gaussian
+from ..plants import coordinate_names
 
 __all__ = [
     "AdaptiveWeights",
@@ -83,7 +84,7 @@ class GaussianBasis:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names x1, ..., xn."""
-        return tuple(f"x{i}" for i in range(1, len(self.centres[0]) + 1))
+        return coordinate_names(len(self.centres[0]))
 
     @property
     def outputs(self) -> tuple[str, ...]:

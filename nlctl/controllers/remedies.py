@@ -10,12 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 
-import numpy as np
-
 from .._equation import equation
 from .._param import param, record
+from ..functions import clip
 from .known_sign import damped_base
-from .nussbaum import NussbaumLaw, control_base
+from .nussbaum import NussbaumLaw, control_base, gained
 
 __all__ = ["DeadZoneNussbaumLaw", "LeakyNussbaumLaw", "MonotoneNussbaumLaw"]
 
@@ -23,7 +22,7 @@ __all__ = ["DeadZoneNussbaumLaw", "LeakyNussbaumLaw", "MonotoneNussbaumLaw"]
 @equation
 def beyond(r, r_0):
     """What of r lies outside [-r_0, r_0]: d(r) = r - clip(r, -r_0, r_0), continuous in r."""
-    return r - np.minimum(np.maximum(r, -r_0), r_0)
+    return r - clip(r, -r_0, r_0)
 
 
 @record
@@ -96,11 +95,4 @@ class MonotoneNussbaumLaw(NussbaumLaw):
     @cached_property
     def output(self) -> Callable:
         """Equation (23) with the damped base."""
-        N = equation(self.N)
-
-        @equation
-        def output(t, x, u, p):
-            (zeta,) = x
-            return N(zeta) * damped_base(u, p), zeta
-
-        return output
+        return gained(self.N, damped_base)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import control as ct
-import numpy as np
 
 from .._diagram import as_system, interconnect
 from .._equation import equation
 from .._param import param, record
+from ..functions import clip
 from .filtered_error import FilteredError
 
 __all__ = ["SlidingModeLaw", "sliding_mode"]
@@ -40,7 +40,7 @@ class SlidingModeLaw:
     def output(t, x, u, p):
         """The law."""
         (r,) = u
-        return (-p.K * np.minimum(np.maximum(r / p.phi, -1.0), 1.0),)
+        return (-p.K * clip(r / p.phi, -1.0, 1.0),)
 
     @staticmethod
     @equation

@@ -1,0 +1,18 @@
+"""The blocks that come with nlctl."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from . import actuators, controllers, plants, references
+
+
+def block_records() -> dict[str, type]:
+    """Return every block record of nlctl by name."""
+    found = {}
+    for module in (plants, actuators, references, controllers):
+        for name in module.__all__:
+            thing = getattr(module, name)
+            if isinstance(thing, type) and dataclasses.is_dataclass(thing):
+                found[name] = thing
+    return found
