@@ -30,7 +30,17 @@ from analysis.report import (
     render_json,
     write_report,
 )
-from analysis.report.outline import LIGHTS, claim_status, light, place, sort_key, summary
+from analysis.report.outline import (
+    LIGHTS,
+    MEANINGS,
+    claim_status,
+    light,
+    meanings,
+    numeric,
+    place,
+    sort_key,
+    summary,
+)
 from analysis.report.page import parts
 from analysis.report.svg import shapes_svg, svg
 from analysis.report.svg_compact import short_path
@@ -78,6 +88,7 @@ def every_kind(text="plain", key="key"):
     ]
     figure = Figure(key=key, caption=text, description=text, figure=drawn())
     twin = dataclasses.replace(figure, figure=drawn())
+    typed = Paragraph(text=text, code=text)
     return Report(
         title=text,
         verdict=text,
@@ -87,11 +98,12 @@ def every_kind(text="plain", key="key"):
             Claim(text="c", measured="1", limit="2", holds=False, evidence=key, status=text),
         ],
         sections=[
-            Section(key=key, title=text, items=[Paragraph(text=text), *formulas, figure]),
+            Section(key=key, title=text, items=[typed, *formulas, figure]),
             Section(key=key, title=text, items=[wide, long, kinds, twin], level=3),
         ],
         command=text,
         provenance={text: text},
+        inputs={text: text},
         numbers={text: {text: 1.0}},
         methods=[text],
         limits=[text],
@@ -290,6 +302,25 @@ def test_sort_keys_are_the_numbers_themselves(number):
 def test_what_is_no_number_has_no_sort_key(value):
     """Units, words, truth values."""
     assert sort_key(value) == ""
+
+
+def test_shares_are_numbers_and_empty_cells_spoil_no_column():
+    """A column of numbers is one, also in % and where something is missing."""
+    rows = [("5 %", 1.0, None, "a"), ("−0.5 %", None, "", ""), ("12 %", 2, None, "1")]
+    assert [float(sort_key(row[0])) for row in rows] == [5.0, -0.5, 12.0]
+    table = Table(caption="", columns=["share", "some", "none", "words"], rows=rows)
+    assert numeric(table) == [True, True, False, False]
+
+
+def test_the_page_says_what_the_statuses_of_its_claims_mean():
+    """Of those that it has, and of no others."""
+    claim = Claim(text="", measured="", limit="", holds=True, evidence="", status="sampled")
+    lost = dataclasses.replace(claim, holds=False)
+    assert list(meanings([claim])) == ["sampled"]
+    assert list(meanings([lost, claim])) == ["sampled", "fails"]
+    assert meanings([dataclasses.replace(claim, status="wonderful")]) == {}
+    usual = {status for look in ("proved", "checked") for status in LIGHTS[look]}
+    assert usual <= set(MEANINGS)
 
 
 def test_proved_and_checked_never_look_alike():

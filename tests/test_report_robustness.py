@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
+from studies_example import LOOP
 
 from analysis import robustness_figures as figures
 from analysis.report import render_html, render_json
@@ -21,48 +22,23 @@ from analysis.report.document import Figure, Paragraph, Section, Table
 from analysis.report.outline import claim_status, place
 from analysis.report.robustness_claims import claims, refusal, verdict
 from analysis.report.robustness_histories import histories
+from analysis.report.robustness_methods import METHODS
 from analysis.report.robustness_part import study_part, study_report, study_sections
-from analysis.report.robustness_rows import row_items, running
+from analysis.report.robustness_rows import margin_items, row_items, running
 from analysis.report.robustness_searches import deviations
-from analysis.report.robustness_text import METHODS, TITLES, margin_text
+from analysis.report.robustness_text import TITLES, margin_text, violate
 from analysis.robustness import Space, Uncertain, confidence_sequence, independent, prepare
 from analysis.robustness.radius import size_of
 from analysis.robustness.spec import FAILED
 from analysis.robustness_figures.labels import plain
 from analysis.robustness_figures.runs import envelope
 from analysis.studies import load_result, read_study, run
+from analysis.studies.answers import unanswered
+from nlctl._errors import UsageError
 from nlctl.cli_study_report import report_study
 
-LOOPS = '''
-import nlctl
-
-
-@nlctl.record
-class Lag:
-    """x' = -rate x + gain x^3, y = scale x."""
-
-    rate: float = nlctl.param(2.0, unit="1/s", meaning="decay")
-    gain: float = nlctl.param(0.1, unit="1/s", meaning="growth")
-    scale: float = nlctl.param(1.0, unit="1", meaning="output")
-    inputs, outputs, states, initial = (), ("y", "e"), ("x",), {"x": 1.0}
-    feedthrough = False
-
-    @staticmethod
-    @nlctl.equation
-    def update(t, x, u, p):
-        return (-p.rate * x[0] + p.gain * x[0] ** 3,)
-
-    @staticmethod
-    @nlctl.equation
-    def output(t, x, u, p):
-        return p.scale * x[0], 2 * x[0]
-
-
-def loop(scale=1.0):
-    return nlctl.interconnect({"lag": Lag(scale=scale)}, outputs=["y", "e"])
-'''
 SPACE = """
-loop = "loops.py:loop"
+loop = "loop.py:scaled"
 [study]
 title = "A lag that may run away"
 question = "How often does y leave its band?"
@@ -73,14 +49,14 @@ seed = 7
 "lag.x(0)" = { uniform = [0.8, 1.2], unit = "1" }
 [spec]
 small = { formula = "always from 1 s on |y| <= 0.5", meaning = "y decays" }
-bounded = "always |e| <= 4"
+bounded = "always |z| <= 4"
 [time]
 end = 2.0
 step = 0.04
 [metrics]
 band = 0.2
 error = "y"
-control = "e"
+control = "z"
 actuated = ""
 weights = ""
 gain = ""
@@ -142,7 +118,7 @@ HOSTILE = (
 
 
 def written(folder, text):
-    (folder / "loops.py").write_text(LOOPS)
+    (folder / "loop.py").write_text(LOOP, encoding="utf-8")
     path = folder / "study.toml"
     path.write_text(SPACE + text)
     return path
@@ -336,6 +312,47 @@ def test_a_refused_guarantee_is_shown_with_its_reason(tmp_path, kind):
     assert "no estimate of a probability" in section.items[0].text
 
 
+def test_an_analysis_without_an_answer_says_why(result):
+    """Of whatever kind: its section and its claim have the reason, and the others are as ever."""
+    of = dict(zip((f.key for f in result.findings), result.study.analysis, strict=True))
+    error = UsageError("the rows do not admit it")
+    lost = {key: unanswered(key, asked, error) for key, asked in of.items()}
+    for gone in ({*lost}, {"sobol", "probability"}):
+        findings = tuple(lost[f.key] if f.key in gone else f for f in result.findings)
+        part = replace(result, findings=findings)
+        made = study_report(part)
+        assert render_html(made)
+        sections = {section.key: section.items for section in made.sections}
+        for key in gone:
+            (words,) = sections[key]
+            assert words.text == "Not answered: the rows do not admit it."
+        told = {claim.evidence: claim for claim in made.claims if claim.evidence in gone}
+        assert told.keys() == gone
+        assert all(claim_status(claim) == ("fails", "fail") for claim in told.values())
+        assert "do not admit it" in " ".join(
+            i.text for s in study_part([(part, None)]) for i in s.items if isinstance(i, Paragraph)
+        )
+
+
+def test_the_page_holds_the_study(result, report, page, tmp_path):
+    """Saved beside its loop, what the page shows is read as the same study."""
+    (tmp_path / "loop.py").write_text(LOOP, encoding="utf-8")
+    (tmp_path / "study.toml").write_text(report.inputs["study.toml"], encoding="utf-8")
+    assert read_study(tmp_path / "study.toml").study == result.study
+    assert report.inputs["study.toml"] in Reader(page).text
+
+
+def test_captions_name_what_is_drawn(result):
+    """Nothing is said of violations and of an edge where there are none."""
+    rows = result.rows.table
+    for chosen, is_told in ((rows, True), (rows[rows["spec"] > 0], False)):
+        (drawn,) = (i for i in margin_items(result, chosen, "k") if isinstance(i, Figure))
+        assert ("Orange" in drawn.caption) is is_told
+        assert ("did not reach their end" in drawn.caption) is is_told
+    assert violate(1, 5) == "1 of 5 runs violates the spec"
+    assert violate(0, 5) == "0 of 5 runs violate the spec"
+
+
 def test_an_unfinished_study_says_so(result):
     """What is done is shown."""
     part = replace(result, findings=result.findings[:2], complete=False)
@@ -372,7 +389,7 @@ def test_histories_are_the_solution(prepared, result, kept):
     assert np.isnan(kept.signals["y"][:, -1]).sum() == kept.ended
     assert kept.margin == result.rows.table["spec"].min()
     middle = np.sqrt(1 / ((1 - 0.05) * np.exp(4 * kept.time) + 0.05))
-    np.testing.assert_allclose(kept.nominal["e"], 2 * middle, rtol=1e-4)
+    np.testing.assert_allclose(kept.nominal["z"], 2 * middle, rtol=1e-4)
 
 
 def test_a_witness_that_is_worse_is_the_worst_run(prepared, result):
@@ -565,7 +582,7 @@ def test_commands_write_the_report(tmp_path, monkeypatch, capsys):
     is_same = first.partition(shell)[0] == after.partition(shell)[0]
     assert is_same
     assert "nlctl report reports/study" in after
-    path.with_name("loops.py").unlink()
+    path.with_name("loop.py").unlink()
     page, _ = report_study(found.folder, tmp_path / "page")
     assert "study_fans" not in page.read_text(encoding="utf-8")
     assert "the report has no fans" in capsys.readouterr().err

@@ -15,6 +15,7 @@ from nlctl._files import replace_file
 __all__ = ["find_browser", "open_page", "write_pdf"]
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+PATIENCE = 300  # s
 FLAGS = (
     *("--headless", "--disable-gpu", "--disable-quic", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
@@ -67,7 +68,14 @@ def write_pdf(page: str | os.PathLike[str], path: str | os.PathLike[str]) -> Pat
             "--no-pdf-header-footer",
             Path(page).resolve().as_uri(),
         ]
-        run = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+        try:
+            run = subprocess.run(
+                command, capture_output=True, text=True, timeout=PATIENCE, check=False
+            )
+        except subprocess.TimeoutExpired:
+            raise UsageError(
+                f"'{browser}' printed no PDF of '{page}' within {PATIENCE} s"
+            ) from None
         if not made.exists():
             reason = (run.stderr.strip().splitlines() or ["no message"])[-1]
             raise UsageError(f"'{browser}' printed no PDF of '{page}': {reason}")

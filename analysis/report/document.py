@@ -32,9 +32,10 @@ __all__ = [
 
 @dataclass(frozen=True, kw_only=True)
 class Paragraph:
-    """A paragraph of plain text."""
+    """A paragraph of plain text, and what is to be typed below it, such as a command."""
 
     text: str
+    code: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,6 +175,8 @@ class Report:
         Command that makes the report again.
     provenance : mapping
         Versions of what made it.
+    inputs : mapping
+        Name and text of each study file that the report is made from.
     numbers : mapping
         Every number of the report, for ``report.json``.
     methods, limits, references : sequence of str
@@ -189,6 +192,7 @@ class Report:
     sections: Sequence[Section]
     command: str
     provenance: Mapping[str, str] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
     numbers: Mapping[str, Any] = field(default_factory=dict)
     methods: Sequence[str] = ()
     limits: Sequence[str] = ()

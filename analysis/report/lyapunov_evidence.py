@@ -118,8 +118,7 @@ def _max_r(loop: ct.InterconnectedSystem, times: np.ndarray) -> float:
 def known_sign(loop: ct.InterconnectedSystem) -> ct.InterconnectedSystem:
     """Return an example with the law that knows the sign of the gain, and gains that suit it."""
     name = str(loop.name)
-    make = {"example_1": paper.example_1, "example_2": paper.example_2}[name]
-    return make(controller=contenders(name)["certified"])
+    return paper.EXAMPLES[name](controller=contenders(name)["certified"])
 
 
 @contextmanager

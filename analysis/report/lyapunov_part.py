@@ -54,7 +54,7 @@ def _finding(found: Mapping[int, Evidence], far: Mapping[str, LongRun]) -> Secti
         items=[
             *_burst(far),
             _creep_table(found),
-            *(Paragraph(text=words) for words in text.COMMANDS),
+            *(Paragraph(text=words, code=command) for words, command in text.COMMANDS),
         ],
     )
 
@@ -225,7 +225,7 @@ def _constants(one: Evidence) -> Table:
         caption=f"{text.CONSTANTS} {pretty(str(one.ledger.constants.box))}.",
         columns=("constant", "value", "unit", "provenance", "how"),
         rows=[
-            (pretty(c.symbol), f"{c.value:.6g}", c.unit, c.provenance, pretty(c.how))
+            (pretty(c.symbol), f"{c.value:.6g}", pretty(c.unit), c.provenance, pretty(c.how))
             for c in entries
         ],
         status="provenance",

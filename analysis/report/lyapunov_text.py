@@ -9,7 +9,7 @@ import numpy as np
 
 from ..lyapunov.conservatism import Conservatism
 from ..lyapunov.ledger import Ledger
-from ..lyapunov.long_run import LongRun
+from ..lyapunov.long_run import LOOKS, LongRun
 from .lyapunov_evidence import Evidence
 
 _IMPORT = "import nlctl; from analysis.lyapunov.long_run import long_run"
@@ -17,9 +17,9 @@ LONG_RUN = f'python -c "{_IMPORT}; print(long_run(nlctl.paper.example_2(), rtol=
 LONG_RUN_1 = (
     f"python -c \"{_IMPORT}; print(long_run(nlctl.paper.example_1(phase='integral'), 20_000))\""
 )
-COMMANDS = (
-    f"The time of the burst at a tolerance of 1e-8; 1e-7 likewise: {LONG_RUN}",
-    f"Example 1, ten times longer than here: {LONG_RUN_1}",
+COMMANDS = (  # what each one shows
+    ("The burst at a tolerance of 1e-8, and likewise at others (some minutes):", LONG_RUN),
+    ("Example 1 until 20 000 s instead of 1000 s:", LONG_RUN_1),
 )
 NO_LONG_RUN = "The runs far beyond 20 s are not part of this report."
 BURST = (
@@ -38,7 +38,8 @@ FAR_CAPTION = (
     "Runs of this report far beyond 20 s. Foretold: from the first 200 s and from the first "
     "1000 s of the same run. max |e₁|: from 200 s on, until a second before the burst. What comes "
     "after 1000 s of Example 2 is a record of the same computation, kept with the program and "
-    "continued from where today's run ends; nlctl report --far computes all of it again."
+    "continued from where today's run ends, unless the command at the end of this page has "
+    "--far: then all of it was computed again."
 )
 CREEP = (
     "While ζ crosses an interval between two zeros of N, a lobe, it uses up the lobe's budget, the "
@@ -52,13 +53,13 @@ LEMMA = (
     "without bound. The reason is the constant α₀ of (31): it pays for a slow drift of ζ for ever. "
     "So the steps (33) to (36), and that the loop is uniformly ultimately bounded, do not follow "
     "from the paper's argument.",
-    "What does follow: over any time that a run was seen to stay in the box, every step up to (32) "
-    "holds, and |r| ≤ C₀ with Q = sup I(t) taken from the run. Without the lemma, (31) gives the "
-    "bound (c), V ≤ V(0) + α₀ t + ζ − ζ(0) + l₊ E₊ − l₋ E₋, with l₋ and l₊ the bounds of k G and "
-    "E₊, E₋ the energy that the Nussbaum term has given and taken; it grows with t. For a constant "
-    "gain or a ζ that never falls, (b) turns it into a time before which N cannot change its sign. "
-    "A bound for all time needs another law: with the sign of the gain known, "
-    "analysis.lyapunov.certify proves one, shown with each example below.",
+    "What does follow: over any time that a run was seen to stay in the box, every step up to "
+    "(32) holds, and |r| ≤ C₀ with Q = sup I(t) taken from the run. Without the lemma, (31) gives "
+    "line (c) of the lists below, V ≤ V(0) + α₀ t + ζ − ζ(0) + l₊ E₊ − l₋ E₋, with l₋ and l₊ the "
+    "bounds of k G and E₊, E₋ the energy that the Nussbaum term has given and taken; it grows "
+    "with t. For a constant gain or a ζ that never falls, line (b) turns it into a time before "
+    "which N cannot change its sign. A bound for all time needs another law: with the sign of the "
+    "gain known, analysis.lyapunov.certify proves one, shown with each example below.",
 )
 PROVED = (
     "Proved: by interval arithmetic over the whole box of states, or for all arguments. Computed: "
@@ -82,8 +83,8 @@ V_CAPTION = (
     "Logarithmic."
 )
 LADDER = (
-    "Bounds of |r| and what happens; logarithmic. Only what is proved for all time is called so; "
-    "the other bounds take Q or more from this run, and say nothing of times beyond it. By "
+    "Bounds of |r|, and what |r| reaches; logarithmic. Only what is proved for all time is called "
+    "so; the other bounds take Q or more from this run, and say nothing of times beyond it. By "
     "comparison: without V and without Lemma 1. Known sign: another controller, with the law that "
     "knows the sign of the gain and gains that suit it."
 )
@@ -98,7 +99,8 @@ MARGINS = (
 )
 EQUATIONS = (
     "Equations of the proof: distance between the two sides over the size of their terms. Grey: "
-    "the tolerance; what stays below it is rounding."
+    "the tolerance; what stays below it is rounding. What is less than 1e-18, or 0, is drawn "
+    "there."
 )
 CONSTANTS = "Every constant of the proof, with how it was obtained. They hold over the box"
 
@@ -137,13 +139,13 @@ def burst(run: LongRun) -> str:
     late = run.predictions[-1]
     return (
         "Example 2 as published does not stay bounded. It tracks calmly for "
-        f"{run.burst / 3600:.1f} hours, max |e₁| = {run.calm:.3f}; all the while the Nussbaum "
-        f"argument ζ creeps upwards, and at t = {run.burst:.1f} s (relative tolerance "
-        f"{run.rtol:g}) it reaches {run.lobe.high:g}, where the gain N(ζ) changes to the wrong "
-        "sign: the input and r grow beyond bounds, and the integrator's steps shrink to "
+        f"{run.burst / 3600:.1f} hours, max |e₁| = {run.calm:.3f} from {min(LOOKS):g} s on; all "
+        f"the while the Nussbaum argument ζ creeps upwards, and at t = {run.burst:.1f} s (relative "
+        f"tolerance {run.rtol:g}) it reaches {run.lobe.high:g}, where the gain N(ζ) changes to "
+        "the wrong sign: the input and r grow beyond bounds, and the integrator's steps shrink to "
         "nothing. So the paper's conclusion, that all signals stay bounded, fails in this run. At "
         "other tolerances the burst comes at other times, since errors add up over hours; the "
-        "command below prints them. The drift told so long "
+        "command below prints one. The drift told so long "
         f"before: from the first {early.time:g} s the burst is foretold for "
         f"{early.burst_by_balance:.0f} s, from the first {late.time:g} s for "
         f"{late.burst_by_balance:.0f} s."

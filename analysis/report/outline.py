@@ -22,8 +22,10 @@ __all__ = [
     "claim_status",
     "evidence",
     "is_long",
+    "is_short",
     "kind",
     "light",
+    "meanings",
     "numeric",
     "place",
     "shown",
@@ -33,6 +35,7 @@ __all__ = [
 
 SHELL = frozenset(["claims", "contents", "provenance", "files"])  # anchors of the page itself
 LONG = 32  # characters of a word that must be broken to fit a column
+SHORT = 24  # characters of a text that stays on one line
 
 # Statuses by the look of their badge.  What is proved never looks like what is sampled.
 LIGHTS = {
@@ -41,6 +44,17 @@ LIGHTS = {
     "checked": ("checked", "sampled"),
     "caution": ("undecided", "open", "inconclusive", "not confirmed"),
     "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
+}
+MEANINGS = {  # of the statuses of claims, as the page explains them
+    "holds": "what was measured is within the limit",
+    "proved": "for everything that the claim speaks of, by rigorous computation",
+    "computed": "in closed form",
+    "checked": "at every sample of one simulated run, which proves nothing of others",
+    "sampled": "found by simulated runs, at most with a stated confidence, which is no proof",
+    "undecided": "what was run does not tell",
+    "not confirmed": "a violation was found, but not by other integrators",
+    "violated": "there is a counterexample",
+    "fails": "what was measured is beyond the limit",
 }
 _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in statuses}
 
@@ -122,11 +136,14 @@ def cells(table: Table) -> list[list[Cell]]:
 
 
 def numeric(table: Table) -> list[bool]:
-    """Return for each column whether all its cells are numbers."""
+    """Return for each column whether all its cells are numbers or empty, and not all empty."""
     rows = cells(table)
     if not rows:
         return [False] * len(table.columns)
-    return [all(cell.value for cell in column) for column in zip(*rows, strict=True)]
+    return [
+        any(cell.value for cell in column) and all(cell.value or not cell.text for cell in column)
+        for column in zip(*rows, strict=True)
+    ]
 
 
 def _cell(value: Any, is_status: bool) -> Cell:
@@ -141,6 +158,11 @@ def is_long(text: str) -> bool:
     return max(map(len, text.split()), default=0) > LONG
 
 
+def is_short(text: str) -> bool:
+    """Whether a text is better not broken into lines."""
+    return len(text) <= SHORT
+
+
 def shown(value: Any) -> str:
     """Return a cell's text: numbers with the digits that a reader can use."""
     if isinstance(value, float | np.floating):
@@ -149,12 +171,12 @@ def shown(value: Any) -> str:
 
 
 def sort_key(value: Any) -> str:
-    """Return the number that a cell holds, as a browser reads it; empty where it is none."""
+    """Return the number that a cell holds, also in %, as a browser reads it; empty without one."""
     if isinstance(value, bool | np.bool_):
         return ""
     if isinstance(value, str):
         try:
-            value = float(value.strip().replace("−", "-"))
+            value = float(value.strip().removesuffix(" %").replace("−", "-"))
         except ValueError:
             return ""
     if not isinstance(value, Real):
@@ -176,6 +198,12 @@ def claim_status(claim: Claim) -> tuple[str, str]:
     if not claim.holds and look != "caution":
         return status if look == "fail" else "fails", "fail"
     return status, look
+
+
+def meanings(claims: Sequence[Claim]) -> Mapping[str, str]:
+    """Return what the statuses of the claims mean, as far as they are the usual ones."""
+    used = {claim_status(claim)[0] for claim in claims}
+    return {status: told for status, told in MEANINGS.items() if status in used}
 
 
 def summary(claims: Sequence[Claim]) -> tuple[str, str]:

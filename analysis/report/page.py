@@ -16,7 +16,7 @@ from nlctl._files import replace_file
 
 from .formula import mathml
 from .math_font import font_face
-from .outline import cells, claim_status, is_long, numeric
+from .outline import cells, claim_status, is_long, is_short, numeric
 
 __all__ = ["fill", "parts", "to_bytes", "write_files"]
 
@@ -71,6 +71,7 @@ def _environment() -> Environment:
         "cells": cells,
         "claim_status": claim_status,
         "long": is_long,
+        "short": is_short,
         "mathml": mathml,
         "numeric": numeric,
         "parts": parts,

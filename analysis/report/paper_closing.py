@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import pandas as pd
 
 from ..reproduction import HORIZON, METRICS, TAIL, Run
@@ -24,7 +25,7 @@ def closing_sections(runs: Runs, numerics: pd.DataFrame | None = None) -> list[S
     numerics : pandas.DataFrame, optional
         Result of `analysis.reproduction.numerics`.
     """
-    return [_choices(runs), _numerics(numerics), _limits(runs)]
+    return [_choices(runs), _numerics(runs, numerics), _limits(runs)]
 
 
 def metric_table(caption: str, cases: Sequence[Run]) -> Table:
@@ -66,16 +67,17 @@ def _same_verdict(shown: Sequence[Run]) -> bool:
     return all(r.metrics["tail_max_e"] <= 1.25 * base[r.case.example] for r in shown)
 
 
-def _numerics(found: pd.DataFrame | None) -> Section:
+def _numerics(runs: Runs, found: pd.DataFrame | None) -> Section:
     return Section(
         key="numerics",
         title="Numerics",
         items=[
             Paragraph(
-                text="All runs are machine code of the python-control diagrams, compiled by nlctl: "
-                "an explicit Runge-Kutta pair of orders 5(4) at relative tolerance 1e-9; steps "
-                "end at the corners of the dead zone. Peaks between samples are those of a "
-                "parabola. The tests repeat published cases in plain python-control."
+                text=f"The runs over {HORIZON:g} s were made by machine code that nlctl compiles "
+                "from the python-control diagrams: an explicit Runge-Kutta pair of orders 5(4) at "
+                f"relative tolerance {runs['1'].case.rtol:g}; steps end at the corners of the dead "
+                "zone. Peaks between samples are those of a parabola. The tests of nlctl repeat "
+                "published cases in plain python-control."
             ),
             Paragraph(
                 text="The backlash is the play operator itself: within a step its memory stands "
@@ -113,10 +115,14 @@ def _limits(runs: Runs) -> Section:
             Paragraph(
                 text="The tracking error does not tend to zero in these runs: it stays at about "
                 f"{runs['1'].metrics['tail_max_e']:.2g} and {runs['2'].metrics['tail_max_e']:.2g} "
-                "for a reference of amplitude 1."
+                f"for a reference that reaches {_reach(runs['1']):.2g}."
             ),
         ],
     )
+
+
+def _reach(run: Run) -> float:
+    return float(np.max(np.abs(run.signals["yd"])))
 
 
 def _drift(run: Run) -> float:

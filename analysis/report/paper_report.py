@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 
 import control as ct
 import pandas as pd
@@ -20,13 +18,11 @@ from .document import Figure, History, Paragraph, Report, Section, Table
 from .lyapunov_part import Evidence, lyapunov_sections
 from .paper_claims import claims, proof_claims, verdict
 from .paper_closing import closing_sections, metric_table
+from .versions import versions
 
 __all__ = ["paper_report"]
 
 Runs = Mapping[str, Run]
-PACKAGES = (
-    "nlctl", "control", "numpy", "scipy", "numba", "matplotlib", "pandas", "python-flint", "cvxpy",
-)  # fmt: skip
 
 
 def paper_report(
@@ -71,7 +67,7 @@ def paper_report(
             *closing_sections(runs, numerics),
         ],
         command="nlctl report",
-        provenance={"Python": platform.python_version()} | {p: version(p) for p in PACKAGES},
+        provenance=versions("python-flint", "cvxpy", "cma"),
         numbers={key: dict(run.metrics) for key, run in runs.items()},
         methods=text.METHODS,
         references=text.REFERENCES,
@@ -83,10 +79,10 @@ def _model() -> Section:
         key="model",
         title="Plant class and controller",
         items=[
+            Paragraph(text=f"The paper: {text.CITATION}"),
             Paragraph(text="The plant is a chain of integrators with a non-affine last equation:"),
             text.PLANT_CLASS,
-            Paragraph(text="The controller, with the paper's equation numbers:"),
-            *text.CONTROLLER,
+            *text.CONTROLLER_PART,
         ],
     )
 
@@ -136,9 +132,9 @@ def _time_histories(key: str, run: Run) -> list[Figure]:
             figures.tracking_error,
             f"Tracking error; the band holds it for t ≥ {TAIL:g} s.",
         ),
-        ("states", figures.upper_states, "The other states."),
+        ("states", figures.upper_states, "The other states of the plant."),
         ("input", figures.control_input, "Control input, and output of the actuator."),
-        ("actuator", figures.actuator_path, "Actuator characteristic actually travelled."),
+        ("actuator", figures.actuator_path, "The part of the actuator's characteristic in use."),
         ("nussbaum", figures.nussbaum_gain, "Argument and value of the Nussbaum gain."),
         ("adaptation", figures.adaptation, "Norm of the weights, and estimate of the robust term."),
     )
@@ -162,8 +158,7 @@ def _interactive(number: int, run: Run) -> History:
     return History(
         key=f"example-{number}-history",
         caption=f"{text.TITLES[number]}: output y, reference yd, tracking error e, control input "
-        "u, output of the actuator v, argument of the Nussbaum gain zeta. All quantities are "
-        "dimensionless.",
+        "u, output of the actuator v, argument of the Nussbaum gain zeta.",
         description=f"Chart of {', '.join(names)} over {HORIZON:g} s; the figures above show the "
         "same signals, the slider below tells their values.",
         time=run.time,
@@ -202,7 +197,7 @@ def _check_table(number: int, compared: Sequence[Check]) -> Table:
     return Table(
         caption=(
             "Found by nlctl's engine from the python-control diagrams; to reach: converged digits "
-            "of an independent event-located integration. All quantities are dimensionless."
+            "of an independent event-located integration."
         ),
         columns=("case", "figure", "found", "to reach", "difference", "tolerance", "status"),
         rows=rows,

@@ -5,7 +5,7 @@ Text only.  The numbers in use are filled in from the blocks themselves.
 
 from __future__ import annotations
 
-from .document import Equation
+from .document import Equation, Paragraph
 
 CITATION = (
     "M. Lv, Y. Wang, S. Baldi, Z. Liu, C. Shi, C. Fu, X. Meng, Y. Qi: Adaptive Neural Control for "
@@ -15,8 +15,9 @@ CITATION = (
 
 METHODS = (
     "Plant, actuator, reference and controller are blocks of python-control, joined by their "
-    "signals; each equation is written once, as in the paper, and compiled to machine code. Every "
-    "figure is held against an independent computation, printed with its tolerance.",
+    "signals; each equation is written once, as in the paper, and compiled to machine code. The "
+    "numbers under “Figures to reach” are held against an independent computation, to the "
+    "tolerances printed there.",
     "The proof is taken as a list of numbered statements. Those about all states of a box are "
     "proved by ball arithmetic on the same equations; those about a run are evaluated along it, "
     "with V′ as the gradient of V times the right-hand side, and are called checked. The studies "
@@ -31,6 +32,15 @@ REFERENCES = (
     "Ch. Tsitouras: Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying "
     "assumption. Computers & Mathematics with Applications 62 (2011), pp. 770-775. "
     "doi 10.1016/j.camwa.2011.06.002.",
+)
+
+SYMBOLS = (
+    "x: state of the plant; y, y_d: its output and the reference, here also x_d = (y_d, y_d′, …); "
+    "e: tracking error, e₁ = y − y_d; r: filtered error; u: control input; v: what the actuator "
+    "makes of it; d: disturbance; ψ: Gaussian basis with centres μ and widths ν; Ŵ: weights of the "
+    "network; δ̂: estimate of the robust term; ζ: argument of the Nussbaum gain N, which finds the "
+    "sign of the control direction. As signals: yd, e for e₁, zeta, delta_hat, and W_norm for the "
+    "norm of Ŵ. The paper gives no units: y, u and v are pure numbers, time is in s."
 )
 
 PLANT_CLASS = Equation(
@@ -62,6 +72,12 @@ CONTROLLER = (
     ),
 )
 
+CONTROLLER_PART = (
+    Paragraph(text="The controller, with the paper's equation numbers:"),
+    *CONTROLLER,
+    Paragraph(text=SYMBOLS),
+)
+
 PLANTS = {
     1: (
         Equation(
@@ -88,6 +104,8 @@ PLANTS = {
         ),
     ),
 }
+
+EXAMPLES = {"example-1": 1, "example-2": 2}  # number by the name that studies call it
 
 TITLES = {
     1: "Example 1: forced oscillator with a dead zone",

@@ -12,17 +12,15 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Mapping
-from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from nlctl._errors import ParameterError
 
+from ..json_values import as_json
 from .document import Figure, History, Item, Report, Table
 from .history import chart
-from .outline import evidence, kind, place, summary
+from .outline import evidence, kind, meanings, place, summary
 from .page import fill, to_bytes, write_files
 from .svg import shapes_svg, svg
 
@@ -75,9 +73,10 @@ def render_html(report: Report, *, interactive: bool = False) -> str:
         light=light,
         told=told,
         margins=any(claim.margin for claim in report.claims),
-        made_by=_pairs("What made it.", ("part", "version"), report.provenance),
+        meanings=meanings(report.claims),
+        made_by=_pairs("What made it.", ("what", "version or value"), report.provenance),
         beside=_pairs(
-            "Files beside this page.",
+            "Files that belong to this page, with their places as seen from it.",
             ("file", "SHA-256"),
             {"report.json": digest, **report.files},
         ),
@@ -107,26 +106,10 @@ def render_json(report: Report) -> str:
         "limits": report.limits,
         "references": report.references,
         "provenance": report.provenance,
+        "inputs": report.inputs,
         "files": report.files,
     }
-    return json.dumps(_json_value(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _json_value(value: Any) -> Any:
-    """Return `value` as JSON can hold it: NaN and infinities become text."""
-    if isinstance(value, Mapping):
-        return {str(k): _json_value(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_json_value(v) for v in value]
-    if isinstance(value, np.ndarray):
-        return _json_value(value.tolist())
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, Integral):
-        return int(value)
-    if isinstance(value, Real):
-        return float(value) if np.isfinite(float(value)) else str(float(value))
-    return value if value is None else str(value)
+    return json.dumps(as_json(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _plain(item: Item) -> dict[str, Any]:

@@ -7,22 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 from nlctl._errors import UsageError
 
-from ..robustness.guarantee import _down, _up, check_iid
+from ..robustness.guarantee import check_iid, rounded_down, rounded_up
 from .document import Claim
 from .robustness_text import DID_NOT_END, margin_text
 
 if TYPE_CHECKING:
     from analysis.studies.result import Finding, Result
 
-__all__ = ["asked_of", "claims", "refusal", "verdict"]
+__all__ = ["STATEMENTS", "claims", "refusal", "verdict"]
 
 STATEMENTS = ("probability", "sequential")
-
-
-def asked_of(result: Result) -> dict[str, Any]:
-    """Return what the study file asks of each analysis that is done, by key of its finding."""
-    pairs = zip(result.findings, result.study.analysis, strict=False)  # the rest is not done
-    return {finding.key: asked for finding, asked in pairs}
 
 
 def verdict(result: Result) -> str:
@@ -59,26 +53,28 @@ def claims(result: Result, prefix: str = "") -> list[Claim]:
 
     A claim that holds was sampled, never proved.
     """
-    asked = asked_of(result)
+    asked = result.asked
     return [
         Claim(
             text=finding.claim,
             holds=bool(finding.holds),
             evidence=f"{prefix}{finding.key}",
-            **(MEASURED.get(finding.kind, _sentence)(finding, asked[finding.key])),
+            **(MEASURED[finding.kind] if finding.is_answered else _no_answer)(
+                finding, asked[finding.key]
+            ),
         )
         for finding in result.claims
     ]
 
 
-def _sentence(finding: Finding, asked: Any) -> dict[str, str]:
-    return {"measured": finding.sentence, "limit": finding.claim, "status": "sampled"}
+def _no_answer(finding: Finding, asked: Any) -> dict[str, str]:
+    return {"measured": finding.sentence, "limit": "an answer"}
 
 
 def _probability(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
     return {
-        "measured": f"{n['violations']} of {n['runs']} runs; at most {_up(n['upper'])} with "
+        "measured": f"{n['violations']} of {n['runs']} runs; at most {rounded_up(n['upper'])} with "
         f"confidence {100 * n['confidence']:g} %",
         "limit": f"≤ {asked.limit:g}",
         "margin": f"{asked.limit - n['upper']:.3g}",
@@ -90,8 +86,8 @@ def _sequential(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
     undecided = n["decision"] == "undecided"
     return {
-        "measured": f"{n['violations']} of {n['runs']} runs; {_down(n['lower'])} to "
-        f"{_up(n['upper'])} with confidence {100 * n['confidence']:g} %",
+        "measured": f"{n['violations']} of {n['runs']} runs; {rounded_down(n['lower'])} to "
+        f"{rounded_up(n['upper'])} with confidence {100 * n['confidence']:g} %",
         "limit": f"< {asked.limit:g}",
         "margin": f"{asked.limit - n['upper']:.3g}",
         "status": "undecided" if undecided else "sampled",
@@ -129,7 +125,7 @@ def _degradation(finding: Finding, asked: Any) -> dict[str, str]:
     row = finding.tables["curve"].loc[asked.at]
     return {
         "measured": f"{row['violations']:.0f} of {row['runs']:.0f} runs at size {asked.at:g}; at "
-        f"most {_up(row['upper'])} with confidence {100 * asked.confidence:g} %",
+        f"most {rounded_up(row['upper'])} with confidence {100 * asked.confidence:g} %",
         "limit": f"≤ {asked.limit:g}",
         "margin": f"{asked.limit - row['upper']:.3g}",
         "status": "sampled",

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl.native import Status, ensemble_response
+from nlctl.native import Status
 
 from ..robustness.evaluation import as_table, margins_of
-from ..robustness.experiment import Prepared
-from ..robustness.space import arguments, nominal
+from ..robustness.experiment import Prepared, by_diagram, simulate
+from ..robustness.space import nominal
 
 __all__ = ["Histories", "histories"]
 
@@ -97,25 +97,16 @@ def histories(
 def _kept(
     prepared: Prepared, rows: pd.DataFrame, threads: int | None
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Return signals and status of rows; rows with the same labels share a diagram."""
+    """Return signals and status of rows, which are numbered from 0."""
     study = prepared.experiment
     names = _signals(study.spec.requirements)
     kept = {name: np.full((len(rows), len(study.timepts)), np.nan) for name in names}
     status = np.full(len(rows), "", dtype=object)
-    for labels, loop in prepared.loops:
-        same = np.logical_and.reduce(
-            [np.ones(len(rows), dtype=bool), *(rows[n] == label for n, label in labels.items())]
-        )
-        if same.any():
-            varied = arguments(study.space, rows.loc[same])
-            found = ensemble_response(
-                loop, study.timepts, study.inputs, varied["initial_state"],
-                params=varied["params"], keep=names, threads=threads, rtol=study.rtol,
-                atol=study.atol, max_steps=study.max_steps, method=study.method,
-            )  # fmt: skip
-            status[same] = found.table["status"].to_numpy()
-            for name in names:
-                kept[name][same] = found.signals[name]
+    for loop, same in by_diagram(prepared, rows):
+        found = simulate(study, loop, same, keep=names, threads=threads)
+        status[same.index] = found.table["status"].to_numpy()
+        for name in names:
+            kept[name][same.index] = found.signals[name]
     return kept, status
 
 

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import hashlib
-import platform
 from collections.abc import Callable, Iterator, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import robustness_methods as how
 from . import robustness_text as text
 from .document import Item, Paragraph, Report, Section, Table
 from .outline import summary
+from .paper_text import EXAMPLES
 from .render import file_hashes
-from .robustness_claims import asked_of, claims, verdict
+from .robustness_claims import STATEMENTS, claims, verdict
 from .robustness_histories import Histories
 from .robustness_rankings import compare, morris, regional, sobol
 from .robustness_rows import (
     fan_items,
+    loop_items,
     margin_items,
     row_items,
     running,
@@ -27,13 +28,13 @@ from .robustness_rows import (
     statement_items,
 )
 from .robustness_searches import degradation, failure_map, radius, worst_case
+from .versions import versions
 
 if TYPE_CHECKING:
     from analysis.studies.result import Finding, Result
 
 __all__ = ["study_part", "study_report", "study_sections"]
 
-PACKAGES = ("nlctl", "control", "numpy", "scipy", "pandas", "numba", "matplotlib", "cma")
 LISTED = 400  # lines of a table that report.json holds as well; longer ones are files beside it
 Items = Callable[["Finding", "Result", Any, str], Iterator[Item]]
 KINDS: dict[str, Items] = {  # in the order of the report
@@ -46,7 +47,7 @@ KINDS: dict[str, Items] = {  # in the order of the report
     "failure map": failure_map,
     "compare": compare,
 }
-STATEMENTS = ("probability", "sequential")
+OUTCOMES = {"pass": "sampled", "caution": "open", "neutral": "no claims"}  # by the light
 
 
 def study_report(
@@ -64,19 +65,19 @@ def study_report(
     command : str, optional
         What makes the report again.
     """
-    paragraphs, sources = text.methods(result)
-    packages = {"Python": platform.python_version()} | {p: version(p) for p in PACKAGES}
+    paragraphs, sources = how.methods(result)
     return Report(
         title=result.study.study.title,
         verdict=verdict(result),
         claims=claims(result),
         sections=study_sections(result, kept, limits=False),
         command=command,
-        provenance=packages | {"seed": str(result.study.study.seed)} | _table_hash(result),
+        provenance=versions("cma") | {"seed": str(result.study.study.seed)} | _table_hash(result),
         numbers=numbers(result),
         methods=paragraphs,
-        limits=[*text.limits(result), *result.notes],
+        limits=[*how.limits(result), *result.notes],
         references=sources,
+        inputs=_study_file(result.folder),
         files=data_files(result.folder),
     )
 
@@ -104,18 +105,22 @@ def study_sections(
     """
     table = None if result.rows is None or not result.rows.done else result.rows.table
     made = [("study_asked", "What was asked", [*setup_items(result)])]
+    if result.study.loop in EXAMPLES:
+        made.append(
+            ("study_loop", "The loop as published", [*loop_items(EXAMPLES[result.study.loop])])
+        )
     if table is not None:
         key = "study_rows"  # no analysis is called that: keys of these have hyphens only
         made.append((key, "How the runs ended", [*row_items(result, table, f"{prefix}{key}")]))
         margins = table["spec"].to_numpy(dtype=float)
-        statements = [f for f in result.findings if f.kind in STATEMENTS]
+        statements = [f for f in _answered(result) if f.kind in STATEMENTS]
         made += [_statement(f, result, margins, prefix) for f in statements]
     if kept is not None:
         shown = [*fan_items(kept, f"{prefix}study")]
-        made.append(("study_fans", "All runs, nominal and worst", shown))
+        made.append(("study_fans", "The runs over time", shown))
     made += _findings(result, prefix)
     if limits:
-        told: list[Item] = [Paragraph(text=words) for words in text.limits(result)]
+        told: list[Item] = [Paragraph(text=words) for words in how.limits(result)]
         made.append(("study_limits", "What this study does not show", told))
     return [
         Section(key=f"{prefix}{key}", title=title, items=items, level=level)
@@ -137,7 +142,8 @@ def study_part(
     rows = []
     for result, _ in studies:
         look, told = summary(claims(result))
-        rows.append((result.study.study.title, look, f"{told} {verdict(result)}"))
+        outcome = OUTCOMES.get(look, look)
+        rows.append((result.study.study.title, outcome, f"{told} {verdict(result)}"))
     overview = Table(
         caption="The studies and their verdicts.",
         columns=("study", "outcome", "verdict"),
@@ -165,19 +171,19 @@ def _brief(result: Result, kept: Histories | None, key: str) -> Iterator[Item]:
         yield from margin_items(result, result.rows.table, key)
     if kept is not None:
         yield from fan_items(kept, key)
-    asked = asked_of(result)
+    asked = result.asked
     for finding in result.findings:
-        told = _told(finding, asked[finding.key])
-        yield Paragraph(text=f"{_title(finding, result)}: {told}")
-        if finding.kind == "failure map":
+        title, told = _title(finding, result), _told(finding, asked[finding.key])
+        yield Paragraph(text=f"{title}{'' if title.endswith(('?', '!', '.')) else '.'} {told}")
+        if finding.kind == "failure map" and finding.is_answered:
             yield from failure_map(finding, result, asked[finding.key], f"{key}-{finding.key}")
-    yield Paragraph(text=f"What this does not show. {' '.join(text.limits(result))}")
+    yield Paragraph(text=f"What this does not show. {' '.join(how.limits(result))}")
 
 
 def _statement(
     finding: Finding, result: Result, margins: np.ndarray, prefix: str
 ) -> tuple[str, str, list[Item]]:
-    limit = asked_of(result)[finding.key].limit
+    limit = result.asked[finding.key].limit
     shown = statement_items(finding, limit, margins, f"{prefix}{finding.key}")
     return finding.key, _title(finding, result), [Paragraph(text=finding.sentence), *shown]
 
@@ -192,27 +198,33 @@ def _told(finding: Finding, asked: Any) -> str:
 
 def _title(finding: Finding, result: Result) -> str:
     """Return the heading that the study file gives an analysis, or one by its kind."""
-    asked = asked_of(result)[finding.key]
+    asked = result.asked[finding.key]
     of = getattr(asked, "of", "spec")
     return asked.title or text.TITLES[finding.kind] + ("" if of == "spec" else f" of {of}")
 
 
 def _findings(result: Result, prefix: str) -> list[tuple[str, str, list[Item]]]:
-    """Return key, title and items of every other analysis, in the order of `KINDS`."""
-    asked = asked_of(result)
-    order = list(KINDS)
-    chosen = [f for f in result.findings if f.kind in KINDS]
-    return [
-        (
-            f.key,
-            _title(f, result),
-            [
-                Paragraph(text=_told(f, asked[f.key])),
-                *KINDS[f.kind](f, result, asked[f.key], f"{prefix}{f.key}"),
-            ],
-        )
-        for f in sorted(chosen, key=lambda f: order.index(f.kind))
+    """Return key, title and items of every other analysis, in the order of `KINDS`.
+
+    Those without an answer come last, with the sentence that says why.
+    """
+    asked = result.asked
+    made = []
+    for kind, items in KINDS.items():
+        for f in _answered(result):
+            if f.kind == kind:
+                shown = items(f, result, asked[f.key], f"{prefix}{f.key}")
+                told = Paragraph(text=_told(f, asked[f.key]))
+                made.append((f.key, _title(f, result), [told, *shown]))
+    return made + [
+        (f.key, _title(f, result), [Paragraph(text=f.sentence)])
+        for f in result.findings
+        if not f.is_answered
     ]
+
+
+def _answered(result: Result) -> list[Finding]:
+    return [finding for finding in result.findings if finding.is_answered]
 
 
 def numbers(result: Result) -> dict[str, Any]:
@@ -228,7 +240,7 @@ def numbers(result: Result) -> dict[str, Any]:
     curves = {}
     if result.rows is not None and result.rows.done:
         margins = result.rows.columns("spec")["spec"].to_numpy(dtype=float)
-        for f in result.findings:
+        for f in _answered(result):
             if f.kind in STATEMENTS:
                 curve = running(margins[: f.numbers["runs"]], f.numbers["confidence"])
                 curves[f.key] = curve.reset_index().to_dict("records")
@@ -246,6 +258,11 @@ def data_files(folder: Path) -> dict[str, str]:
         for path in own
         if path.is_file()
     }
+
+
+def _study_file(folder: Path) -> dict[str, str]:
+    path = folder / "study.toml"
+    return {path.name: path.read_text(encoding="utf-8")} if path.is_file() else {}
 
 
 def _table_hash(result: Result) -> dict[str, str]:

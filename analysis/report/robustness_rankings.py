@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from nlctl.native import Status
-
 from .. import robustness_figures as figures
-from ..robustness.sweep import load
 from ..robustness_figures.labels import plain
 from . import robustness_text as text
-from .document import Figure, Item, Paragraph, Table
+from .document import Figure, Item, Table
 
 if TYPE_CHECKING:
     from analysis.studies.result import Finding, Result
@@ -26,7 +23,6 @@ MOST_PAIRS = 30  # rows of a table of pairs; of more, only those with the first 
 
 def morris(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
     """Yield the elementary effects."""
-    yield from _graded(finding, result)
     table = finding.tables["effects"]
     caption = text.MORRIS.format(of=finding.numbers["of"])
     yield Figure(
@@ -44,7 +40,6 @@ def morris(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
 
 def sobol(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
     """Yield the shares of the variance."""
-    yield from _graded(finding, result)
     table = finding.tables["indices"]
     caption = text.SOBOL.format(
         of=finding.numbers["of"], confidence=100 * finding.numbers["confidence"]
@@ -59,14 +54,6 @@ def sobol(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[It
     columns |= {"ST": "S_T", "ST_low": "from", "ST_high": "to"}
     ordered = table.sort_values("ST", ascending=False, kind="stable")
     yield _table(ordered, "The same in numbers.", columns)
-
-
-def _graded(finding: Finding, result: Result) -> Iterator[Paragraph]:
-    """Say so where margins of runs that did not reach their end outweigh all others."""
-    status = load(result.folder / finding.key / "rows").columns("status")["status"]
-    failed = int(np.sum(status != Status.OK.name))
-    if failed:
-        yield Paragraph(text=text.GRADED.format(failed=failed))
 
 
 def regional(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
@@ -126,6 +113,7 @@ def _medians(differences: pd.DataFrame, units: Mapping[Any, str], key: str) -> I
         own = pairs.loc[pairs.index.get_level_values("a") == first]
         others = own.index.get_level_values("b")
         caption = text.MEDIANS.format(first=first, metric=metric)
+        caption += text.INFINITE * bool(np.any(np.isinf(own["median"])))
         told = "; ".join(
             f"{other}: {middle:.4g}" for other, middle in zip(others, own["median"], strict=True)
         )
@@ -154,7 +142,7 @@ def _table(table: pd.DataFrame, caption: str, columns: Mapping[str, str]) -> Tab
 
 
 def _axis(metric: Any, units: Mapping[Any, str]) -> str:
-    unit = units.get(metric, "1")  # requirements are margins
+    unit = text.unit_text(units.get(metric, "1"))  # requirements are margins
     return f"median difference in {plain(metric)} ({unit})"
 
 

@@ -16,6 +16,7 @@ from ..robustness.evaluation import margins_of
 from ..robustness.sequential import sequence_bounds
 from . import robustness_text as text
 from .document import Figure, History, Item, Paragraph, Table
+from .paper_text import CONTROLLER_PART, EXAMPLES, PLANT_CLASS, PLANTS, TITLES
 from .robustness_claims import refusal
 from .robustness_histories import Histories
 from .robustness_text import margin_text
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "fan_items",
     "known",
+    "loop_items",
     "margin_items",
     "row_items",
     "running",
@@ -44,9 +46,15 @@ def setup_items(result: Result) -> Iterator[Item]:
     study = result.study
     if study.study.question:
         yield Paragraph(text=study.study.question)
+    number = EXAMPLES.get(study.loop)
+    about = f" ({TITLES[number]}; Lv et al. 2017)" if number else ""
+    options = ", ".join(f"{key} = {value}" for key, value in study.options.items())
+    changed = f" It is made with {options}." if options else ""
+    inputs = ", ".join(f"{key} = {value:g}" for key, value in study.inputs.items())
+    changed += f" Its inputs are {inputs}." if inputs else ""
     yield Paragraph(
-        text=f"Loop: {study.loop}. Runs last {study.time.end:g} s. All random numbers follow from "
-        f"the seed {study.study.seed}."
+        text=f"Loop: {study.loop}{about}.{changed} Runs last {study.time.end:g} s. All random "
+        f"numbers follow from the seed {study.study.seed}."
     )
     yield Table(
         caption=text.SPEC,
@@ -63,17 +71,26 @@ def setup_items(result: Result) -> Iterator[Item]:
     )
 
 
+def loop_items(number: int) -> Iterator[Item]:
+    """Yield the equations of one of the paper's examples."""
+    yield Paragraph(text="The class of plants, the last equation of this one, and its actuator:")
+    yield from (PLANT_CLASS, *PLANTS[number], *CONTROLLER_PART)
+
+
 def known(quantities: pd.DataFrame, *columns: str) -> Iterable[tuple[Any, ...]]:
     """Return name and columns of every quantity, None where a choice has no such thing."""
     table = quantities.reindex(columns=list(columns)).astype(object)
-    return table.where(table.notna(), None).itertuples(name=None)
+    table = table.where(table.notna(), None)
+    if "unit" in columns:
+        table["unit"] = table["unit"].map(text.unit_text)
+    return table.itertuples(name=None)
 
 
 def row_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item]:
     """Yield how the rows of the main table ended, and the worst of them."""
     margins = table["spec"].to_numpy(dtype=float)
-    violated = int(np.sum(~(margins > 0)))
-    told = f"{violated} of {len(table)} runs violate the spec"
+    violated = _violations(margins)
+    told = text.violate(violated, len(table))
     if refused := refusal(result):
         told += f". That is no estimate of a probability: {refused}"
     yield Paragraph(text=f"{told}.")
@@ -97,14 +114,20 @@ def margin_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item
     """Yield the margins of the rows: by requirement, and how they are distributed."""
     yield _requirements(result, table)
     margins = table["spec"].to_numpy(dtype=float)
-    violated = int(np.sum(~(margins > 0)))
+    violated = _violations(margins)
+    caption = text.MARGINS + text.VIOLATIONS * bool(violated) + text.clipped(margins)
     yield Figure(
         key=f"{key}-margins",
-        caption=text.MARGINS,
-        description=f"{text.MARGINS} {violated} of {margins.size} runs violate the spec; the "
-        f"median margin is {margin_text(float(figures.quantile(margins, 0.5, -np.inf)))}.",
+        caption=caption,
+        description=f"{caption} {text.violate(violated, margins.size)}; the median margin is "
+        f"{margin_text(float(figures.quantile(margins, 0.5, -np.inf)))}.",
         figure=figures.margins(margins),
     )
+
+
+def _violations(margins: np.ndarray) -> int:
+    """Return how many margins are violations; NaN is one."""
+    return int(np.sum(~(margins > 0)))
 
 
 def status_text(name: object) -> str:
@@ -116,7 +139,7 @@ def _requirements(result: Result, table: pd.DataFrame) -> Table:
     rows = []
     for key in [*result.requirements.index, "spec"]:
         margins = table[key].to_numpy(dtype=float)
-        violated = int(np.sum(~(margins > 0)))
+        violated = _violations(margins)
         ends = (float(figures.quantile(margins, part, -np.inf)) for part in (0.0, 0.5, 1.0))
         share = f"{100 * violated / len(table):.4g} %"
         rows.append((key, violated, share, *map(margin_text, ends)))
@@ -143,14 +166,15 @@ def _worst_rows(result: Result, table: pd.DataFrame) -> Iterator[Table]:
         )
         for number, row in worst.to_dict("index").items()
     ]
+    which = f"The {len(worst)} rows" if len(worst) > 1 else "The row"
     yield Table(
-        caption=f"The {len(worst)} rows with the lowest margins, and the commands that run them "
-        "again, bit for bit.",
+        caption=f"{which} with the lowest margins, and the command that runs each again, bit for "
+        "bit.",
         columns=("row", "margin", "least in", "status", "reached (s)", "again"),
         rows=ended,
     )
     values = worst[names].itertuples(name=None)
-    yield Table(caption="Their values.", columns=("row", *names), rows=list(values))
+    yield Table(caption="The values of these rows.", columns=("row", *names), rows=list(values))
 
 
 def _metrics(result: Result, table: pd.DataFrame) -> Table:
@@ -172,8 +196,8 @@ def fan_items(kept: Histories, key: str) -> Iterator[Item]:
     """Yield quantile fans of some rows with the nominal and the worst run, and these as charts."""
     count = len(next(iter(kept.signals.values())))
     ended = (
-        f" {kept.ended} of them did not reach their end; from there on they count as lying beyond "
-        "both ends of every band."
+        f" Runs that did not reach their end, {kept.ended} of these, count from there on as lying "
+        "beyond both ends of every band."
         if kept.ended
         else ""
     )

@@ -28,10 +28,11 @@ def worst_case(finding: Finding, result: Result, asked: Any, key: str) -> Iterat
     """Yield how the worst row was found, whether it is confirmed, and what of it is needed."""
     n = finding.numbers
     lowest = finding.tables["best"]["margin"].to_numpy(dtype=float)
+    caption = text.SEARCH + text.clipped(lowest)
     yield Figure(
         key=f"{key}-search",
-        caption=text.SEARCH,
-        description=f"{text.SEARCH} After {lowest.size} runs it is {margin_text(lowest[-1])}.",
+        caption=caption,
+        description=f"{caption} After {lowest.size} runs it is {margin_text(lowest[-1])}.",
         figure=figures.search(lowest, list(finding.tables["rows"]["searcher"].astype(str))),
     )
     if "replays" in finding.tables:
@@ -39,7 +40,7 @@ def worst_case(finding: Finding, result: Result, asked: Any, key: str) -> Iterat
     number = int(np.argmin(margins_of(finding.tables["rows"])))
     folder = shlex.quote(str(result.folder))
     yield Paragraph(
-        text=f"The worst row again: nlctl replay {folder} {number} --part {finding.key}"
+        text="The worst row again:", code=f"nlctl replay {folder} {number} --part {finding.key}"
     )
     rows = {"worst row": n["witness"]}
     if "shrunk" in n:
@@ -79,7 +80,7 @@ def _rows(rows: Mapping[str, Row], quantities: pd.DataFrame, key: str) -> Iterat
         caption="Its values beside the nominal ones; * deviates from nominal.",
         columns=("quantity", "unit", "nominal", *rows),
         rows=[
-            (name, unit or "", middle, *(_marked(row[name], middle) for row in rows.values()))
+            (name, unit, middle, *(_marked(row[name], middle) for row in rows.values()))
             for name, unit, middle in known(quantities, "unit", "nominal")
         ],
     )
@@ -131,10 +132,13 @@ def radius(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
         f"{step['size']:.4g}: {margin_text(float(step['margin']))}"
         for step in steps.to_dict("records")
     )
+    caption = (
+        text.RADIUS + text.SMALLEST * bool(np.isfinite(n["upper"])) + text.clipped(steps["margin"])
+    )
     yield Figure(
         key=f"{key}-sizes",
-        caption=text.RADIUS,
-        description=f"{text.RADIUS} Lowest margin by size: {told}.",
+        caption=caption,
+        description=f"{caption} Lowest margin by size: {told}.",
         figure=figures.radius_steps(steps, float(n["upper"])),
     )
     if n["witness"] is not None:
@@ -175,25 +179,27 @@ def failure_map(finding: Finding, result: Result, asked: Any, key: str) -> Itera
     points = finding.tables["points"]
     about = result.quantities.loc[list(names)]
     nominal = tuple(map(float, about["nominal"]))
-    labels = tuple(f"{name} ({unit or '1'})" for name, unit in about["unit"].items())
+    labels = tuple(f"{name} ({unit or '1'})" for name, unit in known(about, "unit"))
+    edge, is_nominal = finding.tables["boundary"], bool(np.all(np.isfinite(nominal)))
+    caption = text.MAP + text.VIOLATED * bool(np.any(~(points["spec"] > 0)))
+    caption += text.BOUNDARY * bool(len(edge)) + text.STAR * is_nominal
     yield Figure(
         key=f"{key}-map",
-        caption=text.MAP,
-        description=f"{text.MAP} {finding.sentence}",
+        caption=caption,
+        description=f"{caption} {finding.sentence}",
         figure=figures.failure_map(
             points,
             finding.tables["triangles"].to_numpy(),
             names,
             labels=labels,  # type: ignore[arg-type]
-            nominal=nominal if np.all(np.isfinite(nominal)) else None,  # type: ignore[arg-type]
+            nominal=nominal if is_nominal else None,  # type: ignore[arg-type]
         ),
     )
-    edge = finding.tables["boundary"]
     if len(edge):
-        yield Paragraph(
-            text="On the line where the margin is 0: "
-            + "; ".join(
-                f"{name} from {edge[name].min():.4g} to {edge[name].max():.4g}" for name in names
-            )
-            + "."
-        )
+        ranges = (_range(name, edge[name].to_numpy()) for name in names)
+        yield Paragraph(text=f"On the line where the margin is 0: {'; '.join(ranges)}.")
+
+
+def _range(name: str, values: np.ndarray) -> str:
+    low, high = f"{values.min():.4g}", f"{values.max():.4g}"
+    return f"{name} is {low}" if low == high else f"{name} from {low} to {high}"

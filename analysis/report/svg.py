@@ -26,6 +26,10 @@ THEME = {
     drawing.GREY: "var(--soft)",
     drawing.FILL: "var(--panel)",
     figures.GREY: "var(--soft)",
+    figures.BLUE.lower(): "var(--blue)",
+    figures.ORANGE.lower(): "var(--orange)",
+    figures.GREEN.lower(): "var(--green)",
+    figures.PURPLE.lower(): "var(--purple)",
 }
 SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": 9.0}
 WIDE = 450.0  # points; a phone shows wider figures in a box that scrolls

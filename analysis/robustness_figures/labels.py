@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
-from ..figures import _style
+from ..figures.axes import set_style
 
 __all__ = ["arms", "number_axes", "plain"]
 
@@ -41,7 +41,7 @@ def number_axes(names: Iterable[object]) -> tuple[Figure, Axes]:
     labels = [plain(name) for name in names]
     figure = Figure(figsize=(9.0, 0.32 * len(labels) + 0.9), layout="constrained")
     ax = figure.subplots()
-    _style(ax)
+    set_style(ax)
     ax.set_yticks(np.arange(len(labels)), labels, parse_math=False)
     ax.set_ylim(len(labels) - 0.4, -0.6)
     return figure, ax

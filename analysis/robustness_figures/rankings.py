@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from ..figures import BLUE, GREY, ORANGE
+from ..figures.axes import BLUE, GREY, ORANGE, legend_beside
 from .labels import arms, number_axes
 
 __all__ = ["paired_differences", "screening", "set_apart", "shares", "violation_rates"]
@@ -23,8 +23,8 @@ def screening(effects: pd.DataFrame) -> Figure:
     _bar(ax, effects, ("mu_star", "low", "high"), BLUE, "$\\mu^*$, mean magnitude")
     at = np.arange(len(effects))
     ax.plot(effects["sigma"], at, "D", color=ORANGE, markersize=5, label="$\\sigma$, deviation")
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    ax.set_xlabel("effect: change of the response per side of the box")
+    legend_beside(ax)
+    ax.set_xlabel("effect: change of the response per width of the box")
     return figure
 
 
@@ -34,7 +34,7 @@ def shares(indices: pd.DataFrame) -> Figure:
     figure, ax = number_axes(indices.index)
     _bar(ax, indices, ("S1", "S1_low", "S1_high"), BLUE, "$S_1$, by itself", -0.18)
     _bar(ax, indices, ("ST", "ST_low", "ST_high"), ORANGE, "$S_T$, with interactions", 0.18, "///")
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_beside(ax)
     ax.set_xlabel("share of the variance (1)")
     return figure
 

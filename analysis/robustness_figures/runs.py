@@ -13,7 +13,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from ..figures import BLUE, GREY, ORANGE, TIME, _axes, _style
+from ..figures.axes import BLUE, GREY, ORANGE, TIME, legend_beside, set_style, stacked_axes
 from .labels import plain
 
 __all__ = ["CLIP", "fans", "margins", "quantile", "running_estimate", "shown"]
@@ -56,7 +56,7 @@ def margins(values: np.ndarray) -> Figure:
     part.set(xlabel="margin (1)", ylabel="share of runs", ylim=(0.0, 1.02))
     part.yaxis.set_major_formatter(PercentFormatter(1.0))
     for ax in (counts, part):
-        _style(ax)
+        set_style(ax)
     counts.yaxis.set_major_locator(MaxNLocator(integer=True))
     return figure
 
@@ -71,13 +71,15 @@ def running_estimate(curve: pd.DataFrame, limit: float | None = None) -> Figure:
     limit : float, optional
         Of the claim.
     """
-    figure, (ax,) = _axes()
+    figure, (ax,) = stacked_axes()
     n = curve.index.to_numpy()
-    ax.fill_between(n, curve["low"], curve["high"], color=BLUE, alpha=0.2, linewidth=0)
-    ax.plot(n, curve["rate"], color=BLUE, linewidth=1.4)
+    ax.fill_between(
+        n, curve["low"], curve["high"], color=BLUE, alpha=0.2, linewidth=0, label="bounds"
+    )
+    ax.plot(n, curve["rate"], color=BLUE, linewidth=1.4, label="share so far")
     if limit is not None:
         ax.axhline(limit, color=ORANGE, linewidth=1.2, linestyle="--", label="limit")
-        ax.legend(frameon=False)
+    legend_beside(ax)
     top = float(np.max(curve["high"].to_numpy()[n >= min(30, n[-1])]))
     ax.set(xscale="log", xlabel="runs", ylabel="probability of a violation")
     top = min(1.0, 1.2 * max(top, limit or 0.0)) or 1.0
@@ -103,7 +105,7 @@ def fans(
     nominal, worst : mapping
         Samples of shape (m,) by name.
     """
-    figure, axes = _axes(rows=len(signals), height=2.2)
+    figure, axes = stacked_axes(rows=len(signals), height=2.2)
     nodes = np.unique(np.linspace(0, time.size - 1, STRETCHES + 1).astype(int))
     for ax, (name, samples) in zip(axes, signals.items(), strict=True):
         lines = np.array([nominal[name], worst[name]])
@@ -119,7 +121,7 @@ def fans(
         ax.plot(time, np.clip(worst[name], low, high), "--", color=ORANGE, label="worst run")
         ax.plot(time, np.clip(nominal[name], low, high), color=GREY, label="nominal")
         ax.set_ylabel(plain(name), parse_math=False)
-    axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_beside(axes[0])
     axes[-1].set_xlabel(TIME)
     return figure
 

@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from ..figures import BLUE, GREEN, GREY, ORANGE, PURPLE, _axes
+from ..figures.axes import BLUE, GREEN, GREY, ORANGE, PURPLE, legend_beside, stacked_axes
 from .labels import arms, number_axes, plain
 from .runs import shown
 
@@ -22,7 +22,7 @@ INK = "#111111"  # on the map, which is light on dark pages as well
 
 def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
     """Lowest margin found after each run of a search, in the colour of what chose the run."""
-    figure, (ax,) = _axes()
+    figure, (ax,) = stacked_axes()
     y, names = shown(lowest), np.asarray(searchers, dtype=object)
     starts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1), names.size]
     labelled = set()
@@ -35,7 +35,7 @@ def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
         labelled.add(name)
     ax.step(np.arange(1, y.size + 1), y, where="post", color=ORANGE, linewidth=1.4)
     ax.axhline(0.0, color=GREY, linewidth=1.0, linestyle="--")
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_beside(ax)
     ax.set(xlabel="runs", ylabel="lowest margin (1)")
     return figure
 
@@ -58,14 +58,14 @@ def deviations(table: pd.DataFrame) -> Figure:
         ax.barh(at, values, height, color=colour, hatch=hatch, edgecolor="white", label=str(name))
     for end in (-1.0, 0.0, 1.0):
         ax.axvline(end, color=GREY, linewidth=0.8, linestyle="--" if end else "-")
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_beside(ax)
     ax.set_xlabel("deviation from nominal, in sides of the box (1)")
     return figure
 
 
 def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | None = None) -> Figure:
     """Share of violations with its interval against the size of the uncertainty."""
-    figure, (ax,) = _axes()
+    figure, (ax,) = stacked_axes()
     size, rate = curve.index.to_numpy(dtype=float), curve["rate"].to_numpy()
     ax.errorbar(
         size, rate, yerr=arms(rate, curve["lower"], curve["upper"]), color=BLUE, marker="o",
@@ -75,13 +75,14 @@ def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | Non
         ax.plot([at], [limit], "v", color=ORANGE, markersize=7, label="limit")
         ax.legend(frameon=False)
     ax.set(xlabel="size of the uncertainty (1)", ylabel="probability of a violation")
+    ax.margins(x=0.03)
     ax.set_ylim(bottom=-0.03 * ax.get_ylim()[1])
     return figure
 
 
 def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
     """Lowest margin that was found at each size that was looked at, and the radius."""
-    figure, (ax,) = _axes()
+    figure, (ax,) = stacked_axes()
     margin = shown(steps["margin"])
     violated = ~(margin > 0)
     for chosen, marker, colour, name in (
@@ -93,7 +94,7 @@ def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
     if np.isfinite(radius):
         ax.axvline(radius, color=ORANGE, linewidth=1.2, linestyle="--", label="radius at most")
     ax.axhline(0.0, color=GREY, linewidth=1.0)
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_beside(ax)
     ax.set(xlabel="size of the uncertainty (1)", ylabel="lowest margin (1)")
     return figure
 
@@ -136,5 +137,5 @@ def failure_map(
         ax.plot(*nominal, "*", color=INK, markeredgecolor="white", markersize=13)
     ax.set_xlabel(plain((labels or names)[0]), parse_math=False)
     ax.set_ylabel(plain((labels or names)[1]), parse_math=False)
-    figure.colorbar(image, ax=ax, label="margin (1), up to ±1")
+    figure.colorbar(image, ax=ax, label="margin (1), cut off at ±1")
     return figure

@@ -1,4 +1,4 @@
-"""Results -> matplotlib figures.  Nothing here writes a file or shows a window."""
+"""Figures of the proof: long runs, V and its bounds, margins."""
 
 from __future__ import annotations
 
@@ -9,152 +9,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
-from nlctl.functions import nussbaum
-
-from .lyapunov.long_run import LongRun
-from .lyapunov.signals import Margin
-from .reproduction import TAIL, Run
+from ..lyapunov.long_run import LongRun
+from ..lyapunov.signals import Margin
+from .axes import BLUE, GREEN, GREY, ORANGE, STYLES, TIME, legend_beside, set_style, stacked_axes
 
 __all__ = [
-    "actuator_path",
-    "adaptation",
     "bounds",
     "burst",
-    "control_input",
+    "envelope",
     "equality_residuals",
-    "error_comparison",
     "inequality_margins",
     "long_zeta",
     "lyapunov_bound",
-    "nussbaum_gain",
-    "overview",
-    "tracking",
-    "tracking_error",
-    "upper_states",
 ]
-
-# Okabe-Ito: distinguishable for colour-blind readers; line styles distinguish as well.
-BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#6b7280"
-STYLES = ((BLUE, "-"), (ORANGE, "--"), (GREEN, "-."), (PURPLE, ":"))
-TIME = "time t (s)"
-
-
-def _axes(rows: int = 1, height: float = 2.6) -> tuple[Figure, list[Axes]]:
-    figure = Figure(figsize=(9.0, height * rows), layout="constrained")
-    axes = list(np.ravel(figure.subplots(rows, 1, sharex=rows > 1)))
-    for ax in axes:
-        _style(ax)
-        ax.margins(x=0.01)
-    return figure, axes
-
-
-def _style(ax: Axes) -> None:
-    ax.grid(True, alpha=0.25, linewidth=0.6)
-    ax.spines[["top", "right"]].set_visible(False)
-
-
-def _lines(ax: Axes, t: np.ndarray, curves: Mapping[str, np.ndarray]) -> None:
-    for (label, y), (colour, style) in zip(curves.items(), STYLES, strict=False):
-        ax.plot(t, y, style, color=colour, linewidth=1.4, label=label)
-    if len(curves) > 1:
-        ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-
-
-def tracking(run: Run) -> Figure:
-    """Output y against the reference yd."""
-    figure, (ax,) = _axes()
-    _lines(ax, run.time, {"$y$": run.signals["y"], "$y_d$": run.signals["yd"]})
-    ax.set(xlabel=TIME, ylabel="output")
-    return figure
-
-
-def tracking_error(run: Run) -> Figure:
-    """Tracking error e1, with the largest one of the last half marked."""
-    figure, (ax,) = _axes()
-    bound = run.metrics["tail_max_e"]
-    _lines(ax, run.time, {"$e_1$": run.signals["e"]})
-    ax.fill_between([TAIL, run.time[-1]], -bound, bound, color=GREY, alpha=0.15, linewidth=0)
-    ax.annotate(
-        f"±{bound:.4f}",
-        (run.time[-1], bound),
-        (-3, 3),
-        textcoords="offset points",
-        ha="right",
-        color=GREY,
-    )
-    ax.set(xlabel=TIME, ylabel="tracking error $e_1$")
-    return figure
-
-
-def upper_states(run: Run) -> Figure:
-    """The states x2, ..., xn."""
-    figure, (ax,) = _axes()
-    names = [f"x{i}" for i in range(2, 10) if f"x{i}" in run.signals]
-    _lines(ax, run.time, {f"$x_{n[1:]}$": run.signals[n] for n in names})
-    ax.set(xlabel=TIME, ylabel="state " + ", ".join(f"$x_{n[1:]}$" for n in names))
-    return figure
-
-
-def control_input(run: Run) -> Figure:
-    """Control input u and what the actuator makes of it, v."""
-    figure, (ax,) = _axes()
-    _lines(ax, run.time, {"$u$": run.signals["u"], "$v$": run.signals["v"]})
-    ax.set(xlabel=TIME, ylabel="input $u$, actuator output $v$")
-    return figure
-
-
-def actuator_path(run: Run) -> Figure:
-    """The part of the actuator's characteristic that was travelled: v over u."""
-    figure = Figure(figsize=(4.6, 3.6), layout="constrained")
-    ax = figure.subplots()
-    _style(ax)
-    u, v = run.signals["u"], run.signals["v"]
-    late = run.time >= TAIL
-    ax.plot(u, v, "-", color=GREY, linewidth=0.9, label=f"t < {TAIL:g} s")
-    ax.plot(u[late], v[late], "-", color=BLUE, linewidth=1.6, label=f"t ≥ {TAIL:g} s")
-    ax.legend(frameon=False, loc="upper left")
-    ax.set(xlabel="input $u$", ylabel="actuator output $v$")
-    return figure
-
-
-def nussbaum_gain(run: Run) -> Figure:
-    """The argument zeta, and the gain N(zeta) that it gives."""
-    figure, (top, bottom) = _axes(rows=2, height=1.9)
-    zeta = run.signals["zeta"]
-    _lines(top, run.time, {"$\\zeta$": zeta})
-    _lines(bottom, run.time, {"$N(\\zeta)$": nussbaum(zeta)})
-    top.set(ylabel="$\\zeta$")
-    bottom.set(xlabel=TIME, ylabel="$N(\\zeta)$")
-    return figure
-
-
-def adaptation(run: Run) -> Figure:
-    """Norm of the network's weights, and the estimate delta_hat."""
-    figure, (ax,) = _axes()
-    curves = {"$\\|\\hat W\\|$": run.signals["W_norm"], "$\\hat\\delta$": run.signals["delta_hat"]}
-    _lines(ax, run.time, curves)
-    ax.set(xlabel=TIME, ylabel="$\\|\\hat W\\|$, $\\hat\\delta$")
-    return figure
-
-
-def error_comparison(runs: Sequence[Run], labels: Sequence[str]) -> Figure:
-    """Tracking errors of up to four runs above each other."""
-    figure, (ax,) = _axes()
-    _lines(ax, runs[0].time, dict(zip(labels, (run.signals["e"] for run in runs), strict=True)))
-    ax.set(xlabel=TIME, ylabel="tracking error $e_1$")
-    return figure
-
-
-def overview(time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Figure:
-    """Tracking, input and Nussbaum argument of one run above each other."""
-    figure, (top, middle, bottom) = _axes(rows=3, height=2.0)
-    _lines(top, time, {"$y$": signals["y"], "$y_d$": signals["yd"], "$e_1$": signals["e"]})
-    _lines(middle, time, {"$u$": signals["u"], "$v$": signals["v"]})
-    _lines(bottom, time, {"$\\zeta$": signals["zeta"], "$\\hat\\delta$": signals["delta_hat"]})
-    top.set(ylabel="output, error")
-    middle.set(ylabel="input")
-    bottom.set(xlabel=TIME, ylabel="$\\zeta$, $\\hat\\delta$")
-    return figure
 
 
 def burst(run: LongRun) -> Figure:
@@ -163,7 +30,7 @@ def burst(run: LongRun) -> Figure:
     (whole, end), (error, signals) = figure.subplots(2, 2, sharex="col", width_ratios=(1.5, 1))
     time, s = run.time, run.signals
     for ax in (whole, end, error, signals):
-        _style(ax)
+        set_style(ax)
     for ax, across in ((whole, time), (end, left := run.time[-1] + 1e-5 - time)):
         ax.axhline(run.lobe.high, color=GREY, linewidth=1.0, linestyle="--")
         ax.plot(across, s["zeta"], "-", color=BLUE, linewidth=1.4)
@@ -201,7 +68,7 @@ def envelope(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi) -> np.n
 
 def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
     """The Nussbaum argument of long runs that do not burst, and where it is foretold to stop."""
-    figure, (ax,) = _axes()
+    figure, (ax,) = stacked_axes()
     for (label, run), (colour, style) in zip(runs.items(), STYLES, strict=False):
         ax.plot(run.time, run.signals["zeta"], style, color=colour, linewidth=1.4, label=label)
         for prediction in run.predictions[-1:]:
@@ -215,14 +82,14 @@ def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
 
 def lyapunov_bound(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Figure:
     """V over time against what bounds it; a bound that is infinite is named in the legend."""
-    figure, (ax,) = _axes()
+    figure, (ax,) = stacked_axes()
     for (label, y), (colour, style) in zip(curves.items(), STYLES, strict=False):
         named = label if np.any(np.isfinite(y)) else f"{label}: infinite"
         ax.semilogy(t, np.where(y > 0, y, np.nan), style, color=colour, linewidth=1.4, label=named)
     _, top = ax.get_ylim()
     ax.set_ylim(max(ax.get_ylim()[0], 1e-5 * top), top)
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    ax.set(xlabel=TIME, ylabel="energy")
+    legend_beside(ax)
+    ax.set(xlabel=TIME, ylabel="$V$ and its bounds")
     return figure
 
 
@@ -261,7 +128,7 @@ def _panels(margins: Sequence[Margin], *, sharey: bool = False) -> tuple[Figure,
     for ax in axes[len(margins) :]:
         ax.set_axis_off()
     for ax, margin in zip(axes, margins, strict=False):
-        _style(ax)
+        set_style(ax)
         ax.set_title(margin.equation, fontsize=9, loc="left")
     for ax in axes[: len(margins)][-3:]:
         ax.set_xlabel(TIME)
@@ -286,13 +153,13 @@ def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
     numbers = [number for number, _ in shown.values()]
     figure = Figure(figsize=(9.0, 0.3 * len(shown) + 0.6), layout="constrained")
     ax = figure.subplots()
-    _style(ax)
+    set_style(ax)
     for kind, colour in (("proved", GREEN), ("along this run", BLUE), ("what happens", GREY)):
         places = [i for i, (_, own) in enumerate(shown.values()) if own == kind]
         bars = ax.barh(places, [numbers[i] for i in places], 0.55, color=colour, label=kind)
         ax.bar_label(bars, fmt="%.4g", padding=4)
     ax.set_yticks(range(len(shown)), list(shown))
-    ax.set(xscale="log", xlim=(0.5 * min(numbers), 3 * max(numbers)))
+    ax.set(xscale="log", xlim=(0.5 * min(numbers), 3 * max(numbers)), xlabel="$|r|$")
     ax.invert_yaxis()
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_beside(ax)
     return figure
