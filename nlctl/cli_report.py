@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json as json_text
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .cli_studies import INCOMPLETE, exit_codes
+from .cli_studies import INCOMPLETE, INTERRUPTED, exit_codes, run_folder
 
 QUICK = ("example-1-quick", "example-2-quick")  # the studies of the paper's report
 
@@ -101,8 +102,8 @@ def _paper(
             studies=studies_part([out / name for name in QUICK], threads=jobs or None),
             numerics=numerics(),
         )
-    if interactive:
-        made = replace(made, command=f"{made.command} --interactive")
+    options = " --far" * far + " --interactive" * interactive
+    made = replace(made, command=made.command + options)
     page = write_report(made, out, interactive=interactive)
     return made.verdict, page, int(not all(check.passed for check in checks(runs)))
 
@@ -114,13 +115,16 @@ def _study(
     from ._sweep_progress import sweep_bar
     from .cli_study_report import report_study
 
-    kept = Path("reports") / study.stem if study.suffix == ".toml" else study
+    kept = run_folder(study) if study.suffix == ".toml" else study
     check_report_options(out or kept, pdf=pdf)
     page, result = report_study(
         study, out, threads=jobs or None, watch=sweep_bar, interactive=interactive
     )
-    code = int(not result.holds) if result.complete else INCOMPLETE
-    return result.verdict, page, code
+    if result.complete:
+        return result.verdict, page, int(not result.holds)
+    if study.suffix == ".toml":
+        print("nlctl: incomplete; the same command goes on", file=sys.stderr)
+    return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE
 
 
 def compare(

@@ -19,6 +19,7 @@ from typing import Annotated, Any
 import typer
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, INTERRUPTED = 1, 2, 3, 4, 130
+CONNECT = "5s"  # how long a scheduler may take to answer
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY", help="The study file, .toml.")]
 Settings = Annotated[
@@ -54,37 +55,29 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a study, print what it found, and keep everything in a folder."""
-    with exit_codes(json):
+    options = [part for text in set_ or [] for part in ("--set", text)]
+    options += [] if out is None else ["--out", str(out)]
+    options += [] if executor == "threads" else ["--executor", executor]
+    options += ["--jobs", str(jobs)] if jobs else []
+    folder = run_folder(study) if out is None else out
+    with exit_codes(json), _told_how_to_go_on(study, options, folder, resume, json):
         from analysis.studies import read_study
         from analysis.studies import run as run_study
 
         from ._sweep_progress import sweep_bar
 
-        folder = Path("reports") / study.stem if out is None else out
         file = read_study(study, set_ or [])
         with _executor(executor, jobs) as pool:
-            try:
-                result = run_study(
-                    file,
-                    folder,
-                    resume=resume,
-                    executor=pool,
-                    threads=jobs or None if pool is None else None,
-                    watch=sweep_bar,
-                )
-            except (OSError, ValueError) as error:
-                if not _is_full(error):
-                    raise
-                _fail(error, json)
-                raise typer.Exit(INCOMPLETE) from None
+            result = run_study(
+                file,
+                folder,
+                resume=resume,
+                executor=pool,
+                threads=jobs or None if pool is None else None,
+                watch=sweep_bar,
+            )
         _show(result, json)
         if not result.complete:
-            options = [part for text in set_ or [] for part in ("--set", text)]
-            options += [] if out is None else ["--out", str(out)]
-            options += [] if executor == "threads" else ["--executor", executor]
-            options += ["--jobs", str(jobs)] if jobs else []
-            again = shlex.join(["nlctl", "run", str(study), "--resume", *options])
-            print(f"continue with: {again}", file=sys.stderr)
             raise typer.Exit(INTERRUPTED if result.interrupted else INCOMPLETE)
         if not result.holds:
             raise typer.Exit(FAILS)
@@ -123,16 +116,13 @@ def replay(
         from analysis.studies import replay as replay_row
         from analysis.studies import replay_figure
 
-        from ._files import replace_file
-        from ._terminal import check_figure, check_writable
+        from ._terminal import check_figure, write_figure
 
         if plot is not None:
             check_figure(plot)
-            check_writable(plot.parent)
         made = replay_row(folder, row, part)
         if plot is not None:
-            figure = replay_figure(made)
-            replace_file(plot, lambda file: figure.savefig(file, format=plot.suffix[1:].lower()))
+            write_figure(plot, replay_figure(made))
         if json:
             print(json_text.dumps(made.plain(), indent=1))
         else:
@@ -146,6 +136,43 @@ def schema() -> None:
     from analysis.studies import Study
 
     print(json_text.dumps(Study.model_json_schema(), indent=1))
+
+
+def run_folder(study: Path) -> Path:
+    """Return where the run of a study file is kept by default."""
+    return Path("reports") / study.stem
+
+
+@contextmanager
+def _told_how_to_go_on(
+    study: Path, options: list[str], folder: Path, resume: bool, json: bool
+) -> Iterator[None]:
+    """Print the command that goes on, where a run ends early and may be continued.
+
+    It resumes from the moment on at which the folder holds the study; before, it begins.
+    """
+    kept = folder / "study.toml"
+    is_taken = kept.exists() and not resume  # by a run that is there already: it is refused
+    try:
+        yield
+        return
+    except KeyboardInterrupt:
+        print("nlctl: interrupted", file=sys.stderr)
+        code = INTERRUPTED
+    except typer.Exit as error:
+        if error.exit_code not in (INCOMPLETE, INTERRUPTED):
+            raise
+        code = error.exit_code
+    except (OSError, ValueError) as error:
+        if not _is_full(error):
+            raise
+        _fail(error, json)
+        code = INCOMPLETE
+    verb, flag = ("continue", ["--resume"]) if resume or kept.exists() else ("begin", [])
+    if not is_taken:
+        command = shlex.join(["nlctl", "run", str(study), *flag, *options])
+        print(f"{verb} with: {command}", file=sys.stderr)
+    raise typer.Exit(code) from None
 
 
 @contextmanager
@@ -208,16 +235,29 @@ def _executor(text: str, jobs: int) -> Iterator[Any]:
         with ProcessPoolExecutor(jobs or cores(), mp_context=context) as pool:
             yield pool
     elif text.startswith("dask:"):
-        try:
-            from distributed import Client
-        except ImportError:
-            raise ParameterError(
-                "dask:ADDRESS needs the extra: pip install nlctl[cluster]"
-            ) from None
-        with Client(text.removeprefix("dask:"), timeout="10s") as client:
+        with _dask_client(text.removeprefix("dask:")) as client:
             yield client.get_executor()
     else:
         raise ParameterError(f"--executor needs threads, processes or dask:ADDRESS, got '{text}'")
+
+
+def _dask_client(address: str) -> Any:
+    """Return a client of the scheduler at an address; it is to be closed."""
+    from ._errors import ParameterError
+
+    try:
+        from distributed import Client
+    except ImportError:
+        raise ParameterError(
+            '--executor dask:ADDRESS needs the extra: pip install "nlctl[cluster]"'
+        ) from None
+    try:
+        return Client(address, timeout=CONNECT)
+    except (OSError, ValueError) as error:
+        raise ParameterError(
+            f"cannot reach a Dask scheduler at '{address}' ({error}): give the address that it "
+            "prints when it starts, such as --executor dask:tcp://127.0.0.1:8786"
+        ) from None
 
 
 def _show(result: Any, json: bool) -> None:

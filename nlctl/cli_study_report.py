@@ -11,6 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .cli_studies import run_folder
+
 if TYPE_CHECKING:
     from analysis.report.document import Section
     from analysis.report.robustness_histories import Histories
@@ -99,9 +101,8 @@ def studies_part(folders: Sequence[Path], *, threads: int | None = None) -> list
 def _run(path: Path, threads: int | None, watch: Watch | None) -> Result:
     from analysis.studies import read_study, run
 
-    folder = Path("reports") / path.stem
     how: dict[str, Any] = {} if watch is None else {"watch": watch}
-    return run(read_study(path), folder, resume=True, threads=threads, **how)
+    return run(read_study(path), run_folder(path), resume=True, threads=threads, **how)
 
 
 def _histories(result: Result, threads: int | None) -> Histories | None:
@@ -114,7 +115,7 @@ def _histories(result: Result, threads: int | None) -> Histories | None:
 
     if result.rows is None or not result.rows.done:
         return None
-    searched = [f.numbers for f in result.findings if f.kind == "worst case"]
+    searched = [f.numbers for f in result.findings if f.kind == "worst case" and f.is_answered]
     witness = min(
         ((n["witness"], n["margin"]) for n in searched), key=lambda pair: pair[1], default=None
     )

@@ -17,7 +17,7 @@ from nlctl._param import equation_arguments
 
 numbers = st.floats(-50, 50)
 T = np.linspace(0, 20, 2001)
-EXAMPLES = {"example_1": nlctl.paper.example_1, "example_2": nlctl.paper.example_2}
+EXAMPLES = nlctl.paper.EXAMPLES
 
 
 def at(spec, x, u):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nlctl
-from nlctl import actuators, controllers, plants, references
+from nlctl._catalogue import block_records
 from nlctl._param import declared_params, equation_arguments
 
 
@@ -38,12 +38,7 @@ NEEDED = {
 
 def records():
     """Return an example of every public record class that has inputs and outputs."""
-    found = {}
-    for module in (plants, actuators, references, controllers):
-        for name in module.__all__:
-            cls = getattr(module, name)
-            if isinstance(cls, type) and dataclasses.is_dataclass(cls):
-                found[name] = cls(**NEEDED.get(name, {}))
+    found = {name: cls(**NEEDED.get(name, {})) for name, cls in block_records().items()}
     return {name: spec for name, spec in found.items() if hasattr(spec, "outputs")}
 
 

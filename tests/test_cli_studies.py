@@ -122,24 +122,32 @@ def test_a_full_disk_is_exit_code_4_and_can_be_continued(folder):
     stopped = nlctl("run", path, "--out", "full", cwd=folder, preexec_fn=small_files)
     assert stopped.returncode == 4, stopped.stderr
     assert "cannot write" in stopped.stderr
-    resumed = nlctl("run", path, "--out", "full", "--resume", cwd=folder)
+    command = stopped.stderr.splitlines()[-1].removeprefix("continue with: nlctl ")
+    assert command == f"run {path} --resume --out full"
+    resumed = nlctl(*shlex.split(command), cwd=folder)
     assert resumed.returncode == 0, resumed.stderr
     assert_same(load_result(folder / "full"), whole)
+
+
+def interrupted(arguments, is_time, cwd):
+    """Run the command line and press Ctrl-C when it is time; return code, output and errors."""
+    process = subprocess.Popen(
+        [*NLCTL, *arguments], cwd=cwd, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    while process.poll() is None and not is_time():
+        time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    out, told = process.communicate(timeout=300)
+    return process.returncode, out, told
 
 
 def test_ctrl_c_is_exit_code_130_and_prints_how_to_go_on(folder):
     """The chunk in hand is kept; the printed command ends with the uninterrupted table."""
     path = write(folder, HEAD, MANY, name="long.toml")
     chunks = folder / "long" / "rows" / "chunks"
-    arguments = ["run", "long.toml", "--out", "long", "--jobs", "1"]
-    process = subprocess.Popen(
-        [*NLCTL, *arguments], cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    while process.poll() is None and not list(chunks.glob("*.parquet")):
-        time.sleep(0.005)
-    process.send_signal(signal.SIGINT)
-    out, told = process.communicate(timeout=300)
-    assert process.returncode == 130, (out, told)
+    arguments = ("run", "long.toml", "--out", "long", "--jobs", "1")
+    code, out, told = interrupted(arguments, lambda: list(chunks.glob("*.parquet")), folder)
+    assert code == 130, (out, told)
     kept = load_result(folder / "long")
     assert 0 < kept.rows.done < 6000
     assert not kept.complete
@@ -148,6 +156,46 @@ def test_ctrl_c_is_exit_code_130_and_prints_how_to_go_on(folder):
     resumed = nlctl(*shlex.split(command)[1:], cwd=folder)
     assert resumed.returncode == 0, resumed.stderr
     assert_same(load_result(folder / "long"), run_study(read_study(path), folder / "straight"))
+
+
+WAITING = """
+
+def waiting(name="loop"):
+    import pathlib, time
+
+    here = pathlib.Path(__file__).parent
+    if (here / {kept!r}).exists() and not (here / "waits").exists():
+        (here / "waits").touch()
+        time.sleep(600)
+    return loop(name=name)
+"""
+
+
+@pytest.mark.parametrize(
+    ("kept", "command"),
+    [
+        ("study.toml", "begin with: nlctl run study.toml --out out --jobs 1"),
+        ("out/study.toml", "continue with: nlctl run study.toml --resume --out out --jobs 1"),
+    ],
+)
+def test_ctrl_c_before_the_first_row_says_how_to_go_on(tmp_path, kept, command):
+    """While the file is checked nothing is kept; while diagrams are compiled the study is.
+
+    The loop waits where it is built, until SIGINT comes; the printed command then does it all.
+    """
+    write(tmp_path, HEAD.replace("loop.py:loop", "loop.py:waiting"), ROWS)
+    with (tmp_path / "loop.py").open("a", encoding="utf-8") as file:
+        file.write(WAITING.format(kept=kept))
+    code, out, told = interrupted(
+        ("run", "study.toml", "--out", "out", "--jobs", "1"), (tmp_path / "waits").exists, tmp_path
+    )
+    assert (code, out) == (130, "")
+    assert told.splitlines() == ["nlctl: interrupted", command]
+    assert (tmp_path / "out").exists() == command.startswith("continue")
+    again = command.partition(": nlctl ")[2]
+    done = nlctl(*shlex.split(again), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert load_result(tmp_path / "out").complete
 
 
 def assert_same(one, other):

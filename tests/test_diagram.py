@@ -194,6 +194,14 @@ def probe(diagram, t=0.7, params=None, **states):
 
 
 class TestExamples:
+    def test_they_go_by_the_names_of_their_diagrams(self):
+        """In Python example_1, on the command line example-1."""
+        for name, make in nlctl.paper.EXAMPLES.items():
+            assert make().name == name
+            assert nlctl.paper.named_example(name.replace("_", "-")) is make
+        with pytest.raises(nlctl.UnknownNameError, match="'example-3'; nearest: 'example-"):
+            nlctl.paper.named_example("example-3")
+
     @pytest.mark.parametrize("order", PAPER)
     def test_signals(self, order):
         """No input from outside, and the documented outputs in the documented order."""

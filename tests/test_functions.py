@@ -8,6 +8,7 @@ from scipy.integrate import quad
 
 from nlctl.functions import (
     band_limited,
+    clip,
     gaussian,
     nussbaum,
     nussbaum_derivative,
@@ -102,6 +103,13 @@ class TestSmoothSign:
         """For a narrow width it is the sign, and it is odd for any width."""
         assert smooth_sign(r, 1e-4) == 1.0
         assert smooth_sign(-r, 0.7) == -smooth_sign(r, 0.7)
+
+
+class TestClip:
+    @given(y=st.floats(), low=st.floats(-9, 9), width=st.floats(0, 9))
+    def test_it_is_that_of_numpy(self, y, low, width):
+        """Equal to numpy.clip, also for NaN and infinity."""
+        np.testing.assert_array_equal(clip(y, low, low + width), np.clip(y, low, low + width))
 
 
 class TestGaussian:

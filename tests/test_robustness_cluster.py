@@ -2,12 +2,17 @@
 
 import os
 import signal
+import subprocess
+import sys
 
 import pytest
+from studies_example import write
 from sweep_examples import experiment, same
+from test_cli_studies import nlctl
 
 from analysis.robustness import independent, prepare
 from analysis.robustness.sweep import sweep
+from analysis.studies import load_result, read_study, run
 
 distributed = pytest.importorskip("distributed")
 
@@ -42,3 +47,48 @@ def test_a_killed_worker_loses_nothing(client, tmp_path):
     assert found.complete
     assert found.notes == ()
     same(found.table, sweep(made, design).table)
+
+
+def test_the_command_line_runs_a_study_on_the_cluster(client, tmp_path):
+    """The table is that of threads, bit for bit; the user's loop in a file travels to workers."""
+    path = write(tmp_path)
+    there = nlctl(
+        *("run", path, "--out", "there", "--executor", f"dask:{client.scheduler.address}"),
+        cwd=tmp_path,
+    )
+    assert there.returncode == 0, there.stderr
+    here = run(read_study(path), tmp_path / "here", threads=1)
+    found = load_result(tmp_path / "there")
+    same(found.rows.table, here.rows.table)
+    assert found.plain() == here.plain()
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("tcp://127.0.0.1:9", "Timed out"),  # the port of discard, where nobody listens
+        ("mainframe", "missing port"),
+    ],
+)
+def test_a_wrong_address_is_one_sentence_and_leaves_nothing(address, words, tmp_path):
+    """Exit code 2, with the address and what is wrong with it."""
+    path = write(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    told = nlctl("run", path, "--out", "out", "--executor", f"dask:{address}", cwd=tmp_path)
+    assert (told.returncode, told.stdout) == (2, "")
+    assert told.stderr.startswith(f"nlctl: cannot reach a Dask scheduler at '{address}' ({words}")
+    assert len(told.stderr.splitlines()) == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_without_the_extra_the_message_says_what_to_install(tmp_path):
+    """As where distributed is not installed."""
+    code = "import sys; sys.modules['distributed'] = None; from nlctl.cli import main; main()"
+    told = subprocess.run(
+        [sys.executable, "-c", code, "run", str(write(tmp_path)), "--executor", "dask:tcp://x:1"],
+        **{"cwd": tmp_path, "capture_output": True, "text": True, "timeout": 300, "check": False},
+    )
+    assert told.returncode == 2
+    assert told.stderr == (
+        'nlctl: --executor dask:ADDRESS needs the extra: pip install "nlctl[cluster]"\n'
+    )

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import function
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -20,11 +21,6 @@ SPACE = Space(
     ),
     choices=(Choice(name="arm", options={"x": 1, "y": 2}),),
 )
-
-
-def function(formula):
-    """What simulates nothing: the margin is a formula of the row."""
-    return lambda table: pd.DataFrame({"spec": formula(table)}, index=table.index)
 
 
 def ellipse(table):

@@ -14,6 +14,7 @@ import nlctl
 from analysis.robustness.experiment import Experiment, evaluate, prepare
 from analysis.robustness.formula import always, in_band
 from analysis.robustness.largest_scale import largest_scale
+from analysis.robustness.patterns import corners
 from analysis.robustness.quantity import QUANTILES, Choice, SpaceError, Uncertain
 from analysis.robustness.radius import robustness_radius, size_of
 from analysis.robustness.space import Space, scaled
@@ -268,6 +269,91 @@ def test_the_search_ends_where_the_loop_refuses_values():
         largest_scale(made, 0)
     half = largest_scale(prepare_scaled(made, 2.0))[0]
     assert half == pytest.approx(5 / 3, rel=1e-9)
+
+
+def alone(record, boxes, **nominal):
+    """A block by itself, with boxes of its parameters."""
+    quantities = (
+        Uncertain(name=f"block.{key}", bounds=box, nominal=nominal.get(key))
+        for key, box in boxes.items()
+    )
+    formula = always(in_band("v", upper=1))
+    return prepare(
+        Experiment(
+            space=Space(quantities=tuple(quantities)),
+            build=lambda: nlctl.interconnect({"block": record}, inputs=["u"], outputs=["v"]),
+            spec=Spec(requirements=(Requirement(key="small", formula=formula, until=1),)),
+            timepts=np.linspace(0, 1, 11),
+        )
+    )
+
+
+def test_rules_of_two_parameters_end_the_sizes_together():
+    """A gap -0.6 + 0.4 r < 0.5 - 0.3 r closes at r = 11 / 7, though each end may go on by itself.
+
+    Just below, all corners are simulated; just above, one of them is refused.
+    """
+    made = alone(nlctl.Backlash(), {"c_l": (-0.8, -0.2), "c_r": (0.2, 0.7), "m_r": (1.0, 1.4)})
+    largest, why = largest_scale(made)
+    assert largest == pytest.approx(11 / 7, rel=1e-9)
+    assert largest < 11 / 7
+    assert "Backlash needs c_l < c_r" in why
+    space = made.experiment.space
+    rows = evaluate(made, corners(scaled(space, largest)).table)
+    assert (rows["status"] == "OK").all()
+    with pytest.raises(nlctl.ParameterError, match="c_l < c_r"):
+        evaluate(made, corners(scaled(space, largest * (1 + 1e-9))).table)
+
+
+def test_what_is_not_scaled_is_nominal_and_not_what_was_run_last():
+    """A gap -0.4 < 0.5 - 0.3 r closes at r = 3; -0.6 is the block's own end, -0.2 that of a run."""
+    made = alone(nlctl.Backlash(), {"c_l": (-0.8, -0.2), "c_r": (0.2, 0.7)}, c_l=-0.4)
+    evaluate(made, corners(made.experiment.space).table.iloc[::-1])
+    assert largest_scale(made, names=["block.c_r"])[0] == pytest.approx(3, rel=1e-9)
+
+
+def test_the_first_of_several_rules_ends_the_sizes():
+    """Of a dead zone b_r > 0 at 5 / 3, |ripple| < slope at 0.7 / 0.3 on the right, 3 / 2 left."""
+    boxes = {"b_r": (0.2, 0.6), "slope_r": (0.8, 1.0), "ripple_r": (0.2, 0.4)}
+    boxes |= {"slope_l": (0.6, 0.8), "ripple_l": (0.0, 0.4)}
+    largest, why = largest_scale(alone(nlctl.DeadZone(), boxes))
+    assert largest == pytest.approx(3 / 2, rel=1e-9)
+    assert "|ripple_l| < slope_l" in why
+
+
+@nlctl.record
+class Knots:
+    """v = u, with knots in order: a rule about neighbours only."""
+
+    at: tuple = nlctl.param(tuple(map(float, range(12))), unit="1", meaning="knots")
+    inputs, outputs, states = ("u",), ("v",), ()
+    feedthrough = True
+
+    def check(self):
+        if not np.all(np.diff(self.at) > 0):
+            raise nlctl.ParameterError("Knots needs them in order")
+
+    @staticmethod
+    @nlctl.equation
+    def output(t, x, u, p):
+        return (u[0] + 0.0 * p.at[0],)
+
+
+def test_many_quantities_of_one_block_are_tried_in_pairs():
+    """Knots i +- r / 4: an end meets its neighbour at r = 4, two ends meet in the middle at 2."""
+    boxes = {f"at[{i}]": (i - 0.25, i + 0.25) for i in range(12)}
+    largest, why = largest_scale(alone(Knots(), boxes), 8.0)
+    assert largest == pytest.approx(2, rel=1e-9)
+    assert "Knots needs them in order" in why
+    single = {key: boxes[key] for key in ("at[3]",)}
+    assert largest_scale(alone(Knots(), single), 8.0)[0] == pytest.approx(4, rel=1e-9)
+
+
+def test_a_nominal_row_that_is_refused_has_no_size():
+    """Each of the two is admissible with the other's default; together they are not."""
+    made = alone(nlctl.Backlash(), {"c_l": (0.0, 0.4), "c_r": (-0.5, 0.6)}, c_l=0.3, c_r=-0.1)
+    with pytest.raises(nlctl.ParameterError, match=r"c_l < c_r, got 0\.3 and -0\.1"):
+        largest_scale(made)
 
 
 def prepare_scaled(made, factor):

@@ -12,6 +12,7 @@ from analysis.robustness.design import independent
 from analysis.robustness.patterns import sobol
 from analysis.robustness.quantity import Choice, Uncertain
 from analysis.robustness.sensitivity import (
+    censored,
     elementary_effects,
     morris,
     regional,
@@ -19,6 +20,7 @@ from analysis.robustness.sensitivity import (
     sobol_indices,
 )
 from analysis.robustness.space import Space, scaled
+from analysis.robustness.spec import unfinished_margin
 
 
 def cube(d, low=0.0, high=1.0):
@@ -151,6 +153,64 @@ def test_a_constant_response_has_no_shares():
     """0, not NaN."""
     design = saltelli(cube(2), 8, entropy=1)
     assert (sobol_indices(design, np.full(32, 3.7), resamples=9) == 0).all(axis=None)
+
+
+def margins_with_failures(x):
+    """Margin x1 where x0 < 1 - p; elsewhere the run ends at time x1 of 1."""
+    graded = [unfinished_margin(time, 1.0) for time in x.x1]
+    return np.where(x.x0 < 0.75, x.x1, graded)
+
+
+def test_shares_with_failed_runs_are_those_of_the_censored_margin():
+    """A quarter fails and counts as -1: y = (1 - I) x1 - I with I ~ Bernoulli(p) set by x0.
+
+    E[y | x0] = 1/2 - 3/2 I and E[y | x1] = (1 - p) x1 - p.  Graded margins are (x1 - 2) I, in
+    millions: of x1 only the time at which runs end is left, p^2 / 12 of 7 p / 3 - 9 p^2 / 4.
+    """
+    p = 0.25
+    v0, v1, v01 = 9 / 4 * p * (1 - p), (1 - p) ** 2 / 12, p * (1 - p) / 12
+    v = v0 + v1 + v01
+    assert v == pytest.approx((1 - p) / 3 + p - ((1 - p) / 2 - p) ** 2)  # E[y^2] - E[y]^2
+    design = saltelli(cube(2), 2**12, entropy=1)
+    graded = margins_with_failures(design.table)
+    values, failed, least = censored(graded)
+    assert least == -1
+    assert failed == np.sum(design.table.x0 >= 0.75)
+    got = sobol_indices(design, values, resamples=99)
+    assert list(got.S1) == pytest.approx([v0 / v, v1 / v], abs=0.01)
+    assert list(got.ST) == pytest.approx([(v0 + v01) / v, (v1 + v01) / v], abs=0.01)
+    swamped = sobol_indices(design, graded, resamples=9).S1["x1"]
+    assert swamped == pytest.approx(p**2 / 12 / (7 * p / 3 - 9 * p**2 / 4), abs=0.005)
+
+
+def test_effects_with_failed_runs_are_those_of_the_censored_margin():
+    """x0 always steps between {0, 1/3} and {2/3, 1}: there it crosses 1/2, from x1 to -1.
+
+    Its effect is -(1 + x1) 3 / 2, of mean -9 / 4 over the levels of x1; that of x1 is 1 or 0.
+    """
+    design = morris(cube(2), 400, 4, entropy=2)
+    t = design.table
+    values, failed, least = censored(np.where(t.x0 < 0.5, t.x1, -2e6 + 1e6 * t.x1))
+    assert (failed, least) == (np.sum(t.x0 > 0.5), -1)
+    got = elementary_effects(design, values)
+    assert list(got.mu) == pytest.approx([-9 / 4, 1 / 2], abs=0.1)
+    assert list(got.mu_star) == pytest.approx([9 / 4, 1 / 2], abs=0.1)
+
+
+@given(st.lists(st.floats(-9e5, 1e3) | st.floats(-2e6, -1e6) | st.just(np.nan), min_size=1))
+def test_a_failed_run_is_no_better_than_any_other_and_violates(margins):
+    """Margins of runs that ended stay as they are; the order of all others is lost, not turned."""
+    margins = np.array(margins)
+    ended = margins > -1e6
+    if not ended.any():
+        with pytest.raises(nlctl.ParameterError, match=f"none of {margins.size} rows reached"):
+            censored(margins)
+        return
+    values, failed, least = censored(margins)
+    np.testing.assert_array_equal(values[ended], margins[ended])
+    assert failed == np.sum(~ended)
+    assert np.all(values[~ended] == least)
+    assert least == min(*margins[ended], -1)
 
 
 def test_what_sets_failures_apart_is_found():

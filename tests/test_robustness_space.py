@@ -15,6 +15,7 @@ from analysis.robustness.space import (
     arguments,
     boxed,
     combinations,
+    ends,
     nominal,
     sampled,
     scaled,
@@ -139,6 +140,14 @@ def test_the_box_of_an_unbounded_law_holds_its_quantiles():
     assert X1.law.cdf(high) - X1.law.cdf(low) == pytest.approx(0.998)
     assert Uncertain(name="g", law=stats.expon()).box[0] == 0
     assert Uncertain(name="g", law=stats.norm(), bounds=(-2, 1)).box == (-2, 1)
+
+
+def test_ends_are_those_of_the_scaled_boxes():
+    """Low and high of every quantity, whatever the choices and their weights."""
+    b_r = Uncertain(name="b_r", bounds=(0.3, 0.9), nominal=0.5)
+    found = ends(Space(quantities=(b_r,), choices=(ACTUATOR,), scale=2.0))
+    assert list(found) == ["b_r"]
+    np.testing.assert_allclose(found["b_r"], [0.1, 1.3])
 
 
 def test_arguments_split_parameters_from_initial_states():

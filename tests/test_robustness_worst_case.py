@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import function
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -21,11 +22,6 @@ from analysis.robustness.shrink import shrink
 from analysis.robustness.space import Space, scaled
 from analysis.robustness.spec import Requirement, Spec
 from analysis.robustness.worst_case import worst_case
-
-
-def function(formula):
-    """What simulates nothing: the margin is a formula of the row."""
-    return lambda table: pd.DataFrame({"spec": formula(table)}, index=table.index)
 
 
 def box(d, low=-1.0, high=2.0):

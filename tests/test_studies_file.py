@@ -6,8 +6,8 @@ from studies_example import HEAD, ROWS, write
 
 from analysis.robustness import nominal, resolved
 from analysis.studies import Study, StudyError, from_toml, read_study, to_toml
-from analysis.studies.check import keyed
 from analysis.studies.problems import line_numbers
+from analysis.studies.schema import keyed
 from nlctl import ParameterError, paper
 
 

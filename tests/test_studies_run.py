@@ -2,15 +2,25 @@
 
 import json
 import math
+import os
+import signal
+from contextlib import nullcontext
 
 import numpy as np
 import pandas as pd
 import pytest
 from studies_example import HEAD, ROWS, write
 
-from analysis.robustness import clopper_pearson
+from analysis.robustness import (
+    clopper_pearson,
+    elementary_effects,
+    load,
+    prepare,
+    sobol_indices,
+)
 from analysis.studies import (
     RunFolderError,
+    StudyError,
     load_result,
     plan,
     read_study,
@@ -19,7 +29,9 @@ from analysis.studies import (
     run,
     run_differences,
 )
-from nlctl import ParameterError
+from analysis.studies.build import own_design
+from analysis.studies.schema import keyed
+from nlctl import ParameterError, UnknownNameError
 
 EVERY_KIND = """
 [runs]
@@ -167,6 +179,8 @@ def test_a_result_is_read_from_its_folder_without_running(result):
     content = json.loads((result.folder / "results.json").read_text(encoding="utf-8"))
     assert content["verdict"] == result.verdict
     assert [f["key"] for f in content["findings"]] == [f.key for f in result.findings]
+    with pytest.raises(UnknownNameError, match="unknown finding 'sobel'; nearest: 'sobol'"):
+        result["sobel"]
 
 
 @pytest.mark.parametrize(("part", "row"), [("", 7), ("worst-case", 3), ("compare", 11)])
@@ -219,6 +233,60 @@ def test_an_interrupted_study_goes_on_to_the_same_result(result, folder):
         run(read_study(path, ["runs.size=100"]), again, resume=True)
 
 
+def test_a_folder_is_run_by_one_process_at_a_time(folder):
+    """The second one is told who works there, and the first one goes on."""
+    file, refused = read_study(write(folder, HEAD, ROWS, name="once.toml")), []
+
+    def second(progress):
+        with pytest.raises(RunFolderError, match=f"in use by process {os.getpid()} on") as error:
+            run(file, folder / "once", resume=True)
+        refused.append(error)
+
+    assert run(file, folder / "once", threads=1, watch=lambda title: nullcontext(second)).complete
+    assert refused
+    with pytest.raises(RunFolderError, match=r"cannot write to '.*loop\.py'"):
+        run(file, folder / "loop.py")
+
+
+def test_two_names_of_one_parameter_are_a_mistake_of_the_file(folder):
+    """With its place; each by itself would be right."""
+    twice = HEAD.replace("[spec]", "rate = { uniform = [0.5, 1.5] }\n\n[spec]")
+    with pytest.raises(StudyError, match=r"space: .* got twice: \['lag\.rate'\]"):
+        read_study(write(folder, twice, ROWS, name="twice.toml"))
+
+
+THREE = f"""{ROWS}
+[[analysis]]
+kind = "morris"
+trajectories = 4
+
+[[analysis]]
+kind = "sobol"
+size = 8
+"""
+
+
+@pytest.mark.parametrize(("part", "findings"), [("rows", 0), ("morris", 2), ("sobol", 3)])
+def test_ctrl_c_in_a_last_chunk_is_not_forgotten(folder, part, findings):
+    """All rows of that part are there; what follows waits for --resume all the same."""
+    file = read_study(write(folder, HEAD, THREE, name="three.toml"))
+
+    def press(progress):
+        if progress.done == progress.total:
+            signal.raise_signal(signal.SIGINT)
+
+    found = run(
+        file, folder / part, threads=1, watch=lambda t: nullcontext(press if t == part else None)
+    )
+    assert found.interrupted
+    assert found.rows.complete
+    assert len(found.findings) == findings
+    assert found.complete == (findings == 3)
+    resumed = run(file, folder / part, resume=True)
+    assert resumed.complete
+    assert resumed.plain() == run(file, folder / f"{part}-straight").plain()
+
+
 def test_two_runs_are_compared_number_by_number(result, folder):
     """The same run has no differences; another seed has some, each with its place."""
     assert run_differences(result.folder, result.folder) == []
@@ -246,9 +314,103 @@ def test_an_analysis_that_cannot_be_made_costs_no_other(folder):
     text = ROWS + '\n[[analysis]]\nkind = "sobol"\nsize = 8\nof = "settled"\n'
     found = run(read_study(write(folder, HEAD, text, name="inf.toml")), folder / "inf", threads=1)
     assert found.complete
-    assert found["sobol"].sentence.startswith("Not answered: this analysis needs a finite value")
-    assert found["sobol"].holds is False
+    endless = np.sum(np.isinf(load(folder / "inf" / "sobol" / "rows").table["settled"]))
+    assert 0 < endless < 32
+    assert found["sobol"].sentence.startswith(
+        f"Not answered: {endless} of 32 rows have no finite 'settled': take a margin"
+    )
+    assert (found["sobol"].is_answered, found["sobol"].holds) == (False, False)
+    assert found["sobol"].runs == 32
     assert found["probability"].holds is True
+
+
+FAILING = (
+    HEAD.replace(
+        '"lag.x(0)" = { bounds = [0.5, 1.5], nominal = 1.0 }',
+        """\
+"lag.gain" = { bounds = [0.0, 4.0], nominal = 0.0 }""",
+    )
+    + """
+[[analysis]]
+kind = "sobol"
+size = 32
+of = "iae"
+
+[[analysis]]
+kind = "morris"
+trajectories = 8
+of = "iae"
+
+[[analysis]]
+kind = "sobol"
+key = "shares"
+size = 32
+of = "decays"
+
+[[analysis]]
+kind = "morris"
+key = "effects"
+trajectories = 8
+"""
+)
+
+
+@pytest.fixture(scope="module")
+def failing(folder):
+    """Sensitivity where some runs diverge: of a metric, which they lack, and of margins."""
+    file = read_study(write(folder, FAILING, name="failing.toml"))
+    return file, run(file, folder / "failing", threads=1)
+
+
+def solution(table, t):
+    """y(t) in closed form, x^-2 = g / r + (1 - g / r) exp(2 r t) from x(0) = 1; NaN if it ended."""
+    r, ratio = table["lag.rate"], table["lag.gain"] / table["lag.rate"]
+    inverse_square = ratio + (1 - ratio) * np.exp(2 * r * t)
+    return 1 / np.sqrt(inverse_square.where(inverse_square > 0))
+
+
+@pytest.mark.parametrize("key", ["sobol", "morris"])
+def test_a_metric_that_failed_rows_lack_has_no_sensitivity(failing, key):
+    """The finding says how many and what to take instead; the others are made, and stay made."""
+    file, found = failing
+    table = load(found.folder / key / "rows").table
+    failed = int(solution(table, 2.0).isna().sum())
+    assert 0 < failed < len(table)
+    assert found[key].sentence == (
+        f"Not answered: {failed} of {len(table)} rows did not reach their end and have no finite "
+        "'iae': take a margin, such as of = \"spec\", which every row has, or a space without "
+        "such rows."
+    )
+    assert (found[key].holds, found[key].runs) == (False, len(table))
+    assert found.complete
+    assert found["shares"].tables.keys() == {"indices"}
+    titles = []
+    again = run(file, found.folder, resume=True, watch=lambda t: nullcontext(titles.append(t)))
+    assert titles == []
+    assert again.plain() == found.plain()
+
+
+def test_failed_rows_count_as_the_least_margin_of_the_others(failing):
+    """Shares and effects are those of the closed form, with one number where a run ended early."""
+    file, found = failing
+    space = prepare(file.experiment).experiment.space
+    made = {"shares": ("indices", sobol_indices), "effects": ("effects", elementary_effects)}
+    for key, (name, analysis) in made.items():
+        asked = keyed(file.study)[key]
+        design = own_design(asked, space, file.study.study.seed)
+        end = solution(design.table, 2.0)
+        margin = (0.5 - np.fmax(solution(design.table, 1.0), end)) / 0.5
+        if asked.of == "spec":
+            margin = np.minimum(margin, (4 - 2 * np.fmax(end, 1.0)) / 4)
+        least = min(margin[end.notna()].min(), -1.0)
+        expected = analysis(design, margin.where(end.notna(), least))
+        pd.testing.assert_frame_equal(found[key].tables[name], expected, rtol=1e-3, atol=1e-4)
+        assert found[key].numbers["failed"] == end.isna().sum() > 0
+        assert found[key].numbers["counted_as"] == pytest.approx(least, rel=1e-4)
+        assert found[key].sentence.endswith(
+            f"{end.isna().sum()} of them did not reach their end: each counts as a margin of "
+            f"{least:.4g}, no better than any of the others."
+        )
 
 
 def test_a_plan_counts_the_runs(folder):

@@ -23,7 +23,14 @@ from .patterns import corners, grid, latin_hypercube, one_at_a_time, sobol
 from .quantity import Choice, SpaceError, Uncertain
 from .radius import Radius, robustness_radius
 from .resolve import diagrams, resolved
-from .sensitivity import elementary_effects, morris, regional, saltelli, sobol_indices
+from .sensitivity import (
+    censored,
+    elementary_effects,
+    morris,
+    regional,
+    saltelli,
+    sobol_indices,
+)
 from .sequential import SequentialTest, confidence_sequence, decide, sequence_bounds
 from .shrink import Shrunk, shrink
 from .space import Space, arguments, nominal, scaled
@@ -61,6 +68,7 @@ __all__ = [
     "always",
     "arguments",
     "boundary",
+    "censored",
     "clopper_pearson",
     "compare",
     "confidence_sequence",

@@ -2,67 +2,124 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import itertools
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
-from nlctl._errors import ParameterError, UsageError
+from nlctl._errors import ParameterError
+from nlctl._param import with_overrides
 
+from .evaluation import towards_nominal
 from .experiment import Prepared
-from .quantity import Uncertain
-from .resolve import resolved
-from .space import nominal
+from .resolve import owner_of
+from .space import Space, ends, nominal
 
 __all__ = ["largest_scale"]
 
+FEW = 10
+"""Of up to so many quantities of one block all corners are tried."""
 
-def largest_scale(prepared: Prepared, at_most: float = 4.0) -> tuple[float, str]:
+
+def largest_scale(
+    prepared: Prepared, at_most: float = 4.0, names: Collection[str] | None = None
+) -> tuple[float, str]:
     """Return how far the boxes may be scaled before the loop refuses a value, and why.
+
+    A block refuses its own parameters only, but several of them together: a backlash needs
+    c_l < c_r.  So the corners of each block's own box are tried.  Where these are admissible,
+    everything between them is: the rules of nlctl's blocks are linear, or say that a polynomial is
+    Hurwitz (Kharitonov's theorem).  Of a block with more than 10 quantities only each end by
+    itself and the corners of each pair are tried, the others nominal: a rule about three may then
+    refuse a row later.
 
     Parameters
     ----------
     prepared : Prepared
     at_most : float, optional
         Larger factors are not tried.
+    names : collection of str, optional
+        Quantities that are scaled, the others nominal; all by default.
 
     Returns
     -------
     factor : float
-        To 10 digits; every value of the scaled boxes is taken.
+        To 10 digits; nothing that is tried is refused at this factor.
     reason : str
-        Of the first refusal at `at_most`; empty if that is admissible.
+        Of the refusal that ends the sizes; empty if `at_most` is admissible.
 
     Raises
     ------
     ParameterError
-        If `at_most` is no finite number > 0.
+        If `at_most` is no finite number > 0, or the nominal values themselves are refused.
     """
     if not 0 < at_most < np.inf:
         raise ParameterError(f"a largest scale needs a finite at_most > 0, got {at_most}")
-    reason = _refusal(prepared, at_most)
-    if not reason:
-        return float(at_most), ""
-    low, high = 0.0, float(at_most)
+    space, factor, why = prepared.experiment.space, float(at_most), ""
+    tries = [
+        partial(part.refusal, space, corner)
+        for part in _parts(prepared, space.names if names is None else names)
+        for corner in _corners(space, list(part.fields))
+    ]
+    while (refusal := next((one for one in tries if one(factor)), None)) is not None:
+        why = f"since at {factor:.4g} {refusal(factor)}"
+        factor = _largest(refusal, factor)
+    return factor, why and f"Sizes end at {factor:.4g} {why}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Part:
+    """A block's record at the nominal values, and fields of it by the names of quantities."""
+
+    record: Any
+    path: str
+    fields: Mapping[str, str]
+
+    def refusal(self, space: Space, corner: Mapping[str, Any], factor: float) -> str:
+        """Return why the block refuses a corner moved by a factor from nominal, or nothing."""
+        row = towards_nominal(space, corner, factor, corner)
+        try:
+            with_overrides(self.record, {self.fields[name]: row[name] for name in row}, self.path)
+        except ParameterError as error:
+            return str(error)
+        return ""
+
+
+def _parts(prepared: Prepared, names: Collection[str]) -> Iterator[_Part]:
+    """Yield every block of every loop with parameters that are uncertain; `names` may be scaled."""
+    space = prepared.experiment.space
+    middle = nominal(space)
+    for _, loop in prepared.loops:
+        places, fields = {}, {}
+        for quantity in space.quantities:
+            owner = None if quantity.is_initial else owner_of(loop.system, quantity.name)
+            if owner is not None:  # a foreign block takes what it is given
+                place, key = owner
+                places[place.path] = place
+                fields.setdefault(place.path, {})[quantity.name] = key
+        for path, keys in fields.items():
+            given = {key: middle[name] for name, key in keys.items()}
+            record = with_overrides(places[path].system.current_spec, given, path)
+            scaled = {name: key for name, key in keys.items() if name in names}
+            yield _Part(record=record, path=path, fields=scaled)
+
+
+def _corners(space: Space, names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Yield what is tried of some quantities: those that are not nominal, each at an end."""
+    values = ends(space).to_dict("list")
+    sizes = [len(names)] if len(names) <= FEW else [1, 2]
+    for group in itertools.chain(*(itertools.combinations(names, size) for size in sizes)):
+        for corner in itertools.product(*(values[name] for name in group)):
+            yield dict(zip(group, corner, strict=True))
+
+
+def _largest(refusal: Callable[[float], str], refused: float) -> float:
+    """Return the largest factor below a refused one that is not, by bisection from 0."""
+    low, high = 0.0, refused
     while high - low > 1e-10 * high:
         middle = (low + high) / 2
-        low, high = (low, middle) if _refusal(prepared, middle) else (middle, high)
-    return low, f"Sizes end at {low:.4g} since at {at_most:.4g} {reason}"
-
-
-def _refusal(prepared: Prepared, factor: float) -> str:
-    """Return why a loop refuses an end of the scaled boxes, or nothing."""
-    space = prepared.experiment.space
-    factor *= space.scale
-
-    def ends(quantity: Uncertain, middle: float) -> tuple[float, float]:
-        low, high = quantity.box
-        return middle + factor * (low - middle), middle + factor * (high - middle)
-
-    middle = nominal(space)
-    quantities = tuple(replace(q, bounds=ends(q, middle[q.name])) for q in space.quantities)
-    try:
-        for _, loop in prepared.loops:
-            resolved(replace(space, quantities=quantities, scale=1.0), loop)
-    except UsageError as error:
-        return str(error)
-    return ""
+        low, high = (low, middle) if refusal(middle) else (middle, high)
+    return low

@@ -72,16 +72,16 @@ class Radius:
         return sum(self.steps["runs"].tolist())
 
     def __str__(self) -> str:
+        searched = f"the size {self.searched:.4g}"
         if self.witness is None:
-            found = f"No violation was found up to the size {self.largest:.4g}"
+            text = [f"No violation was found up to {searched}, which proves nothing."]
         else:
-            found = (
+            text = [
                 f"The robustness radius is at most {self.upper:.4g}: {row_text(self.witness)} "
-                f"violates the spec (margin {self.margin:.4g})"
-            )
-        text = [found + "."]
-        if self.searched:
-            text += [f"A search at the size {self.searched:.4g} found none, which proves nothing."]
+                f"violates the spec (margin {self.margin:.4g})."
+            ]
+            if self.searched:
+                text += [f"A search at {searched} found none, which proves nothing."]
         if self.statement:
             text += [f"Draws of that size: {self.statement}"]
         return " ".join([*text, *(f"{note}." for note in self.notes)])

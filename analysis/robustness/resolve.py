@@ -6,13 +6,14 @@ import inspect
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import control as ct
 import numpy as np
 
 from nlctl._block import Block
-from nlctl._diagram import all_parameter_rows, initial_state, leaves, state_names
+from nlctl._diagram import Place, all_parameter_rows, initial_state, leaves, state_names
 from nlctl._errors import UsageError
 from nlctl._names import Parameters, base_name, find_name, unknown
 from nlctl._param import with_overrides
@@ -21,7 +22,7 @@ from nlctl.native import Compiled
 from .quantity import SpaceError, Uncertain
 from .space import Space, combinations
 
-__all__ = ["diagrams", "resolved"]
+__all__ = ["check_keyword", "diagrams", "owner_of", "resolved"]
 
 
 def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
@@ -60,13 +61,12 @@ def _parameter(quantity: Uncertain, system: Any) -> Uncertain:
     full = find_name("parameter", base, dict(known) | rows, clashes)
     suffix = quantity.name[len(base) :]
     value, unit = (rows[full].value, rows[full].unit) if full in rows else (known[full], "")
-    for leaf in leaves(system):
-        if isinstance(leaf.system, Block) and full.rpartition(".")[0] == leaf.parameter_path:
-            key = full.rpartition(".")[2] + suffix
-            for end in quantity.box:
-                number = int(end) if quantity.is_whole else end
-                with_overrides(leaf.system.current_spec, {key: number}, leaf.path)
-            _check_whole(quantity, full in rows and isinstance(value, int))
+    owner = owner_of(system, full + suffix)
+    if owner is not None:
+        leaf, key = owner
+        for end in map(np.rint, quantity.box) if quantity.is_whole else quantity.box:
+            with_overrides(leaf.system.current_spec, {key: end}, leaf.path)
+        _check_whole(quantity, full in rows and isinstance(value, int))
     if suffix:
         value = np.asarray(value)[tuple(int(k) for k in re.findall(r"\d+", suffix))]
     if np.ndim(value):
@@ -75,6 +75,26 @@ def _parameter(quantity: Uncertain, system: Any) -> Uncertain:
             f"'{full}[{', '.join('0' * np.ndim(value))}]'"
         )
     return _filled(quantity, full + suffix, float(value), unit)
+
+
+def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Place, str] | None:
+    """Return the block of nlctl that a parameter belongs to, and its name there.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+    name : str
+        In full, ``"controller.lambdas[0]"``.
+
+    Returns
+    -------
+    (place, ``"lambdas[0]"``), or None for a parameter of a foreign block
+    """
+    path = base_name(name).rpartition(".")[0]
+    for leaf in leaves(system):
+        if isinstance(leaf.system, Block) and leaf.parameter_path == path:
+            return leaf, name.removeprefix(f"{path}.")
+    return None
 
 
 def _check_whole(quantity: Uncertain, wanted: bool) -> None:
@@ -91,6 +111,21 @@ def _filled(quantity: Uncertain, name: str, value: float, unit: str) -> Uncertai
         return replace(quantity, name=name, nominal=number, unit=quantity.unit or unit)
     except SpaceError as error:
         raise SpaceError(f"{error}, which is the diagram's: give a nominal value") from None
+
+
+def check_keyword(function: Callable[..., Any], name: str) -> None:
+    """Refuse a keyword that a function does not take.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest ones.
+    """
+    known = inspect.signature(function).parameters
+    if name not in known and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
+        plain = function.func if isinstance(function, partial) else function
+        where = getattr(plain, "__qualname__", "")
+        raise unknown("keyword", name, known, where and f"of {where}")
 
 
 def diagrams(
@@ -115,12 +150,8 @@ def diagrams(
     UsageError
         As in `resolved`; the message names the combination.
     """
-    keywords = inspect.signature(build).parameters
-    takes_any = any(p.kind is inspect.Parameter.VAR_KEYWORD for p in keywords.values())
     for choice in space.choices:
-        if choice.name not in keywords and not takes_any:
-            where = f"of {getattr(build, '__name__', build)}"
-            raise unknown("keyword", choice.name, keywords, where)
+        check_keyword(build, choice.name)
     options = {choice.name: choice.options for choice in space.choices}
     built = []
     for labels in combinations(space):

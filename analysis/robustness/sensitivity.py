@@ -17,8 +17,39 @@ from .guarantee import Margins, checked_confidence
 from .multiplicity import holm
 from .patterns import sobol_points
 from .space import Space, boxed, sampled
+from .spec import FAILED
 
-__all__ = ["elementary_effects", "morris", "regional", "saltelli", "sobol_indices"]
+__all__ = ["censored", "elementary_effects", "morris", "regional", "saltelli", "sobol_indices"]
+
+
+def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
+    """Return margins with one number for all failed runs, for effects and shares of a variance.
+
+    The margin of a run that did not reach its end is graded for searches, a million times the
+    others (`spec.unfinished_margin`): it would be the whole variance.  What such a run tells is
+    that its margin is no better than those of the runs that did, so it counts as the least of
+    these, and at most as -1, beyond the bound by the bound itself.  The others stay as they are.
+
+    Returns
+    -------
+    values : ndarray
+    failed : int
+        Number of rows that count as `least`.
+    least : float
+
+    Raises
+    ------
+    ParameterError
+        If no run reached its end.
+    """
+    values = np.array(margins, dtype=float)
+    ended = values > -FAILED  # not of NaN
+    if not ended.any():
+        raise ParameterError(
+            f"none of {values.size} rows reached its end, so that their margins tell nothing apart"
+        )
+    least = min(float(values[ended].min()), -1.0)
+    return np.where(ended, values, least), int(np.sum(~ended)), least
 
 
 def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None = None) -> Design:
@@ -75,7 +106,7 @@ def elementary_effects(
     design : Design
         From `morris`.
     values : sequence of length ``design.size``
-        The response of every row.
+        The response of every row; margins where runs failed: see `censored`.
     confidence : float, optional
         Of the bootstrap interval (percentiles, trajectories resampled) of mu_star.
 
@@ -158,7 +189,7 @@ def sobol_indices(
     design : Design
         From `saltelli`.
     values : sequence of length ``design.size``
-        The response of every row.
+        The response of every row; margins where runs failed: see `censored`.
     confidence : float, optional
         Of the bootstrap intervals (percentiles; rows of all sets resampled together).
     resamples : int, optional

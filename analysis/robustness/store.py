@@ -3,7 +3,7 @@
 study.json        what is run, see `identity`
 chunks/000000000-000000999.parquet
                   rows 0 to 999; the file exists only when it is whole
-.lock             held by the operating system for the process that works here
+.lock, .owner     held by the operating system for the process that works here; which that is
 """
 
 from __future__ import annotations
@@ -31,7 +31,17 @@ from nlctl._files import replace_file
 from .columns import Columns, typed
 from .identity import differences_of
 
-__all__ = ["Store", "StoreError", "claimed", "opened", "put", "stored", "table_of", "taken_up"]
+__all__ = [
+    "Store",
+    "StoreError",
+    "claimed",
+    "locked",
+    "opened",
+    "put",
+    "stored",
+    "table_of",
+    "taken_up",
+]
 
 
 class StoreError(UsageError):
@@ -67,46 +77,67 @@ class Store:
 
 
 @contextmanager
-def claimed(store: Store, *, resume: bool = False) -> Iterator[None]:
-    """Hold a folder for this process alone, with the study's identity in it.
+def locked(folder: Path, error: type[UsageError] = StoreError) -> Iterator[None]:
+    """Hold a folder for this process alone; it is made where there is none.
 
     The lock is the operating system's: it ends with the process, however that ends.
+
+    Parameters
+    ----------
+    folder : Path
+    error : type, optional
+        Class of what is raised.
+
+    Raises
+    ------
+    UsageError
+        If the folder cannot be written, or another process works in it.
+    """
+    owner, lock = folder / ".owner", FileLock(folder / ".lock", timeout=0)
+    me = f"process {os.getpid()} on {socket.gethostname()}".encode()
+    try:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            lock.acquire()
+            replace_file(owner, lambda file: file.write(me))
+        except Timeout:
+            raise error(
+                f"'{folder}' is in use by {_text(owner) or 'another process'}: wait until it "
+                "ends, or take another folder"
+            ) from None
+        except OSError as reason:
+            raise error(f"cannot write to '{folder}': {reason.strerror or reason}") from reason
+        yield
+    finally:
+        lock.release()  # does nothing where it is not held
+
+
+def _text(path: Path) -> str:
+    """Return what a file holds; nothing if it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError:
+        return ""
+
+
+@contextmanager
+def claimed(store: Store, *, resume: bool = False) -> Iterator[None]:
+    """Hold a folder for this process alone, with the study's identity in it.
 
     Raises
     ------
     StoreError
-        If the folder cannot be written, another process works in it, it holds chunks and `resume`
-        is False, or it belongs to another study; the message says what differs.
+        As in `locked`, or if the folder holds chunks and `resume` is False, or belongs to another
+        study; the message says what differs.
     """
-    try:
-        store.chunks.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(store.folder / ".lock", timeout=0)
-        lock.acquire()
-    except Timeout:
-        raise StoreError(
-            f"'{store.folder}' is in use by {_owner(store)}: wait until it ends, or take another "
-            "folder"
-        ) from None
-    except OSError as error:
-        raise StoreError(f"cannot write to '{store.folder}': {error.strerror or error}") from error
-    try:
-        _write(store, ".owner", f"process {os.getpid()} on {socket.gethostname()}".encode())
+    with locked(store.folder):
         _identify(store, resume)
         yield
-    finally:
-        lock.release()
-
-
-def _owner(store: Store) -> str:
-    try:
-        return (store.folder / ".owner").read_text(encoding="utf-8")
-    except OSError:
-        return "another process"
 
 
 def _identify(store: Store, resume: bool) -> None:
     """Write who a folder belongs to, or compare."""
-    path, begun = store.folder / "study.json", bool(_ranges(store))
+    begun = bool(_ranges(store))
     if begun and not resume:
         raise StoreError(
             f"'{store.folder}' holds rows of a study already: continue it with resume=True "
@@ -122,7 +153,7 @@ def _identify(store: Store, resume: bool) -> None:
             )
         return
     content = {"format": 1, "identity": store.identity, "columns": store.columns}
-    _write(store, path.name, json.dumps(content, indent=1).encode())
+    _write(store, store.folder / "study.json", json.dumps(content, indent=1).encode())
 
 
 def opened(folder: str | os.PathLike[str]) -> Store:
@@ -141,8 +172,8 @@ def opened(folder: str | os.PathLike[str]) -> Store:
         raise StoreError(f"'{path}' is no study of a sweep: {error}") from error
 
 
-def _write(store: Store, name: str, content: bytes | memoryview) -> None:
-    """Write a file in one step, and not before it is on the disk."""
+def _write(store: Store, path: Path, content: bytes | memoryview) -> None:
+    """Write a file of a store in one step, and return when it is on the disk."""
 
     def write(file: Any) -> None:
         file.write(content)
@@ -150,12 +181,12 @@ def _write(store: Store, name: str, content: bytes | memoryview) -> None:
         os.fsync(file.fileno())
 
     try:
-        replace_file(store.folder / name, write)
+        path.parent.mkdir(exist_ok=True)
+        replace_file(path, write)
     except OSError as error:
-        kept = sum(map(len, _ranges(store)))
         raise StoreError(
-            f"cannot write '{store.folder / name}': {error.strerror or error}. {kept} of "
-            f"{store.size} rows are kept there; make room and continue with resume=True (--resume)"
+            f"cannot write '{path}': {error.strerror or error}. {stored(store)} of {store.size} "
+            "rows are kept there; make room and continue with resume=True (--resume)"
         ) from error
 
 
@@ -174,9 +205,8 @@ def put(store: Store, frame: pd.DataFrame) -> None:
     pq.write_table(
         pa.table(arrays), sink, compression="zstd", use_dictionary=labels, write_page_checksum=True
     )
-    first, last = frame.index[0], frame.index[-1]
-    name = f"chunks/{first:09d}-{last:09d}.parquet"
-    _write(store, name, memoryview(sink.getvalue()))
+    numbers = range(frame.index[0], frame.index[-1] + 1)
+    _write(store, _path(store, numbers), memoryview(sink.getvalue()))
 
 
 def _ranges(store: Store) -> list[range]:
@@ -208,8 +238,13 @@ def taken_up(store: Store) -> Iterator[tuple[range, np.ndarray | str]]:
     (range, message)
         Rows of a chunk that is damaged: its file has been renamed.
     """
-    for left in (*store.folder.glob(".*.json.*"), *store.chunks.glob(".*.parquet.*")):
-        left.unlink(missing_ok=True)
+    for place, pattern in (
+        (store.folder, "..owner.*"),
+        (store.folder, ".*.json.*"),
+        (store.chunks, ".*.parquet.*"),
+    ):
+        for left in place.glob(pattern):
+            left.unlink(missing_ok=True)
     end = 0
     for numbers in _ranges(store):
         path = _path(store, numbers)

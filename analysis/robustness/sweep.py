@@ -51,7 +51,7 @@ class Sweep:
     decided : object
         What ended the sweep early, see `sweep`; None if nothing did.
     interrupted : bool
-        Whether Ctrl-C ended it.
+        Whether Ctrl-C was pressed; in the last chunk that leaves it complete.
     notes : tuple of str
         What the user has to know: damaged chunks that were run again, lost workers.
     """
@@ -138,7 +138,7 @@ def sweep(
     Returns
     -------
     Sweep
-        Incomplete after Ctrl-C, an early stop, or if worker processes were lost.
+        Incomplete after Ctrl-C before the last chunk, an early stop, or if workers were lost.
 
     Raises
     ------

@@ -63,7 +63,7 @@ class Morris(Asked):
     kind: Literal["morris"]
     trajectories: Whole = Field(20, ge=2)
     levels: Whole = Field(4, ge=2)
-    of: str = Field("spec", description="Column of the table: a margin, or a metric.")
+    of: str = Field("spec", description="Column: a margin, or a metric that every row has.")
 
 
 class Sobol(Asked):
@@ -72,7 +72,7 @@ class Sobol(Asked):
     kind: Literal["sobol"]
     size: Whole = Field(ge=2, description="A power of 2; it takes size (quantities + 2) rows.")
     confidence: Confidence = 0.95
-    of: str = Field("spec", description="Column of the table: a margin, or a metric.")
+    of: str = Field("spec", description="Column: a margin, or a metric that every row has.")
 
 
 class Regional(Asked):

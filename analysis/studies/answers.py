@@ -16,8 +16,10 @@ from analysis.robustness import (
     sobol_indices,
     violation_probability,
 )
+from analysis.robustness.sensitivity import censored
 from analysis.robustness.sweep import Sweep
-from nlctl._errors import UsageError
+from nlctl._errors import ParameterError, UsageError
+from nlctl.native import Status
 
 from .analyses import Morris, Probability, Regional, Sequential, Sobol
 from .build import own_design
@@ -50,9 +52,16 @@ def answer(key: str, asked: Any, ground: Ground) -> Finding | None:
     return _headed(key, asked, found)
 
 
-def unanswered(key: str, asked: Any, error: UsageError) -> Finding:
-    """Return what stands in the place of an analysis that the rows or the loop do not admit."""
-    found = made(asked, f"Not answered: {error}.", claim="the analysis can be made", holds=False)
+def unanswered(key: str, asked: Any, error: UsageError, runs: int = 0) -> Finding:
+    """Return what stands in the place of an analysis that its `runs` or the loop do not admit."""
+    found = made(
+        asked,
+        f"Not answered: {error}.",
+        claim="the analysis can be made",
+        holds=False,
+        runs=runs,
+        is_answered=False,
+    )
     return _headed(key, asked, found)
 
 
@@ -91,14 +100,15 @@ def _morris(asked: Morris, ground: Ground) -> Finding | None:
     design, done = _own_rows(asked, ground)
     if not done.complete:
         return None
-    table = elementary_effects(design, column(done, asked.of))
+    values, failed, numbers = _response(asked.of, ground, done)
+    table = elementary_effects(design, values)
     order = ", ".join(table.nlargest(3, "mu_star").index)
     return made(
         asked,
         f"Largest mean effects on '{asked.of}': {order} ({done.done} runs of a Morris design, "
-        f"which screens and proves nothing{_failed(done)}).",
+        f"which screens and proves nothing).{failed}",
         runs=done.done,
-        numbers={"of": asked.of, "trajectories": asked.trajectories},
+        numbers={"of": asked.of, "trajectories": asked.trajectories, **numbers},
         tables={"effects": table},
     )
 
@@ -107,16 +117,17 @@ def _sobol(asked: Sobol, ground: Ground) -> Finding | None:
     design, done = _own_rows(asked, ground)
     if not done.complete:
         return None
-    table = sobol_indices(design, column(done, asked.of), asked.confidence)
+    values, failed, numbers = _response(asked.of, ground, done)
+    table = sobol_indices(design, values, asked.confidence)
     largest = table.nlargest(3, "ST")["ST"].to_dict()
     told = ", ".join(f"{name} ({share:.0%})" for name, share in largest.items())
     return made(
         asked,
         f"Largest shares of the variance of '{asked.of}', interactions included: {told} "
-        f"({done.done} runs{_failed(done)}; intervals by bootstrap with confidence "
-        f"{100 * asked.confidence:g} % each).",
+        f"({done.done} runs; intervals by bootstrap with confidence {100 * asked.confidence:g} % "
+        f"each).{failed}",
         runs=done.done,
-        numbers={"of": asked.of, "confidence": asked.confidence},
+        numbers={"of": asked.of, "confidence": asked.confidence, **numbers},
         tables={"indices": table},
     )
 
@@ -128,10 +139,31 @@ def _own_rows(asked: Any, ground: Ground) -> tuple[Design, Sweep]:
     return design, ground.run_design(design)
 
 
-def _failed(done: Sweep) -> str:
-    """Say how many rows did not reach their end: their margins are graded, far below others."""
-    count = np.count_nonzero(column(done, "status") != "OK")
-    return f", {count} of which did not reach their end" if count else ""
+def _response(of: str, ground: Ground, done: Sweep) -> tuple[np.ndarray, str, dict[str, Any]]:
+    """Return the column that a sensitivity is of, and how failed rows count: text and numbers.
+
+    Raises
+    ------
+    ParameterError
+        If it is a metric that some rows do not have, or no row reached its end.
+    """
+    values = column(done, of)
+    if of in ("spec", *(r.key for r in ground.prepared.experiment.spec.requirements)):
+        values, failed, least = censored(values)
+        if not failed:
+            return values, "", {}
+        text = f" {failed} of them did not reach their end: each counts as a margin of {least:.4g}"
+        text += ", no better than any of the others."
+        return values, text, {"failed": failed, "counted_as": least}
+    lacking = int(np.count_nonzero(~np.isfinite(values)))
+    if lacking:
+        failed = int(np.count_nonzero(column(done, "status") != Status.OK.name))
+        why = "did not reach their end and have" if failed else "have"
+        raise ParameterError(
+            f"{failed or lacking} of {done.done} rows {why} no finite '{of}': take a margin, such "
+            'as of = "spec", which every row has, or a space without such rows'
+        )
+    return values, "", {}
 
 
 def _regional(asked: Regional, ground: Ground) -> Finding:

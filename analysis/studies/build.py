@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import control as ct
 import numpy as np
 
 from analysis.metrics import Metric
@@ -40,6 +41,7 @@ from .schema import Choices, Rows, Study
 __all__ = [
     "choice",
     "experiment",
+    "inputs_of",
     "labels",
     "loop",
     "main_design",
@@ -174,7 +176,35 @@ def _metric(value: Any, folder: Path) -> Metric:
     return made
 
 
-def experiment(study: Study, folder: Path, signals: frozenset[str]) -> Experiment:
+def inputs_of(study: Study, diagrams: Iterable[ct.InputOutputSystem]) -> tuple[float, ...]:
+    """Return the value of each input of the diagrams, in their order.
+
+    Raises
+    ------
+    UsageError
+        If the study names an input that a diagram lacks, or leaves one out, or the order differs.
+    """
+    labels = [list(diagram.input_labels) for diagram in diagrams]
+    for known in labels:
+        for name in study.inputs:
+            if name not in known:
+                raise unknown("input", name, known)
+        for name in known:
+            if name not in study.inputs:
+                raise ParameterError(
+                    f"the loop's input '{name}' is fed by nothing: give its value under [inputs], "
+                    "or feed it by a block of the loop, such as a reference"
+                )
+        if known != labels[0]:
+            raise ParameterError(
+                f"every option needs its inputs in the same order, got {labels[0]} and {known}"
+            )
+    return tuple(study.inputs[name] for name in labels[0])
+
+
+def experiment(
+    study: Study, folder: Path, signals: frozenset[str], inputs: Sequence[float] = ()
+) -> Experiment:
     """Return what is simulated for each row.
 
     Parameters
@@ -184,6 +214,8 @@ def experiment(study: Study, folder: Path, signals: frozenset[str]) -> Experimen
         Of the study file.
     signals : frozenset of str
         Outputs that all diagrams of the study have.
+    inputs : sequence of float, optional
+        Values of their inputs, see `inputs_of`.
 
     Raises
     ------
@@ -195,11 +227,13 @@ def experiment(study: Study, folder: Path, signals: frozenset[str]) -> Experimen
         quantities=tuple(uncertain(name, law) for name, law in study.space.items()),
         choices=tuple(choice(name, c, build, folder) for name, c in study.choices.items()),
     )
+    timepts = times(study)
     return Experiment(
         space=space,
         build=build,
         spec=Spec(requirements=tuple(requirement(study, key) for key in study.spec)),
-        timepts=times(study),
+        timepts=timepts,
+        inputs=np.tile(np.array(inputs)[:, None], len(timepts)) if inputs else 0.0,
         metrics=metrics_of(study, folder, signals),
         **study.solver.model_dump(),
     )

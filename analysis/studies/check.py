@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,6 +12,7 @@ import control as ct
 from analysis.metrics import Metric
 from analysis.robustness import Experiment, Requirement, Space, Uncertain, resolved
 from analysis.robustness.guarantee import check_iid
+from analysis.robustness.resolve import check_keyword
 from analysis.robustness.space import combinations
 from nlctl._errors import UsageError
 from nlctl._names import unknown
@@ -22,6 +22,7 @@ from .build import (
     SIGNALS,
     choice,
     experiment,
+    inputs_of,
     loop,
     main_design,
     metrics_of,
@@ -30,11 +31,11 @@ from .build import (
     times,
 )
 from .comparison import alternatives, widened
-from .parts import check_keyword, loop_function, option, uncertain
+from .parts import loop_function, option, uncertain
 from .problems import Place, Problem
 from .schema import Study
 
-__all__ = ["bound", "keyed"]
+__all__ = ["bound"]
 
 T = TypeVar("T")
 NEED_ROWS = ("probability", "sequential", "regional")
@@ -79,10 +80,11 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
     for diagram in diagrams:
         _check_names(study, diagram, quantities, requirements, notes)
     metrics = notes.attempt(("metrics",), metrics_of, study, folder, signals) if diagrams else None
+    inputs = notes.attempt(("inputs",), inputs_of, study, diagrams) if diagrams else None
     _check_analyses(study, metrics, notes)
     if notes.problems or not diagrams:
         return None, _unique(notes.problems)
-    made = notes.attempt((), experiment, study, folder, signals)
+    made = notes.attempt((), experiment, study, folder, signals, inputs or ())
     if made is not None:
         _check_designs(study, made, diagrams[0], folder, notes)
     return made, _unique(notes.problems)
@@ -112,7 +114,7 @@ def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputS
     build = loop(study, folder)
     made = []
     for name, asked in study.choices.items():
-        notes.attempt(("choices", name), check_keyword, build.func, name)
+        notes.attempt(("choices", name), check_keyword, build, name)
         found = notes.attempt(("choices", name), choice, name, asked, build, folder)
         made += [] if found is None else [found]
     if len(notes.problems) > before:
@@ -136,9 +138,8 @@ def _check_names(
 ) -> None:
     for name, quantity in quantities.items():
         if quantity is not None:
-            notes.attempt(
-                ("space", name), resolved, Space(quantities=(quantity,)), diagram
-            )  # fmt: skip
+            alone = Space(quantities=(quantity,))
+            notes.attempt(("space", name), resolved, alone, diagram)
     for asked in requirements:
         for signal in asked.signals:
             if signal not in diagram.output_labels:
@@ -148,20 +149,6 @@ def _check_names(
         signal = getattr(study.metrics, key, None)
         if signal and signal not in diagram.output_labels:
             notes.add(("metrics", key), str(unknown("signal", signal, diagram.output_labels)))
-
-
-def keyed(study: Study) -> dict[str, Any]:
-    """Return the analyses by key: their own, or their kind, numbered where it is not alone."""
-    named: dict[str, Any] = {}
-    taken = {asked.key for asked in study.analysis}
-    for asked in study.analysis:
-        plain = asked.kind.replace(" ", "-")
-        key = asked.key or plain
-        numbers = itertools.count(2)
-        while key in named or (key in taken and not asked.key):
-            key = f"{plain}-{next(numbers)}"
-        named[key] = asked
-    return named
 
 
 def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Notes) -> None:
@@ -186,7 +173,9 @@ def _check_designs(
     study: Study, made: Experiment, diagram: ct.InputOutputSystem, folder: Path, notes: _Notes
 ) -> None:
     """Make every design that is known in advance, and hold the analyses against it."""
-    space, main = resolved(made.space, diagram), None
+    space, main = notes.attempt(("space",), resolved, made.space, diagram), None
+    if space is None:
+        return
     if study.runs is not None:
         main = notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
     for i, asked in enumerate(study.analysis):

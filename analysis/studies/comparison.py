@@ -22,7 +22,7 @@ from nlctl._errors import ParameterError
 from nlctl._names import unknown
 
 from .analyses import Compare
-from .build import choice, metrics_of
+from .build import choice, inputs_of, metrics_of
 from .ground import Ground, made
 from .parts import option
 from .result import Finding
@@ -48,11 +48,13 @@ def alternatives(asked: Compare, build: Callable[..., Any], folder: Path) -> Cho
             )
         every = Choice(name=asked.keyword, options=options)
     else:
-        every = choice(asked.keyword, Choices(options=asked.options), build, folder)  # type: ignore[call-arg]
+        choices = Choices.model_validate({"options": asked.options})
+        every = choice(asked.keyword, choices, build, folder)
     labels = asked.only or tuple(every.options)
-    for label in (*labels, *(asked.better or ())):
-        if label not in (every.options if label in labels else labels):
-            raise unknown("option", label, labels if label not in labels else every.options)
+    for named, known in ((labels, every.options), (asked.better or (), labels)):
+        for label in named:
+            if label not in known:
+                raise unknown("option", label, known)
     return Choice(name=asked.keyword, options={label: every.options[label] for label in labels})
 
 
@@ -72,6 +74,7 @@ def widened(
     others = tuple(c for c in experiment.space.choices if c.name != options.name)
     space = Space(quantities=experiment.space.quantities, choices=(*others, options))
     built = diagrams(space, experiment.build)
+    inputs_of(study, [diagram for _, diagram in built])
     signals = frozenset.intersection(*(frozenset(d.output_labels) for _, d in built))
     counting = {r.key: r for r in experiment.spec.requirements}
     for key in asked.requirements:

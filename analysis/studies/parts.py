@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import importlib
 import importlib.util
-import inspect
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,28 +14,30 @@ import cloudpickle
 from scipy import stats
 
 from analysis.robustness import Uncertain
-from nlctl import actuators, controllers, paper, plants, references
-from nlctl._errors import ParameterError, UsageError
+from analysis.robustness.resolve import check_keyword
+from nlctl._catalogue import block_records
+from nlctl._errors import ParameterError, UnknownNameError, UsageError
 from nlctl._names import unknown
+from nlctl.paper import named_example
 
 from .schema import Law
 
-__all__ = ["DEFAULT", "check_keyword", "loop_function", "named_function", "option", "uncertain"]
+__all__ = ["DEFAULT", "loop_function", "named_function", "option", "uncertain"]
 
 DEFAULT = "default"
 """The option that leaves a keyword of the loop as it is."""
 
-EXAMPLES = {"example-1": paper.example_1, "example-2": paper.example_2}
-
 
 def loop_function(name: str, folder: Path) -> Callable[..., Any]:
-    """Return the function that builds the loop, see `named_function`."""
-    if ":" not in name and name not in EXAMPLES:
-        error = unknown("example", name, EXAMPLES)
+    """Return the function that builds the loop, see `paper.named_example`, `named_function`."""
+    if ":" in name:
+        return named_function(name, folder)
+    try:
+        return named_example(name)
+    except UnknownNameError as error:
         raise ParameterError(
             f"{error}; a loop of your own is 'path/to/file.py:function' or 'module:function'"
-        )
-    return EXAMPLES[name] if name in EXAMPLES else named_function(name, folder)
+        ) from None
 
 
 def named_function(name: str, folder: Path) -> Callable[..., Any]:
@@ -88,20 +88,6 @@ def _from_module(name: str) -> Any:
         raise ParameterError(f"there is no module '{name}' ({error})") from None
 
 
-def check_keyword(function: Callable[..., Any], name: str) -> None:
-    """Refuse a keyword that a function does not take.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest ones.
-    """
-    known = inspect.signature(function).parameters
-    if name not in known and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
-        where = getattr(function, "__qualname__", "")
-        raise unknown("keyword", name, known, where and f"of {where}")
-
-
 def option(value: Any, folder: Path) -> Any:
     """Make what a table of the file describes; numbers and texts stay what they are.
 
@@ -128,23 +114,13 @@ def option(value: Any, folder: Path) -> Any:
             f"got the keys {sorted(value)}"
         )
     arguments = {key: option(part, folder) for key, part in value.items()}
-    name = arguments.pop("block", None)
-    made = named_function(arguments.pop("function"), folder) if name is None else _block(name)
+    name, records = arguments.pop("block", None), block_records()
+    if name is not None and name not in records:
+        raise unknown("block", str(name), records)
+    made = named_function(arguments.pop("function"), folder) if name is None else records[name]
     for key in arguments:
         check_keyword(made, key)
     return made(**arguments)
-
-
-def _block(name: Any) -> Any:
-    records = {
-        key: thing
-        for module in (plants, actuators, references, controllers)
-        for key in module.__all__
-        if dataclasses.is_dataclass(thing := getattr(module, key))
-    }
-    if name not in records:
-        raise unknown("block", str(name), records)
-    return records[name]
 
 
 def uncertain(name: str, law: Law) -> Uncertain:

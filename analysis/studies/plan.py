@@ -13,9 +13,9 @@ from analysis.robustness.columns import columns_of
 
 from .analyses import Compare, Degradation, Map, Morris, Radius, Sobol, WorstCase
 from .build import main_design, own_design
-from .check import keyed
 from .comparison import alternatives
 from .read import StudyFile
+from .schema import keyed
 
 __all__ = ["Plan", "plan"]
 

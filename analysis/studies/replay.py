@@ -12,18 +12,18 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.figures import BLUE, ORANGE, TIME
-from analysis.robustness import Experiment, Prepared, arguments, evaluate, prepare
+from analysis.robustness import Experiment, Prepared, evaluate, prepare
+from analysis.robustness.experiment import by_diagram, simulate
 from analysis.robustness.formula import Band, parts_of
 from analysis.robustness.sweep import load
 from nlctl._errors import ParameterError
-from nlctl.native import ensemble_response
 
 from .analyses import Compare
-from .check import keyed
 from .comparison import alternatives, widened
 from .plain import RunFolderError, as_json
 from .read import StudyFile
 from .run import rerun_file
+from .schema import keyed
 
 __all__ = ["Replay", "replay", "replay_figure"]
 
@@ -100,7 +100,6 @@ def replay(folder: Path, row: int, part: str = "") -> Replay:
         raise ParameterError(f"row {row} {where} is not there: it has {len(table)} rows")
     prepared = prepare(_experiment(file, part))
     chosen = table.loc[[row], prepared.experiment.space.names]
-    chosen = chosen.astype({c.name: str for c in prepared.experiment.space.choices})
     stored = table.loc[row].to_dict()
     again = evaluate(prepared, chosen).iloc[0].to_dict()
     time, signals = _signals(prepared, chosen)
@@ -142,22 +141,8 @@ def _same(one: Any, other: Any) -> bool:
 
 def _signals(prepared: Prepared, row: pd.DataFrame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return all outputs of a row over time."""
-    experiment = prepared.experiment
-    labels = {c.name: row[c.name].iloc[0] for c in experiment.space.choices}
-    loop = next(loop for chosen, loop in prepared.loops if dict(chosen) == labels)
-    given = arguments(experiment.space, row)
-    found = ensemble_response(
-        loop,
-        experiment.timepts,
-        experiment.inputs,
-        keep=loop.system.output_labels,
-        rtol=experiment.rtol,
-        atol=experiment.atol,
-        max_steps=experiment.max_steps,
-        method=experiment.method,
-        params=given["params"],
-        initial_state=given["initial_state"],
-    )
+    ((loop, _),) = by_diagram(prepared, row)
+    found = simulate(prepared.experiment, loop, row, keep=loop.system.output_labels)
     return found.time, {name: samples[0] for name, samples in found.signals.items()}
 
 

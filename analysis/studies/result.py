@@ -10,9 +10,10 @@ from typing import Any
 import pandas as pd
 
 from analysis.robustness.sweep import Sweep
+from nlctl._names import unknown
 
 from .plain import as_json
-from .schema import Study
+from .schema import Study, keyed
 
 __all__ = ["Finding", "Result"]
 
@@ -37,6 +38,9 @@ class Finding:
         Bounds, margins, rows: what the sentence says, as numbers and texts.
     tables : mapping
         DataFrames by name.
+    is_answered : bool
+        False where rows or loop did not admit the analysis: the sentence says why, and there are
+        neither numbers nor tables.
     """
 
     key: str
@@ -48,6 +52,7 @@ class Finding:
     runs: int = 0
     numbers: Mapping[str, Any] = field(default_factory=dict)
     tables: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    is_answered: bool = True
 
     def plain(self) -> dict[str, Any]:
         """Return everything but the tables, as JSON can hold it."""
@@ -77,7 +82,7 @@ class Result:
     complete : bool
         Whether all analyses are done.
     interrupted : bool
-        Whether Ctrl-C ended the run that returned this; not kept in the folder.
+        Whether Ctrl-C was pressed in the run that returned this; not kept in the folder.
     notes : tuple of str
         What the user has to know, such as lost workers.
     """
@@ -92,6 +97,12 @@ class Result:
     complete: bool
     interrupted: bool = False
     notes: tuple[str, ...] = ()
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """What the study file asks of each analysis that is done, by key of its finding."""
+        every = keyed(self.study)
+        return {finding.key: every[finding.key] for finding in self.findings}
 
     @property
     def claims(self) -> tuple[Finding, ...]:
@@ -119,8 +130,17 @@ class Result:
         )
 
     def __getitem__(self, key: str) -> Finding:
-        """Return the finding with this key."""
-        return next(finding for finding in self.findings if finding.key == key)
+        """Return the finding with this key.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest ones.
+        """
+        found = {finding.key: finding for finding in self.findings}
+        if key not in found:
+            raise unknown("finding", key, found)
+        return found[key]
 
     def plain(self) -> dict[str, Any]:
         """Return everything but the tables, as JSON can hold it."""

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from filelock import FileLock, Timeout
 
 from analysis.robustness import Design, Prepared, evaluate, nominal, prepare
-from analysis.robustness.store import StoreError
+from analysis.robustness.store import StoreError, locked
 from analysis.robustness.sweep import Sweep, load, sweep
 from analysis.robustness.watch import Progress, until_decided
 from nlctl._errors import UsageError
@@ -22,13 +21,13 @@ from nlctl._files import replace_file
 
 from .answers import answer, unanswered
 from .build import main_design
-from .check import NEED_ROWS, keyed
+from .check import NEED_ROWS
 from .folder import METRIC_COLUMNS, load_finding, save_finding
 from .ground import Ground
 from .plain import RunFolderError, read_json, write_json
 from .read import StudyFile, read_study
 from .result import Finding, Result
-from .schema import Study
+from .schema import Study, keyed
 from .written import from_toml, to_toml
 
 __all__ = ["Watch", "rerun_file", "run"]
@@ -68,7 +67,7 @@ def run(
     ----------
     file : StudyFile
     folder : Path
-        See `result` for what is in it.
+        See `folder` for what is in it.
     resume : bool, optional
         Whether to take up what the folder holds.
     executor : concurrent.futures.Executor, optional
@@ -81,7 +80,8 @@ def run(
     Returns
     -------
     Result
-        Not ``complete`` after Ctrl-C (then ``interrupted``), or if workers were lost.
+        Not ``complete`` after Ctrl-C (then ``interrupted``) before the last analysis is done, or
+        if workers were lost.
 
     Raises
     ------
@@ -90,8 +90,11 @@ def run(
         process works in it.
     StoreError
         If a file cannot be written.
+    KeyboardInterrupt
+        If Ctrl-C comes before the first row, while diagrams are compiled.
     """
-    with _held(file, folder, resume):
+    with locked(folder, RunFolderError):
+        _identify(file, folder, resume)
         prepared = prepare(file.experiment)
         way = _Way(executor=executor, threads=threads, watch=watch)
         result = _through(file, prepared, folder, way)
@@ -103,33 +106,38 @@ def _through(file: StudyFile, prepared: Prepared, folder: Path, way: _Way) -> Re
     """Run the main table, then every analysis that is not done yet."""
     study = file.study
     rows, notes, findings = None, [], []
-    interrupted = False
-    complete = True
+    complete, interrupted = True, False
     if study.runs is not None:
         rows = _main_rows(study, prepared, folder, way)
         notes += rows.notes
         complete, interrupted = rows.complete or bool(rows.decided), rows.interrupted
     for key, asked in keyed(study).items() if complete else ():
-        finding = load_finding(folder, key)
-        if finding is None:
-            own: list[Sweep] = []
+        finding, own = load_finding(folder, key), []
+        if finding is None and not interrupted:
             ground = _ground(file, prepared, rows, folder / key, way, own)
             try:
-                finding = answer(key, asked, ground)
+                finding = _answered(key, asked, ground, own)
             except KeyboardInterrupt:
                 interrupted = True
-            except StoreError:
-                raise
-            except UsageError as error:  # costs this analysis, not what others have found
-                finding = unanswered(key, asked, error)
             notes += [note for done in own for note in done.notes]
             interrupted = interrupted or any(done.interrupted for done in own)
-            if finding is None:
-                complete = False
-                break
-            save_finding(folder, finding)
+            if finding is not None:
+                save_finding(folder, finding)
+        if finding is None:
+            complete = False
+            break
         findings.append(finding)
     return _result(study, prepared, folder, rows, findings, complete, interrupted, notes)
+
+
+def _answered(key: str, asked: Any, ground: Ground, own: Sequence[Sweep]) -> Finding | None:
+    """Run one analysis; what it may not be made of costs it alone, not what others have found."""
+    try:
+        return answer(key, asked, ground)
+    except StoreError:
+        raise
+    except UsageError as error:
+        return unanswered(key, asked, error, sum(done.done for done in own))
 
 
 def _main_rows(study: Study, prepared: Prepared, folder: Path, way: _Way) -> Sweep:
@@ -194,25 +202,8 @@ def _swept(
         )
 
 
-@contextmanager
-def _held(file: StudyFile, folder: Path, resume: bool) -> Iterator[None]:
-    """Hold the folder for this process alone, with the study in it."""
-    lock = FileLock(folder / ".lock", timeout=0)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock.acquire()
-    except Timeout:
-        raise RunFolderError(f"'{folder}' is in use by another process") from None
-    except OSError as error:
-        raise RunFolderError(f"cannot write to '{folder}': {error.strerror or error}") from error
-    try:
-        _identify(file, folder, resume)
-        yield
-    finally:
-        lock.release()
-
-
 def _identify(file: StudyFile, folder: Path, resume: bool) -> None:
+    """Write which study a folder belongs to, or compare."""
     path = folder / "study.toml"
     if path.exists():
         if not resume:

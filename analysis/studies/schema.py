@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
@@ -9,7 +10,18 @@ from pydantic import BeforeValidator, Field
 from .analyses import Analysis
 from .fields import Number, Pair, Strict, Whole
 
-__all__ = ["About", "Choices", "Law", "Measured", "Rows", "Rule", "Solver", "Study", "Times"]
+__all__ = [
+    "About",
+    "Choices",
+    "Law",
+    "Measured",
+    "Rows",
+    "Rule",
+    "Solver",
+    "Study",
+    "Times",
+    "keyed",
+]
 
 
 class About(Strict):
@@ -110,6 +122,9 @@ class Study(Strict):
     study: About
     options: dict[str, Any] = Field({}, description="Keywords of the loop; as options of choices.")
     space: dict[str, Law] = Field({}, description="Parameter or initial state -> what is known.")
+    inputs: dict[str, Number] = Field(
+        {}, description="Input of the loop from outside -> its value, the same all the time."
+    )
     choices: dict[str, Choices] = Field({}, description="Keyword of the loop -> its options.")
     spec: dict[str, Annotated[Rule, BeforeValidator(_rule)]] = Field(
         min_length=1, description="Name -> requirement."
@@ -119,3 +134,17 @@ class Study(Strict):
     solver: Solver = Solver()  # type: ignore[call-arg]
     runs: Rows | None = Field(None, description="The main table.")
     analysis: tuple[Analysis, ...] = Field((), description="What is asked.")
+
+
+def keyed(study: Study) -> dict[str, Any]:
+    """Return the analyses by key: their own, or their kind, numbered where it is not alone."""
+    named: dict[str, Any] = {}
+    taken = {asked.key for asked in study.analysis}
+    for asked in study.analysis:
+        plain = asked.kind.replace(" ", "-")
+        key = asked.key or plain
+        numbers = itertools.count(2)
+        while key in named or (key in taken and not asked.key):
+            key = f"{plain}-{next(numbers)}"
+        named[key] = asked
+    return named

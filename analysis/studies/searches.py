@@ -97,8 +97,7 @@ def degradation(asked: Degradation, ground: Ground) -> Finding:
 def radius(asked: Radius, ground: Ground) -> Finding:
     """Search for the smallest size with a violation."""
     space = ground.space(asked.quantities)
-    experiment = replace(ground.prepared.experiment, space=space)
-    largest, why = largest_scale(replace(ground.prepared, experiment=experiment), asked.largest)
+    largest, why = largest_scale(ground.prepared, asked.largest, space.names)
     found = robustness_radius(
         ground.simulate,
         space,
@@ -144,16 +143,19 @@ def failures(asked: Map, ground: Ground) -> Finding:
     edge = boundary(found)
     bad = int(np.count_nonzero(~(found.table["spec"].to_numpy() > 0)))
     if bad in (0, len(found.table)):
-        where = "every point violates" if bad else "no point violates"
-        told = f"{where} the spec"
+        which = "every one" if bad else "none"
+        told = f"{which} of {len(found.table)} points violates the spec."
     else:
-        told = f"{bad} of {len(found.table)} points violate the spec"
-    fine = "" if found.is_finished else "; refinement ended with the number of runs"
+        sides = " and ".join(f"{side:.3g}" for side in found.cell)
+        fine = "" if found.is_finished else "; refinement ended with the number of runs"
+        told = (
+            f"{bad} of {len(found.table)} points violate the spec; cells at the boundary have "
+            f"sides {sides}{fine}. Points were chosen near the boundary, so their share is no "
+            "probability."
+        )
     return made(
         asked,
-        f"In the plane of {found.x} and {found.y}, the others nominal, {told}; cells at the "
-        f"boundary have sides {found.cell[0]:.3g} and {found.cell[1]:.3g}{fine}. Points were "
-        "chosen near the boundary, so their share is no probability.",
+        f"In the plane of {found.x} and {found.y}, the others nominal, {told}",
         runs=len(found.table),
         numbers={"x": found.x, "y": found.y, "cell": list(found.cell)},
         tables={
