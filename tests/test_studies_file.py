@@ -368,3 +368,14 @@ def test_analyses_have_keys_of_their_own(tmp_path):
     study = read_study(write(tmp_path, HEAD, text)).study
     assert list(keyed(study)) == ["probability", "regional", "probability-3", "probability-2"]
     assert list(keyed(study).values()) == list(study.analysis)
+
+
+def test_boxes_that_fit_one_by_one_but_not_together_are_a_mistake(tmp_path):
+    """A backlash needs c_l < c_r: no row has to be drawn to find that out."""
+    text = HEAD.replace("loop.py:loop", "example-2").replace("on y <=", "on e <=")
+    head, _, rest = text.partition("[space]")
+    tail = rest.partition("[spec]")[2].replace("|z|", "|u|").partition("[metrics]")[0]
+    boxes = '"actuator.c_r" = { bounds = [-0.7, 0.6] }\n"actuator.c_l" = { bounds = [-0.8, -0.5] }'
+    ((line, message),) = mistakes(write(tmp_path, f"{head}[space]\n{boxes}\n[spec]{tail}")).values()
+    assert line == text.splitlines().index("[space]") + 2  # the first box
+    assert message.startswith("boxes do not fit together: Backlash needs c_l < c_r")

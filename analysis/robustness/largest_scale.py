@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import control as ct
 import numpy as np
 
 from nlctl._errors import ParameterError
@@ -18,7 +19,7 @@ from .experiment import Prepared
 from .resolve import owner_of
 from .space import Space, ends, nominal
 
-__all__ = ["largest_scale"]
+__all__ = ["largest_scale", "refusal_of"]
 
 FEW = 10
 """Of up to so many quantities of one block all corners are tried."""
@@ -59,15 +60,34 @@ def largest_scale(
     if not 0 < at_most < np.inf:
         raise ParameterError(f"a largest scale needs a finite at_most > 0, got {at_most}")
     space, factor, why = prepared.experiment.space, float(at_most), ""
-    tries = [
-        partial(part.refusal, space, corner)
-        for part in _parts(prepared, space.names if names is None else names)
-        for corner in _corners(space, list(part.fields))
-    ]
+    systems = [loop.system for _, loop in prepared.loops]
+    tries = list(_tries(space, systems, space.names if names is None else names))
     while (refusal := next((one for one in tries if one(factor)), None)) is not None:
         why = f"since at {factor:.4g} {refusal(factor)}"
         factor = _largest(refusal, factor)
     return factor, why and f"Sizes end at {factor:.4g} {why}"
+
+
+def refusal_of(space: Space, systems: Iterable[ct.InputOutputSystem]) -> str:
+    """Return why a block refuses values of the boxes that each by itself are admissible, or "".
+
+    Parameters
+    ----------
+    space : Space
+        With full names, and nominal values, which are admissible.
+    systems : iterable of control.InputOutputSystem
+        See `largest_scale` for what is tried of their blocks.
+    """
+    return next(filter(None, (one(1.0) for one in _tries(space, systems, space.names))), "")
+
+
+def _tries(
+    space: Space, systems: Iterable[ct.InputOutputSystem], names: Collection[str]
+) -> Iterator[Callable[[float], str]]:
+    """Yield for each corner what tells from a factor why its block refuses it, or nothing."""
+    for part in _parts(space, systems, names):
+        for corner in _corners(space, list(part.fields)):
+            yield partial(part.refusal, space, corner)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,14 +108,15 @@ class _Part:
         return ""
 
 
-def _parts(prepared: Prepared, names: Collection[str]) -> Iterator[_Part]:
-    """Yield every block of every loop with parameters that are uncertain; `names` may be scaled."""
-    space = prepared.experiment.space
+def _parts(
+    space: Space, systems: Iterable[ct.InputOutputSystem], names: Collection[str]
+) -> Iterator[_Part]:
+    """Yield every block with parameters that are uncertain; `names` may be scaled."""
     middle = nominal(space)
-    for _, loop in prepared.loops:
+    for system in systems:
         places, fields = {}, {}
         for quantity in space.quantities:
-            owner = None if quantity.is_initial else owner_of(loop.system, quantity.name)
+            owner = None if quantity.is_initial else owner_of(system, quantity.name)
             if owner is not None:  # a foreign block takes what it is given
                 place, key = owner
                 places[place.path] = place

@@ -12,6 +12,7 @@ import control as ct
 from analysis.metrics import Metric
 from analysis.robustness import Experiment, Requirement, Space, Uncertain, resolved
 from analysis.robustness.guarantee import check_iid
+from analysis.robustness.largest_scale import refusal_of
 from analysis.robustness.resolve import check_keyword
 from analysis.robustness.space import combinations
 from nlctl._errors import UsageError
@@ -86,7 +87,7 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
         return None, _unique(notes.problems)
     made = notes.attempt((), experiment, study, folder, signals, inputs or ())
     if made is not None:
-        _check_designs(study, made, diagrams[0], folder, notes)
+        _check_designs(study, made, diagrams, folder, notes)
     return made, _unique(notes.problems)
 
 
@@ -170,12 +171,18 @@ def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Note
 
 
 def _check_designs(
-    study: Study, made: Experiment, diagram: ct.InputOutputSystem, folder: Path, notes: _Notes
+    study: Study,
+    made: Experiment,
+    diagrams: Sequence[ct.InputOutputSystem],
+    folder: Path,
+    notes: _Notes,
 ) -> None:
     """Make every design that is known in advance, and hold the analyses against it."""
-    space, main = notes.attempt(("space",), resolved, made.space, diagram), None
+    space, main = notes.attempt(("space",), resolved, made.space, diagrams[0]), None
     if space is None:
         return
+    if refusal := notes.attempt(("space",), refusal_of, space, diagrams):
+        notes.add(("space",), f"boxes do not fit together: {refusal}")
     if study.runs is not None:
         main = notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
     for i, asked in enumerate(study.analysis):
