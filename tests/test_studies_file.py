@@ -377,5 +377,5 @@ def test_boxes_that_fit_one_by_one_but_not_together_are_a_mistake(tmp_path):
     tail = rest.partition("[spec]")[2].replace("|z|", "|u|").partition("[metrics]")[0]
     boxes = '"actuator.c_r" = { bounds = [-0.5, 0.6] }\n"actuator.c_l" = { bounds = [-0.8, 0.4] }'
     ((line, message),) = mistakes(write(tmp_path, f"{head}[space]\n{boxes}\n[spec]{tail}")).values()
-    assert line == text.splitlines().index("[space]") + 2  # the first box
+    assert line == text.splitlines().index("[space]") + 1
     assert message.startswith("boxes do not fit together: Backlash needs c_l < c_r")
