@@ -7,20 +7,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-
-NLCTL = [sys.executable, "-c", "from nlctl.cli import main; main()"]
-
-
-def nlctl(*arguments, cwd=None):
-    """Run the command line in a process of its own."""
-    return subprocess.run(
-        [*NLCTL, *arguments], capture_output=True, text=True, cwd=cwd, timeout=300, check=False
-    )
+from command_line import nlctl, nlctl_here
 
 
 def refused(*arguments, cwd=None):
     """Run it with input that it must refuse; return the one sentence."""
-    result = nlctl(*arguments, cwd=cwd)
+    result = nlctl_here(*arguments, cwd=cwd)
     assert result.returncode == 2, result
     assert "Traceback" not in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
@@ -113,10 +105,10 @@ def test_divergence_is_reported_with_its_time(tmp_path):
 
 def test_list_shows_blocks_with_units_and_bounds():
     """Every block record is listed; one can be asked for alone."""
-    text = nlctl("list").stdout
+    text = nlctl_here("list").stdout
     for block in ("DeadZone", "Backlash", "ForcedDuffing", "Genesio", "NussbaumLaw", "example-2"):
         assert block in text
-    alone = nlctl("list", "ForcedDuffing").stdout
+    alone = nlctl_here("list", "ForcedDuffing").stdout
     assert "rad/s" in alone
     assert "DeadZone" not in alone
 
@@ -125,7 +117,7 @@ def test_list_shows_blocks_with_units_and_bounds():
 def test_diagram_is_drawn_in_each_format(suffix, tmp_path):
     """The file begins as its format does."""
     path = tmp_path / f"loop.{suffix}"
-    assert nlctl("diagram", "example-2", "-o", str(path)).returncode == 0
+    assert nlctl_here("diagram", "example-2", "-o", str(path)).returncode == 0
     start = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}[suffix]
     assert path.read_bytes().startswith(start)
 

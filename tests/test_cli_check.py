@@ -8,8 +8,8 @@ import shlex
 
 import numpy as np
 import pytest
+from command_line import nlctl, nlctl_here
 from rich.console import Console
-from test_cli import nlctl
 
 from analysis.lyapunov.ledger import ledger
 from nlctl import paper
@@ -26,15 +26,15 @@ def found():
 
 def check(*arguments):
     """Exit code and what was printed."""
-    done = nlctl("check", *arguments)
+    done = nlctl_here("check", *arguments)
     return done.returncode, done.stdout, done.stderr
 
 
 def test_the_published_loop_holds_and_the_paper_does_not():
     """All corrected lines hold, and the literal reading of (31) is violated, with the time."""
-    code, said, _ = check("example-1", "--json")
-    assert code == 0
-    lines = {line["key"]: line for line in json.loads(said)["lines"]}
+    done = nlctl("check", "example-1", "--json")
+    assert done.returncode == 0
+    lines = {line["key"]: line for line in json.loads(done.stdout)["lines"]}
     assert lines["(31)"]["status"] == "checked"
     assert lines["(31) literal"]["status"] == "violated"
     assert 0 < lines["(31) literal"]["time"] < 20

@@ -5,19 +5,18 @@ import resource
 import shlex
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from command_line import NLCTL, nlctl, nlctl_here
 from studies_example import HEAD, ROWS, write
 
 from analysis.studies import load_result, read_study
 from analysis.studies import run as run_study
 
-NLCTL = [sys.executable, "-c", "from nlctl.cli import main; main()"]
 MANY = ROWS.replace("size = 200", "size = 6000")
 
 
@@ -26,18 +25,10 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("cli")
 
 
-def nlctl(*arguments, cwd, **options):
-    """Run the command line in a process of its own."""
-    command = [*NLCTL, *map(str, arguments)]
-    return subprocess.run(
-        command, capture_output=True, text=True, cwd=cwd, timeout=300, check=False, **options
-    )
-
-
 def test_a_study_is_validated_run_and_replayed(folder):
     """Exit code 0 throughout, one verdict, and a row again bit for bit with its figure."""
     path = write(folder)
-    planned = nlctl("validate", path, cwd=folder)
+    planned = nlctl_here("validate", path, cwd=folder)
     assert planned.returncode == 0, planned.stderr
     assert "rows: 200 runs" in planned.stdout
     done = nlctl("run", path, "--jobs", "1", cwd=folder)
@@ -45,7 +36,7 @@ def test_a_study_is_validated_run_and_replayed(folder):
     assert "The claim holds." in done.stdout
     assert "Assumed: rows are independent draws" in done.stdout
     assert (folder / "reports" / "study" / "results.json").exists()
-    again = nlctl("replay", "reports/study", 17, "--plot", "row.svg", cwd=folder)
+    again = nlctl_here("replay", "reports/study", 17, "--plot", "row.svg", cwd=folder)
     assert again.returncode == 0, again.stderr
     assert "bit for bit" in again.stdout
     assert (folder / "row.svg").read_text(encoding="utf-8").lstrip().startswith("<?xml")
@@ -54,32 +45,32 @@ def test_a_study_is_validated_run_and_replayed(folder):
 def test_a_failing_claim_is_exit_code_1_and_json_is_json(folder):
     """Standard output is one JSON document, whatever the outcome."""
     path = write(folder)
-    failing = nlctl(
+    failing = nlctl_here(
         "run", path, "--set", "analysis.0.limit=0.01", "--out", "fails", "--json", cwd=folder
     )
     assert failing.returncode == 1, failing.stderr
     content = json.loads(failing.stdout)
     assert content["holds"] is False
     assert content["findings"][0]["claim"] == "a violation has at most probability 0.01"
-    planned = json.loads(nlctl("validate", path, "--json", cwd=folder).stdout)
+    planned = json.loads(nlctl_here("validate", path, "--json", cwd=folder).stdout)
     assert (planned["valid"], planned["runs"]["rows"]) == (True, 200)
-    row = json.loads(nlctl("replay", "fails", 0, "--json", cwd=folder).stdout)
+    row = json.loads(nlctl_here("replay", "fails", 0, "--json", cwd=folder).stdout)
     assert row["same"] is True
-    schema = json.loads(nlctl("schema", cwd=folder).stdout)
+    schema = json.loads(nlctl_here("schema", cwd=folder).stdout)
     assert schema["properties"]["loop"]["type"] == "string"
 
 
 def test_an_invalid_study_is_exit_code_2_with_every_mistake(folder):
     """As text on standard error, or as JSON on standard output."""
     path = write(folder, HEAD.replace("band", "bnad").replace("|z|", "|zz|"), ROWS, name="bad.toml")
-    told = nlctl("run", path, cwd=folder)
+    told = nlctl_here("run", path, cwd=folder)
     assert (told.returncode, told.stdout) == (2, "")
     assert "2 mistakes" not in told.stderr  # band is missing as well
     for words in ("nearest: 'band'", "metrics.band: is missing", "unknown signal 'zz'"):
         assert words in told.stderr
     assert "Traceback" not in told.stderr
     assert not (folder / "reports" / "bad").exists()
-    content = json.loads(nlctl("validate", path, "--json", cwd=folder).stdout)
+    content = json.loads(nlctl_here("validate", path, "--json", cwd=folder).stdout)
     assert content["valid"] is False
     assert {problem["text"] for problem in content["problems"]} == {
         "metrics.bnad",
@@ -95,7 +86,7 @@ def test_other_bad_input_is_exit_code_2(folder):
         (("run", write(folder), "--executor", "mainframe", "--out", "x"), "got 'mainframe'"),
         (("replay", ".", "0"), "holds no run of a study"),
     ):
-        told = nlctl(*arguments, cwd=folder)
+        told = nlctl_here(*arguments, cwd=folder)
         assert told.returncode == 2, told
         assert words in told.stderr
         assert len(told.stderr.strip().splitlines()) == 1
@@ -104,7 +95,7 @@ def test_other_bad_input_is_exit_code_2(folder):
 def test_an_error_in_the_users_own_function_is_exit_code_3(folder):
     """With its traceback: it is neither a claim that fails nor a mistake in the file."""
     path = write(folder, HEAD.replace("loop.py:loop", "loop.py:broken"), ROWS, name="broken.toml")
-    told = nlctl("validate", path, "--json", cwd=folder)
+    told = nlctl_here("validate", path, "--json", cwd=folder)
     assert told.returncode == 3
     assert "RuntimeError: no such luck" in told.stderr
     assert json.loads(told.stdout) == {"error": "RuntimeError: no such luck"}
@@ -124,7 +115,7 @@ def test_a_full_disk_is_exit_code_4_and_can_be_continued(folder):
     assert "cannot write" in stopped.stderr
     command = stopped.stderr.splitlines()[-1].removeprefix("continue with: nlctl ")
     assert command == f"run {path} --resume --out full"
-    resumed = nlctl(*shlex.split(command), cwd=folder)
+    resumed = nlctl_here(*shlex.split(command), cwd=folder)
     assert resumed.returncode == 0, resumed.stderr
     assert_same(load_result(folder / "full"), whole)
 
@@ -153,7 +144,7 @@ def test_ctrl_c_is_exit_code_130_and_prints_how_to_go_on(folder):
     assert not kept.complete
     command = told.strip().splitlines()[-1].removeprefix("continue with: ")
     assert command == "nlctl run long.toml --resume --out long --jobs 1"
-    resumed = nlctl(*shlex.split(command)[1:], cwd=folder)
+    resumed = nlctl_here(*shlex.split(command)[1:], cwd=folder)
     assert resumed.returncode == 0, resumed.stderr
     assert_same(load_result(folder / "long"), run_study(read_study(path), folder / "straight"))
 
@@ -193,7 +184,7 @@ def test_ctrl_c_before_the_first_row_says_how_to_go_on(tmp_path, kept, command):
     assert told.splitlines() == ["nlctl: interrupted", command]
     assert (tmp_path / "out").exists() == command.startswith("continue")
     again = command.partition(": nlctl ")[2]
-    done = nlctl(*shlex.split(again), cwd=tmp_path)
+    done = nlctl_here(*shlex.split(again), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert load_result(tmp_path / "out").complete
 

