@@ -75,7 +75,7 @@ def _paper(
 
     from . import paper
     from ._terminal import progress_bar
-    from .cli_study_report import run_shipped, studies_part
+    from .cli_study_report import compile_shipped, run_shipped, studies_part
 
     check_report_options(out, pdf=pdf)
     spawned = get_context("spawn")
@@ -83,9 +83,12 @@ def _paper(
         far_runs_in_background(whole=far) as long_runs,
         ProcessPoolExecutor(1, mp_context=spawned) as beside,  # the studies, on the other core
     ):
-        studying = beside.submit(run_shipped, QUICK, out, jobs or None)
+        # an empty cache: both processes need the integrators, so only this one compiles them
+        compiled = beside.submit(compile_shipped, QUICK)
         with progress_bar("simulating", len(CASES)) as advance:
-            runs = run_all(CASES, done=lambda _: advance(1))  # machine code: processes cost more
+            runs = run_all(CASES[:1], done=lambda _: advance(1))
+            studying = beside.submit(run_shipped, QUICK, out, jobs or None)
+            runs |= run_all(CASES[1:], done=lambda _: advance(1))  # in here: processes cost more
         proofs = {}
         with progress_bar("checking the proof", 2) as advance:
             for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
@@ -94,6 +97,7 @@ def _paper(
         with progress_bar("running far beyond 20 s, and the studies", 2) as advance:
             far_away = long_runs.result()
             advance(1)
+            compiled.result()
             studying.result()
         made = paper_report(
             runs,

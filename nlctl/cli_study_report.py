@@ -11,6 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .cli_studies import run_folder
 
 if TYPE_CHECKING:
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from analysis.studies.result import Result
     from analysis.studies.run import Watch
 
-__all__ = ["report_study", "run_shipped", "studies_part"]
+__all__ = ["compile_shipped", "report_study", "run_shipped", "studies_part"]
 
 
 def report_study(
@@ -66,6 +68,18 @@ def report_study(
         made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})
     folder = result.folder if out is None else out
     return write_report(made, folder, interactive=interactive), result
+
+
+def compile_shipped(names: Sequence[str]) -> None:
+    """Compile what `run_shipped` needs besides the integrators: diagrams and metrics."""
+    from analysis.robustness import prepare
+    from analysis.robustness.experiment import machine_metrics
+    from analysis.studies import read_study, shipped
+
+    for name in names:
+        experiment = prepare(read_study(shipped(name)).experiment).experiment
+        for metric in machine_metrics(experiment):
+            metric.function(np.linspace(0.0, 1.0, 5), *np.zeros((len(metric.signals), 5)))
 
 
 def run_shipped(names: Sequence[str], folder: Path, threads: int | None = None) -> None:

@@ -22,7 +22,15 @@ from .resolve import diagrams, resolved
 from .space import Space, arguments
 from .spec import Requirement, Spec, unfinished_margin
 
-__all__ = ["Experiment", "Prepared", "by_diagram", "evaluate", "prepare", "simulate"]
+__all__ = [
+    "Experiment",
+    "Prepared",
+    "by_diagram",
+    "evaluate",
+    "machine_metrics",
+    "prepare",
+    "simulate",
+]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -226,7 +234,7 @@ def _run(
     progress: Callable[[int], object] | None,
 ) -> pd.DataFrame:
     requirements = experiment.spec.requirements
-    metrics = (*map(_fast, experiment.metrics), *requirements)
+    metrics = (*machine_metrics(experiment), *requirements)
     made = simulate(experiment, loop, rows, metrics=metrics, threads=threads, progress=progress)
     found = made.table.reindex(columns=experiment.measured)
     found = found.set_axis(rows.index[found.index.to_numpy()])
@@ -237,6 +245,11 @@ def _run(
         found.loc[failed, requirement.key] = graded
     found["spec"] = np.min(found.loc[:, [r.key for r in requirements]].to_numpy(), axis=1)
     return found
+
+
+def machine_metrics(experiment: Experiment) -> tuple[Metric, ...]:
+    """Return the metrics of an experiment as machine code, which is compiled when it is called."""
+    return tuple(map(_fast, experiment.metrics))
 
 
 def _fast(metric: Metric) -> Metric:
