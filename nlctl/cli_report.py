@@ -71,11 +71,11 @@ def _paper(
     from analysis.report.lyapunov_evidence import evidence, far_runs_in_background
     from analysis.report.paper_report import paper_report
     from analysis.report.render import write_report
-    from analysis.reproduction import CASES, checks, numerics, run_all
+    from analysis.reproduction import checks
 
     from . import paper
     from ._terminal import progress_bar
-    from .cli_study_report import compile_shipped, run_shipped, studies_part
+    from .cli_study_report import studies_part
 
     check_report_options(out, pdf=pdf)
     spawned = get_context("spawn")
@@ -83,12 +83,7 @@ def _paper(
         far_runs_in_background(whole=far) as long_runs,
         ProcessPoolExecutor(1, mp_context=spawned) as beside,  # the studies, on the other core
     ):
-        # an empty cache: both processes need the integrators, so only this one compiles them
-        compiled = beside.submit(compile_shipped, QUICK)
-        with progress_bar("simulating", len(CASES)) as advance:
-            runs = run_all(CASES[:1], done=lambda _: advance(1))
-            studying = beside.submit(run_shipped, QUICK, out, jobs or None)
-            runs |= run_all(CASES[1:], done=lambda _: advance(1))  # in here: processes cost more
+        runs, waiting = _runs(beside, out, jobs)
         proofs = {}
         with progress_bar("checking the proof", 2) as advance:
             for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
@@ -97,19 +92,38 @@ def _paper(
         with progress_bar("running far beyond 20 s, and the studies", 2) as advance:
             far_away = long_runs.result()
             advance(1)
-            compiled.result()
-            studying.result()
+            *_, numbers = (task.result() for task in waiting)
         made = paper_report(
             runs,
             proofs=proofs,
             far=far_away,
             studies=studies_part([out / name for name in QUICK], threads=jobs or None),
-            numerics=numerics(),
+            numerics=numbers,
         )
     options = " --far" * far + " --interactive" * interactive
     made = replace(made, command=made.command + options)
     page = write_report(made, out, interactive=interactive)
     return made.verdict, page, int(not all(check.passed for check in checks(runs)))
+
+
+def _runs(beside: Any, out: Path, jobs: int) -> tuple[Any, list[Any]]:
+    """Run the paper's cases; return them, and what runs in the other process meanwhile.
+
+    That is the studies, and last the numerics.  Both processes need the integrators: where nothing
+    is compiled yet only this one compiles them, while the other does what needs none.
+    """
+    from analysis.reproduction import CASES, numerics, run_all
+
+    from ._terminal import progress_bar
+    from .cli_study_report import compile_shipped, run_shipped
+
+    waiting = [beside.submit(compile_shipped, QUICK)]
+    with progress_bar("simulating", len(CASES)) as advance:
+        runs = run_all(CASES[:1], done=lambda _: advance(1))
+        waiting.append(beside.submit(run_shipped, QUICK, out, jobs or None))
+        waiting.append(beside.submit(numerics))
+        runs |= run_all(CASES[1:], done=lambda _: advance(1))  # machine code: in this process
+    return runs, waiting
 
 
 def _study(
