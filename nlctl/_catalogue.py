@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from . import actuators, controllers, plants, references
+from ._names import unknown
 
 
 def block_records() -> dict[str, type]:
@@ -16,3 +17,17 @@ def block_records() -> dict[str, type]:
             if isinstance(thing, type) and dataclasses.is_dataclass(thing):
                 found[name] = thing
     return found
+
+
+def named_block(name: str) -> type:
+    """Return the block record of that name.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest ones.
+    """
+    records = block_records()
+    if name not in records:
+        raise unknown("block", name, records)
+    return records[name]

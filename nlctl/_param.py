@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import inspect
 import math
 import re
 from collections import namedtuple
@@ -113,8 +112,8 @@ def record(cls: type[T]) -> type[T]:
     if "__post_init__" not in cls.__dict__:
         cls.__post_init__ = check_params  # type: ignore[attr-defined]
         cls.__checked_at_birth__ = True  # type: ignore[attr-defined]
-    made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
-    init, known = made.__init__, list(inspect.signature(made).parameters)
+    made: Any = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    init, known = made.__init__, [f.name for f in dataclasses.fields(made) if f.init]
 
     @functools.wraps(init)
     def by_name(self: Any, *arguments: Any, **given: Any) -> None:
@@ -123,7 +122,7 @@ def record(cls: type[T]) -> type[T]:
                 raise unknown("parameter", name, known, f"of {made.__name__}", UnknownKeywordError)
         init(self, *arguments, **given)
 
-    made.__init__ = by_name  # type: ignore[method-assign]
+    made.__init__ = by_name
     return made
 
 

@@ -16,7 +16,6 @@ from rich.table import Table
 
 from ._errors import ParameterError
 from ._files import replace_file
-from ._names import unknown
 from ._param import declared_params
 
 FIGURE_FORMATS = (".svg", ".png", ".pdf")
@@ -84,16 +83,15 @@ def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
 
 def show_blocks(name: str | None) -> None:
     """Print the parameter table of one block, or of all, and the examples."""
-    from ._catalogue import block_records
+    from ._catalogue import block_records, named_block
 
-    records, console = block_records(), Console()
-    if name is not None and name not in records:
-        raise unknown("block", name, records)
-    for key in [name] if name else records:
-        summary = (records[key].__doc__ or "").strip().splitlines()[0]
+    console = Console()
+    records = block_records() if name is None else {name: named_block(name)}
+    for key, record in records.items():
+        summary = (record.__doc__ or "").strip().splitlines()[0]
         table = Table("parameter", "default", "unit", "bounds", "meaning", title=None)
-        defaults = {f.name: f.default for f in dataclasses.fields(records[key])}
-        for field, rule in declared_params(records[key]).items():
+        defaults = {f.name: f.default for f in dataclasses.fields(record)}
+        for field, rule in declared_params(record).items():
             default = np.asarray(defaults[field])
             text = str(defaults[field]) if default.size <= 4 else f"{default.shape} values"
             table.add_row(field, text, rule.unit, rule.bounds, rule.meaning)

@@ -11,8 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from .cli_studies import run_folder
 
 if TYPE_CHECKING:
@@ -73,13 +71,11 @@ def report_study(
 def compile_shipped(names: Sequence[str]) -> None:
     """Compile what `run_shipped` needs besides the integrators: diagrams and metrics."""
     from analysis.robustness import prepare
-    from analysis.robustness.experiment import machine_metrics
+    from analysis.robustness.experiment import compile_metrics
     from analysis.studies import read_study, shipped
 
     for name in names:
-        experiment = prepare(read_study(shipped(name)).experiment).experiment
-        for metric in machine_metrics(experiment):
-            metric.function(np.linspace(0.0, 1.0, 5), *np.zeros((len(metric.signals), 5)))
+        compile_metrics(prepare(read_study(shipped(name)).experiment).experiment)
 
 
 def run_shipped(names: Sequence[str], folder: Path, threads: int | None = None) -> None:

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import function
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -19,11 +20,6 @@ from analysis.robustness.quantity import QUANTILES, Choice, SpaceError, Uncertai
 from analysis.robustness.radius import robustness_radius, size_of
 from analysis.robustness.space import Space, scaled
 from analysis.robustness.spec import Requirement, Spec
-
-
-def function(formula):
-    """What simulates nothing: the margin is a formula of the row."""
-    return lambda table: pd.DataFrame({"spec": formula(table)}, index=table.index)
 
 
 def box(*sides):

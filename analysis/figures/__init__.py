@@ -1,6 +1,5 @@
 """Results -> matplotlib figures.  Nothing here writes a file or shows a window."""
 
-from .axes import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLES, TIME
 from .histories import (
     actuator_path,
     adaptation,
@@ -23,13 +22,6 @@ from .proof import (
 )
 
 __all__ = [
-    "BLUE",
-    "GREEN",
-    "GREY",
-    "ORANGE",
-    "PURPLE",
-    "STYLES",
-    "TIME",
     "actuator_path",
     "adaptation",
     "bounds",

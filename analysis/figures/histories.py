@@ -25,12 +25,17 @@ __all__ = [
 ]
 
 
+def _one(time: np.ndarray, curves: Mapping[str, np.ndarray], label: str) -> Figure:
+    """Draw up to four signals into one pair of axes."""
+    figure, (ax,) = stacked_axes()
+    draw_lines(ax, time, curves)
+    ax.set(xlabel=TIME, ylabel=label)
+    return figure
+
+
 def tracking(run: Run) -> Figure:
     """Output y against the reference yd."""
-    figure, (ax,) = stacked_axes()
-    draw_lines(ax, run.time, {"$y$": run.signals["y"], "$y_d$": run.signals["yd"]})
-    ax.set(xlabel=TIME, ylabel="output")
-    return figure
+    return _one(run.time, {"$y$": run.signals["y"], "$y_d$": run.signals["yd"]}, "output")
 
 
 def tracking_error(run: Run) -> Figure:
@@ -53,19 +58,15 @@ def tracking_error(run: Run) -> Figure:
 
 def upper_states(run: Run) -> Figure:
     """The states x2, ..., xn."""
-    figure, (ax,) = stacked_axes()
-    names = [f"x{i}" for i in range(2, 10) if f"x{i}" in run.signals]
-    draw_lines(ax, run.time, {f"$x_{n[1:]}$": run.signals[n] for n in names})
-    ax.set(xlabel=TIME, ylabel="state " + ", ".join(f"$x_{n[1:]}$" for n in names))
-    return figure
+    numbers = [i for i in range(2, 10) if f"x{i}" in run.signals]
+    curves = {f"$x_{i}$": run.signals[f"x{i}"] for i in numbers}
+    return _one(run.time, curves, "state " + ", ".join(curves))
 
 
 def control_input(run: Run) -> Figure:
     """Control input u and what the actuator makes of it, v."""
-    figure, (ax,) = stacked_axes()
-    draw_lines(ax, run.time, {"$u$": run.signals["u"], "$v$": run.signals["v"]})
-    ax.set(xlabel=TIME, ylabel="input $u$, actuator output $v$")
-    return figure
+    curves = {"$u$": run.signals["u"], "$v$": run.signals["v"]}
+    return _one(run.time, curves, "input $u$, actuator output $v$")
 
 
 def actuator_path(run: Run) -> Figure:
@@ -95,19 +96,14 @@ def nussbaum_gain(run: Run) -> Figure:
 
 def adaptation(run: Run) -> Figure:
     """Norm of the network's weights, and the estimate delta_hat."""
-    figure, (ax,) = stacked_axes()
     curves = {"$\\|\\hat W\\|$": run.signals["W_norm"], "$\\hat\\delta$": run.signals["delta_hat"]}
-    draw_lines(ax, run.time, curves)
-    ax.set(xlabel=TIME, ylabel="$\\|\\hat W\\|$, $\\hat\\delta$")
-    return figure
+    return _one(run.time, curves, ", ".join(curves))
 
 
 def error_comparison(runs: Sequence[Run], labels: Sequence[str]) -> Figure:
     """Tracking errors of up to four runs above each other."""
-    figure, (ax,) = stacked_axes()
-    draw_lines(ax, runs[0].time, dict(zip(labels, (run.signals["e"] for run in runs), strict=True)))
-    ax.set(xlabel=TIME, ylabel="tracking error $e_1$")
-    return figure
+    curves = dict(zip(labels, (run.signals["e"] for run in runs), strict=True))
+    return _one(runs[0].time, curves, "tracking error $e_1$")
 
 
 def overview(time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Figure:

@@ -13,6 +13,11 @@ CITATION = (
     "Processing (ICONIP 2017), LNCS 10639, pp. 201-211. doi 10.1007/978-3-319-70136-3_22."
 )
 
+CLOPPER = (
+    "C. J. Clopper, E. S. Pearson: The use of confidence or fiducial limits illustrated in the "
+    "case of the binomial. Biometrika 26 (1934), pp. 404-413. doi 10.1093/biomet/26.4.404."
+)
+
 METHODS = (
     "Plant, actuator, reference and controller are blocks of python-control, joined by their "
     "signals; each equation is written once, as in the paper, and compiled to machine code. The "
@@ -25,8 +30,7 @@ METHODS = (
 )
 REFERENCES = (
     CITATION,
-    "C. J. Clopper, E. S. Pearson: The use of confidence or fiducial limits illustrated in the "
-    "case of the binomial. Biometrika 26 (1934), pp. 404-413. doi 10.1093/biomet/26.4.404.",
+    CLOPPER,
     "F. Johansson: Arb: efficient arbitrary-precision midpoint-radius interval arithmetic. IEEE "
     "Transactions on Computers 66 (2017), pp. 1281-1292. doi 10.1109/TC.2017.2690633.",
     "Ch. Tsitouras: Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying "

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .paper_text import CITATION, EXAMPLES
+from .paper_text import CITATION, CLOPPER, EXAMPLES
 
 if TYPE_CHECKING:
     from analysis.studies.result import Result
 
 __all__ = ["METHODS", "limits", "methods"]
 
-CLOPPER = (
-    "C. Clopper, E. Pearson: The use of confidence or fiducial limits illustrated in the case of "
-    "the binomial. Biometrika 26 (1934) 404-413. doi 10.1093/biomet/26.4.404."
-)
 ROBBINS = (
     "H. Robbins: Statistical methods related to the law of the iterated logarithm. Ann. Math. "
     "Statist. 41 (1970) 1397-1409. doi 10.1214/aoms/1177696786."

@@ -14,6 +14,7 @@ from nlctl.native import Status
 from .. import robustness_figures as figures
 from ..robustness.evaluation import margins_of
 from ..robustness.sequential import sequence_bounds
+from ..robustness.spec import violates
 from . import robustness_text as text
 from .document import Figure, History, Item, Paragraph, Table
 from .paper_text import CONTROLLER_PART, EXAMPLES, PLANT_CLASS, PLANTS, TITLES
@@ -89,7 +90,7 @@ def known(quantities: pd.DataFrame, *columns: str) -> Iterable[tuple[Any, ...]]:
 def row_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item]:
     """Yield how the rows of the main table ended, and the worst of them."""
     margins = table["spec"].to_numpy(dtype=float)
-    violated = _violations(margins)
+    violated = int(np.sum(violates(margins)))
     told = text.violate(violated, len(table))
     if refused := refusal(result):
         told += f". That is no estimate of a probability: {refused}"
@@ -114,7 +115,7 @@ def margin_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item
     """Yield the margins of the rows: by requirement, and how they are distributed."""
     yield _requirements(result, table)
     margins = table["spec"].to_numpy(dtype=float)
-    violated = _violations(margins)
+    violated = int(np.sum(violates(margins)))
     caption = text.MARGINS + text.VIOLATIONS * bool(violated) + text.clipped(margins)
     yield Figure(
         key=f"{key}-margins",
@@ -123,11 +124,6 @@ def margin_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item
         f"{margin_text(float(figures.quantile(margins, 0.5, -np.inf)))}.",
         figure=figures.margins(margins),
     )
-
-
-def _violations(margins: np.ndarray) -> int:
-    """Return how many margins are violations; NaN is one."""
-    return int(np.sum(~(margins > 0)))
 
 
 def status_text(name: object) -> str:
@@ -139,7 +135,7 @@ def _requirements(result: Result, table: pd.DataFrame) -> Table:
     rows = []
     for key in [*result.requirements.index, "spec"]:
         margins = table[key].to_numpy(dtype=float)
-        violated = _violations(margins)
+        violated = int(np.sum(violates(margins)))
         ends = (float(figures.quantile(margins, part, -np.inf)) for part in (0.0, 0.5, 1.0))
         share = f"{100 * violated / len(table):.4g} %"
         rows.append((key, violated, share, *map(margin_text, ends)))
@@ -264,7 +260,7 @@ def running(margins: np.ndarray, confidence: float) -> pd.DataFrame:
 
     Columns violations, rate, low, high; NaN is a violation.
     """
-    counts = np.cumsum(~(np.asarray(margins, dtype=float) > 0))
+    counts = np.cumsum(violates(margins))
     numbers = np.unique(np.geomspace(1, counts.size, POINTS).round().astype(int))
     rows = []
     for n in map(int, numbers):

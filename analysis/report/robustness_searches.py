@@ -11,6 +11,7 @@ import pandas as pd
 
 from .. import robustness_figures as figures
 from ..robustness.evaluation import margins_of
+from ..robustness.spec import violates
 from . import robustness_text as text
 from .document import Figure, Item, Paragraph, Table
 from .robustness_rows import known, status_text
@@ -181,7 +182,7 @@ def failure_map(finding: Finding, result: Result, asked: Any, key: str) -> Itera
     nominal = tuple(map(float, about["nominal"]))
     labels = tuple(f"{name} ({unit or '1'})" for name, unit in known(about, "unit"))
     edge, is_nominal = finding.tables["boundary"], bool(np.all(np.isfinite(nominal)))
-    caption = text.MAP + text.VIOLATED * bool(np.any(~(points["spec"] > 0)))
+    caption = text.MAP + text.VIOLATED * bool(np.any(violates(points["spec"])))
     caption += text.BOUNDARY * bool(len(edge)) + text.STAR * is_nominal
     yield Figure(
         key=f"{key}-map",

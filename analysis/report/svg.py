@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from nlctl import drawing
 
-from .. import figures
+from ..figures import axes
 from .document import Figure
 from .svg_compact import compact, shared_shape, short_path
 
@@ -25,11 +25,11 @@ THEME = {
     drawing.INK: "currentColor",
     drawing.GREY: "var(--soft)",
     drawing.FILL: "var(--panel)",
-    figures.GREY: "var(--soft)",
-    figures.BLUE.lower(): "var(--blue)",
-    figures.ORANGE.lower(): "var(--orange)",
-    figures.GREEN.lower(): "var(--green)",
-    figures.PURPLE.lower(): "var(--purple)",
+    axes.GREY: "var(--soft)",
+    axes.BLUE.lower(): "var(--blue)",
+    axes.ORANGE.lower(): "var(--orange)",
+    axes.GREEN.lower(): "var(--green)",
+    axes.PURPLE.lower(): "var(--purple)",
 }
 SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": 9.0}
 WIDE = 450.0  # points; a phone shows wider figures in a box that scrolls

@@ -5,10 +5,8 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from importlib.resources import files
-from multiprocessing import get_context
 
 import numpy as np
 
@@ -119,25 +117,17 @@ def measured(case: Case, time: np.ndarray, signals: Mapping[str, np.ndarray]) ->
 
 
 def run_all(
-    cases: Iterable[Case], *, jobs: int = 1, done: Callable[[Case], object] | None = None
+    cases: Iterable[Case], *, done: Callable[[Case], object] | None = None
 ) -> dict[str, Run]:
-    """Simulate cases in `jobs` processes (1: in this one) and return them by key, in order.
+    """Simulate cases and return them by key, in order.
 
     `done` is called with each case when it is finished.
     """
-    cases, results = list(cases), {}
-    if jobs <= 1:
-        for case in cases:
-            results[case.key] = run(case)
-            if done is not None:
-                done(case)
-        return results
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        futures = {case.key: pool.submit(run, case) for case in cases}
-        for case in cases:
-            results[case.key] = futures[case.key].result()
-            if done is not None:
-                done(case)
+    results = {}
+    for case in cases:
+        results[case.key] = run(case)
+        if done is not None:
+            done(case)
     return results
 
 

@@ -16,6 +16,7 @@ from .design import Design
 from .guarantee import clopper_pearson
 from .paired import Better, differences, mcnemar, wins
 from .quantity import Choice
+from .spec import violates
 
 __all__ = ["Comparison", "compare", "crossed"]
 
@@ -196,7 +197,7 @@ def _ranking(
 ) -> pd.DataFrame:
     rows = {}
     for label, margins in paired[spec].items():
-        count, size = int(np.sum(~(margins > 0))), margins.size
+        count, size = int(np.sum(violates(margins))), margins.size
         low, high = clopper_pearson(count, size, confidence, "both")
         rows[label] = {
             "violations": count,

@@ -26,8 +26,8 @@ __all__ = [
     "Experiment",
     "Prepared",
     "by_diagram",
+    "compile_metrics",
     "evaluate",
-    "machine_metrics",
     "prepare",
     "simulate",
 ]
@@ -234,7 +234,7 @@ def _run(
     progress: Callable[[int], object] | None,
 ) -> pd.DataFrame:
     requirements = experiment.spec.requirements
-    metrics = (*machine_metrics(experiment), *requirements)
+    metrics = (*map(_fast, experiment.metrics), *requirements)
     made = simulate(experiment, loop, rows, metrics=metrics, threads=threads, progress=progress)
     found = made.table.reindex(columns=experiment.measured)
     found = found.set_axis(rows.index[found.index.to_numpy()])
@@ -247,9 +247,12 @@ def _run(
     return found
 
 
-def machine_metrics(experiment: Experiment) -> tuple[Metric, ...]:
-    """Return the metrics of an experiment as machine code, which is compiled when it is called."""
-    return tuple(map(_fast, experiment.metrics))
+def compile_metrics(experiment: Experiment) -> None:
+    """Compile the metrics of an experiment, which otherwise happens with its first row."""
+    time = np.linspace(0.0, 1.0, 5)
+    for metric in experiment.metrics:
+        if isinstance(metric, Metric):
+            _fast(metric).function(time, *np.zeros((len(metric.signals), time.size)))
 
 
 def _fast(metric: Metric) -> Metric:

@@ -14,6 +14,7 @@ from nlctl._errors import ParameterError, UsageError
 from nlctl._param import whole_number
 
 from .design import Design
+from .spec import violates
 
 __all__ = [
     "Margins",
@@ -244,7 +245,7 @@ def violations_of(design: Design, margins: Margins) -> np.ndarray:
         raise NoGuaranteeError(
             f"the design has {design.size} rows, got margins of {series.size} runs"
         )
-    return ~(series.to_numpy() > 0)
+    return violates(series)
 
 
 def check_iid(design: Design) -> None:

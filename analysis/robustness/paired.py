@@ -15,6 +15,7 @@ from nlctl._errors import ParameterError
 from .design import Design
 from .guarantee import Margins, check_iid, checked_confidence
 from .multiplicity import holm
+from .spec import violates
 
 __all__ = ["Better", "differences", "mcnemar", "median_interval", "wins"]
 
@@ -128,7 +129,7 @@ def mcnemar(design: Design, margins: Mapping[str, Margins]) -> pd.DataFrame:
         If there are less than two controllers, or margins are missing.
     """
     check_iid(design)
-    failed = {name: ~(_column(design, name, values) > 0) for name, values in margins.items()}
+    failed = {name: violates(_column(design, name, values)) for name, values in margins.items()}
     rows = []
     for a, b in itertools.combinations(_two_or_more(failed), 2):
         only_a = int(np.sum(failed[a] & ~failed[b]))

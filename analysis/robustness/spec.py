@@ -6,13 +6,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
 
 from .formula import Formula, Signals, horizon, signals_of, trace
 
-__all__ = ["FAILED", "Requirement", "Spec", "margin", "margins", "unfinished_margin"]
+__all__ = [
+    "FAILED",
+    "Requirement",
+    "Spec",
+    "margin",
+    "margins",
+    "unfinished_margin",
+    "violates",
+]
 
 FAILED = 1e6
 """No margin of a run that reached its end is below -FAILED, and none of another run above it."""
@@ -83,6 +92,11 @@ class Spec:
                 "a spec needs at least one requirement, each with its own key other than 'spec', "
                 f"got {keys}"
             )
+
+
+def violates(margins: ArrayLike) -> np.ndarray:
+    """Return for each margin whether it is a violation: it is none if it is > 0; NaN is one."""
+    return ~(np.asarray(margins, dtype=float) > 0)
 
 
 def unfinished_margin(time: float, until: float) -> float:

@@ -14,6 +14,7 @@ from nlctl._errors import ParameterError
 from .design import Design
 from .guarantee import check_iid, checked_confidence
 from .sequential import SequentialTest, decision, sequence_bounds
+from .spec import violates
 
 __all__ = ["Progress", "Tally", "until_decided"]
 
@@ -82,7 +83,7 @@ class Tally:
         """Take a chunk's margins ``spec`` in."""
         insort(self.ranges, numbers, key=lambda known: known.start)
         self.done += len(numbers)
-        self._beyond[numbers.start] = len(numbers), int(np.count_nonzero(~(margins > 0)))
+        self._beyond[numbers.start] = len(numbers), int(np.count_nonzero(violates(margins)))
         while self.runs in self._beyond:
             runs, violations = self._beyond.pop(self.runs)
             self.runs += runs

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from ..figures.axes import BLUE, GREY, ORANGE, TIME, legend_beside, set_style, stacked_axes
+from ..robustness.spec import violates
 from .labels import plain
 
 __all__ = ["CLIP", "fans", "margins", "quantile", "running_estimate", "shown"]
@@ -35,7 +36,7 @@ def margins(values: np.ndarray) -> Figure:
     figure = Figure(figsize=(9.0, 2.8), layout="constrained")
     counts, part = figure.subplots(1, 2)
     y = shown(values)
-    violated = ~(y > 0)
+    violated = violates(y)
     low, high = min(float(y.min()), 0.0), max(float(y.max()), 0.0)
     width = (high - low or 1.0) / 40
     edges = width * np.arange(np.floor(low / width) - 1, np.ceil(high / width) + 2)  # 0 is an edge

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from ..figures.axes import BLUE, GREEN, GREY, ORANGE, PURPLE, legend_beside, stacked_axes
+from ..robustness.spec import violates
 from .labels import arms, number_axes, plain
 from .runs import shown
 
@@ -84,7 +85,7 @@ def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
     """Lowest margin that was found at each size that was looked at, and the radius."""
     figure, (ax,) = stacked_axes()
     margin = shown(steps["margin"])
-    violated = ~(margin > 0)
+    violated = violates(margin)
     for chosen, marker, colour, name in (
         (~violated, "o", BLUE, "no violation found"),
         (violated, "X", ORANGE, "violation"),

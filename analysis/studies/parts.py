@@ -15,7 +15,7 @@ from scipy import stats
 
 from analysis.robustness import Uncertain
 from analysis.robustness.resolve import check_keyword
-from nlctl._catalogue import block_records
+from nlctl._catalogue import named_block
 from nlctl._errors import ParameterError, UnknownNameError, UsageError
 from nlctl._names import unknown
 from nlctl.paper import named_example
@@ -114,10 +114,12 @@ def option(value: Any, folder: Path) -> Any:
             f"got the keys {sorted(value)}"
         )
     arguments = {key: option(part, folder) for key, part in value.items()}
-    name, records = arguments.pop("block", None), block_records()
-    if name is not None and name not in records:
-        raise unknown("block", str(name), records)
-    made = named_function(arguments.pop("function"), folder) if name is None else records[name]
+    name = arguments.pop("block", None)
+    made = (
+        named_function(arguments.pop("function"), folder)
+        if name is None
+        else named_block(str(name))
+    )
     for key in arguments:
         check_keyword(made, key)
     return made(**arguments)

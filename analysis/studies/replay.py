@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.figures import BLUE, ORANGE, TIME
+from analysis.figures.axes import BLUE, ORANGE, TIME, stacked_axes
 from analysis.robustness import Experiment, Prepared, evaluate, prepare
 from analysis.robustness.experiment import by_diagram, simulate
 from analysis.robustness.formula import Band, parts_of
@@ -161,15 +161,12 @@ def replay_figure(made: Replay) -> Figure:
         for signal in requirement.signals:
             texts.setdefault(signal, []).append(f"{requirement.key}: {requirement.formula}")
     names = [*bounds, *(name for name in made.signals if name not in bounds)][:MOST]
-    figure = Figure(figsize=(9.0, 1.7 * len(names)), layout="constrained")
-    axes = np.ravel(figure.subplots(len(names), 1, sharex=True))
+    figure, axes = stacked_axes(rows=len(names), height=1.7)
     for ax, name in zip(axes, names, strict=True):
         ax.plot(made.time, made.signals[name], color=BLUE, linewidth=1.2)
         for end in bounds.get(name, ()):
             ax.axhline(end, color=ORANGE, linestyle="--", linewidth=1.0)
         ax.set_ylabel(name)
         ax.set_title("; ".join(texts.get(name, ())), fontsize="small", loc="left")
-        ax.grid(True, alpha=0.25, linewidth=0.6)
-        ax.margins(x=0.01)
     axes[-1].set_xlabel(TIME)
     return figure

@@ -16,6 +16,7 @@ from analysis.robustness.guarantee import assumptions
 from analysis.robustness.largest_scale import largest_scale
 from analysis.robustness.radius import robustness_radius
 from analysis.robustness.shrink import shrink
+from analysis.robustness.spec import violates
 from analysis.robustness.worst_case import worst_case
 
 from .analyses import Degradation, Map, Radius, WorstCase
@@ -141,7 +142,7 @@ def failures(asked: Map, ground: Ground) -> Finding:
         most=asked.runs,
     )
     edge = boundary(found)
-    bad = int(np.count_nonzero(~(found.table["spec"].to_numpy() > 0)))
+    bad = int(np.count_nonzero(violates(found.table["spec"])))
     if bad in (0, len(found.table)):
         which = "every one" if bad else "none"
         told = f"{which} of {len(found.table)} points violates the spec."
