@@ -115,15 +115,27 @@ def _runs(beside: Any, out: Path, jobs: int) -> tuple[Any, list[Any]]:
     from analysis.reproduction import CASES, numerics, run_all
 
     from ._terminal import progress_bar
-    from .cli_study_report import compile_shipped, run_shipped
+    from .cli_study_report import run_shipped
 
-    waiting = [beside.submit(compile_shipped, QUICK)]
+    waiting = [beside.submit(_compile_ahead)]
     with progress_bar("simulating", len(CASES)) as advance:
         runs = run_all(CASES[:1], done=lambda _: advance(1))
         waiting.append(beside.submit(run_shipped, QUICK, out, jobs or None))
         waiting.append(beside.submit(numerics))
         runs |= run_all(CASES[1:], done=lambda _: advance(1))  # machine code: in this process
     return runs, waiting
+
+
+def _compile_ahead() -> None:
+    """Compile what the proof, the studies and their metrics need besides the integrators."""
+    from analysis.report.lyapunov_evidence import compile_ahead
+
+    from . import paper
+    from .cli_study_report import compile_shipped
+
+    for loop in (paper.example_1(), paper.example_2()):
+        compile_ahead(loop)
+    compile_shipped(QUICK)
 
 
 def _study(

@@ -71,11 +71,11 @@ def report_study(
 def compile_shipped(names: Sequence[str]) -> None:
     """Compile what `run_shipped` needs besides the integrators: diagrams and metrics."""
     from analysis.robustness import prepare
-    from analysis.robustness.experiment import compile_metrics
+    from analysis.robustness.experiment import compile_ahead
     from analysis.studies import read_study, shipped
 
     for name in names:
-        compile_metrics(prepare(read_study(shipped(name)).experiment).experiment)
+        compile_ahead(prepare(read_study(shipped(name)).experiment))
 
 
 def run_shipped(names: Sequence[str], folder: Path, threads: int | None = None) -> None:

@@ -408,6 +408,35 @@ def test_arguments_stay_as_they_are_and_parts_are_views():
     np.testing.assert_array_equal(y, [[8, 5], [7.5, 6], [7.5, 6], [7, 7]])
 
 
+@pytest.mark.parametrize("n", [6, 20])
+@pytest.mark.parametrize(
+    "places", [[0, 2, 1, 1, -1], [5, 3, 1], [], list(range(1, 13)), list(range(18, 1, -2))]
+)
+def test_elements_at_fixed_places_are_copies(places, n):
+    """An array of indices: short ones as they come, long ones at equal distances."""
+    picked = np.array([i for i in places if i < n], dtype=np.int64)
+
+    def output(t, x, u, params):
+        taken = (x * params["k"])[picked]
+        taken += u[0]
+        return np.append(x[picked] * u[0], np.append(taken, x[picked]))
+
+    block = ct.nlsys(lambda t, x, u, params: -x, output, inputs=1, outputs=3 * picked.size,
+                     states=n, name="picks", params={"k": 2.0})  # fmt: skip
+    for lanes in (1, 2):
+        assert not check(block, lanes).opaque
+
+
+@pytest.mark.parametrize(
+    "picked", [np.array([1, 2, 4, 8, 9, 11, 12, 13, 15, 18]), np.arange(20) > 9]
+)
+def test_many_elements_at_irregular_places_are_not_traced(picked):
+    block = ct.nlsys(lambda t, x, u, params: -x, lambda t, x, u, params: x[picked] * u[0],
+                     inputs=1, outputs=10, states=20, name="picks")  # fmt: skip
+    lowered = check(block, native=False)
+    assert lowered.opaque
+
+
 def test_every_expression_is_computed_once():
     """sin(x1) of two blocks is one sine, and what depends on parameters alone is none."""
 

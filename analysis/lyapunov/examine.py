@@ -10,15 +10,17 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from nlctl import native
+
 from .box import Box, visited_box
 from .constants import constants
 from .decomposition import Decomposition, decompose
 from .integral import sharpest
 from .parts import read_parts
 from .record import Constants
-from .runs import Member, Run, members_of, observe
+from .runs import Member, Run, members_of, observe, observed_loop
 
-__all__ = ["U_MAX", "Examination", "Runs", "examine"]
+__all__ = ["U_MAX", "Examination", "Runs", "compile_ahead", "examine"]
 
 U_MAX = 60.0  # a split that is proved and not computed holds for |u| <= 2 U_MAX
 
@@ -122,7 +124,7 @@ def examine(
     if len(members) == 1:
         fixed = dict(members[0].start), dict(members[0].params)
     parts = read_parts(loop, *fixed)
-    split = sharpest(decompose(parts.actuator, k=k, u_max=U_MAX))
+    split = _split(parts.actuator, k)
     runs = Runs(loop=loop, members=members, split=split, max_steps=max_steps)
     box = _visited(runs) if box is None else box
     sides = [name for name in box.names if name != "u"]
@@ -132,6 +134,15 @@ def examine(
         params=fixed[1],
     )  # fmt: skip
     return Examination(loop=loop, runs=runs, constants=found)
+
+
+def compile_ahead(loop: ct.InterconnectedSystem) -> None:
+    """Compile the diagram that `examine` runs, which otherwise happens with the first run."""
+    native.compile_ahead(observed_loop(loop, _split(read_parts(loop).actuator)))
+
+
+def _split(actuator: Any, k: tuple[float, float] | None = None) -> Decomposition:
+    return sharpest(decompose(actuator, k=k, u_max=U_MAX))
 
 
 def _numbers(values: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from .observed import observed
 from .parts import Parts, read_parts
 from .signals import Signals, signals_of
 
-__all__ = ["Member", "Run", "members_of", "observe"]
+__all__ = ["Member", "Run", "members_of", "observe", "observed_loop"]
 
 AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
 
@@ -164,8 +164,7 @@ def observe(
     ParameterError
         If a member does not reproduce the response that it stands for.
     """
-    base = read_parts(loop)
-    compiled = native.compile(observed(loop, base, split, alpha_1(base.gains)))
+    compiled = observed_loop(loop, split)
     for member in members:
         parts = read_parts(loop, member.start, member.params)
         params = {**member.params, "integral.alpha_1": alpha_1(parts.gains)}
@@ -183,6 +182,12 @@ def observe(
         lost = None if response.success else float(response.statistics.time)
         message = str(response.message or "")
         yield Run(member=member, parts=parts, signals=signals, lost=lost, message=message)
+
+
+def observed_loop(loop: ct.InterconnectedSystem, split: Decomposition) -> native.Compiled:
+    """Compile what `observe` runs."""
+    base = read_parts(loop)
+    return native.compile(observed(loop, base, split, alpha_1(base.gains)))
 
 
 def _check_reproduced(member: Member, signals: Signals) -> None:

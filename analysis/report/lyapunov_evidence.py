@@ -11,7 +11,7 @@ from threading import Event
 import control as ct
 import numpy as np
 
-from nlctl import paper
+from nlctl import native, paper
 from nlctl.native import compile as compiled
 from nlctl.response import input_output_response
 
@@ -20,6 +20,7 @@ from ..lyapunov.certificate import Certificate, certify
 from ..lyapunov.conservatism import Conservatism, conservatism
 from ..lyapunov.creep import Creep
 from ..lyapunov.drift import signal
+from ..lyapunov.examine import compile_ahead as examine_ahead
 from ..lyapunov.examine import examine
 from ..lyapunov.far_record import continued, read_record
 from ..lyapunov.inequalities import inequalities, terms
@@ -30,7 +31,15 @@ from ..lyapunov.signals import Margin
 from ..metrics import peak
 from ..robustness.contenders import contenders
 
-__all__ = ["FAR", "LOOK", "Evidence", "evidence", "far_runs_in_background", "known_sign"]
+__all__ = [
+    "FAR",
+    "LOOK",
+    "Evidence",
+    "compile_ahead",
+    "evidence",
+    "far_runs_in_background",
+    "known_sign",
+]
 
 SPLIT = {"example_1": (0.6, 1.3)}  # bounds of the dead zone's k that make eps_u* small
 LOOK = min(LOOKS)  # s; from so much of a run the creep of zeta is told
@@ -108,6 +117,12 @@ def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
         ),
         margins=margins,
     )
+
+
+def compile_ahead(loop: ct.InterconnectedSystem) -> None:
+    """Compile the diagrams that `evidence` runs besides the example itself."""
+    examine_ahead(loop)
+    native.compile_ahead(compiled(known_sign(loop)))
 
 
 def _max_r(loop: ct.InterconnectedSystem, times: np.ndarray) -> float:

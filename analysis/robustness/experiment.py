@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 import pandas as pd
 
+from nlctl import native
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
 from nlctl._param import checked_times
@@ -26,7 +27,7 @@ __all__ = [
     "Experiment",
     "Prepared",
     "by_diagram",
-    "compile_metrics",
+    "compile_ahead",
     "evaluate",
     "prepare",
     "simulate",
@@ -247,10 +248,12 @@ def _run(
     return found
 
 
-def compile_metrics(experiment: Experiment) -> None:
-    """Compile the metrics of an experiment, which otherwise happens with its first row."""
+def compile_ahead(prepared: Prepared) -> None:
+    """Compile diagrams and metrics, which otherwise happens with the first row."""
+    for _, loop in prepared.loops:
+        native.compile_ahead(loop, ensemble=True)
     time = np.linspace(0.0, 1.0, 5)
-    for metric in experiment.metrics:
+    for metric in prepared.experiment.metrics:
         if isinstance(metric, Metric):
             _fast(metric).function(time, *np.zeros((len(metric.signals), time.size)))
 

@@ -8,7 +8,7 @@ once on symbols (`_trace*`) and written out for several members at a time (`_low
 
 `_integrate` moves members side by side through time, each with its own steps: an explicit pair
 (`_tsit5`), a stiff method (`_rodas5p`, `_stiff`), decisions (`_control`), corners and memories
-(`_events`, `_work`).  `_response` makes of one run what python-control returns, `_ensemble` runs
+(`_events`, `_restart`).  `_response` makes of one run what python-control returns, `_ensemble` runs
 many; `_discrete` is for sampled systems.
 """
 
@@ -16,6 +16,7 @@ from ._code import CompileError
 from ._compile import Compiled, compile  # noqa: A004 (what it does)
 from ._ensemble import Ensemble, ensemble_response
 from ._lane import Status
+from ._machine import compile_ahead
 from ._response import Response
 from ._schedule import AlgebraicLoopError
 from ._simulate import Settings, Statistics
@@ -30,5 +31,6 @@ __all__ = [
     "Statistics",
     "Status",
     "compile",
+    "compile_ahead",
     "ensemble_response",
 ]

@@ -13,6 +13,8 @@ One pass tries one guess: the present one, or one that differs in one signal, fo
 Jacobian matrix by a forward difference.  A step that does not bring the two closer together is
 halved.  The search begins at 0, then at 1 and -1; of several solutions the one is found that it
 reaches first.  Where it ends without a solution the guess is NaN, and `failed` says so.
+
+All this is compiled into every such program, hence loops instead of slices, see `_work`.
 """
 
 from __future__ import annotations
@@ -58,7 +60,10 @@ def searching(search):
 @register_jitable
 def failed(search):
     """Whether the search has ended without a solution."""
-    return np.isnan(search.guess).any()
+    for value in search.guess:  # noqa: SIM110 (no generators in machine code)
+        if np.isnan(value):
+            return True
+    return False
 
 
 @register_jitable
@@ -76,25 +81,43 @@ def improve(search):
 @register_jitable
 def _judged(search):
     """Take the guess as the new base if it is better than the last, otherwise halve the step."""
-    norm = np.max(np.abs(search.found - search.guess))
+    norm = 0.0
+    for i in range(search.guess.size):
+        norm = _larger(search.found[i] - search.guess[i], norm)
     search.count[0] += 1
-    if search.phase[0] == TRIAL and norm <= ROUNDING * np.max(np.abs(search.found)):
+    if search.phase[0] == TRIAL and norm <= ROUNDING * _largest(search.found):
         search.phase[0] = DONE
     elif norm < search.norm[0]:  # NaN is not; the first norm is infinite
-        search.base[:] = search.guess
-        search.answer[:] = search.found
+        for i in range(search.guess.size):
+            search.base[i], search.answer[i] = search.guess[i], search.found[i]
         search.norm[0] = norm
         _perturbed(search, 0)
     elif search.phase[0] == BASE or search.count[0] > STEPS:
         _start_again(search)
     else:
-        search.guess[:] = 0.5 * (search.guess + search.base)
+        for i in range(search.guess.size):
+            search.guess[i] = 0.5 * (search.guess[i] + search.base[i])
+
+
+@register_jitable
+def _larger(value, largest):
+    """Return the larger magnitude; NaN stays NaN."""
+    return abs(value) if abs(value) > largest or np.isnan(value) else largest
+
+
+@register_jitable
+def _largest(values):
+    largest = 0.0
+    for value in values:
+        largest = _larger(value, largest)
+    return largest
 
 
 @register_jitable
 def _perturbed(search, column):
     """Guess the base with one signal changed."""
-    search.guess[:] = search.base
+    for i in range(search.guess.size):
+        search.guess[i] = search.base[i]
     scale = max(abs(search.base[column]), abs(search.answer[column]))
     search.guess[column] += DIFFERENCE * (scale if scale > 0.0 else 1.0)
     search.increment[0] = search.guess[column] - search.base[column]  # what rounding left of it
@@ -105,17 +128,22 @@ def _perturbed(search, column):
 def _measured(search, column):
     """Take in a column of the Jacobian matrix; after the last one, make Newton's step."""
     n = search.base.size
-    search.jacobian[:, column] = (search.found - search.answer) / search.increment[0]
+    for i in range(n):
+        change = search.found[i] - search.answer[i]
+        search.jacobian[i, column] = change / search.increment[0]
     search.jacobian[column, column] -= 1.0
     if column + 1 < n:
         _perturbed(search, column + 1)
         return
-    step = search.base - search.answer
+    step = np.zeros(n)
+    for i in range(n):
+        step[i] = search.base[i] - search.answer[i]
     if not _solve(search.jacobian, step):
         _start_again(search)
         return
-    search.guess[:] = search.base + step
-    short = np.max(np.abs(step)) <= SMALL_STEP * np.max(np.abs(search.guess))
+    for i in range(n):
+        search.guess[i] = search.base[i] + step[i]
+    short = _largest(step) <= SMALL_STEP * _largest(search.guess)
     search.phase[0] = LAST if short else TRIAL
 
 
@@ -126,11 +154,11 @@ def _start_again(search):
     search.count[1] += 1
     search.norm[0] = np.inf
     if search.count[1] < len(STARTS):
-        search.guess[:] = STARTS[search.count[1]]
         search.phase[0] = BASE
     else:
-        search.guess[:] = np.nan
         search.phase[0] = LAST
+    for i in range(search.guess.size):
+        search.guess[i] = STARTS[search.count[1]] if search.phase[0] == BASE else np.nan
 
 
 @register_jitable
@@ -140,18 +168,28 @@ def _solve(matrix, b):
     Gaussian elimination with partial pivoting.
     """
     n = b.size
-    smallest = SINGULAR * max(1.0, np.max(np.abs(matrix)))
+    largest = 1.0
     for i in range(n):
-        pivot = i + np.argmax(np.abs(matrix[i:, i]))
-        if not abs(matrix[pivot, i]) > smallest:  # NaN as well
+        for j in range(n):
+            largest = _larger(matrix[i, j], largest)
+    for i in range(n):
+        pivot = i
+        for k in range(i + 1, n):
+            if abs(matrix[k, i]) > abs(matrix[pivot, i]) or np.isnan(matrix[k, i]):
+                pivot = k
+        if not abs(matrix[pivot, i]) > SINGULAR * largest:  # NaN as well
             return False
         for j in range(n):
             matrix[i, j], matrix[pivot, j] = matrix[pivot, j], matrix[i, j]
         b[i], b[pivot] = b[pivot], b[i]
         for k in range(i + 1, n):
             factor = matrix[k, i] / matrix[i, i]
-            matrix[k, :] -= factor * matrix[i, :]
+            for j in range(n):
+                matrix[k, j] -= factor * matrix[i, j]
             b[k] -= factor * b[i]
     for i in range(n - 1, -1, -1):
-        b[i] = (b[i] - np.sum(matrix[i, i + 1 :] * b[i + 1 :])) / matrix[i, i]
+        known = 0.0
+        for j in range(i + 1, n):
+            known += matrix[i, j] * b[j]
+        b[i] = (b[i] - known) / matrix[i, i]
     return True

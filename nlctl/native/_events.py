@@ -76,7 +76,8 @@ def locate(lane, corners, rtol, e_start, e_low, e_high, e, behind, j):
     """
     if lane.tries == 0:
         lane.low, lane.high = 0.0, lane.step
-        e_low[:, j], e_high[:, j] = e_start[:, j], e[:, j]
+        for i in range(e.shape[0]):
+            e_low[i, j], e_high[i, j] = e_start[i, j], e[i, j]
     root, memory = _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j)
     if root < 0.0:
         return CLEAR
@@ -109,14 +110,14 @@ def _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j):
         if not inside:
             lane.low, lane.high = lane.step, before
             lane.same_side = min(lane.same_side, 0) - 1
-            e_low[:, j] = e[:, j]
-            if lane.same_side < -1:
-                e_high[:, j] *= 0.5  # Illinois: an end that stays loses weight
         else:
             lane.same_side = max(lane.same_side, 0) + 1
-            e_high[:, j] = e[:, j]
-            if lane.same_side > 1:
-                e_low[:, j] *= 0.5
+        weight = 0.5 if abs(lane.same_side) > 1 else 1.0  # Illinois: an end that stays loses some
+        for i in range(e.shape[0]):
+            if inside:
+                e_low[i, j], e_high[i, j] = e_low[i, j] * weight, e[i, j]
+            else:
+                e_low[i, j], e_high[i, j] = e[i, j], e_high[i, j] * weight
     else:
         lane.same_side = 0
     return first_root(lane, corners, e_start, e_low, e_high, behind, j)

@@ -18,8 +18,9 @@ from . import _rodas5p, _tsit5
 from ._control import choose_method, choose_step, next_step, rejected
 from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
 from ._lane import INNER, LANES, RUNNING
+from ._restart import memory_rates, restart, start
 from ._stiff import stiff_attempt
-from ._work import AUTO, OUT, RHS, Task, inputs_at, memory_rates, new_work, outputs, restart, start
+from ._work import AUTO, OUT, RHS, Task, inputs_at, new_work, outputs
 
 
 @numba.njit(**INNER)
@@ -43,7 +44,8 @@ def _explicit_attempt(rhs, task, lanes, w):
             _tsit5.combined(x, hh, k, s, w.x_new_flat)
             rhs(w.t, w.x_new, w.u, task.p, w.k[s], w.g)
         for i in task.memory:
-            w.k[s, i, :] = 0.0
+            for j in range(count):
+                w.k[s, i, j] = 0.0
     _tsit5.weighed_errors(x, w.x_new_flat, k, hh, task.rtol, task.atol, w.x_ahead_flat)
     _tsit5.errors(w.x_ahead, w.x_new, w.x_stage, w.k, w.sums, w.error, w.rate)
 
@@ -57,7 +59,8 @@ def _sample(lane, j, times, t_new, x, x_new, k, U, states):
         theta = (times[lane.segment] - lane.t) / lane.step
         target = states[lane.segment]
         if theta >= 1.0:
-            target[:, j] = x_new[:, j]  # exactly the solution, not its interpolant
+            for i in range(x.shape[0]):
+                target[i, j] = x_new[i, j]  # exactly the solution, not its interpolant
         elif lane.stiff:
             _rodas5p.interpolate(theta, x, x_new, U, target)
         else:
@@ -75,8 +78,9 @@ def _judge(task, lanes, w, states, done, passed):
     """Accept or reject the step just tried in every lane, and propose the next.
 
     ``done`` becomes whether it was accepted, ``passed`` whether it ended with an event or set a
-    memory in motion.
+    memory in motion.  Return whether any lane has passed.
     """
+    any_passed = False
     corners, memories = task.corners, task.memory.size
     shortest = 1e-7 * (task.times[-1] - task.times[0])
     for j in range(lanes.size):
@@ -106,8 +110,10 @@ def _judge(task, lanes, w, states, done, passed):
             at_corner = lane.ends and w.u.shape[0] > 0
             passed[j] = at_corner or _began_to_move(corners, w.e_start, w.e, j)
         passed[j] |= found == EVENT
+        any_passed |= passed[j]
         if task.method == AUTO:
             choose_method(lane, w.x.shape[0], task.alone)
+    return any_passed
 
 
 @numba.njit(**INNER)
@@ -135,7 +141,8 @@ def _take(task, w, done):
         for j in range(count):
             if done[j] and w.e_start[task.corners + i, j] == 0.0:  # otherwise locked
                 if w.x[task.memory[i], j] != w.g[task.corners + i, j]:
-                    w.behind[:, j] = 0.0  # with another memory the way back is an event
+                    for m in range(w.behind.shape[0]):
+                        w.behind[m, j] = 0.0  # with another memory the way back is an event
                 w.x[task.memory[i], j] = w.g[task.corners + i, j]
     for i in range(w.e.shape[0]):
         for j in range(count):
@@ -167,10 +174,12 @@ def advance(rhs, task, lanes, w, states, rounds):
             for j in range(lanes.size):
                 w.t_end[j] = lanes[j].t + lanes[j].step
             memory_rates(rhs, task, lanes, w, w.x_new, w.k[6])
-        w.e[: task.corners] = w.g[: task.corners]
-        _judge(task, lanes, w, states, done, passed)
+        for i in range(task.corners):
+            for j in range(lanes.size):
+                w.e[i, j] = w.g[i, j]
+        any_passed = _judge(task, lanes, w, states, done, passed)
         _take(task, w, done)
-        if task.memory.size and np.any(passed):
+        if task.memory.size and any_passed:
             restart(rhs, task, lanes, w, passed)
 
 

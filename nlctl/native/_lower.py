@@ -144,21 +144,27 @@ def _one_by_one(schedule: Schedule, program: Program, lanes: int) -> Lowered:
     source = f"""{one}
 
 def prepare(p, c):
-    c[:{rows}] = p
+    for i in range({rows}):
+        for lane in range({lanes}):
+            c[i, lane] = p[i, lane]
 
 
 def rhs(t, x, u, c, dx, g):
     dx1, g1 = np.empty({n}), np.empty({program.events})
     for lane in range({lanes}):
         rhs_of_one({given}, dx1, g1)
-        dx[:, lane], g[:, lane] = dx1, g1
+        for i in range({n}):
+            dx[i, lane] = dx1[i]
+        for i in range({program.events}):
+            g[i, lane] = g1[i]
 
 
 def out(t, x, u, c, y):
     y1 = np.empty({count})
     for lane in range({lanes}):
         out_of_one({given}, y1)
-        y[:, lane] = y1
+        for i in range({count}):
+            y[i, lane] = y1[i]
 """
     return Lowered(
         source=source,

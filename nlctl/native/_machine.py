@@ -66,6 +66,26 @@ def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:
     return known["plain"]
 
 
+def compile_ahead(compiled: Compiled, *, ensemble: bool = False) -> None:
+    """Make a diagram's machine code now, instead of with its first run; it stays in the cache.
+
+    The integrators, which all diagrams share, are not included.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    ensemble : bool, optional
+        Make that of `nlctl.ensemble_response`, instead of that of single runs.
+
+    Raises
+    ------
+    CompileError
+        If a block's function cannot be machine code.
+    """
+    width = WIDTH if ensemble else 1
+    machine(compiled, np.repeat(compiled.parameter_vector()[:, None], width, axis=1), width)
+
+
 def _plain(compiled: Compiled) -> Machine:
     """The program as it stands, for one member."""
     one_rhs, one_out = compiled.native

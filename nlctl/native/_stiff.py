@@ -20,7 +20,8 @@ def _jacobian(rhs, task, lanes, w):
     """Fill w.jacobian and w.f_t at the start of a step by forward differences."""
     n, lane = w.x.shape[0], lanes[0]
     w.t[0] = lane.t
-    w.x_ahead[:] = w.x
+    for i in range(n):
+        w.x_ahead[i, 0] = w.x[i, 0]
     for c in range(n):
         w.x_ahead[c, 0] += RELATIVE * max(abs(w.x[c, 0]), FLOOR)
         delta = w.x_ahead[c, 0] - w.x[c, 0]
@@ -39,16 +40,22 @@ def _jacobian(rhs, task, lanes, w):
 def _spectral_radius(w):
     """Estimate the largest eigenvalue's magnitude by a few steps of the power method."""
     n = w.jacobian.shape[0]
-    v, rate = 0.5 + (0.6180339887 * np.arange(1, n + 1)) % 1.0, 0.0  # like no matrix's null space
+    v, product, rate = np.zeros(n), np.zeros(n), 0.0
+    for i in range(n):
+        v[i] = 0.5 + (0.6180339887 * (i + 1)) % 1.0  # like no matrix's null space
     for _ in range(8):
-        product = np.zeros(n)
+        before, after = 0.0, 0.0
         for i in range(n):
+            product[i] = 0.0
             for j in range(n):
                 product[i] += w.jacobian[i, j] * v[j]
-        rate = np.sqrt(np.sum(product * product) / np.sum(v * v))
+            before += v[i] * v[i]
+            after += product[i] * product[i]
+        rate = np.sqrt(after / before)
         if not rate > 0.0:
             return 0.0
-        v = product / rate
+        for i in range(n):
+            v[i] = product[i] / rate
     return rate
 
 
@@ -73,7 +80,8 @@ def stiff_attempt(rhs, task, lanes, w):
                 total += _rodas5p.A[s, j] * w.U[j, i]
             w.x_stage[i, 0] = w.x[i, 0] + total
         if s == 0:
-            w.dx_ahead[:] = w.k[0]
+            for i in range(n):
+                w.dx_ahead[i, 0] = w.k[0, i, 0]
         else:
             evaluate(rhs, task, lanes, w, w.x_stage, w.dx_ahead, w.g_ahead)
         for i in range(n):

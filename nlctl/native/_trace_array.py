@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -79,6 +80,8 @@ class Tracer:
         return (self[i] for i in range(len(self)))
 
     def __getitem__(self, key: Any) -> Tracer:
+        if isinstance(key, np.ndarray) and key.ndim:
+            return self._taken(key)
         keys = full_key(key, self.ndim)
         if self.axis is None:
             return Tracer(self.graph, boxed(self.cells[tuple(keys)]))
@@ -97,6 +100,21 @@ class Tracer:
         cells = mapped(lambda e: self.graph.part(e, start, step, size), cells)
         self.alone = False
         return Tracer(self.graph, cells, before, size, alone=False)
+
+    def _taken(self, places: np.ndarray) -> Tracer:
+        """Return copies of the elements at fixed places; many only where these are equally far."""
+        if self.ndim != 1 or places.ndim != 1 or places.dtype.kind not in "iu":
+            raise Untraceable("indexing by such an array")
+        indices = [int(i) for i in np.arange(self.size)[places]]
+        if self.axis is None:
+            return Tracer(self.graph, self.cells[indices])
+        if len(indices) <= SMALL:
+            return traced(self.graph, [self[i] for i in indices])
+        start, step = indices[0], indices[1] - indices[0]
+        if step == 0 or any(b - a != step for a, b in pairwise(indices)):
+            raise Untraceable("many elements at irregular places")
+        part = self.graph.part(self.only, start, step, len(indices))
+        return Tracer(self.graph, boxed(part), 0, len(indices))
 
     def copy(self) -> Tracer:
         """Return a copy."""

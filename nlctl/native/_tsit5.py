@@ -99,8 +99,8 @@ def errors(parts, x_new, x_stage, k, sums, error, rate):
     (Hairer, Wanner, Solving ODEs II, IV.2).
     """
     n, lanes = x_new.shape
-    error[:] = 0.0
-    sums[:] = 0.0
+    for j in range(error.size):
+        error[j] = sums[0, j] = sums[1, j] = sums[2, j] = 0.0
     for i in range(n):
         for j in range(lanes):
             part = parts[i, j]

@@ -1,0 +1,73 @@
+"""What is compiled ahead of a run is what the run needs: nothing is left to be compiled."""
+
+from contextlib import contextmanager
+
+import numpy as np
+import pandas as pd
+import pytest
+from numba.core import config, event
+from sweep_examples import experiment
+
+import nlctl
+from analysis.lyapunov.examine import compile_ahead as examine_ahead
+from analysis.lyapunov.examine import examine
+from analysis.robustness import prepare
+from analysis.robustness.experiment import compile_ahead as rows_ahead
+from analysis.robustness.experiment import evaluate
+from nlctl.native import compile_ahead
+
+T = np.linspace(0, 1, 11)
+pytestmark = pytest.mark.skipif(
+    getattr(config, "DISABLE_JIT", False), reason="nothing is compiled without JIT"
+)
+
+
+@pytest.fixture(autouse=True)
+def empty_cache(tmp_path, monkeypatch):
+    """The integrators are there, programs are not."""
+    nlctl.input_output_response(nlctl.compile(nlctl.paper.example_1()), T)
+    monkeypatch.setenv("NLCTL_CACHE_DIR", str(tmp_path))
+
+
+@contextmanager
+def compiling():
+    """Return the names of the functions that are compiled meanwhile."""
+    names = []
+    with event.install_recorder("numba:compile") as recorder:
+        yield names
+    names += [e.data["dispatcher"].py_func.__qualname__ for _, e in recorder.buffer if e.is_start]
+
+
+@pytest.mark.parametrize("ensemble", [False, True])
+def test_single_runs_and_ensembles(ensemble):
+    compiled = nlctl.compile(nlctl.paper.example_1())
+    with compiling() as before:
+        compile_ahead(compiled, ensemble=ensemble)
+    assert {"prepare", "rhs", "out"} <= set(before)
+    with compiling() as during:
+        if ensemble:
+            nlctl.ensemble_response(compiled, T, params={"law.beta": [2.0, 3.0]})
+        else:
+            nlctl.input_output_response(compiled, T)
+    assert during == []
+
+
+def test_rows_of_an_experiment_and_their_metrics():
+    prepared = prepare(experiment())
+    with compiling() as before:
+        rows_ahead(prepared)
+    assert {"prepare", "rhs", "out"} <= set(before)
+    with compiling() as during:
+        found = evaluate(prepared, pd.DataFrame({"lag.rate": [1.0, 1.5], "lag.gain": [0.5, 0.1]}))
+    assert during == []
+    assert np.all(np.isfinite(found["peak"]))
+
+
+def test_the_observed_loop_of_a_proof():
+    loop = nlctl.paper.example_1()
+    with compiling() as before:
+        examine_ahead(loop)
+    assert "rhs" in before
+    with compiling() as during:
+        examine(loop, 1.0)
+    assert during == []
