@@ -81,7 +81,7 @@ def _paper(
     spawned = get_context("spawn")
     with (
         far_runs_in_background(whole=far) as long_runs,
-        ProcessPoolExecutor(1, mp_context=spawned) as beside,  # the studies, on the other core
+        ProcessPoolExecutor(1, mp_context=spawned) as beside,  # the other core
     ):
         runs, waiting = _runs(beside, out, jobs)
         proofs = {}
@@ -100,9 +100,9 @@ def _paper(
             studies=studies_part([out / name for name in QUICK], threads=jobs or None),
             numerics=numbers,
         )
-    options = " --far" * far + " --interactive" * interactive
-    made = replace(made, command=made.command + options)
-    page = write_report(made, out, interactive=interactive)
+        options = " --far" * far + " --interactive" * interactive
+        made = replace(made, command=made.command + options)
+        page = write_report(made, out, interactive=interactive, pool=beside)
     return made.verdict, page, int(not all(check.passed for check in checks(runs)))
 
 
@@ -127,14 +127,16 @@ def _runs(beside: Any, out: Path, jobs: int) -> tuple[Any, list[Any]]:
 
 
 def _compile_ahead() -> None:
-    """Compile what the proof, the studies and their metrics need besides the integrators."""
-    from analysis.report.lyapunov_evidence import compile_ahead
+    """Compile what is needed besides the integrators, in the order in which it is needed."""
+    from analysis import reproduction
+    from analysis.report import lyapunov_evidence
 
     from . import paper
     from .cli_study_report import compile_shipped
 
-    for loop in (paper.example_1(), paper.example_2()):
-        compile_ahead(loop)
+    lyapunov_evidence.compile_ahead(paper.example_1())
+    reproduction.compile_ahead(reproduction.CASES)  # by now the other process has the first two
+    lyapunov_evidence.compile_ahead(paper.example_2())
     compile_shipped(QUICK)
 
 

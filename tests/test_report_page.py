@@ -8,6 +8,8 @@ import json
 import re
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -42,7 +44,7 @@ from analysis.report.outline import (
     summary,
 )
 from analysis.report.page import parts
-from analysis.report.svg import shapes_svg, svg
+from analysis.report.svg import shapes_svg, svg, svg_files
 from analysis.report.svg_compact import short_path
 from nlctl._errors import UsageError
 
@@ -227,7 +229,7 @@ def test_frames_of_legends_follow_the_theme_and_white_text_stays_white():
     figure = drawn()
     figure.axes[1].text(1, 0, "7", color="white")
     frame = Figure(key="k", caption="c", description="d", figure=figure)
-    root = ElementTree.fromstring(svg(frame, "k", {}))
+    root = ElementTree.fromstring(svg(frame, *svg_files([frame.figure]), "k", {}))
     framed = [e for e in root.iter() if e.get("fill") == "var(--page)"]
     assert {e.tag for e in framed} == {"path"}
     assert [e.tag for e in root.iter() if e.get("fill") == "#ffffff"] == ["g"]
@@ -261,14 +263,30 @@ def test_letters_are_drawn_once_for_all_figures_of_a_page():
     """A second figure adds no shapes, and every letter refers to one that there is."""
     shapes = {}
     once = Figure(key="k", caption="c", description="d", figure=drawn())
-    first = svg(once, "first", shapes)
+    files = svg_files([once.figure, drawn()])
+    first = svg(once, files[0], "first", shapes)
     count = len(shapes)
-    second = svg(dataclasses.replace(once, figure=drawn()), "second", shapes)
+    second = svg(once, files[1], "second", shapes)
     assert len(shapes) == count > 10
     ids = set(re.findall(r' id="([^"]*)"', shapes_svg(shapes)))
     for drawing in (first, second):
         assert set(re.findall(r'<use href="#([^"]*)"', drawing)) <= ids
     assert first.replace("first", "second") == second
+
+
+def test_a_pool_that_helps_with_drawing_changes_no_byte():
+    """Figures are the same files wherever they are drawn, and in the same order."""
+
+    def figures():  # a layout that is computed again differs in the last digit
+        for i in range(4):
+            figure = drawn()
+            figure.axes[0].set_title(f"number {i}")
+            yield figure
+
+    alone = svg_files([*figures()])
+    assert len(set(alone)) == 4
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        assert svg_files([*figures()], pool) == alone
 
 
 def numbers_in(value):

@@ -172,7 +172,7 @@ def conservatism(
         max_r=peak(s.t, s["r"]),
         ultimate=given.C_0(0.0, Q),
         tail_max_r=peak(late, r),
-        shares=_shares(given, V_0, Q),
+        shares=_shares(given, float(x.r[0]), Q),
         delta_shares=_delta_shares(given, found),
         C_0_along=_bound_with(given, along, given.W, Q),
         C_0_fitted=_fitted(s, given, Q),
@@ -183,7 +183,7 @@ def conservatism(
     )
 
 
-def _shares(given: Premises, V_0: float, Q: float) -> tuple[Share, ...]:
+def _shares(given: Premises, r_0: float, Q: float) -> tuple[Share, ...]:
     gains, rate = given.gains, given.alpha_1
     W, error = given.W @ given.W, given.W - np.array(gains.W_hat_0)
     by = rate if rate > 0 else np.nan
@@ -196,7 +196,7 @@ def _shares(given: Premises, V_0: float, Q: float) -> tuple[Share, ...]:
         ("tau in alpha_0", "0.2785 tau delta* / alpha_1", KAPPA * gains.tau * given.delta / by),
         ("delta* in V(0)", "(delta* - delta_hat(0))^2 / (2 gamma)", start_delta),
         ("|W| in V(0)", "|W - W_hat(0)|^2 / (2 Gamma)", start_W),
-        ("r(0) in V(0)", "r(0)^2 / 2", V_0 - start_delta - start_W),
+        ("r(0) in V(0)", "r(0)^2 / 2", r_0**2 / 2),
         ("Q", "sup I(t)", Q),
     )  # fmt: skip
     whole = sum(value for _, _, value in rows)

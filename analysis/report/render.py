@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Mapping
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from .document import Figure, History, Item, Report, Table
 from .history import chart
 from .outline import evidence, kind, meanings, place, summary
 from .page import fill, to_bytes, write_files
-from .svg import shapes_svg, svg
+from .svg import shapes_svg, svg, svg_files
 
 __all__ = ["file_hashes", "render_html", "render_json", "write_report"]
 
@@ -35,7 +36,7 @@ TITLES = {
 }
 
 
-def render_html(report: Report, *, interactive: bool = False) -> str:
+def render_html(report: Report, *, interactive: bool = False, pool: Executor | None = None) -> str:
     """Return the report as one HTML page without references to anything outside.
 
     Parameters
@@ -43,20 +44,22 @@ def render_html(report: Report, *, interactive: bool = False) -> str:
     report : Report
     interactive : bool, optional
         Whether its `History` items become charts, drawn by a script inside the page.
+    pool : concurrent.futures.Executor, optional
+        Processes that help with drawing the figures.
     """
     placed = place(report)
     light, told = summary(report.claims)
+    items = {anchor: item for part in placed for anchor, _, item in part.items}
+    figures = {anchor: item for anchor, item in items.items() if isinstance(item, Figure)}
+    files = svg_files([figure.figure for figure in figures.values()], pool)
     shapes: dict[str, str] = {}
     drawings = {
-        anchor: svg(item, anchor, shapes)
-        for part in placed
-        for anchor, _, item in part.items
-        if isinstance(item, Figure)
+        anchor: svg(figure, file, anchor, shapes)
+        for (anchor, figure), file in zip(figures.items(), files, strict=True)
     }
     charts = {
         anchor: chart(item)
-        for part in placed
-        for anchor, _, item in part.items
+        for anchor, item in items.items()
         if interactive and isinstance(item, History)
     }
     digest = hashlib.sha256(to_bytes(render_json(report))).hexdigest()
@@ -117,7 +120,11 @@ def _plain(item: Item) -> dict[str, Any]:
 
 
 def write_report(
-    report: Report, folder: str | os.PathLike[str], *, interactive: bool = False
+    report: Report,
+    folder: str | os.PathLike[str],
+    *,
+    interactive: bool = False,
+    pool: Executor | None = None,
 ) -> Path:
     """Write ``index.html`` and ``report.json``; nothing is half written.
 
@@ -128,6 +135,8 @@ def write_report(
         Made where it does not exist.
     interactive : bool, optional
         As in `render_html`; ``report.json`` is the same either way.
+    pool : concurrent.futures.Executor, optional
+        As in `render_html`.
 
     Returns
     -------
@@ -140,7 +149,7 @@ def write_report(
         If the folder cannot be written to.
     """
     folder = Path(folder)
-    page = render_html(report, interactive=interactive)
+    page = render_html(report, interactive=interactive, pool=pool)
     write_files(folder, {"report.json": render_json(report), "index.html": page})
     return folder / "index.html"
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from typing import Any
 from xml.etree import ElementTree
 
 import matplotlib as mpl
 from markupsafe import Markup
+from matplotlib.figure import Figure as MatplotlibFigure
 
 from nlctl import drawing
 
@@ -17,7 +19,7 @@ from ..figures import axes
 from .document import Figure
 from .svg_compact import compact, shared_shape, short_path
 
-__all__ = ["shapes_svg", "svg"]
+__all__ = ["shapes_svg", "svg", "svg_files"]
 
 # Colours of the figures that follow the page's theme, by the page's own names for them.
 THEME = {
@@ -39,7 +41,25 @@ TAG = re.compile(r"<(\w+)")
 URL = re.compile(r"url\(#([^)]*)\)")
 
 
-def svg(figure: Figure, key: str, shapes: dict[str, str]) -> Markup:
+def svg_files(figures: Sequence[MatplotlibFigure], pool: Executor | None = None) -> list[bytes]:
+    """Return figures as SVG files; this process and those of a pool share the work."""
+    waiting = [] if pool is None else [pool.submit(_svg_file, figure) for figure in figures]
+    here: dict[int, bytes] = {}
+    for i in reversed(range(len(figures))):  # a pool begins with the first one
+        if waiting and not waiting[i].cancel():
+            break
+        here[i] = _svg_file(figures[i])
+    return [here[i] if i in here else waiting[i].result() for i in range(len(figures))]
+
+
+def _svg_file(figure: MatplotlibFigure) -> bytes:
+    buffer = io.BytesIO()
+    with mpl.rc_context(SETTINGS):
+        figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+    return buffer.getvalue()
+
+
+def svg(figure: Figure, file: bytes, key: str, shapes: dict[str, str]) -> Markup:
     """Return a figure as inline SVG, the same bytes every time.
 
     Letters and markers are drawn from `shapes`, which all figures of a page share.  Of the other
@@ -50,15 +70,14 @@ def svg(figure: Figure, key: str, shapes: dict[str, str]) -> Markup:
     Parameters
     ----------
     figure : Figure
+    file : bytes
+        What `svg_files` made of it.
     key : str
         Unique on the page.
     shapes : dict
         Definition of each shape, and its id; new ones are added.
     """
-    buffer = io.BytesIO()
-    with mpl.rc_context(SETTINGS):
-        figure.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
-    root = ElementTree.fromstring(buffer.getvalue())
+    root = ElementTree.fromstring(file)
     for element in root.iter():
         _plain(element)
     shared = _share(root, shapes)

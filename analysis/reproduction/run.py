@@ -10,6 +10,7 @@ from importlib.resources import files
 
 import numpy as np
 
+from nlctl import native
 from nlctl.native import compile  # noqa: A004 (what it does)
 from nlctl.response import input_output_response
 
@@ -129,6 +130,12 @@ def run_all(
         if done is not None:
             done(case)
     return results
+
+
+def compile_ahead(cases: Iterable[Case]) -> None:
+    """Compile the diagrams of cases, which otherwise happens when they are run."""
+    for case in cases:
+        native.compile_ahead(compile(case.diagram))
 
 
 def checks(runs: Mapping[str, Run]) -> list[Check]:

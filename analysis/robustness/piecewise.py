@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ..metrics import vertex
+from ..metrics import differences, vertex
 
 __all__ = ["Trace", "extremes", "higher", "joined", "largest", "with_vertices"]
 
@@ -65,7 +65,7 @@ def with_vertices(t: np.ndarray, y: np.ndarray) -> Trace:
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def _vertices(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the vertices between samples: before which sample each is, when, and its value."""
-    d = np.diff(y)
+    d = differences(y)
     i = np.nonzero(d[:-1] * d[1:] < 0)[0] + 1
     if i.size == 0:
         return i, t[:0], y[:0]
