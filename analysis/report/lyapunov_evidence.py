@@ -165,7 +165,10 @@ def _far_runs(stop: Event, whole: bool) -> dict[str, LongRun]:
     ends = {key: end for key, (_, end) in FAR.items()}
     if not whole:
         ends["2"] = max(LOOKS)
-    runs = {key: long_run(loops[key], end, progress=progress) for key, end in ends.items()}
+    with ThreadPoolExecutor(2) as pool:
+        tasks = {key: (loops[key], end) for key, end in ends.items()}
+        waiting = {k: pool.submit(long_run, *task, progress=progress) for k, task in tasks.items()}
+    runs = {key: run.result() for key, run in waiting.items()}
     if not whole:
         runs["2"] = continued(runs["2"], read_record(runs["2"]))
     return runs

@@ -9,6 +9,7 @@ interrupted after any number of rounds and go on.
 from __future__ import annotations
 
 import functools
+import threading
 from collections.abc import Callable
 
 import numba
@@ -21,6 +22,8 @@ from ._lane import INNER, LANES, RUNNING
 from ._restart import memory_rates, restart, start
 from ._stiff import stiff_attempt
 from ._work import AUTO, OUT, RHS, Task, inputs_at, new_work, outputs
+
+_ONCE = threading.Lock()  # of several threads that begin at the same time one compiles
 
 
 @numba.njit(**INNER)
@@ -183,9 +186,14 @@ def advance(rhs, task, lanes, w, states, rounds):
             restart(rhs, task, lanes, w, passed)
 
 
-@functools.cache
 def machine_code() -> dict[str, Callable[..., None]]:
     """Return the compiled functions: made when first needed, from the cache in later sessions."""
+    with _ONCE:
+        return _machine_code()
+
+
+@functools.cache
+def _machine_code() -> dict[str, Callable[..., None]]:
     one = np.zeros(1)
     task = numba.typeof(
         Task(one, one[None], one[None], 0, np.zeros(1, np.int64), 0.0, 0.0, 0.0, 0, 0, 0)
