@@ -27,6 +27,7 @@ from ._emit import Program
 from ._lower_blocks import Call, Equations, equations
 from ._lower_emit import written
 from ._lower_plan import Store, needed, plan, split
+from ._parameters import length
 from ._schedule import Schedule
 from ._trace_graph import Expr
 from ._vector_math import FUNCTIONS
@@ -107,10 +108,16 @@ def lower(schedule: Schedule, program: Program, lanes: int = 8) -> Lowered:
         name: [part for row, array in rows for part in _stores(name, row, array)]
         for name, rows in found.results.items()
     }
-    known = _parameters_alone([s.expr for part in stores.values() for s in part])
-    size = sum(e.size or 1 for e in known)
+    size = length(program.layout)
+    known = _parameters_alone([s.expr for part in stores.values() for s in part], size)
     tables: dict[Expr, str] = {}
-    prepared = [Store(array="c", row=r, expr=e, size=e.size or 1) for e, (_, r) in known.items()]
+    prepared = [
+        Store(array="c", row=r, expr=e, size=e.size or 1)
+        for e, (_, r) in known.items()
+        if r >= size
+    ]
+    copied = _copied(size, lanes)
+    size += sum(store.size for store in prepared)
     lines: list[str] = [f"L = {lanes}", *_calls(found)]
     for header, wanted, given in (
         ("prepare(p, c)", prepared, {}),
@@ -119,7 +126,8 @@ def lower(schedule: Schedule, program: Program, lanes: int = 8) -> Lowered:
     ):
         planned = plan(wanted, given, size)
         size = planned.rows
-        lines += ["", "", *written(header, planned, given, lanes, found.calls, tables)]
+        head, *body = written(header, planned, given, lanes, found.calls, tables)
+        lines += ["", "", head, *(copied if wanted is prepared else ()), *body]
     constants = {"np": np, **_NAMES, **program.constants}
     constants |= {name: np.array(table.data) for table, name in tables.items()}
     return Lowered(
@@ -137,7 +145,7 @@ def lower(schedule: Schedule, program: Program, lanes: int = 8) -> Lowered:
 def _one_by_one(schedule: Schedule, program: Program, lanes: int) -> Lowered:
     """Return the program itself for one member after the other: loops are solved by iteration."""
     n, count = schedule.system.nstates or 0, schedule.system.noutputs or 0
-    rows = sum(slot.size for block in program.layout.values() for slot in block.values())
+    rows = length(program.layout)
     one = program.source.replace("def rhs(", "@equation\ndef rhs_of_one(")
     one = one.replace("def out(", "@equation\ndef out_of_one(")
     given = f"t[lane], x[:, lane].copy(), u[:, lane].copy(), c[:{rows}, lane].copy()"
@@ -216,8 +224,20 @@ def _stores(name: str, row: int, array: Any) -> list[Store]:
     ]
 
 
-def _parameters_alone(results: list[Expr]) -> dict[Expr, tuple[str, int]]:
-    """Return what is used and depends on parameters alone, with its place in `c`."""
+def _copied(rows: int, lanes: int) -> list[str]:
+    """Return the lines that make the parameters the first rows of `c`."""
+    if not rows:
+        return []
+    line = "c[i, 0] = p[i, 0]" if lanes == 1 else "store(c, i * L, load(p, i * L, L))"
+    return [f"    for i in range({rows}):", f"        {line}"]
+
+
+def _parameters_alone(results: list[Expr], rows: int) -> dict[Expr, tuple[str, int]]:
+    """Return what is used and depends on parameters alone, with its place in `c`.
+
+    That is where a parameter has it in `p`, and behind all of them, from `rows` on, what is
+    computed of them.
+    """
     nodes = needed(results, ())
     inside = {node for node in nodes if node.varies}
     used = set(results) - inside
@@ -227,10 +247,12 @@ def _parameters_alone(results: list[Expr]) -> dict[Expr, tuple[str, int]]:
                 inside.add(arg)
             elif not arg.varies:
                 used.add(arg)
-    found, row = {}, 0
+    found = {}
     for node in nodes:
-        if node in used and node.op != "const":
-            found[node], row = ("c", row), row + (node.size or 1)
+        if node in used and node.op == "leaf" and node.size is None:
+            found[node] = ("c", node.data[1])
+        elif node in used and node.op != "const":
+            found[node], rows = ("c", rows), rows + (node.size or 1)
     return found
 
 

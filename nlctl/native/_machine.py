@@ -14,6 +14,7 @@ from numba.core.errors import NumbaError
 from ._compile import Compiled
 from ._explain import explained
 from ._lower import lower, lowered_code
+from ._parameters import length
 from ._work import OUT, RHS
 
 WIDTH = 8  # members side by side in ensembles: one AVX-512 register
@@ -99,8 +100,8 @@ def _plain(compiled: Compiled) -> Machine:
     if not getattr(config, "DISABLE_JIT", False):
         rhs = numba.njit(RHS.signature, error_model="numpy", nogil=True)(rhs)
         out = numba.njit(OUT.signature, error_model="numpy", nogil=True)(out)
-    size = sum(s.size for block in compiled.program.layout.values() for s in block.values())
-    return Machine(width=1, rows=size, prepare=_copied, rhs=rhs, out=out)
+    rows = length(compiled.program.layout)
+    return Machine(width=1, rows=rows, prepare=_copied, rhs=rhs, out=out)
 
 
 def _copied(p: np.ndarray, c: np.ndarray) -> None:

@@ -105,6 +105,11 @@ def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
     return found
 
 
+def length(layout: Mapping[int, Mapping[str, Slot]]) -> int:
+    """Return how many numbers the parameter vector has."""
+    return sum(slot.size for block in layout.values() for slot in block.values())
+
+
 def packed(
     nodes: Sequence[Node],
     layout: Mapping[int, Mapping[str, Slot]],
@@ -118,8 +123,7 @@ def packed(
         If an override has changed what is fixed by compiling, or brings a parameter that nobody
         declared.
     """
-    size = sum(slot.size for block in layout.values() for slot in block.values())
-    p = np.empty(size)
+    p = np.empty(length(layout))
     for i, block in layout.items():
         path, values, constants = nodes[i].path, current_values(nodes[i].system), fixed.get(i, {})
         for name, value in values.items():
