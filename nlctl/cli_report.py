@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json as json_text
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .cli_studies import INCOMPLETE, INTERRUPTED, exit_codes, run_folder
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
 
 QUICK = ("example-1-quick", "example-2-quick")  # the studies of the paper's report
 
@@ -65,9 +70,6 @@ def _paper(
     out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool
 ) -> tuple[str, Path, int]:
     """Reproduce the paper; return the verdict, the page and the exit code."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
     from analysis.report.lyapunov_evidence import evidence, far_runs_in_background
     from analysis.report.paper_report import paper_report
     from analysis.report.render import write_report
@@ -78,11 +80,7 @@ def _paper(
     from .cli_study_report import studies_part
 
     check_report_options(out, pdf=pdf)
-    spawned = get_context("spawn")
-    with (
-        far_runs_in_background(whole=far) as long_runs,
-        ProcessPoolExecutor(1, mp_context=spawned) as beside,  # the other core
-    ):
+    with far_runs_in_background(whole=far) as long_runs, _other_process() as beside:
         runs, waiting = _runs(beside, out, jobs)
         proofs = {}
         with progress_bar("checking the proof", 2) as advance:
@@ -106,7 +104,22 @@ def _paper(
     return made.verdict, page, int(not all(check.passed for check in checks(runs)))
 
 
-def _runs(beside: Any, out: Path, jobs: int) -> tuple[Any, list[Any]]:
+@contextmanager
+def _other_process() -> Iterator[Executor]:
+    """Lend a process for the other core; it ends when the body fails, whatever it is doing."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import active_children, get_context
+
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        try:
+            yield pool
+        except BaseException:
+            for process in active_children():
+                process.terminate()
+            raise
+
+
+def _runs(beside: Executor, out: Path, jobs: int) -> tuple[Any, list[Future[Any]]]:
     """Run the paper's cases; return them, and what runs in the other process meanwhile.
 
     That is the studies, and last the numerics.  Both processes need the integrators: where nothing
@@ -117,7 +130,7 @@ def _runs(beside: Any, out: Path, jobs: int) -> tuple[Any, list[Any]]:
     from ._terminal import progress_bar
     from .cli_study_report import run_shipped
 
-    waiting = [beside.submit(_compile_ahead)]
+    waiting: list[Future[Any]] = [beside.submit(_compile_ahead)]
     with progress_bar("simulating", len(CASES)) as advance:
         runs = run_all(CASES[:1], done=lambda _: advance(1))
         waiting.append(beside.submit(run_shipped, QUICK, out, jobs or None))

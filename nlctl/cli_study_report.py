@@ -82,13 +82,19 @@ def run_shipped(names: Sequence[str], folder: Path, threads: int | None = None) 
     """Run studies that come with nlctl, each in ``folder/name``; a run that is there is replaced.
 
     It can be called in another process: what it finds is on the disk.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If a study was interrupted; those after it are not begun.
     """
     from analysis.studies import read_study, run, shipped
 
     for name in names:
         if (folder / name / "run.json").exists():
             shutil.rmtree(folder / name)
-        run(read_study(shipped(name)), folder / name, threads=threads)
+        if run(read_study(shipped(name)), folder / name, threads=threads).interrupted:
+            raise KeyboardInterrupt
 
 
 def studies_part(folders: Sequence[Path], *, threads: int | None = None) -> list[Section]:

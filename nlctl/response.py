@@ -89,6 +89,8 @@ def input_output_response(
     ------
     DivergedError
         If the state becomes infinite or NaN.
+    KeyboardInterrupt
+        After Ctrl-C; machine code with ``ignore_errors`` returns what it has until then.
     CompileError, AlgebraicLoopError
         If `engine` is "native" and the diagram cannot be compiled.
     UnknownNameError, ParameterError

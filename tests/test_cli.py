@@ -1,13 +1,19 @@
 """The command line, run as a user runs it."""
 
+import multiprocessing
 import subprocess
 import sys
+import time
+from concurrent.futures import CancelledError
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from command_line import nlctl, nlctl_here
+
+from nlctl.cli_report import _other_process
 
 
 def refused(*arguments, cwd=None):
@@ -126,3 +132,23 @@ def test_console_script_points_to_main():
     """pyproject's script is the function that these tests run."""
     text = (Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8")
     assert 'nlctl = "nlctl.cli:main"' in text
+
+
+def fail_beside(tasks):
+    """Fail while another process sleeps."""
+    with _other_process() as pool:
+        tasks += [pool.submit(time.sleep, 3600) for _ in range(4)]
+        while not tasks[0].running():
+            time.sleep(0.01)
+        raise ZeroDivisionError
+
+
+def test_the_other_process_of_a_report_ends_when_this_one_fails():
+    """Neither what it is doing nor what is waiting holds up the message."""
+    tasks = []
+    with pytest.raises(ZeroDivisionError):
+        fail_beside(tasks)
+    assert not multiprocessing.active_children()
+    for task in tasks:
+        with pytest.raises((BrokenProcessPool, CancelledError)):
+            task.result()

@@ -1,7 +1,9 @@
 """The ledger of whole loops: the audit's figures, what is violated, ensembles."""
 
+import _thread
 import functools
 import json
+import threading
 
 import numpy as np
 import pytest
@@ -197,6 +199,16 @@ class TestFaults:
         assert '--set "plant.d_amplitude=1"' in many["A2"].replay
         assert '--set "plant.x1(0)=0.5"' in many["A2"].replay
         assert "run 2" in many["A2"].text(10)
+
+
+def test_ctrl_c_ends_the_examination_and_no_run_is_taken_for_a_whole_one():
+    """Wherever it comes: in a run it was once the end of a response, and the report went on."""
+    examine(example(1), 1.0, box=BOXES[1])  # compiled
+    timer = threading.Timer(0.5, _thread.interrupt_main)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        examine(example(1), 2_000.0, box=BOXES[1])
+    timer.join()
 
 
 def test_responses_are_run_again_with_what_the_proof_needs():

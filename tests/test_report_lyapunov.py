@@ -210,6 +210,17 @@ def test_a_burst_feeds_on_the_integral_of_the_nussbaum_function():
     assert slope * G[0] < r[-1] ** 2 / 2 / (upper - lower) < 1.01 * slope * G[1]
 
 
+def test_ctrl_c_ends_a_long_run():
+    """It is no run that stands still: what was reached is not taken for an answer."""
+
+    def progress(t):
+        if t > 1.0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="was stopped at"):
+        long_run(nlctl.paper.example_2(), 60.0, progress=progress)
+
+
 def test_a_run_that_does_not_burst_has_no_time_of_it():
     """Twenty seconds as published: nothing is lost, and there is nothing to foretell it from."""
     run = long_run(nlctl.paper.example_2(), 20.0)

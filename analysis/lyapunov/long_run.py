@@ -139,9 +139,7 @@ def long_run(
     )
     compiled, N = native.compile(loop), read_parts(loop).law.N
     settings: Any = {"rtol": rtol, "atol": rtol / 100, "ignore_errors": True}
-    whole: Any = input_output_response(
-        compiled, times, 0, start, progress=_Watch(progress), **settings
-    )
+    whole = _watched(compiled, times, start, progress, settings)
     time, signals = whole.time, _signals(whole)
     predictions = tuple(
         creep(_Beginning(time, signals, look), N, window=window)
@@ -152,9 +150,7 @@ def long_run(
     if not whole.success:
         i = max(int(np.searchsorted(time, whole.statistics.time - END)) - 1, 0)
         again = np.arange(time[i], whole.statistics.time + END, FINEST)
-        end: Any = input_output_response(
-            compiled, again, 0, whole.states[:, i], progress=_Watch(progress), **settings
-        )
+        end = _watched(compiled, again, whole.states[:, i], progress, settings)
         late = _signals(end)
         time = np.append(time[:i], end.time)
         signals = {name: np.append(signals[name][:i], late[name]) for name in SIGNALS}
@@ -171,6 +167,19 @@ def long_run(
     )
 
 
+def _watched(
+    compiled: native.Compiled,
+    times: np.ndarray,
+    start: Any,
+    progress: Callable[[float], object] | None,
+    settings: Mapping[str, Any],
+) -> Any:
+    """Return a run that may end where it stands still, but not where Ctrl-C ends it."""
+    watch = _Watch(progress)
+    response = input_output_response(compiled, times, 0, start, progress=watch, **settings)
+    return response if watch.stands_still else native.uninterrupted(response)
+
+
 def _signals(response: Any) -> dict[str, np.ndarray]:
     rows = dict(zip(response.output_labels, np.asarray(response.outputs), strict=True))
     return {name: rows[name] for name in SIGNALS}
@@ -182,11 +191,13 @@ class _Watch:
 
     progress: Callable[[float], object] | None
     reached: float = -np.inf
+    stands_still: bool = False
 
     def __call__(self, t: float) -> None:
         if self.progress is not None:
             self.progress(t)
-        if t - self.reached < STANDSTILL:
+        self.stands_still = t - self.reached < STANDSTILL
+        if self.stands_still:
             raise KeyboardInterrupt
         self.reached = t
 

@@ -177,7 +177,7 @@ def observe(
             max_steps=max_steps,
             ignore_errors=True,
         )
-        signals = signals_of(response)
+        signals = signals_of(native.uninterrupted(response))
         _check_reproduced(member, signals)
         lost = None if response.success else float(response.statistics.time)
         message = str(response.message or "")

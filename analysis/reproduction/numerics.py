@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
 from nlctl.native import compile as compiled
+from nlctl.native import uninterrupted
 from nlctl.response import input_output_response
 
 from .cases import CASES, Case
@@ -42,9 +41,11 @@ def numerics() -> pd.DataFrame:
 def _signals(case: Case, method: str, rtol: float) -> np.ndarray:
     """Return e and zeta at the sample times, NaN after the end of a run."""
     times = sample_times()
-    response: Any = input_output_response(
-        compiled(case.diagram), times, rtol=rtol, atol=rtol / 100, method=method,
-        ignore_errors=True, max_steps=3_000_000,
+    response = uninterrupted(
+        input_output_response(
+            compiled(case.diagram), times, rtol=rtol, atol=rtol / 100, method=method,
+            ignore_errors=True, max_steps=3_000_000,
+        )
     )  # fmt: skip
     signals = np.full((2, times.size), np.nan)
     signals[:, : response.time.size] = [response.outputs[name] for name in ("e", "zeta")]

@@ -17,7 +17,7 @@ from ._compile import Compiled, compile  # noqa: A004 (what it does)
 from ._ensemble import Ensemble, ensemble_response
 from ._lane import Status
 from ._machine import compile_ahead
-from ._response import Response
+from ._response import Response, uninterrupted
 from ._schedule import AlgebraicLoopError
 from ._simulate import Settings, Statistics
 
@@ -33,4 +33,5 @@ __all__ = [
     "compile",
     "compile_ahead",
     "ensemble_response",
+    "uninterrupted",
 ]

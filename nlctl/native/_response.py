@@ -40,6 +40,8 @@ def respond(
     DivergedError
         If the run does not reach the last time, unless `ignore_errors`: then the response ends
         where the run did, with ``success = False``.
+    KeyboardInterrupt
+        After Ctrl-C, unless `ignore_errors`.
     ParameterError
         If an argument has a wrong shape, or times do not fit a discrete-time diagram.
     """
@@ -51,9 +53,23 @@ def respond(
     else:
         made = _sampled(compiled, times, u, x0, p)
     run = made.statistics
+    if run.status is Status.STOPPED and not ignore_errors:
+        raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error goes on
     if run.status is not Status.OK and not ignore_errors:
         raise DivergedError(_message(system, run), run.time)
     return _response(compiled, made, u[:, : made.time.size], params)
+
+
+def uninterrupted(response: Any) -> Any:
+    """Return a response that was computed with `ignore_errors`, if Ctrl-C has not ended it.
+
+    Raises
+    ------
+    KeyboardInterrupt
+    """
+    if response.statistics.status is Status.STOPPED:
+        raise KeyboardInterrupt(response.message)
+    return response
 
 
 def _sampled(
