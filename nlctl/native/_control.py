@@ -13,6 +13,7 @@ from . import _tsit5
 from ._lane import (
     DIVERGED,
     FIRST_PATIENCE,
+    INNER,
     OK,
     RUNNING,
     STEP_LIMIT,
@@ -25,7 +26,7 @@ TRIAL = 20  # steps of the stiff method before it is judged
 MAX_PATIENCE = 2000
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def choose_step(lane, stop, over, max_steps):
     """Set the step to be tried up to time `stop`, or the status of a run that has ended."""
     if over:
@@ -41,7 +42,7 @@ def choose_step(lane, stop, over, max_steps):
         lane.step = stop - lane.t if lane.ends else lane.h
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def rejected(lane, error, fixed):
     """Whether the error of a step is too large; if so, propose a shorter one."""
     finite = np.isfinite(error)
@@ -55,7 +56,7 @@ def rejected(lane, error, fixed):
     return True
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def next_step(lane, error, rate, fixed, memories):
     """Propose the next step after an accepted one: PI control, and stability."""
     log_error = np.log(max(error, 1e-10))
@@ -75,7 +76,7 @@ def next_step(lane, error, rate, fixed, memories):
             lane.h = limit / rate
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def choose_method(lane, states, alone):
     """Go over to the stiff method where stability limits the step, and back where it does not pay.
 

@@ -13,6 +13,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from ._lane import INNER
+
 STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
 AGAIN, CLEAR, EVENT = 0, 1, 2  # what became of the step just tried
 TRIES = 30
@@ -20,7 +22,7 @@ SHORT = 1e-3  # part of a step: a shorter one between events is no progress
 PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory events
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def triggered(start, end, is_memory, behind):
     """Whether an event function's values at the ends of a step show an event in between.
 
@@ -32,7 +34,7 @@ def triggered(start, end, is_memory, behind):
     return start * end < 0.0 and not (behind and abs(start) <= STARTS_BEHIND * abs(end))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def unforeseen(w, h, j):
     """Whether an event function has changed over a step otherwise than its slopes say.
 
@@ -49,7 +51,7 @@ def unforeseen(w, h, j):
     return False
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def first_root(lane, corners, e_start, e_low, e_high, behind, j):
     """Return where the first event between the lengths low and high lies, -1 if there is none.
 
@@ -68,7 +70,7 @@ def first_root(lane, corners, e_start, e_low, e_high, behind, j):
     return first, is_memory
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def locate(lane, corners, rtol, e_start, e_low, e_high, e, behind, j):
     """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT.
 
@@ -100,7 +102,7 @@ def locate(lane, corners, rtol, e_start, e_low, e_high, e, behind, j):
     return AGAIN
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j):
     """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
     before = lane.high
@@ -123,7 +125,7 @@ def _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j):
     return first_root(lane, corners, e_start, e_low, e_high, behind, j)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def step_accepted(lane, event):
     """Count an accepted step; after several events without progress those of memories rest."""
     lane.accepted += 1

@@ -21,7 +21,7 @@ from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
 from ._lane import INNER, LANES, RUNNING
 from ._restart import memory_rates, restart, start
 from ._stiff import stiff_attempt
-from ._work import AUTO, OUT, RHS, Task, inputs_at, new_work, outputs
+from ._work import AUTO, OUT, RESTART, RHS, STIFF, TASK, WORK, inputs_at, outputs
 
 _ONCE = threading.Lock()  # of several threads that begin at the same time one compiles
 
@@ -154,10 +154,11 @@ def _take(task, w, done):
                 w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
 
 
-def advance(rhs, task, lanes, w, states, rounds):
+def advance(rhs, restart, stiff_attempt, task, lanes, w, states, rounds):
     """Try at most `rounds` steps in every lane; fill ``states[m, :, lane]`` for passed times.
 
-    A run's ``lane.status`` is RUNNING until it has ended.
+    A run's ``lane.status`` is RUNNING until it has ended.  What is rarely called is an argument,
+    and so machine code of its own: it is compiled once and not into this function too.
     """
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     for _ in range(rounds):
@@ -194,20 +195,18 @@ def machine_code() -> dict[str, Callable[..., None]]:
 
 @functools.cache
 def _machine_code() -> dict[str, Callable[..., None]]:
-    one = np.zeros(1)
-    task = numba.typeof(
-        Task(one, one[None], one[None], 0, np.zeros(1, np.int64), 0.0, 0.0, 0.0, 0, 0, 0)
-    )
-    work = numba.typeof(new_work(1, 1, 1, 1))
-    samples = numba.float64[:, :, ::1]
-    signatures = {
-        start: (RHS, task, LANES, work),
-        advance: (RHS, task, LANES, work, samples, numba.int64),
-        outputs: (RHS, OUT, task, work, samples, samples),
-    }
+    def code(function, *arguments, **options):
+        signature = numba.void(*arguments)
+        return numba.njit(signature, cache=True, error_model="numpy", **options)(function)
+
+    rarely, often = {"no_cpython_wrapper": True}, {"nogil": True}
+    common, samples = (TASK, LANES, WORK), numba.float64[:, :, ::1]
+    again = code(restart, *RESTART.signature.args, **rarely)
+    stiff = code(stiff_attempt, *STIFF.signature.args, **rarely)
+    begin = code(start, RHS, RESTART, *common, **often)
+    go_on = code(advance, RHS, RESTART, STIFF, *common, samples, numba.int64, **often)
     return {
-        function.__name__: numba.njit(
-            numba.void(*arguments), cache=True, nogil=True, error_model="numpy"
-        )(function)
-        for function, arguments in signatures.items()
+        "start": lambda rhs, *rest: begin(rhs, again, *rest),
+        "advance": lambda rhs, *rest: go_on(rhs, again, stiff, *rest),
+        "outputs": code(outputs, RHS, OUT, TASK, WORK, samples, samples, **often),
     }

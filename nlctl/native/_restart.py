@@ -38,7 +38,6 @@ def memory_rates(rhs, task, lanes, w, x, dx):
                 w.e[i, j] = 0.0  # memories are committed step by step for a while
 
 
-@numba.njit(**INNER)
 def restart(rhs, task, lanes, w, chosen):
     """Make the chosen lanes' derivatives, event functions and memories those of their state."""
     _refresh(rhs, task, lanes, w, chosen)
@@ -215,10 +214,9 @@ def _first_step(rhs, task, lanes, w):
         lanes[j].h = task.fixed if task.fixed > 0.0 else (h if np.isfinite(h) else h0)
 
 
-def start(rhs, task, lanes, w):
+def start(rhs, restart, task, lanes, w):
     """Begin at the initial states in w.x: commit the memories, propose first steps."""
     everyone = np.ones(lanes.size, np.bool_)
-    for again in (False, True):  # one call in the source: it is compiled into this function once
-        restart(rhs, task, lanes, w, everyone)
-        if not again:
-            _first_step(rhs, task, lanes, w)
+    restart(rhs, task, lanes, w, everyone)
+    _first_step(rhs, task, lanes, w)
+    restart(rhs, task, lanes, w, everyone)

@@ -13,6 +13,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from ._lane import INNER
+
 STAGES = 8
 GAMMA = 0.21193756319429014
 NODES = np.array([0.0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716])
@@ -62,7 +64,7 @@ H[2] = (
 )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def factorise(matrix, pivots):
     """Factorise a square matrix in place, P M = L U, with partial pivoting."""
     n = matrix.shape[0]
@@ -84,7 +86,7 @@ def factorise(matrix, pivots):
                     matrix[i, j] -= factor * matrix[c, j]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def solve(matrix, pivots, b):
     """Solve with the factors of `factorise`; `b` becomes the solution."""
     n = b.size
@@ -99,7 +101,7 @@ def solve(matrix, pivots, b):
         b[i] /= matrix[i, i]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def error_norm(x, x_new, U, rtol, atol):
     """Return the largest error over the tolerance; not finite if a state is not."""
     largest, spoilt = 0.0, 0.0
@@ -111,7 +113,7 @@ def error_norm(x, x_new, U, rtol, atol):
     return largest + spoilt
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def interpolate(theta, x, x_new, U, result):
     """Fill `result` with the solution at the fraction theta of a step."""
     for i in range(x.shape[0]):

@@ -14,6 +14,7 @@ from ._compile import Compiled
 from ._integrate import machine_code
 from ._lane import RUNNING, Status, new_lanes
 from ._machine import Machine, machine
+from ._pointed import with_table
 from ._work import AUTO, EXPLICIT, IMPLICIT, Task, new_work
 
 METHODS = {"auto": AUTO, "tsit5": EXPLICIT, "rodas5p": IMPLICIT}
@@ -120,7 +121,7 @@ class Run:
     Attributes
     ----------
     machine : Machine
-    task, work : namedtuple
+    task, work : Task, Work
         See `_work`.
     lanes : ndarray
         One record per member, see `_lane`.
@@ -169,7 +170,8 @@ def prepared(
     code = machine(compiled, p, count)
     c = np.zeros((code.rows, count))
     code.prepare(np.ascontiguousarray(p), c)
-    task = Task(
+    task = with_table(
+        Task,
         times=times,
         inputs=inputs,
         p=c,

@@ -12,6 +12,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from ._lane import INNER
+
 STAGES = 7
 C = np.array([0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 1.0])
 A = np.zeros((7, 7))
@@ -47,7 +49,7 @@ B[6] = 0.0, 1.5, -4.0, 2.5
 STABLE = 3.3  # h |lambda| on the negative real axis up to which a step is stable, a little less
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def combined(x, h, k, s, result):
     """Fill `result` with x + h (A[s, 0] k[0] + ... + A[s, s-1] k[s-1]).
 
@@ -78,7 +80,7 @@ def combined(x, h, k, s, result):
             result[j] = x[j] + h[j] * (slope + a5 * k[5, j])
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def weighed_errors(x, x_new, k, h, rtol, atol, result):
     """Fill `result` with the magnitudes of the errors over atol + rtol |x|; all are flat."""
     e0, e1, e2, e3, e4, e5, e6 = E[0], E[1], E[2], E[3], E[4], E[5], E[6]
@@ -89,7 +91,7 @@ def weighed_errors(x, x_new, k, h, rtol, atol, result):
         result[j] = abs(h[j] * slope) / (atol + rtol * largest)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def errors(parts, x_new, x_stage, k, sums, error, rate):
     """Fill, lane by lane, the error over its tolerance, and the fastest rate seen (1/s).
 
@@ -114,7 +116,7 @@ def errors(parts, x_new, x_stage, k, sums, error, rate):
         rate[j] = np.sqrt(sums[1, j] / sums[2, j]) if sums[2, j] > 0.0 else 0.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(**INNER)
 def interpolate(theta, h, x, k, lane, result):
     """Fill column `lane` of `result` with the solution at the fraction theta of its step."""
     weights = np.empty(STAGES)

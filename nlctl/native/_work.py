@@ -8,14 +8,14 @@ as long to compile.
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
 from . import _rodas5p, _tsit5
-from ._lane import INNER
+from ._lane import INNER, LANES
+from ._pointed import pointed, with_table
 
 VECTOR = numba.float64[::1]
 MATRIX = numba.float64[:, ::1]
@@ -24,52 +24,100 @@ OUT = numba.types.FunctionType(numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
 
-Task = namedtuple("Task", "times inputs p corners memory rtol atol fixed max_steps method alone")
-Work = namedtuple(
-    "Work",
-    "t h hh x x_new x_stage k g e e_start e_low e_high behind u error rate x_ahead dx_ahead "
-    "g_start slope slope_start g_ahead x_flat x_new_flat x_stage_flat x_ahead_flat k_flat sums "
-    "t_end jacobian matrix f_t pivots U",
-)
-FLAT = ("x", "x_new", "x_stage", "x_ahead")
+
+@pointed
+class Task(NamedTuple):
+    """What is to be integrated, and how."""
+
+    times: np.ndarray  # of the samples; inputs are linear in between
+    inputs: np.ndarray  # (inputs, times)
+    p: np.ndarray  # (rows, lanes): what the right-hand side reads besides its arguments
+    corners: int  # number of switching functions, the first rows of g
+    memory: np.ndarray  # indices of memory states; what they would become follows in g
+    rtol: float
+    atol: float
+    fixed: float  # step size, 0 if it is to be chosen
+    max_steps: int
+    method: int
+    alone: int  # whether this is a single run
+    table: np.ndarray
+
+
+@pointed
+class Work(NamedTuple):
+    """The arrays for integrating members side by side: (states, lanes), (events, lanes), ..."""
+
+    t: np.ndarray  # the times at which the right-hand side is evaluated
+    h: np.ndarray
+    hh: np.ndarray  # steps, repeated for every state
+    x: np.ndarray  # the states at the start of the step being tried
+    x_new: np.ndarray  # and at its end
+    x_stage: np.ndarray
+    x_ahead: np.ndarray  # for evaluations besides the step's own, with their results
+    dx_ahead: np.ndarray
+    g_ahead: np.ndarray
+    k: np.ndarray  # derivatives at the stages
+    g: np.ndarray  # switching functions, and what memories would become
+    g_start: np.ndarray
+    e: np.ndarray  # event functions: those of corners, and the rates of memories
+    e_start: np.ndarray
+    e_low: np.ndarray  # at the ends of the bracket in which an event is located
+    e_high: np.ndarray
+    behind: np.ndarray  # 1 where the step before ended with this event
+    slope: np.ndarray  # rates of g
+    slope_start: np.ndarray
+    u: np.ndarray
+    error: np.ndarray  # of the step over its tolerance
+    rate: np.ndarray  # estimate of the largest eigenvalue's magnitude (1/s)
+    sums: np.ndarray
+    t_end: np.ndarray
+    x_flat: np.ndarray  # the same memory as x, x_new, x_stage, x_ahead, k
+    x_new_flat: np.ndarray
+    x_stage_flat: np.ndarray
+    x_ahead_flat: np.ndarray
+    k_flat: np.ndarray
+    jacobian: np.ndarray  # of the stiff method, empty with several lanes
+    matrix: np.ndarray
+    f_t: np.ndarray
+    pivots: np.ndarray
+    U: np.ndarray
+    table: np.ndarray
 
 
 def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
     """Return the arrays for integrating members with `n` states."""
-    size = n if lanes == 1 else 0  # the stiff method is for single runs
-    columns: dict[str, Any] = {
-        name: np.zeros((n, lanes)) for name in ("x", "x_new", "x_stage", "x_ahead", "dx_ahead")
+    stiff = n if lanes == 1 else 0  # the stiff method is for single runs
+    shapes: dict[str, tuple[int, ...]] = {
+        **dict.fromkeys(("x", "x_new", "x_stage", "x_ahead", "dx_ahead"), (n, lanes)),
+        **dict.fromkeys(("g", "g_ahead", "g_start", "slope", "slope_start"), (events, lanes)),
+        **dict.fromkeys(("e", "e_start", "e_low", "e_high", "behind"), (events, lanes)),
+        **dict.fromkeys(("t", "h", "error", "rate", "t_end"), (lanes,)),
+        "hh": (n * lanes,),
+        "k": (_tsit5.STAGES, n, lanes),
+        "sums": (3, lanes),
+        "u": (inputs, lanes),
+        **dict.fromkeys(("jacobian", "matrix"), (stiff, stiff)),
+        "f_t": (stiff,),
+        "U": (_rodas5p.STAGES, stiff),
     }
-    rows = (
-        "g",
-        "g_ahead",
-        "e",
-        "e_start",
-        "e_low",
-        "e_high",
-        "behind",
-        "g_start",
-        "slope",
-        "slope_start",
-    )
-    columns |= {name: np.zeros((events, lanes)) for name in rows}
-    flat = {f"{name}_flat": columns[name].reshape(-1) for name in FLAT}  # the same memory
-    k = np.zeros((_tsit5.STAGES, n, lanes))
-    return Work(
-        **columns,
-        **flat,
-        **{name: np.zeros(lanes) for name in ("t", "h", "error", "rate", "t_end")},
-        hh=np.zeros(n * lanes),
-        k=k,
-        k_flat=k.reshape(_tsit5.STAGES, n * lanes),
-        sums=np.zeros((3, lanes)),
-        u=np.zeros((inputs, lanes)),
-        jacobian=np.zeros((size, size)),
-        matrix=np.zeros((size, size)),
-        f_t=np.zeros(size),
-        pivots=np.zeros(size, dtype=np.int64),
-        U=np.zeros((_rodas5p.STAGES, size)),
-    )
+    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    flat = {f"{x}_flat": arrays[x].reshape(-1) for x in ("x", "x_new", "x_stage", "x_ahead")}
+    k_flat = arrays["k"].reshape(_tsit5.STAGES, n * lanes)
+    pivots = np.zeros(stiff, dtype=np.int64)
+    return with_table(Work, **arrays, **flat, k_flat=k_flat, pivots=pivots)
+
+
+def _some_task() -> Task:
+    """Return a task, of which only the type matters."""
+    one, none = np.zeros(1), np.zeros(0, dtype=np.int64)
+    numbers = {"rtol": 0.0, "atol": 0.0, "fixed": 0.0, "max_steps": 0, "method": 0, "alone": 0}
+    arrays = {"times": one, "inputs": one[None], "p": one[None], "memory": none}
+    return with_table(Task, **arrays, **numbers, corners=0)
+
+
+TASK, WORK = numba.typeof(_some_task()), numba.typeof(new_work(1, 1, 1, 1))
+STIFF = numba.types.FunctionType(numba.void(RHS, TASK, LANES, WORK))
+RESTART = numba.types.FunctionType(numba.void(RHS, TASK, LANES, WORK, numba.boolean[::1]))
 
 
 @numba.njit(**INNER)
