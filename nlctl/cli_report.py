@@ -17,6 +17,8 @@ from .cli_studies import INCOMPLETE, INTERRUPTED, exit_codes, run_folder
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
 
+    from analysis.report.document import Report
+
 QUICK = ("example-1-quick", "example-2-quick")  # the studies of the paper's report
 
 Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser.")]
@@ -70,17 +72,32 @@ def _paper(
     out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool
 ) -> tuple[str, Path, int]:
     """Reproduce the paper; return the verdict, the page and the exit code."""
+    check_report_options(out, pdf=pdf)
+    with _other_process() as beside:
+        compiling = beside.submit(_compile_ahead)  # first of all: imports here take seconds
+        from analysis.report.render import write_report
+
+        made, drawn, passed = _reproduced(beside, compiling, out, jobs, far=far)
+        options = " --far" * far + " --interactive" * interactive
+        made = replace(made, command=made.command + options)
+        page = write_report(made, out, interactive=interactive, pool=beside, drawn=drawn)
+    return made.verdict, page, int(not passed)
+
+
+def _reproduced(
+    beside: Executor, compiling: Future[None], out: Path, jobs: int, *, far: bool
+) -> tuple[Report, dict[Any, bytes], bool]:
+    """Return the report, those of its figures that are drawn, and whether all claims hold."""
     from analysis.report.lyapunov_evidence import evidence, far_runs_in_background
-    from analysis.report.paper_report import paper_report
-    from analysis.report.render import write_report
+    from analysis.report.paper_report import paper_report, paper_sections
+    from analysis.report.svg import draw_ahead
     from analysis.reproduction import checks
 
     from . import paper
     from ._terminal import progress_bar
     from .cli_study_report import studies_part
 
-    check_report_options(out, pdf=pdf)
-    with far_runs_in_background(whole=far) as long_runs, _other_process() as beside:
+    with far_runs_in_background(whole=far) as long_runs:
         runs, waiting = _runs(beside, out, jobs)
         proofs = {}
         with progress_bar("checking the proof", 2) as advance:
@@ -88,20 +105,14 @@ def _paper(
                 proofs[number] = evidence(loop)
                 advance(1)
         with progress_bar("running far beyond 20 s, and the studies", 2) as advance:
-            far_away = long_runs.result()
+            found: dict[str, Any] = {"proofs": proofs, "far": long_runs.result()}
             advance(1)
-            *_, numbers = (task.result() for task in waiting)
-        made = paper_report(
-            runs,
-            proofs=proofs,
-            far=far_away,
-            studies=studies_part([out / name for name in QUICK], threads=jobs or None),
-            numerics=numbers,
-        )
-        options = " --far" * far + " --interactive" * interactive
-        made = replace(made, command=made.command + options)
-        page = write_report(made, out, interactive=interactive, pool=beside)
-    return made.verdict, page, int(not all(check.passed for check in checks(runs)))
+            found["sections"] = paper_sections(runs, **found)
+            drawn = draw_ahead(found["sections"], until=waiting[-1].done)
+            *_, numbers = (task.result() for task in (compiling, *waiting))
+    studies = studies_part([out / name for name in QUICK], threads=jobs or None)
+    made = paper_report(runs, **found, studies=studies, numerics=numbers)
+    return made, drawn, all(check.passed for check in checks(runs))
 
 
 @contextmanager
@@ -130,17 +141,16 @@ def _runs(beside: Executor, out: Path, jobs: int) -> tuple[Any, list[Future[Any]
     from ._terminal import progress_bar
     from .cli_study_report import run_shipped
 
-    waiting: list[Future[Any]] = [beside.submit(_compile_ahead)]
     with progress_bar("simulating", len(CASES)) as advance:
         runs = run_all(CASES[:1], done=lambda _: advance(1))
-        waiting.append(beside.submit(run_shipped, QUICK, out, jobs or None))
-        waiting.append(beside.submit(numerics))
+        studies = beside.submit(run_shipped, QUICK, out, jobs or None)
+        waiting = [studies, beside.submit(numerics)]
         runs |= run_all(CASES[1:], done=lambda _: advance(1))  # machine code: in this process
     return runs, waiting
 
 
 def _compile_ahead() -> None:
-    """Compile what is needed besides the integrators, in the order in which it is needed."""
+    """Compile what is needed besides the integrators, first what the other process needs late."""
     from analysis import reproduction
     from analysis.report import lyapunov_evidence
 
@@ -148,8 +158,8 @@ def _compile_ahead() -> None:
     from .cli_study_report import compile_shipped
 
     lyapunov_evidence.compile_ahead(paper.example_1())
-    reproduction.compile_ahead(reproduction.CASES)  # by now the other process has the first two
     lyapunov_evidence.compile_ahead(paper.example_2())
+    reproduction.compile_ahead(reproduction.CASES)  # by now the other process has the first two
     compile_shipped(QUICK)
 
 

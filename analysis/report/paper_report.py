@@ -20,7 +20,7 @@ from .paper_claims import claims, proof_claims, verdict
 from .paper_closing import closing_sections, metric_table
 from .versions import versions
 
-__all__ = ["paper_report"]
+__all__ = ["paper_report", "paper_sections"]
 
 Runs = Mapping[str, Run]
 
@@ -32,6 +32,7 @@ def paper_report(
     far: Mapping[str, LongRun] | None = None,
     studies: Sequence[Section] = (),
     numerics: pd.DataFrame | None = None,
+    sections: Sequence[Section] | None = None,
 ) -> Report:
     """Compose the reproduction report from the runs of `analysis.reproduction.CASES`.
 
@@ -47,31 +48,44 @@ def paper_report(
         The part on robustness, see `analysis.report.robustness_part.study_part`.
     numerics : pandas.DataFrame, optional
         Result of `analysis.reproduction.numerics`.
+    sections : sequence of Section, optional
+        What `paper_sections` makes of the same; by default it is made here.
 
     Returns
     -------
     Report
     """
     compared = checks(runs)
+    if sections is None:
+        sections = paper_sections(runs, proofs=proofs, far=far)
     return Report(
         title="Adaptive neural control with an uncertain actuator: the paper reproduced",
         verdict=verdict(compared, far or {}),
         claims=[*claims(runs, compared), *proof_claims(proofs or {}, far or {})],
-        sections=[
-            _model(),
-            *_example(1, runs, compared),
-            *_example(2, runs, compared),
-            _exchange(runs),
-            *lyapunov_sections(proofs or {}, far),
-            *studies,
-            *closing_sections(runs, numerics),
-        ],
+        sections=[*sections, *studies, *closing_sections(runs, numerics)],
         command="nlctl report",
         provenance=versions("python-flint", "cvxpy", "cma"),
         numbers={key: dict(run.metrics) for key, run in runs.items()},
         methods=text.METHODS,
         references=text.REFERENCES,
     )
+
+
+def paper_sections(
+    runs: Runs,
+    *,
+    proofs: Mapping[int, Evidence] | None = None,
+    far: Mapping[str, LongRun] | None = None,
+) -> list[Section]:
+    """Return the sections of `paper_report` up to those on studies; the arguments are the same."""
+    compared = checks(runs)
+    return [
+        _model(),
+        *_example(1, runs, compared),
+        *_example(2, runs, compared),
+        _exchange(runs),
+        *lyapunov_sections(proofs or {}, far),
+    ]
 
 
 def _model() -> Section:

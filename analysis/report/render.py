@@ -14,7 +14,10 @@ import os
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
+
+from matplotlib.figure import Figure as MatplotlibFigure
 
 from nlctl._errors import ParameterError
 
@@ -36,7 +39,13 @@ TITLES = {
 }
 
 
-def render_html(report: Report, *, interactive: bool = False, pool: Executor | None = None) -> str:
+def render_html(
+    report: Report,
+    *,
+    interactive: bool = False,
+    pool: Executor | None = None,
+    drawn: Mapping[MatplotlibFigure, bytes] = MappingProxyType({}),
+) -> str:
     """Return the report as one HTML page without references to anything outside.
 
     Parameters
@@ -46,12 +55,14 @@ def render_html(report: Report, *, interactive: bool = False, pool: Executor | N
         Whether its `History` items become charts, drawn by a script inside the page.
     pool : concurrent.futures.Executor, optional
         Processes that help with drawing the figures.
+    drawn : mapping, optional
+        Figures that are drawn already, see `analysis.report.svg.draw_ahead`.
     """
     placed = place(report)
     light, told = summary(report.claims)
     items = {anchor: item for part in placed for anchor, _, item in part.items}
     figures = {anchor: item for anchor, item in items.items() if isinstance(item, Figure)}
-    files = svg_files([figure.figure for figure in figures.values()], pool)
+    files = svg_files([figure.figure for figure in figures.values()], pool, drawn)
     shapes: dict[str, str] = {}
     drawings = {
         anchor: svg(figure, file, anchor, shapes)
@@ -125,6 +136,7 @@ def write_report(
     *,
     interactive: bool = False,
     pool: Executor | None = None,
+    drawn: Mapping[MatplotlibFigure, bytes] = MappingProxyType({}),
 ) -> Path:
     """Write ``index.html`` and ``report.json``; nothing is half written.
 
@@ -136,6 +148,7 @@ def write_report(
     interactive : bool, optional
         As in `render_html`; ``report.json`` is the same either way.
     pool : concurrent.futures.Executor, optional
+    drawn : mapping, optional
         As in `render_html`.
 
     Returns
@@ -149,7 +162,7 @@ def write_report(
         If the folder cannot be written to.
     """
     folder = Path(folder)
-    page = render_html(report, interactive=interactive, pool=pool)
+    page = render_html(report, interactive=interactive, pool=pool, drawn=drawn)
     write_files(folder, {"report.json": render_json(report), "index.html": page})
     return folder / "index.html"
 

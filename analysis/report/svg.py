@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
+from itertools import takewhile
+from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
 
@@ -16,10 +18,10 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from nlctl import drawing
 
 from ..figures import axes
-from .document import Figure
+from .document import Figure, Section
 from .svg_compact import compact, shared_shape, short_path
 
-__all__ = ["shapes_svg", "svg", "svg_files"]
+__all__ = ["draw_ahead", "shapes_svg", "svg", "svg_files"]
 
 # Colours of the figures that follow the page's theme, by the page's own names for them.
 THEME = {
@@ -41,15 +43,42 @@ TAG = re.compile(r"<(\w+)")
 URL = re.compile(r"url\(#([^)]*)\)")
 
 
-def svg_files(figures: Sequence[MatplotlibFigure], pool: Executor | None = None) -> list[bytes]:
-    """Return figures as SVG files; this process and those of a pool share the work."""
-    waiting = [] if pool is None else [pool.submit(_svg_file, figure) for figure in figures]
-    here: dict[int, bytes] = {}
-    for i in reversed(range(len(figures))):  # a pool begins with the first one
+def svg_files(
+    figures: Sequence[MatplotlibFigure],
+    pool: Executor | None = None,
+    drawn: Mapping[MatplotlibFigure, bytes] = MappingProxyType({}),
+) -> list[bytes]:
+    """Return figures as SVG files; this process and those of a pool share the work.
+
+    Those in `drawn`, of `draw_ahead`, are not drawn again.
+    """
+    left = [figure for figure in figures if figure not in drawn]
+    waiting = [] if pool is None else [pool.submit(_svg_file, figure) for figure in left]
+    files = dict(drawn)
+    for i in reversed(range(len(left))):  # a pool begins with the first one
         if waiting and not waiting[i].cancel():
             break
-        here[i] = _svg_file(figures[i])
-    return [here[i] if i in here else waiting[i].result() for i in range(len(figures))]
+        files[left[i]] = _svg_file(left[i])
+    for figure, file in zip(left, waiting, strict=False):
+        if figure not in files:
+            files[figure] = file.result()
+    return [files[figure] for figure in figures]
+
+
+def draw_ahead(
+    sections: Iterable[Section], until: Callable[[], bool]
+) -> dict[MatplotlibFigure, bytes]:
+    """Draw figures while there is nothing else to do; return them as SVG files, see `svg_files`.
+
+    Parameters
+    ----------
+    sections : iterable of Section
+    until : callable
+        Asked before each figure whether to end.
+    """
+    items = (item for section in sections for item in section.items)
+    figures = (item.figure for item in items if isinstance(item, Figure))
+    return {figure: _svg_file(figure) for figure in takewhile(lambda _: not until(), figures)}
 
 
 def _svg_file(figure: MatplotlibFigure) -> bytes:
