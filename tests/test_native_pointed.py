@@ -112,7 +112,9 @@ def test_a_record_is_passed_on_between_functions():
     assert outer(sample(), 10) == 2 * (1 - 2.0**-10) + 2.0**-10
 
 
-@pytest.mark.skipif(config.DISABLE_JIT, reason="plain Python has no types to refuse")
+@pytest.mark.skipif(
+    getattr(config, "DISABLE_JIT", False), reason="plain Python has no types to refuse"
+)
 def test_an_array_of_another_kind_is_refused():
     """What is compiled for one layout is not run on another."""
     compiled = numba.njit(numba.float64(numba.typeof(sample()), numba.int64))(inner.py_func)
