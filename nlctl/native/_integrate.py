@@ -50,7 +50,7 @@ def _explicit_attempt(rhs, task, lanes, w):
             for j in range(count):
                 w.k[s, i, j] = 0.0
     _tsit5.weighed_errors(x, w.x_new_flat, k, hh, task.rtol, task.atol, w.x_ahead_flat)
-    _tsit5.errors(w.x_ahead, w.x_new, w.x_stage, w.k, w.sums, w.error, w.rate)
+    _tsit5.errors(w.x_ahead, w.x_new, w.x_stage, w.k, w.error, w.rate)
 
 
 @numba.njit(**INNER)
@@ -131,27 +131,24 @@ def _began_to_move(corners, e_start, e, j):
 @numba.njit(**INNER)
 def _take(task, w, done):
     """Make the ends of the accepted steps the states, and commit the memories."""
-    n, count = w.x.shape
-    for i in range(n):
-        for j in range(count):
-            w.x[i, j] = w.x_new[i, j] if done[j] else w.x[i, j]
-            w.k[0, i, j] = w.k[6, i, j] if done[j] else w.k[0, i, j]
-    for i in range(task.corners):
-        for j in range(count):
-            if done[j]:
-                w.behind[i, j] = w.e_start[i, j] * w.e[i, j] < 0.0
-    for i in range(task.memory.size):
-        for j in range(count):
-            if done[j] and w.e_start[task.corners + i, j] == 0.0:  # otherwise locked
-                if w.x[task.memory[i], j] != w.g[task.corners + i, j]:
-                    for m in range(w.behind.shape[0]):
-                        w.behind[m, j] = 0.0  # with another memory the way back is an event
-                w.x[task.memory[i], j] = w.g[task.corners + i, j]
-    for i in range(w.e.shape[0]):
-        for j in range(count):
-            if done[j]:
-                w.e_start[i, j] = w.e[i, j]
-                w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
+    x, k, corners = w.x, w.k, task.corners
+    for j in range(done.size):
+        if not done[j]:
+            continue
+        for i in range(x.shape[0]):
+            x[i, j] = w.x_new[i, j]
+            k[0, i, j] = k[6, i, j]
+        for i in range(corners):
+            w.behind[i, j] = w.e_start[i, j] * w.e[i, j] < 0.0
+        for i in range(task.memory.size):
+            m, become = task.memory[i], w.g[corners + i, j]
+            if w.e_start[corners + i, j] == 0.0 and x[m, j] != become:  # otherwise locked
+                x[m, j] = become
+                for c in range(w.behind.shape[0]):
+                    w.behind[c, j] = 0.0  # with another memory the way back is an event
+        for i in range(w.e.shape[0]):
+            w.e_start[i, j] = w.e[i, j]
+            w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
 
 
 def advance(rhs, restart, stiff_attempt, task, lanes, w, states, rounds):

@@ -92,7 +92,7 @@ def weighed_errors(x, x_new, k, h, rtol, atol, result):
 
 
 @numba.njit(**INNER)
-def errors(parts, x_new, x_stage, k, sums, error, rate):
+def errors(parts, x_new, x_stage, k, error, rate):
     """Fill, lane by lane, the error over its tolerance, and the fastest rate seen (1/s).
 
     The error is the largest of the states' `parts`; it is not finite if a state is not.  (A mean
@@ -101,19 +101,17 @@ def errors(parts, x_new, x_stage, k, sums, error, rate):
     (Hairer, Wanner, Solving ODEs II, IV.2).
     """
     n, lanes = x_new.shape
-    for j in range(error.size):
-        error[j] = sums[0, j] = sums[1, j] = sums[2, j] = 0.0
-    for i in range(n):
-        for j in range(lanes):
-            part = parts[i, j]
-            error[j] = part if part > error[j] else error[j]
-            sums[0, j] += 0.0 * (part + x_new[i, j])  # NaN or infinity: no maximum keeps it
-            step, change = x_new[i, j] - x_stage[i, j], k[6, i, j] - k[5, i, j]
-            sums[1, j] += change * change
-            sums[2, j] += step * step
     for j in range(lanes):
-        error[j] += sums[0, j]
-        rate[j] = np.sqrt(sums[1, j] / sums[2, j]) if sums[2, j] > 0.0 else 0.0
+        largest, spoilt, changes, steps = 0.0, 0.0, 0.0, 0.0
+        for i in range(n):
+            part = parts[i, j]
+            largest = part if part > largest else largest
+            spoilt += 0.0 * (part + x_new[i, j])  # NaN or infinity: no maximum keeps it
+            step, change = x_new[i, j] - x_stage[i, j], k[6, i, j] - k[5, i, j]
+            changes += change * change
+            steps += step * step
+        error[j] = largest + spoilt
+        rate[j] = np.sqrt(changes / steps) if steps > 0.0 else 0.0
 
 
 @numba.njit(**INNER)

@@ -69,7 +69,6 @@ class Work(NamedTuple):
     u: np.ndarray
     error: np.ndarray  # of the step over its tolerance
     rate: np.ndarray  # estimate of the largest eigenvalue's magnitude (1/s)
-    sums: np.ndarray
     t_end: np.ndarray
     x_flat: np.ndarray  # the same memory as x, x_new, x_stage, x_ahead, k
     x_new_flat: np.ndarray
@@ -94,7 +93,6 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
         **dict.fromkeys(("t", "h", "error", "rate", "t_end"), (lanes,)),
         "hh": (n * lanes,),
         "k": (_tsit5.STAGES, n, lanes),
-        "sums": (3, lanes),
         "u": (inputs, lanes),
         **dict.fromkeys(("jacobian", "matrix"), (stiff, stiff)),
         "f_t": (stiff,),
