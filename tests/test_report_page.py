@@ -44,7 +44,7 @@ from analysis.report.outline import (
     summary,
 )
 from analysis.report.page import parts
-from analysis.report.svg import shapes_svg, svg, svg_files
+from analysis.report.svg import draw_ahead, shapes_svg, svg, svg_files
 from analysis.report.svg_compact import short_path
 from nlctl._errors import UsageError
 
@@ -287,6 +287,28 @@ def test_a_pool_that_helps_with_drawing_changes_no_byte():
     assert len(set(alone)) == 4
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         assert svg_files([*figures()], pool) == alone
+        early = [*figures()]
+        done = dict(zip(early[1:3], alone[1:3], strict=True))
+        assert svg_files(early, pool, done) == alone
+    assert svg_files(early[1:3], drawn=done) == alone[1:3]
+
+
+def test_what_is_drawn_ahead_is_drawn_once_and_in_the_same_bytes():
+    """Until something else is to be done; a figure that is drawn is not drawn again."""
+    kept = [Figure(key=str(i), caption="c", description="d", figure=drawn()) for i in range(4)]
+    text = Paragraph(text="No figure.")
+    sections = [
+        Section(key="a", title="A", items=[text, *kept[:2]]),
+        Section(key="b", title="B", items=kept[2:]),
+    ]
+    asked = iter((False, False, False, True))
+    early = draw_ahead(sections, until=lambda: next(asked))
+    assert [*early] == [figure.figure for figure in kept[:3]]
+    for figure in early:
+        figure.clear()  # drawn again it would be empty
+    *before, last = svg_files([figure.figure for figure in kept], drawn=early)
+    assert before == [last] * 3
+    assert draw_ahead(sections, until=lambda: True) == {}
 
 
 def numbers_in(value):
