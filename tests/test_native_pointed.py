@@ -115,12 +115,22 @@ def test_a_record_is_passed_on_between_functions():
 @pytest.mark.skipif(
     getattr(config, "DISABLE_JIT", False), reason="plain Python has no types to refuse"
 )
-def test_an_array_of_another_kind_is_refused():
-    """What is compiled for one layout is not run on another."""
+def test_an_array_of_another_type_is_refused():
+    """What is compiled for one type is not run on another."""
     compiled = numba.njit(numba.float64(numba.typeof(sample()), numba.int64))(inner.py_func)
     assert compiled(sample(), 1) == 1.0
-    for line in (np.ones(4)[::2], np.ones(2, dtype=np.float32)):
-        values = sample()._asdict() | {"line": line}
-        values.pop("table")
-        with pytest.raises(TypeError, match="No matching definition"):
-            compiled(with_table(Record, **values), 1)
+    with pytest.raises(TypeError, match="No matching definition"):
+        compiled(changed(line=np.ones(2, dtype=np.float32)), 1)
+
+
+@pytest.mark.parametrize("array", [np.ones(4)[::2], np.ones((2, 3)).T])
+def test_an_array_with_gaps_or_in_another_order_is_refused(array):
+    name = "line" if array.ndim == 1 else "grid"
+    with pytest.raises(ValueError, match=f"'{name}' of Record needs a C-contiguous array"):
+        changed(**{name: array})
+
+
+def changed(**values):
+    kept = sample()._asdict() | values
+    kept.pop("table")
+    return with_table(Record, **kept)

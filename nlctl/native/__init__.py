@@ -8,8 +8,9 @@ once on symbols (`_trace*`) and written out for several members at a time (`_low
 
 `_integrate` moves members side by side through time, each with its own steps: an explicit pair
 (`_tsit5`), a stiff method (`_rodas5p`, `_stiff`), decisions (`_control`), corners and memories
-(`_events`, `_restart`).  `_response` makes of one run what python-control returns, `_ensemble` runs
-many; `_discrete` is for sampled systems.
+(`_events`, `_restart`); all their arrays are one pointer to machine code (`_work`, `_pointed`).
+`_response` makes of one run what python-control returns, `_ensemble` runs many; `_discrete` is for
+sampled systems.
 """
 
 from ._code import CompileError

@@ -1,7 +1,7 @@
 """Decisions about one member's steps: how long, accepted or not, by which method.
 
-Each function takes the member's record and a few numbers, never the whole workspace: what is
-passed here is passed for every member and every step.
+Each function takes the member's record and a few numbers, never the whole workspace: its arguments
+are all that a decision rests on.
 """
 
 from __future__ import annotations

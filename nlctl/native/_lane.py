@@ -21,8 +21,8 @@ class Status(IntEnum):
 OK, DIVERGED, STEP_LIMIT, STEP_TOO_SMALL, STOPPED = map(int, Status)  # for compiled code
 RUNNING, STIFF = -1, -2  # STIFF: to be finished by a method that only single runs have
 FIRST_PATIENCE = 15
-# for functions that only machine code calls: without a way in from Python, which for a workspace
-# of many arrays takes longer to compile than the function
+# for functions that only machine code calls: without a way in from Python, which would have to be
+# compiled as well
 INNER = {
     "cache": True,
     "error_model": "numpy",

@@ -54,11 +54,19 @@ def pointed(record: R) -> R:
 
 
 def with_table(record: Any, **values: Any) -> Any:
-    """Return a record of these values; its table holds as long as it does."""
+    """Return a record of these values; its table holds as long as it does.
+
+    Raises
+    ------
+    ValueError
+        If an array is not C-contiguous: the table has no strides.
+    """
     rows = []
     for name in _named(record):
         value = values[name]
         if isinstance(value, np.ndarray):
+            if not value.flags.c_contiguous:
+                raise ValueError(f"'{name}' of {record.__name__} needs a C-contiguous array")
             row = [value.ctypes.data, *value.shape]
         else:
             row = [int(np.asarray(value).view(np.int64))]  # a float's bits, or an integer
