@@ -2,6 +2,7 @@
 
 from contextlib import contextmanager
 
+import control as ct
 import numpy as np
 import pandas as pd
 import pytest
@@ -47,6 +48,20 @@ def test_single_runs_and_ensembles(ensemble):
     with compiling() as during:
         if ensemble:
             nlctl.ensemble_response(compiled, T, params={"law.beta": [2.0, 3.0]})
+        else:
+            nlctl.input_output_response(compiled, T)
+    assert during == []
+
+
+@pytest.mark.parametrize("ensemble", [False, True])
+def test_discrete_time(ensemble):
+    compiled = nlctl.compile(ct.ss([[0.5]], [[1]], [[1]], [[0]], 0.1))
+    with compiling() as before:
+        compile_ahead(compiled, ensemble=ensemble)
+    assert {"rhs", "out"} <= set(before)
+    with compiling() as during:
+        if ensemble:
+            nlctl.ensemble_response(compiled, T, initial_state={"x[0]": [2.0, 3.0]})
         else:
             nlctl.input_output_response(compiled, T)
     assert during == []

@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 
 import nlctl
+from analysis.metrics import Metric, final
+from nlctl._diagram import state_names
 from nlctl._errors import ParameterError
+from nlctl.native import ensemble_response
 from nlctl.native._compile import compile as compile_diagram
 from nlctl.native._discrete import simulate_discrete
 
@@ -108,3 +111,54 @@ def test_without_a_sampling_time_the_steps_must_be_equal():
         simulated(logistic(True), np.array([0.0, 1.0, 3.0]))
     with pytest.raises(ParameterError, match="no discrete-time system"):
         simulated(logistic(0), np.array([0.0, 1.0]))
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+def test_members_of_an_ensemble_are_the_single_runs(kind):
+    """Bit for bit, more members than one thread takes at a time, on one thread or two."""
+    compiled = compile_diagram(SYSTEMS[kind](0.1))
+    times, state = 0.1 * np.arange(30), state_names(compiled.system)[0]
+    starts, u = np.linspace(0.1, 0.4, 19), 0.0 if kind == "nlsys" else np.cos(times)
+    label = compiled.system.output_labels[0]
+    made = [
+        ensemble_response(compiled, times, u, {state: starts}, keep=[label], threads=threads)
+        for threads in (1, 2)
+    ]
+    first = nlctl.initial_state(compiled.system)
+    for number, start in enumerate(starts):
+        x0 = first.copy()
+        x0[0] = start
+        run = nlctl.input_output_response(compiled, times, u, x0)
+        for ensemble in made:
+            np.testing.assert_array_equal(
+                ensemble.signals[label][number], np.atleast_2d(run.outputs)[0]
+            )
+    assert set(made[0].table["status"]) == {"OK"}
+    assert set(made[0].table["steps"]) == {30}
+
+
+def test_members_have_their_own_parameters_and_their_own_ends():
+    """x[k+1] = a x[k]^2 is (a x0)^(2^k) / a: it settles at 0 or at 1 / a, or leaves the floats."""
+    square = ct.nlsys(
+        lambda t, x, u, params: params["a"] * x**2, lambda t, x, u, params: x,
+        inputs=0, outputs=["y"], states=["x"], params={"a": 1.0}, dt=1, name="square",
+    )  # fmt: skip
+    a = np.array([0.25, 0.5, 1.0])
+    last = Metric(key="last", signal="y", unit="1", meaning="last y", function=final)
+    ensemble = ensemble_response(
+        compile_diagram(square), 1.0 * np.arange(12), 0, {"x": 2.0}, params={"a": a},
+        metrics=[last], keep=["y"],
+    )  # fmt: skip
+    assert ensemble.table["status"].tolist() == ["OK", "OK", "DIVERGED"]
+    assert ensemble.table["last"][:2].tolist() == [0.0, 2.0]
+    assert np.isnan(ensemble.table["last"][2])
+    assert ensemble.table["time"].tolist() == [11.0, 11.0, 9.0]
+    y = ensemble.signals["y"]
+    np.testing.assert_array_equal(y[0, :9], 0.5 ** (2.0 ** np.arange(9)) / 0.25)
+    np.testing.assert_array_equal(y[2, :10], 2.0 ** (2.0 ** np.arange(10)))
+    assert np.isnan(y[2, 10:]).all()
+
+
+def test_an_ensemble_refuses_times_between_the_samples():
+    with pytest.raises(ParameterError, match=r"'logistic' is sampled every 0\.1 s"):
+        ensemble_response(compile_diagram(logistic(0.1)), np.arange(5) * 0.2)

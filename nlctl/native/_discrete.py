@@ -48,7 +48,7 @@ def simulate_discrete(
         If `times` are not one sampling time apart.
     """
     system = compiled.system
-    _check_times(system, times)
+    check_sampling(system, times)
     outputs = np.empty((times.size, system.noutputs or 0))
     states = np.empty((times.size, system.nstates or 0))
     g = np.empty(compiled.program.events)
@@ -59,7 +59,18 @@ def simulate_discrete(
     return outputs[:n].T, states[:n].T
 
 
-def _check_times(system: Any, times: np.ndarray) -> None:
+def compile_discrete(compiled: Compiled) -> None:
+    """Make the machine code that `simulate_discrete` needs."""
+    _ = compiled.native, _loop()
+
+
+def check_sampling(system: Any, times: np.ndarray) -> None:
+    """Refuse times that are not one sampling time apart.
+
+    Raises
+    ------
+    ParameterError
+    """
     steps = np.diff(times)
     if not ct.isdtime(system, strict=True):
         raise ParameterError(f"'{system.name}' has dt = {system.dt} and is no discrete-time system")

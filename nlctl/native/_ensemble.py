@@ -9,15 +9,17 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol
 
+import control as ct
 import numpy as np
 
 from .._names import unknown
 from .._param import checked_times
 from ._compile import Compiled
+from ._discrete import check_sampling, compile_discrete
 from ._lane import RUNNING, STIFF, Status
 from ._machine import WIDTH, machine
 from ._members import Members, members
-from ._response import input_array
+from ._response import input_array, sampled
 from ._simulate import Settings, Trajectory, begin, finish, go_on, made, prepared, trajectory
 
 if TYPE_CHECKING:
@@ -85,6 +87,9 @@ def ensemble_response(
     another order and agrees to rounding.)  Metrics are taken as each member ends, and only the
     signals in `keep` are stored.  After Ctrl-C the members that are finished are returned.
 
+    A diagram in discrete time goes from sample to sample; `rtol`, `atol`, `max_steps` and `method`
+    then mean nothing.
+
     Parameters
     ----------
     compiled : Compiled
@@ -117,8 +122,8 @@ def ensemble_response(
     Raises
     ------
     ParameterError
-        If `timepts` is no increasing grid, arrays have different lengths, or a value is refused;
-        the message then names the member.
+        If `timepts` is no increasing grid or does not fit a discrete-time diagram, arrays have
+        different lengths, or a value is refused; the message then names the member.
     UnknownNameError
         If a parameter, state or signal does not exist.
     """
@@ -132,7 +137,11 @@ def ensemble_response(
     settings = Settings(rtol=rtol, atol=atol, max_steps=max_steps, method=method or "auto")
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
     _, p = every.batch(range(1), WIDTH)  # checks all members before anything runs
-    machine(compiled, p, WIDTH)  # compiled once, before the threads start
+    if ct.isctime(compiled.system):
+        machine(compiled, p, WIDTH)  # compiled once, before the threads start
+    else:
+        check_sampling(compiled.system, times)
+        compile_discrete(compiled)
 
     def one(numbers: range, stop: _Stop) -> dict[int, dict[str, Any]]:
         rows = {}
@@ -163,20 +172,24 @@ def _group(
     stop: _Stop,
 ) -> Iterator[Trajectory]:
     """Run up to WIDTH members side by side; yield them in their order."""
-    x0, p = every.batch(numbers, WIDTH)
-    if settings.method == "rodas5p" or machine(every.compiled, p, WIDTH).width == 1:
+    compiled, (x0, p) = every.compiled, every.batch(numbers, WIDTH)
+    in_steps = not ct.isctime(compiled.system)
+    if in_steps or settings.method == "rodas5p" or machine(compiled, p, WIDTH).width == 1:
         for j in range(len(numbers)):
-            yield trajectory(every.compiled, times, inputs, x0[:, j], p[:, j], settings)
+            if not stop.wanted:
+                return
+            given = (compiled, times, inputs, x0[:, j], p[:, j])
+            yield sampled(*given) if in_steps else trajectory(*given, settings)
         return
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
-        run = prepared(every.compiled, times, inputs, x0, p, settings)
+        run = prepared(compiled, times, inputs, x0, p, settings)
         begin(run)
         while stop.wanted and np.any(run.lanes["status"] == RUNNING):
             go_on(run)
         outputs = finish(run)
     for j in range(len(numbers) if stop.wanted else 0):
         if run.lanes["status"][j] == STIFF:  # the stiff method is for single runs
-            yield trajectory(every.compiled, times, inputs, x0[:, j], p[:, j], settings)
+            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings)
         else:
             yield made(run, outputs, j)
 

@@ -6,12 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import control as ct
 import numba
 import numpy as np
 from numba.core import config
 from numba.core.errors import NumbaError
 
 from ._compile import Compiled
+from ._discrete import compile_discrete
 from ._explain import explained
 from ._lower import lower, lowered_code
 from ._parameters import length
@@ -83,6 +85,9 @@ def compile_ahead(compiled: Compiled, *, ensemble: bool = False) -> None:
     CompileError
         If a block's function cannot be machine code.
     """
+    if not ct.isctime(compiled.system):
+        compile_discrete(compiled)
+        return
     width = WIDTH if ensemble else 1
     machine(compiled, np.repeat(compiled.parameter_vector()[:, None], width, axis=1), width)
 

@@ -51,7 +51,7 @@ def respond(
     if ct.isctime(system):
         made = trajectory(compiled, times, u, x0, p, Settings(**settings), progress)
     else:
-        made = _sampled(compiled, times, u, x0, p)
+        made = sampled(compiled, times, u, x0, p)
     run = made.statistics
     if run.status is Status.STOPPED and not ignore_errors:
         raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error goes on
@@ -72,7 +72,7 @@ def uninterrupted(response: Any) -> Any:
     return response
 
 
-def _sampled(
+def sampled(
     compiled: Compiled, times: np.ndarray, u: np.ndarray, x0: np.ndarray, p: np.ndarray
 ) -> Trajectory:
     """Run a discrete-time diagram; there is nothing to be set."""
