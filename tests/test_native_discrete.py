@@ -140,8 +140,8 @@ def test_members_of_an_ensemble_are_the_single_runs(kind):
 def test_members_have_their_own_parameters_and_their_own_ends():
     """x[k+1] = a x[k]^2 is (a x0)^(2^k) / a: it settles at 0 or at 1 / a, or leaves the floats."""
     square = ct.nlsys(
-        lambda t, x, u, params: params["a"] * x**2, lambda t, x, u, params: x,
-        inputs=0, outputs=["y"], states=["x"], params={"a": 1.0}, dt=1, name="square",
+        lambda t, x, u, params: params["a"] * x**2 + params["b"], lambda t, x, u, params: x,
+        inputs=0, outputs=["y"], states=["x"], params={"a": 1.0, "b": 0.0}, dt=1, name="square",
     )  # fmt: skip
     a = np.array([0.25, 0.5, 1.0])
     last = Metric(key="last", signal="y", unit="1", meaning="last y", function=final)

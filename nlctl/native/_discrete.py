@@ -53,6 +53,7 @@ def simulate_discrete(
     states = np.empty((times.size, system.nstates or 0))
     g = np.empty(compiled.program.events)
     columns = np.array(inputs.T, dtype=float, order="C")  # one that may be written to
+    p = np.ascontiguousarray(p)
     states[:1] = x0
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the result says
         n = _loop()(*compiled.native, times, columns, p, states, outputs, g)
