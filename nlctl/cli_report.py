@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
 
     from analysis.report.document import Report
+    from analysis.report.svg import Drawn
 
 QUICK = ("example-1-quick", "example-2-quick")  # the studies of the paper's report
 
@@ -86,7 +87,7 @@ def _paper(
 
 def _reproduced(
     beside: Executor, compiling: Future[None], out: Path, jobs: int, *, far: bool
-) -> tuple[Report, dict[Any, bytes], bool]:
+) -> tuple[Report, Drawn, bool]:
     """Return the report, those of its figures that are drawn, and whether all claims hold."""
     from analysis.report.lyapunov_evidence import evidence, far_runs_in_background
     from analysis.report.paper_report import paper_report, paper_sections
@@ -105,13 +106,19 @@ def _reproduced(
                 proofs[number] = evidence(loop)
                 advance(1)
         with progress_bar("running far beyond 20 s, and the studies", 2) as advance:
-            found: dict[str, Any] = {"proofs": proofs, "far": long_runs.result()}
+            far_away = long_runs.result()
             advance(1)
-            found["sections"] = paper_sections(runs, **found)
-            drawn = draw_ahead(found["sections"], until=waiting[-1].done)
+            sections = paper_sections(runs, proofs=proofs, far=far_away)
+            drawn = draw_ahead(sections, until=waiting[-1].done)
             *_, numbers = (task.result() for task in (compiling, *waiting))
-    studies = studies_part([out / name for name in QUICK], threads=jobs or None)
-    made = paper_report(runs, **found, studies=studies, numerics=numbers)
+    made = paper_report(
+        runs,
+        proofs=proofs,
+        far=far_away,
+        sections=sections,
+        studies=studies_part([out / name for name in QUICK], threads=jobs or None),
+        numerics=numbers,
+    )
     return made, drawn, all(check.passed for check in checks(runs))
 
 

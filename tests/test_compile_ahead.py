@@ -39,29 +39,26 @@ def compiling():
     names += [e.data["dispatcher"].py_func.__qualname__ for _, e in recorder.buffer if e.is_start]
 
 
-@pytest.mark.parametrize("ensemble", [False, True])
-def test_single_runs_and_ensembles(ensemble):
-    compiled = nlctl.compile(nlctl.paper.example_1())
-    with compiling() as before:
-        compile_ahead(compiled, ensemble=ensemble)
-    assert {"prepare", "rhs", "out"} <= set(before)
-    with compiling() as during:
-        if ensemble:
-            nlctl.ensemble_response(compiled, T, params={"law.beta": [2.0, 3.0]})
-        else:
-            nlctl.input_output_response(compiled, T)
-    assert during == []
+def sampled():
+    return ct.ss([[0.5]], [[1]], [[1]], [[0]], 0.1)
 
 
 @pytest.mark.parametrize("ensemble", [False, True])
-def test_discrete_time(ensemble):
-    compiled = nlctl.compile(ct.ss([[0.5]], [[1]], [[1]], [[0]], 0.1))
+@pytest.mark.parametrize(
+    ("make", "functions", "varied"),
+    [
+        (nlctl.paper.example_1, {"prepare", "rhs", "out"}, {"params": {"law.beta": [2.0, 3.0]}}),
+        (sampled, {"rhs", "out"}, {"initial_state": {"x[0]": [2.0, 3.0]}}),
+    ],
+)
+def test_single_runs_and_ensembles(make, functions, varied, ensemble):
+    compiled = nlctl.compile(make())
     with compiling() as before:
         compile_ahead(compiled, ensemble=ensemble)
-    assert {"rhs", "out"} <= set(before)
+    assert functions <= set(before)
     with compiling() as during:
         if ensemble:
-            nlctl.ensemble_response(compiled, T, initial_state={"x[0]": [2.0, 3.0]})
+            nlctl.ensemble_response(compiled, T, **varied)
         else:
             nlctl.input_output_response(compiled, T)
     assert during == []

@@ -14,10 +14,7 @@ import os
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
-
-from matplotlib.figure import Figure as MatplotlibFigure
 
 from nlctl._errors import ParameterError
 
@@ -26,7 +23,7 @@ from .document import Figure, History, Item, Report, Table
 from .history import chart
 from .outline import evidence, kind, meanings, place, summary
 from .page import fill, to_bytes, write_files
-from .svg import shapes_svg, svg, svg_files
+from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
 
 __all__ = ["file_hashes", "render_html", "render_json", "write_report"]
 
@@ -44,7 +41,7 @@ def render_html(
     *,
     interactive: bool = False,
     pool: Executor | None = None,
-    drawn: Mapping[MatplotlibFigure, bytes] = MappingProxyType({}),
+    drawn: Drawn = NONE_DRAWN,
 ) -> str:
     """Return the report as one HTML page without references to anything outside.
 
@@ -136,7 +133,7 @@ def write_report(
     *,
     interactive: bool = False,
     pool: Executor | None = None,
-    drawn: Mapping[MatplotlibFigure, bytes] = MappingProxyType({}),
+    drawn: Drawn = NONE_DRAWN,
 ) -> Path:
     """Write ``index.html`` and ``report.json``; nothing is half written.
 

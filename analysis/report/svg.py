@@ -42,32 +42,29 @@ PLACE = re.compile(r"translate\([^)]*\)|^[-\d.]+$")
 TAG = re.compile(r"<(\w+)")
 URL = re.compile(r"url\(#([^)]*)\)")
 
+Drawn = Mapping[MatplotlibFigure, bytes]  # figures and their SVG files
+NONE_DRAWN: Drawn = MappingProxyType({})
+
 
 def svg_files(
     figures: Sequence[MatplotlibFigure],
     pool: Executor | None = None,
-    drawn: Mapping[MatplotlibFigure, bytes] = MappingProxyType({}),
+    drawn: Drawn = NONE_DRAWN,
 ) -> list[bytes]:
     """Return figures as SVG files; this process and those of a pool share the work.
 
     Those in `drawn`, of `draw_ahead`, are not drawn again.
     """
-    left = [figure for figure in figures if figure not in drawn]
-    waiting = [] if pool is None else [pool.submit(_svg_file, figure) for figure in left]
-    files = dict(drawn)
-    for i in reversed(range(len(left))):  # a pool begins with the first one
-        if waiting and not waiting[i].cancel():
+    files, left = dict(drawn), [figure for figure in figures if figure not in drawn]
+    waiting = {} if pool is None else {figure: pool.submit(_svg_file, figure) for figure in left}
+    for figure in reversed(left):  # a pool begins with the first one
+        if waiting and not waiting[figure].cancel():
             break
-        files[left[i]] = _svg_file(left[i])
-    for figure, file in zip(left, waiting, strict=False):
-        if figure not in files:
-            files[figure] = file.result()
-    return [files[figure] for figure in figures]
+        files[figure] = _svg_file(figure)
+    return [files[f] if f in files else waiting[f].result() for f in figures]
 
 
-def draw_ahead(
-    sections: Iterable[Section], until: Callable[[], bool]
-) -> dict[MatplotlibFigure, bytes]:
+def draw_ahead(sections: Iterable[Section], until: Callable[[], bool]) -> Drawn:
     """Draw figures while there is nothing else to do; return them as SVG files, see `svg_files`.
 
     Parameters

@@ -48,7 +48,7 @@ def simulate_discrete(
         If `times` are not one sampling time apart.
     """
     system = compiled.system
-    check_sampling(system, times)
+    _check_times(system, times)
     outputs = np.empty((times.size, system.noutputs or 0))
     states = np.empty((times.size, system.nstates or 0))
     g = np.empty(compiled.program.events)
@@ -65,13 +65,7 @@ def compile_discrete(compiled: Compiled) -> None:
     _ = compiled.native, _loop()
 
 
-def check_sampling(system: Any, times: np.ndarray) -> None:
-    """Refuse times that are not one sampling time apart.
-
-    Raises
-    ------
-    ParameterError
-    """
+def _check_times(system: Any, times: np.ndarray) -> None:
     steps = np.diff(times)
     if not ct.isdtime(system, strict=True):
         raise ParameterError(f"'{system.name}' has dt = {system.dt} and is no discrete-time system")

@@ -15,11 +15,10 @@ import numpy as np
 from .._names import unknown
 from .._param import checked_times
 from ._compile import Compiled
-from ._discrete import check_sampling, compile_discrete
 from ._lane import RUNNING, STIFF, Status
-from ._machine import WIDTH, machine
+from ._machine import WIDTH, compile_for, machine
 from ._members import Members, members
-from ._response import input_array, sampled
+from ._response import input_array
 from ._simulate import Settings, Trajectory, begin, finish, go_on, made, prepared, trajectory
 
 if TYPE_CHECKING:
@@ -137,11 +136,7 @@ def ensemble_response(
     settings = Settings(rtol=rtol, atol=atol, max_steps=max_steps, method=method or "auto")
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
     _, p = every.batch(range(1), WIDTH)  # checks all members before anything runs
-    if ct.isctime(compiled.system):
-        machine(compiled, p, WIDTH)  # compiled once, before the threads start
-    else:
-        check_sampling(compiled.system, times)
-        compile_discrete(compiled)
+    compile_for(compiled, p, WIDTH)  # once, before the threads start
 
     def one(numbers: range, stop: _Stop) -> dict[int, dict[str, Any]]:
         rows = {}
@@ -173,13 +168,12 @@ def _group(
 ) -> Iterator[Trajectory]:
     """Run up to WIDTH members side by side; yield them in their order."""
     compiled, (x0, p) = every.compiled, every.batch(numbers, WIDTH)
-    in_steps = not ct.isctime(compiled.system)
-    if in_steps or settings.method == "rodas5p" or machine(compiled, p, WIDTH).width == 1:
+    alone = settings.method == "rodas5p" or not ct.isctime(compiled.system)
+    if alone or machine(compiled, p, WIDTH).width == 1:
         for j in range(len(numbers)):
             if not stop.wanted:
                 return
-            given = (compiled, times, inputs, x0[:, j], p[:, j])
-            yield sampled(*given) if in_steps else trajectory(*given, settings)
+            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings)
         return
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         run = prepared(compiled, times, inputs, x0, p, settings)

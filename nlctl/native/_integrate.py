@@ -21,7 +21,7 @@ from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
 from ._lane import INNER, LANES, RUNNING
 from ._restart import memory_rates, restart, start
 from ._stiff import stiff_attempt
-from ._work import AUTO, OUT, RESTART, RHS, STIFF, TASK, WORK, inputs_at, outputs
+from ._work import AUTO, OUT, RESTART, RHS, STIFF_ATTEMPT, TASK, WORK, inputs_at, outputs
 
 _ONCE = threading.Lock()  # of several threads that begin at the same time one compiles
 
@@ -199,9 +199,9 @@ def _machine_code() -> dict[str, Callable[..., None]]:
     rarely, often = {"no_cpython_wrapper": True}, {"nogil": True}
     common, samples = (TASK, LANES, WORK), numba.float64[:, :, ::1]
     again = code(restart, *RESTART.signature.args, **rarely)
-    stiff = code(stiff_attempt, *STIFF.signature.args, **rarely)
+    stiff = code(stiff_attempt, *STIFF_ATTEMPT.signature.args, **rarely)
     begin = code(start, RHS, RESTART, *common, **often)
-    go_on = code(advance, RHS, RESTART, STIFF, *common, samples, numba.int64, **often)
+    go_on = code(advance, RHS, RESTART, STIFF_ATTEMPT, *common, samples, numba.int64, **often)
     return {
         "start": lambda rhs, *rest: begin(rhs, again, *rest),
         "advance": lambda rhs, *rest: go_on(rhs, again, stiff, *rest),

@@ -85,11 +85,16 @@ def compile_ahead(compiled: Compiled, *, ensemble: bool = False) -> None:
     CompileError
         If a block's function cannot be machine code.
     """
-    if not ct.isctime(compiled.system):
-        compile_discrete(compiled)
-        return
     width = WIDTH if ensemble else 1
-    machine(compiled, np.repeat(compiled.parameter_vector()[:, None], width, axis=1), width)
+    compile_for(compiled, np.repeat(compiled.parameter_vector()[:, None], width, axis=1), width)
+
+
+def compile_for(compiled: Compiled, p: np.ndarray, width: int) -> None:
+    """Make the machine code that runs with parameters `p` need, as `machine` takes them."""
+    if ct.isctime(compiled.system):
+        machine(compiled, p, width)
+    else:
+        compile_discrete(compiled)
 
 
 def _plain(compiled: Compiled) -> Machine:

@@ -11,7 +11,6 @@ import numpy as np
 from .._diagram import initial_state as state_of
 from .._errors import DivergedError, ParameterError
 from ._compile import Compiled
-from ._discrete import simulate_discrete
 from ._lane import Status
 from ._simulate import Settings, Statistics, Trajectory, trajectory
 
@@ -48,10 +47,7 @@ def respond(
     system = compiled.system
     u, x0 = input_array(inputs, system.ninputs or 0, times), state_array(system, initial_state)
     p = compiled.parameter_vector(params)
-    if ct.isctime(system):
-        made = trajectory(compiled, times, u, x0, p, Settings(**settings), progress)
-    else:
-        made = sampled(compiled, times, u, x0, p)
+    made = trajectory(compiled, times, u, x0, p, Settings(**settings), progress)
     run = made.statistics
     if run.status is Status.STOPPED and not ignore_errors:
         raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error goes on
@@ -70,21 +66,6 @@ def uninterrupted(response: Any) -> Any:
     if response.statistics.status is Status.STOPPED:
         raise KeyboardInterrupt(response.message)
     return response
-
-
-def sampled(
-    compiled: Compiled, times: np.ndarray, u: np.ndarray, x0: np.ndarray, p: np.ndarray
-) -> Trajectory:
-    """Run a discrete-time diagram; there is nothing to be set."""
-    outputs, states = simulate_discrete(compiled, times, u, x0, p)
-    done = outputs.shape[1]
-    run = Statistics(
-        status=Status.OK if done == times.size else Status.DIVERGED,
-        time=float(times[max(done - 1, 0)]),
-        accepted=done,
-        rejected=0,
-    )
-    return Trajectory(time=times[:done], outputs=outputs, states=states, statistics=run)
 
 
 def _message(system: ct.InputOutputSystem, run: Statistics) -> str:

@@ -6,11 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import control as ct
 import numpy as np
 
 from .._errors import ParameterError
 from .._names import unknown
 from ._compile import Compiled
+from ._discrete import simulate_discrete
 from ._integrate import machine_code
 from ._lane import RUNNING, Status, new_lanes
 from ._machine import Machine, machine
@@ -99,7 +101,9 @@ def trajectory(
     settings: Settings,
     progress: Callable[[float], object] | None = None,
 ) -> Trajectory:
-    """Integrate one member.  Ctrl-C ends the run with the status STOPPED."""
+    """Run one member.  Ctrl-C ends an integration with the status STOPPED."""
+    if not ct.isctime(compiled.system):
+        return _sampled(compiled, times, inputs, x0, p)
     run = prepared(compiled, times, inputs, x0[:, None], p[:, None], settings)
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         try:
@@ -112,6 +116,21 @@ def trajectory(
             run.lanes["status"] = Status.STOPPED
         outputs = finish(run)
     return made(run, outputs, 0)
+
+
+def _sampled(
+    compiled: Compiled, times: np.ndarray, inputs: np.ndarray, x0: np.ndarray, p: np.ndarray
+) -> Trajectory:
+    """Run a discrete-time diagram; there is nothing to be set."""
+    outputs, states = simulate_discrete(compiled, times, inputs, x0, p)
+    done = outputs.shape[1]
+    run = Statistics(
+        status=Status.OK if done == times.size else Status.DIVERGED,
+        time=float(times[max(done - 1, 0)]),
+        accepted=done,
+        rejected=0,
+    )
+    return Trajectory(time=times[:done], outputs=outputs, states=states, statistics=run)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -105,16 +105,15 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
     return with_table(Work, **arrays, **flat, k_flat=k_flat, pivots=pivots)
 
 
-def _some_task() -> Task:
-    """Return a task, of which only the type matters."""
-    one, none = np.zeros(1), np.zeros(0, dtype=np.int64)
-    numbers = {"rtol": 0.0, "atol": 0.0, "fixed": 0.0, "max_steps": 0, "method": 0, "alone": 0}
-    arrays = {"times": one, "inputs": one[None], "p": one[None], "memory": none}
-    return with_table(Task, **arrays, **numbers, corners=0)
-
-
-TASK, WORK = numba.typeof(_some_task()), numba.typeof(new_work(1, 1, 1, 1))
-STIFF = numba.types.FunctionType(numba.void(RHS, TASK, LANES, WORK))
+_LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
+TASK = numba.typeof(  # only the types of these matter
+    with_table(
+        Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
+        fixed=0.0, max_steps=0, method=0, alone=0,
+    )
+)  # fmt: skip
+WORK = numba.typeof(new_work(1, 1, 1, 1))
+STIFF_ATTEMPT = numba.types.FunctionType(numba.void(RHS, TASK, LANES, WORK))
 RESTART = numba.types.FunctionType(numba.void(RHS, TASK, LANES, WORK, numba.boolean[::1]))
 
 
