@@ -238,3 +238,16 @@ def test_limits_state_how_far_zeta_moves(runs):
     t = runs["1"].time
     drift = 1 / 40 * (t[-1] - t[t >= TAIL][0])
     assert f"changes by {drift:+.3g} in Example 1" in render_html(paper_report(runs))
+
+
+def test_curves_differ_in_more_than_their_colours(runs):
+    """In every figure, each curve of the legend by its dashes, its markers or its width."""
+    items = [item for section in paper_report(runs).sections for item in section.items]
+    several = 0
+    for figure in (item.figure for item in items if isinstance(item, Figure)):
+        for axes in figure.axes:
+            named = [line for line in axes.lines if not str(line.get_label()).startswith("_")]
+            looks = {(k.get_linestyle(), k.get_marker(), k.get_linewidth()) for k in named}
+            assert len(looks) == len(named), axes.get_ylabel()
+            several += len(named) > 1
+    assert several >= 8

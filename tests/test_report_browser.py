@@ -97,6 +97,15 @@ def test_a_phone_does_not_scroll_sideways(visit, name):
     assert page.evaluate("document.scrollingElement.scrollWidth") <= PHONE
 
 
+def test_the_table_of_contents_stays_in_view(visit):
+    """At the end of a long page it is where it was at its beginning."""
+    page = visit("paper", width=1300)
+    top = "document.querySelector('nav').getBoundingClientRect().top"
+    page.evaluate("window.scrollTo(0, document.body.scrollHeight)")
+    assert page.evaluate("window.scrollY") > 2000
+    assert page.evaluate(top) == 0
+
+
 @pytest.mark.parametrize("name", ["hostile", "long"])
 def test_hostile_names_do_nothing_and_are_shown(visit, name):
     """Not on loading, not on sorting, filtering and enlarging."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+from command_line import nlctl
 from hypothesis import given
 from hypothesis import strategies as st
 from test_report_page import HOSTILE, Reader
@@ -172,6 +173,22 @@ def test_gallery_shows_hostile_titles_as_text(tmp_path, name):
     one, two = (Reader(write_gallery(f).read_text(encoding="utf-8")) for f in (plain, hostile))
     assert [tag for tag, _ in one.tags] == [tag for tag, _ in two.tags]
     assert two.text.count(HOSTILE[name]) == 2
+
+
+def test_a_page_is_opened_in_the_browser_of_the_user(tmp_path, monkeypatch):
+    """Here a program that writes down what it was given; without any, a sentence says so."""
+    folder, seen = write_report(small(), tmp_path / "reports" / "one").parents[1], tmp_path / "seen"
+    opener = tmp_path / "opener"
+    opener.write_text(f'#!/bin/sh\nprintf %s "$1" > "{seen}"\n', encoding="utf-8")
+    opener.chmod(0o755)
+    index = folder / "index.html"
+    monkeypatch.setenv("BROWSER", f"{opener} %s")
+    assert nlctl("gallery", folder, "--open").stdout == f"{index}\n"
+    assert seen.read_text(encoding="utf-8") == index.as_uri()
+    monkeypatch.delenv("BROWSER")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    without = nlctl("gallery", folder, "--open").stdout
+    assert without == f"{index}\nno browser was found to show it\n"
 
 
 def test_without_a_browser_a_pdf_is_refused_before_anything_is_computed(

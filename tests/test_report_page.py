@@ -17,8 +17,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from jinja2 import Environment, UndefinedError, nodes
 from matplotlib.figure import Figure as MatplotlibFigure
 
+import analysis.report
 from analysis.report import (
     Claim,
     Equation,
@@ -43,7 +45,7 @@ from analysis.report.outline import (
     sort_key,
     summary,
 )
-from analysis.report.page import parts
+from analysis.report.page import fill, parts
 from analysis.report.svg import draw_ahead, shapes_svg, svg, svg_files
 from analysis.report.svg_compact import short_path
 from nlctl._errors import UsageError
@@ -291,6 +293,20 @@ def test_a_pool_that_helps_with_drawing_changes_no_byte():
         done = dict(zip(early[1:3], alone[1:3], strict=True))
         assert svg_files(early, pool, done) == alone
     assert svg_files(early[1:3], drawn=done) == alone[1:3]
+
+
+def test_templates_refuse_what_is_missing_and_let_no_markup_through():
+    """A name that nobody gave is an error and no gap; no filter turns escaping off."""
+    with pytest.raises(UndefinedError, match="is undefined"):
+        fill("report.html")
+    environment = Environment(autoescape=True)
+    templates = Path(analysis.report.__file__ or "").parent / "templates"
+    found = sorted(templates.glob("*.html"))
+    assert found
+    for template in found:
+        parsed = environment.parse(template.read_text(encoding="utf-8"))
+        assert "safe" not in {node.name for node in parsed.find_all(nodes.Filter)}
+        assert not [*parsed.find_all(nodes.EvalContextModifier)]
 
 
 def test_what_is_drawn_ahead_is_drawn_once_and_in_the_same_bytes():
