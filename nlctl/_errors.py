@@ -37,3 +37,7 @@ class DivergedError(RuntimeError):
     def __init__(self, message: str, time: float) -> None:
         super().__init__(message)
         self.time = time
+
+
+class CompileError(UsageError):
+    """A block that cannot be compiled: the message names it and says why."""

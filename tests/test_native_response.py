@@ -1,5 +1,6 @@
 """Responses of compiled diagrams: closed forms, orders, pulses, statuses, the cache."""
 
+import linecache
 import os
 import subprocess
 import sys
@@ -262,7 +263,10 @@ class TestCache:
 
         def program(scale, source):
             namespace = {"np": np, "inner": (lambda v: scale * v)}
-            exec(f"def f(t, x, u, params):\n    return [{source}]", namespace)
+            text = f"def f(t, x, u, params):\n    return [{source}]\n"
+            file = f"<equation {source}>"
+            linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+            exec(compile(text, file, "exec"), namespace)
             system = ct.nlsys(None, namespace["f"], inputs=1, outputs=1, name="edited")
             return program_key(nlctl.compile(system).program)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numba.core import config
 
 import nlctl
-from nlctl.native._code import CompileError
+from nlctl.native import CompileError
 from nlctl.native._compile import compile as compile_diagram
 from nlctl.native._schedule import AlgebraicLoopError, schedule
 

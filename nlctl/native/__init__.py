@@ -13,7 +13,7 @@ once on symbols (`_trace*`) and written out for several members at a time (`_low
 sampled systems.
 """
 
-from ._code import CompileError
+from .._errors import CompileError
 from ._compile import Compiled, compile  # noqa: A004 (what it does)
 from ._ensemble import Ensemble, ensemble_response
 from ._lane import Status

@@ -12,19 +12,15 @@ import control as ct
 import numpy as np
 
 from .._block import Block, event_count, memory_states
-from .._errors import UsageError
+from .._errors import CompileError
 from . import _numpy  # noqa: F401 (numba learns what it lacks)
-from ._foreign import callable_constant, params_dict, params_record, unpacked_arguments
-from ._frozen import frozen
 from ._parameters import Slot, current_values
 from ._schedule import Combination, Node, Signal
+from .thirdparty.dicts import callable_constant, params_dict, params_record, unpacked_arguments
+from .thirdparty.objects import frozen
 
 NOTHING: Mapping[Any, str] = MappingProxyType({})
 LONG = 8  # states from which on a block's derivatives are written as one slice
-
-
-class CompileError(UsageError):
-    """A block that cannot be compiled: the message names it and says why."""
 
 
 def sum_of(combination: Combination, guesses: Mapping[Signal, str] = NOTHING) -> str:
@@ -143,7 +139,7 @@ class _FunctionCode(Code):
         ):
             if count:
                 targets = [f"g[{i}]" for i in range(first, first + count)]
-                lines.append(f"{_tuple(targets)} = {self._call(function)}")
+                lines.append(f"{_tuple(targets)} = {self._call(function, count)}")
         return lines
 
     @property
@@ -173,9 +169,10 @@ class _FunctionCode(Code):
             return _tuple([f"x[{i}]" for i in range(start, start + n)])
         return f"x[{start}:{start + n}]" if n else "np.empty(0)"
 
-    def _call(self, function: str) -> str:
+    def _call(self, function: str, count: int) -> str:
+        """Write a call whose result has `count` values."""
         arguments = f"t, {self._states(function)}, u{self.index}, p{self.index}"
-        return f"as_vector({self.name}_{function}({arguments}))"
+        return f"as_vector({self.name}_{function}({arguments}), {count})"
 
     @property
     def fixed(self) -> dict[str, Any]:
@@ -216,7 +213,7 @@ class _FunctionCode(Code):
         # an output that does not depend on the inputs must not read them
         inputs = self.inputs(unknown if self.direct else range(len(self.node.inputs)), guesses)
         given = self._inputs("output", inputs)
-        return [f"u{self.index} = {given}", f"y{self.index} = {self._call('output')}"]
+        return [f"u{self.index} = {given}", f"y{self.index} = {self._call('output', system.noutputs)}"]
 
     def update_lines(self, ready: bool) -> list[str]:
         n, start = self.node.system.nstates or 0, self.node.state_offset
@@ -225,7 +222,7 @@ class _FunctionCode(Code):
         inputs = self._inputs("update", self.inputs())
         same = ready and self.direct and inputs == self._inputs("output", self.inputs())
         given = [] if same else [f"u{self.index} = {inputs}"]
-        call = self._call("update")
+        call = self._call("update", n)
         if self._unpacks:
             targets = [f"dx[{i}]" for i in range(start, start + n)]
             return [*given, f"{_tuple(targets)} = {call}"]

@@ -19,17 +19,16 @@ from numba.core import config
 from numba.core.errors import NumbaWarning
 from numba.core.registry import CPUDispatcher
 
-from .._errors import ParameterError
+from .._errors import CompileError, ParameterError
 from .._names import unknown
 from ._cache import loaded
-from ._code import CompileError
 from ._describe import described
 from ._emit import Program, emit
-from ._explain import explained
-from ._foreign import make_callable
 from ._parameters import packed
-from ._probe import check_functions, check_sizes
 from ._schedule import Schedule, schedule
+from .thirdparty.checks import check_sizes
+from .thirdparty.dicts import make_callable
+from .thirdparty.errors import explained
 
 _RESOLVING = threading.Lock()
 LOOPS = ("error", "solve")  # what may be done with algebraic loops
@@ -178,9 +177,7 @@ def compile(  # noqa: A001 (what it does)
         raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
     read = schedule(system, solve_loops=algebraic_loops == "solve")
     program = emit(read)
-    check_sizes(system, read.nodes)
-    for node in read.nodes:
-        check_functions(node)
+    check_sizes(system, [node.system for node in read.nodes])
     return Compiled(schedule=read, program=program)
 
 

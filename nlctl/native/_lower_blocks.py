@@ -9,13 +9,14 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._block import Block
+from .._errors import CompileError
 from ._code import Code, code
-from ._parameters import Slot, current_values
+from ._parameters import length
 from ._schedule import Combination, Node, Schedule, Signal
 from ._trace import trace
 from ._trace_array import Tracer, boxed, concatenated, full, number, traced, vector
-from ._trace_graph import SMALL, Expr, Graph, Untraceable
+from ._trace_block import parameters, time
+from ._trace_graph import SMALL, Ambiguous, Expr, Graph, Untraceable
 from ._trace_operators import elementwise
 
 
@@ -71,7 +72,9 @@ def equations(schedule: Schedule, layout: Any) -> Equations:
     -------
     Equations
     """
-    reader = _Reader(graph=Graph(), layout=layout, blocks=schedule.nodes)
+    system = schedule.system
+    sizes = {"t": 1, "x": system.nstates or 0, "u": system.ninputs or 0, "p": length(layout)}
+    reader = _Reader(graph=Graph(sizes), layout=layout, blocks=schedule.nodes)
     with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
         for i, unknown in zip(schedule.order, schedule.unknown, strict=True):
             reader.signals[i] = reader.outputs(i, unknown)
@@ -190,8 +193,8 @@ class _Reader:
         node = self.blocks[i]
 
         def arguments() -> tuple[Any, ...]:
-            t = number(self.graph, self.graph.leaf("t", 0, None))
-            return t, self._states(node), inputs.copy(), self._parameters(i)
+            given = parameters(self.graph, node.system, self.layout[i])
+            return time(self.graph), self._states(node), inputs.copy(), given
 
         try:
             parts = [trace(self.graph, function, arguments) for function in functions]
@@ -200,23 +203,12 @@ class _Reader:
                 raise Untraceable(f"it returns {found.size} values, not {count}")
         except Untraceable as error:
             return self._called(i, kind, inputs, count, str(error))
+        except Ambiguous as error:
+            raise CompileError(
+                f"block '{node.path}' cannot be compiled: its {kind} function {error}; "
+                "the diagram still runs in python-control"
+            ) from None
         return found
-
-    def _parameters(self, i: int) -> Any:
-        """Return the record or dict that a block's functions take."""
-        system, slots = self.blocks[i].system, self.layout[i]
-        values = {
-            name: self._parameter(slots[name], value) if name in slots else value
-            for name, value in current_values(system).items()
-        }
-        return type(system._current_params)(**values) if isinstance(system, Block) else values
-
-    def _parameter(self, slot: Slot, value: Any) -> Tracer:
-        if slot.kind == "i" and not slot.shape:
-            leaf = self.graph.leaf("p", slot.offset, None, kind="i", value=int(value))
-            return number(self.graph, leaf)
-        whole = vector(self.graph, "p", slot.offset, slot.shape)
-        return elementwise(self.graph, "ne", whole, 0.0) if slot.kind == "b" else whole
 
     def _called(self, i: int, kind: str, inputs: Tracer, count: int, reason: str) -> Tracer:
         """Return the results of an opaque call."""
@@ -224,8 +216,12 @@ class _Reader:
         name = f"{self.code(i).name}_{kind}_of_one"
         size = sum(s.size for s in slots.values())
         start = min((s.offset for s in slots.values()), default=0)
-        time = number(self.graph, self.graph.leaf("t", 0, None)).reshape(1)
-        given = [time, self._states(node), inputs, vector(self.graph, "p", start, (size,))]
+        given = [
+            time(self.graph).reshape(1),
+            self._states(node),
+            inputs,
+            vector(self.graph, "p", start, (size,)),
+        ]
         lengths = (*(g.size for g in given), count)
         lines = tuple(_lines_of_one(i, node, slots, start, kind, count))
         self.calls[name] = Call(name=name, lines=lines, lengths=lengths, reason=reason)

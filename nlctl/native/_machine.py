@@ -14,10 +14,10 @@ from numba.core.errors import NumbaError
 
 from ._compile import Compiled
 from ._discrete import compile_discrete
-from ._explain import explained
 from ._lower import lower, lowered_code
 from ._parameters import length
 from ._work import OUT, RHS
+from .thirdparty.errors import explained
 
 WIDTH = 8  # members side by side in ensembles: one AVX-512 register
 

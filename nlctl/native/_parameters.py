@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
 
 from .._block import Block
 from .._errors import UsageError
-from ._schedule import Node
+
+if TYPE_CHECKING:
+    from ._schedule import Node
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,22 +88,26 @@ def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
     found: dict[int, dict[str, Slot]] = {}
     offset = 0
     for i, node in enumerate(nodes):
-        found[i] = {}
-        for name, value in current_values(node.system).items():
-            if not isinstance(name, str):
-                raise UsageError(
-                    f"block '{node.path}' has a parameter called {name!r}; names must be strings"
-                )
-            if is_numeric(value):
-                array = np.asarray(value)
-                slot = Slot(
-                    name=f"{node.path}.{name}",
-                    offset=offset,
-                    shape=array.shape,
-                    kind=array.dtype.kind,
-                )
-                found[i][name] = slot
-                offset += slot.size
+        found[i] = slots_of(node.system, node.path, offset)
+        offset += sum(slot.size for slot in found[i].values())
+    return found
+
+
+def slots_of(system: Any, path: str = "", offset: int = 0) -> dict[str, Slot]:
+    """Lay out the numeric parameters of one block from `offset` on, as `slots` does."""
+    found: dict[str, Slot] = {}
+    path = path or system.name
+    for name, value in current_values(system).items():
+        if not isinstance(name, str):
+            raise UsageError(
+                f"block '{path}' has a parameter called {name!r}; names must be strings"
+            )
+        if is_numeric(value):
+            array = np.asarray(value)
+            found[name] = Slot(
+                name=f"{path}.{name}", offset=offset, shape=array.shape, kind=array.dtype.kind
+            )
+            offset += found[name].size
     return found
 
 

@@ -16,9 +16,10 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ._feedthrough import feedthrough, probed_feedthrough
+from ._feedthrough import closer_feedthrough, feedthrough
 from ._tearing import first_loop, tear
 from ._wiring import AlgebraicLoopError, Combination, Signal, Wiring
+from .thirdparty.checks import check_functions
 
 __all__ = ["AlgebraicLoopError", "Combination", "Loop", "Node", "Schedule", "Signal", "schedule"]
 
@@ -116,8 +117,12 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
     ------
     AlgebraicLoopError
         If signals depend on each other without a state in between.
+    CompileError
+        If a block's function does not depend on its arguments alone.
     """
     wiring = Wiring(system)
+    for place in wiring.blocks:
+        check_functions(place.path, place.system)  # before anything calls them
     nodes = tuple(
         Node(
             path=place.path,
@@ -133,7 +138,7 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
         order = tuple(TopologicalSorter(_blocks_before(nodes)).static_order())
         unknown, loops = (frozenset(),) * len(order), ()
     except CycleError:  # look closer: which output depends on which input
-        nodes = tuple(replace(n, direct=probed_feedthrough(n.system, n.direct)) for n in nodes)
+        nodes = tuple(replace(n, direct=closer_feedthrough(n.system, n.direct)) for n in nodes)
         ordering = _Ordering(nodes=nodes)
         ordering.run(solve_loops)
         order, unknown = tuple(ordering.order), tuple(ordering.unknown)

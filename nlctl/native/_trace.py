@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from ._trace_array import Tracer, concatenated, number, traced
-from ._trace_graph import BUDGET, UNLIMITED, Expr, Graph, Undecided, Untraceable
+from ._trace_graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, Undecided, Untraceable
 from ._trace_numpy import Stage
 from ._trace_operators import elementwise
 
@@ -33,17 +35,23 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
     ------
     Untraceable
         If the function does what expressions cannot say, fails, or has too many ways through it.
+    Ambiguous
+        If it does what machine code would understand in another way than Python.
     """
     graph.limit = len(graph.nodes) + BUDGET
     assumptions = dict(graph.assumptions)
     try:
-        copy = Stage(graph).copied(function)
-        return _followed(graph, lambda: _flat(graph, copy(*arguments())), {}, [PATHS])
+        stage = Stage(graph)
+        copy = stage.copied(function)
+        run = lambda: copy(*map(stage.instead, arguments()))  # noqa: E731
+        return _followed(graph, lambda: _flat(graph, run()), {}, [PATHS])
+    except Ambiguous:
+        raise
     except Exception as error:  # a traced function may raise whatever it likes
         graph.assumptions = assumptions
         raise Untraceable(str(error)) from error
     finally:
-        graph.decisions = {}
+        graph.decisions, graph.guards = {}, []
         graph.limit = UNLIMITED
 
 
@@ -51,9 +59,9 @@ def _followed(
     graph: Graph, run: Callable[[], Tracer], decisions: dict[Expr, bool], left: list[int]
 ) -> Tracer:
     """Follow a function from where the decisions have led."""
-    graph.decisions = decisions
+    graph.decisions, graph.guards = decisions, []
     try:
-        result = run()
+        result = _guarded(graph, run())
     except Undecided as question:
         condition = question.condition
     else:
@@ -68,6 +76,13 @@ def _followed(
     if yes.shape != no.shape:
         raise Untraceable("results of different sizes")
     return elementwise(graph, "select", number(graph, condition), yes, no)
+
+
+def _guarded(graph: Graph, result: Tracer) -> Tracer:
+    """Return a result, NaN where Python would have raised an error on the way."""
+    for condition in graph.guards:
+        result = elementwise(graph, "select", number(graph, condition), result, np.nan)
+    return result
 
 
 def _flat(graph: Graph, value: Any) -> Tracer:

@@ -13,39 +13,54 @@ import numpy as np
 from ._trace_graph import SMALL, Expr, Graph, Untraceable
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Tracer:
     """An array of expressions, in the place of an array of floats.
 
     One of its axes may be long: along it every cell is a vector (or a number that is repeated).
-    Assigning to items changes it, as it changes an array.
+    Assigning to items changes it, as it changes an array.  A part of a short array is a view, as
+    NumPy's are.  A part of a long one knows where it is from: what is assigned to it goes there,
+    and it is not read any more once the whole has changed otherwise.
 
     Attributes
     ----------
     graph : Graph
-    cells : ndarray of Expr
+    values : ndarray of Expr
         Its shape is the array's without the long axis.
     axis : int or None
         The long axis.
     length : int
         Size of the long axis, 1 if there is none.
-    alone : bool
-        Whether no part of a long array has been taken: NumPy's parts are views, these are not.
+    origin : (Tracer, int) or None
+        The long array that this is a part of, and how often that had been assigned to.
+    place : range or None
+        Where in the origin a part of one dimension lies.
+    version : int
+        How often a long array has been assigned to.
     """
 
     graph: Graph
-    cells: np.ndarray
+    values: np.ndarray
     axis: int | None = None
     length: int = 1
-    alone: bool = True
+    origin: tuple[Tracer, int] | None = None
+    place: range | None = None
+    version: int = 0
 
     __array_ufunc__ = None  # NumPy's arrays leave arithmetic with tracers to these
     __hash__ = None  # type: ignore[assignment]
 
     @property
+    def cells(self) -> np.ndarray:
+        """The expressions."""
+        if self.origin is not None and self.origin[0].version != self.origin[1]:
+            raise Untraceable("part of an array that has been assigned to since")
+        return self.values
+
+    @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the array."""
-        shape = list(self.cells.shape)
+        shape = list(self.values.shape)
         if self.axis is not None:
             shape.insert(self.axis, self.length)
         return tuple(shape)
@@ -63,13 +78,29 @@ class Tracer:
     @property
     def dtype(self) -> np.dtype:
         """What an array of floats says."""
+        if any(e.kind != "f" for e in self.values.flat):
+            raise Untraceable("the type of an array of integers or truth values")
         return np.dtype(float)
 
     @property
     def T(self) -> Tracer:  # noqa: N802 (NumPy's name)
         """The transpose."""
+        if self.ndim < 2:
+            return self
         axis = None if self.axis is None else self.ndim - 1 - self.axis
-        return Tracer(self.graph, self.cells.T, axis, self.length)
+        return self._part(self.cells.T, axis, self.length)
+
+    def _part(
+        self, cells: np.ndarray, axis: int | None, length: int, place: range | None = None
+    ) -> Tracer:
+        """Return a view of this array, or of what this is a part of."""
+        origin = self.origin or ((self, self.version) if self.axis is not None else None)
+        return Tracer(self.graph, cells, axis, length, origin, place)
+
+    def _text(self, *_: Any) -> str:
+        raise Untraceable("a text of what is only known when it runs")
+
+    __str__ = __repr__ = __format__ = _text
 
     def __len__(self) -> int:
         if not self.shape:
@@ -80,26 +111,37 @@ class Tracer:
         return (self[i] for i in range(len(self)))
 
     def __getitem__(self, key: Any) -> Tracer:
-        if isinstance(key, np.ndarray) and key.ndim:
-            return self._taken(key)
+        if isinstance(key, np.ndarray | list) and np.ndim(key):
+            return self._taken(np.asarray(key))
         keys = full_key(key, self.ndim)
         if self.axis is None:
-            return Tracer(self.graph, boxed(self.cells[tuple(keys)]))
+            cells = boxed(self.cells[tuple(keys)])
+            place = self._place(keys[0]) if len(keys) == 1 else None
+            if not cells.shape:
+                return number(self.graph, cells[()])
+            return self._part(cells, None, 1, place)
         position = [i for i, k in enumerate(keys) if k is not None][self.axis]
         before = sum(k is None or isinstance(k, slice) for k in keys[:position])
         along = keys.pop(position)
         cells = boxed(self.cells[tuple(keys)])
         if not isinstance(along, slice):
             k = range(self.length)[along]
-            return Tracer(self.graph, mapped(lambda e: self.graph.item(e, k), cells))
+            parts = mapped(lambda e: self.graph.item(e, k), cells)
+            return self._part(parts, None, 1) if parts.shape else Tracer(self.graph, parts)
         indices = range(self.length)[along]
+        place = self._place(along) if self.ndim == 1 and not keys else None
         if len(indices) <= SMALL:
             parts = [mapped(lambda e, k=k: self.graph.item(e, k), cells) for k in indices]
-            return Tracer(self.graph, _stacked(parts, before, cells.shape))
+            return self._part(_stacked(parts, before, cells.shape), None, 1, place)
         start, step, size = indices.start, indices.step, len(indices)
         cells = mapped(lambda e: self.graph.part(e, start, step, size), cells)
-        self.alone = False
-        return Tracer(self.graph, cells, before, size, alone=False)
+        return self._part(cells, before, size, place)
+
+    def _place(self, key: Any) -> range | None:
+        """Return where a part of one dimension lies in the origin."""
+        whole = self.place if self.origin is not None else range(self.length)
+        known = whole is not None and (self.origin is not None or self.axis is not None)
+        return whole[key] if known and isinstance(key, slice) and self.ndim == 1 else None
 
     def _taken(self, places: np.ndarray) -> Tracer:
         """Return copies of the elements at fixed places; many only where these are equally far."""
@@ -121,17 +163,21 @@ class Tracer:
         return Tracer(self.graph, self.cells.copy(), self.axis, self.length)
 
     def ravel(self) -> Tracer:
-        """Return the array in one dimension."""
+        """Return the array in one dimension: a view where NumPy's is one."""
         return self.reshape(-1)
 
-    flatten = ravel
+    def flatten(self) -> Tracer:
+        """Return a copy in one dimension."""
+        return self.reshape(-1).copy()
 
     def reshape(self, *shape: Any) -> Tracer:
         """Return the array in another shape."""
         wanted = shape[0] if len(shape) == 1 and not isinstance(shape[0], int) else shape
+        wanted = tuple(operator.index(n) for n in wanted)
         if self.axis is None:
-            return Tracer(self.graph, self.cells.reshape(wanted))
-        if self.ndim == 1 and tuple(wanted) in ((-1,), (self.length,)):
+            place = self.place if self.ndim == len(wanted) == 1 else None
+            return self._part(self.cells.reshape(wanted), None, 1, place)
+        if self.ndim == 1 and wanted in ((-1,), (self.length,)):
             return self
         raise Untraceable("reshaping a long array")
 
@@ -194,9 +240,11 @@ def traced(graph: Graph, value: Any) -> Tracer:
         if len(parts) > SMALL and parts[0].ndim == 0:
             return concatenated(graph, [p.reshape(1) for p in parts])
         return Tracer(graph, _stacked([p.cells for p in parts], 0, ()))
+    if not (type(value) is np.ndarray or isinstance(value, bool | int | float | np.generic)):
+        raise Untraceable(f"values of type {type(value).__name__}")
     array = np.asarray(value)
-    if array.dtype.kind not in "fib":
-        raise Untraceable(f"values of type {array.dtype}")
+    if array.dtype not in (np.dtype(float), np.dtype(int), np.dtype(bool)):
+        raise Untraceable(f"values of type {array.dtype}")  # they would be rounded otherwise
     return _constants(graph, array)
 
 
@@ -252,8 +300,8 @@ def full(graph: Graph, shape: Any, value: Any) -> Tracer:
 
 def concatenated(graph: Graph, parts: Sequence[Tracer]) -> Tracer:
     """Return arrays of one dimension, one after the other."""
-    if any(p.ndim > 1 for p in parts):
-        raise Untraceable("joining matrices")
+    if any(p.ndim != 1 for p in parts):
+        raise Untraceable("joining matrices or numbers")
     size = sum(p.size for p in parts)
     if size <= SMALL:
         return Tracer(graph, np.concatenate([p.cells.reshape(-1) for p in parts]))

@@ -7,7 +7,7 @@ constants.  It never changes the order of a sum.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,11 +22,17 @@ LOGIC = {"and": "logical_and", "or": "logical_or", "xor": "logical_xor", "not": 
 ARITHMETIC = {"add": "add", "sub": "subtract", "mul": "multiply", "div": "true_divide",
               "neg": "negative", "select": "where"}  # fmt: skip
 NUMPY = COMPARISONS | LOGIC | ARITHMETIC
+BOOLEAN = {"mul": "and", "maximum": "or", "minimum": "and", "absolute": "",
+           "add": None, "sub": None, "neg": None}  # fmt: skip  # of truth values alone
 INTEGER = ("add", "sub", "mul", "neg")  # of integers they are integers
 
 
 class Untraceable(Exception):  # noqa: N818 (it ends a trace; nobody else sees it)
     """A function does what expressions cannot say: it is called as it stands instead."""
+
+
+class Ambiguous(Exception):  # noqa: N818 (it ends a trace: the block is refused)
+    """A function does what means one thing in Python and another in machine code."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,11 +90,17 @@ class Graph:
         What is taken to hold on the path through a function that is being traced.
     assumptions : dict
         Integer parameters that steer what is computed: place in `p`, and value.
+    lengths : dict
+        Sizes of the arrays that are read, as far as known: nothing is read beyond.
+    guards : list of Expr
+        Conditions without which Python would have raised an error on this path.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, lengths: Mapping[str, int] | None = None) -> None:
         self.nodes: list[Expr] = []
         self.limit = UNLIMITED
+        self.lengths = dict(lengths or {})
+        self.guards: list[Expr] = []
         self.decisions: dict[Expr, bool] = {}
         self.assumptions: dict[int, int] = {}
         self._known: dict[Any, Expr] = {}
@@ -126,6 +138,7 @@ class Graph:
         if key not in self._known:
             if len(self.nodes) >= self.limit:
                 raise Untraceable("too long to be written out")
+            self._check_lengths(op, args, data, size)
             varies = varies or any(a.varies for a in args)
             self._known[key] = Expr(
                 op=op, args=args, data=data, size=size, kind=kind,
@@ -133,6 +146,27 @@ class Graph:
             )  # fmt: skip
             self.nodes.append(self._known[key])
         return self._known[key]
+
+    def _check_lengths(self, op: str, args: tuple[Expr, ...], data: Any, size: int | None) -> None:
+        """Check that nothing is read beyond the end of what it is read from."""
+        if op == "concat":
+            fits = sum(data) == size and all(
+                a.size in (None, n) for a, n in zip(args, data, strict=True)
+            )
+        elif op in ("item", "slice"):
+            start, step = (data, 0) if op == "item" else data
+            ends = (start, start + step * ((size or 1) - 1))
+            fits = all(0 <= i < (args[0].size or 0) for i in ends)
+        elif op == "leaf" and data[0] in self.lengths:
+            array, start, step = data
+            ends = (start, start + step * ((size or 1) - 1))
+            fits = all(0 <= i < self.lengths[array] for i in ends)
+        elif op in ("const", "table", "leaf", "call", "sum"):
+            fits = True
+        else:
+            fits = all(a.size in (None, size) for a in args)
+        if not fits:
+            raise Untraceable(f"{op} of {data} does not fit into its array")
 
     def const(self, value: Any) -> Expr:
         """Return a constant number; a bool and an int keep their kind."""
@@ -155,6 +189,8 @@ class Graph:
             if all(a.op == "const" for a in args):
                 return self.const(value)
             return self.node(name, *args, kind="i", value=value)
+        if args and all(a.kind == "b" for a in args) and name in BOOLEAN:
+            return self._of_truth_values(name, *args)
         kind, args = self._kinds(name, args)
         sizes = {a.size for a in args if a.size is not None}
         if len(sizes) > 1:
@@ -177,6 +213,19 @@ class Graph:
             rest = args[1:] if truth else tuple(self.number(a) for a in args[1:])
             return "b" if truth else "f", (condition, *rest)
         return "b" if name in COMPARISONS else "f", tuple(self.number(a) for a in args)
+
+    def _of_truth_values(self, name: str, *args: Expr) -> Expr:
+        """Return what NumPy makes of truth values alone.
+
+        Of Python's own, such as ``t > 1``, a sum is 2 and not True.
+        """
+        meaning = BOOLEAN[name]
+        if meaning is None:
+            raise Ambiguous(
+                f"computes with truth values ({NUMPY.get(name, name)}), which means one thing for "
+                "Python's and another for NumPy's: write np.where(condition, 1.0, 0.0)"
+            )
+        return self.op(meaning, *args) if meaning else args[0]
 
     def number(self, a: Expr) -> Expr:
         """Return an expression as a float."""

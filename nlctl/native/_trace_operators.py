@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ._trace_array import Tracer, boxed, concatenated, full, full_key, mapped, traced
-from ._trace_graph import Graph, Untraceable
+from ._trace_graph import Ambiguous, Expr, Graph, Untraceable
 
 
 def elementwise(graph: Graph, name: str, *operands: Any) -> Tracer:
@@ -62,22 +62,63 @@ def product(a: Tracer, b: Tracer) -> Tracer:
 
 
 def _assign(self: Tracer, key: Any, value: Any) -> None:
-    """Assign to items.  A long array must not share them: its parts are no views."""
+    """Assign to items; what is assigned to a part of a long array goes into that."""
     value = traced(self.graph, value)
-    if self.axis is None:
+    _check_kinds(self, value)
+    if self.origin is not None:
+        _assign_to_part(self, key, value)
+    elif self.axis is None:
         if value.axis is not None:
             raise Untraceable("a long array assigned to a short one")
+        if isinstance(key, np.ndarray | list | Tracer):
+            raise Untraceable("assignment to places in an array")
         self.cells[tuple(full_key(key, self.ndim))] = value.cells if value.shape else value.only
-        return
-    if self.ndim > 1 or not self.alone:
+    else:
+        if self.ndim > 1:
+            raise Untraceable("assignment to a part of a large matrix")
+        (along,) = full_key(key, 1)
+        whole = range(self.length)
+        k = None if isinstance(along, slice) else whole[along]
+        _write(self, whole[along] if k is None else range(k, k + 1), value)
+
+
+def _check_kinds(self: Tracer, value: Tracer) -> None:
+    """Check that an assignment rounds nothing: arrays of truth values take no others."""
+    kinds = {e.kind for e in self.values.flat}
+    if kinds and "f" not in kinds and {e.kind for e in value.cells.flat} != kinds:
+        raise Untraceable("assignment to an array of integers or truth values")
+
+
+def _assign_to_part(self: Tracer, key: Any, value: Tracer) -> None:
+    assert self.origin is not None
+    _ = self.cells  # is it still what the whole has there?
+    (along,) = full_key(key, self.ndim) if self.ndim == 1 else (None,)
+    if self.place is None or self.place.step != 1 or along is None:
         raise Untraceable("assignment to a part of a long array")
-    (along,) = full_key(key, 1)
-    places = range(self.length)[along if isinstance(along, slice) else slice(along, along + 1)]
-    middle = value if value.shape else full(self.graph, (len(places),), value)
-    if places.step != 1 or middle.size != len(places):
+    k = None if isinstance(along, slice) else self.place[along]
+    root = self.origin[0]
+    _write(root, self.place[along] if k is None else range(k, k + 1), value)
+    start, stop = self.place.start, self.place.stop
+    renewed = root[start:stop]
+    self.values, self.origin = renewed.values, renewed.origin
+
+
+def _write(whole: Tracer, places: range, value: Tracer) -> None:
+    """Assign to consecutive elements of a long array of one dimension."""
+    if places.step != 1 or value.ndim > 1:
         raise Untraceable("assignment with a step, or of another shape")
-    parts = [p for p in (self[: places.start], middle, self[places.stop :]) if p.size]
-    self.cells, self.alone = concatenated(self.graph, parts).cells, True
+    if not value.shape or value.shape == (1,):
+        middle = full(whole.graph, (len(places),), value.reshape(1)[0])
+    elif value.size == len(places):
+        middle = value
+    else:
+        raise Untraceable("assignment of another shape")
+    before, after = whole[: places.start], whole[places.stop :]
+    parts = [p for p in (before, middle, after) if p.size]
+    joined = concatenated(whole.graph, parts)
+    if joined.shape != whole.shape:
+        raise Untraceable("assignment of another shape")
+    whole.values, whole.version = joined.cells, whole.version + 1
 
 
 def _truth(self: Tracer) -> bool:
@@ -85,6 +126,26 @@ def _truth(self: Tracer) -> bool:
         raise Untraceable("the truth value of an array")
     condition = self.graph.op("ne", self.only, self.graph.const(0.0))
     return self.graph.decided(self.only if self.only.kind == "b" else condition)
+
+
+def _invert(self: Tracer) -> Tracer:
+    """Return the negation of NumPy's truth values; of Python's own ~True is -2."""
+    if any(e.kind != "b" for e in self.cells.flat):
+        raise Untraceable("~ of numbers")
+    if not all(map(_is_of_arrays, self.cells.flat)):
+        raise Ambiguous("takes ~ of a truth value, and ~True is -2 in Python: write not")
+    return elementwise(self.graph, "not", self)
+
+
+def _is_of_arrays(condition: Expr) -> bool:
+    """Whether a condition is one of NumPy's: it depends on states or inputs."""
+    waiting = [condition]
+    while waiting:
+        expr = waiting.pop()
+        if expr.op == "call" or (expr.op == "leaf" and expr.data[0] in ("x", "u")):
+            return True
+        waiting.extend(expr.args)
+    return False
 
 
 def _integer(self: Tracer) -> int:
@@ -115,6 +176,8 @@ def _power(base: Any, exponent: Any) -> Any:
 def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: Any) -> Any:
         if not isinstance(other, Tracer | np.ndarray | float | int | bool | np.generic):
+            if name in ("eq", "ne"):
+                raise Untraceable("comparison with what is no number")  # Python would say False
             return NotImplemented  # a tuple is no array
         return elementwise(self.graph, name, *((other, self) if swapped else (self, other)))
 
@@ -141,10 +204,11 @@ for _name, _op in (BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
     setattr(Tracer, f"__i{_name}__", _in_place(_op))
 for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
     setattr(Tracer, f"__{_name}__", _operator(_name))
-for _name, _op in {"neg": "neg", "abs": "absolute", "invert": "not"}.items():
+for _name, _op in {"neg": "neg", "abs": "absolute"}.items():
     setattr(Tracer, f"__{_name}__", lambda self, op=_op: elementwise(self.graph, op, self))
 for _name, _method in {
     "setitem": _assign,
+    "invert": _invert,
     "bool": _truth,
     "index": _integer,
     "int": _integer,

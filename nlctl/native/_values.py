@@ -6,24 +6,39 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numba.extending import overload
+from numba.extending import overload, register_jitable
+
+MESSAGE = "a function returns another number of values than its block has states or outputs"
 
 
-def as_vector(value: Any) -> Any:
-    """Return a function's result, an array, tuple, list or number, as a 1-D sequence."""
-    return value if isinstance(value, tuple) else np.asarray(value).reshape(-1)
+def as_vector(value: Any, count: int) -> Any:
+    """Return a function's result, an array, tuple, list or number, as `count` values.
+
+    Raises
+    ------
+    ValueError
+        If it has another size: elements are taken by their places.
+    """
+    return _counted(value if isinstance(value, tuple) else np.asarray(value).reshape(-1), count)
+
+
+@register_jitable
+def _counted(values, count):
+    if len(values) != count:
+        raise ValueError(MESSAGE)
+    return values
 
 
 @overload(as_vector)
-def _as_vector_native(value):  # numba compares signatures: no annotations here
+def _as_vector_native(value, count):  # numba compares signatures: no annotations here
     if isinstance(value, types.BaseTuple):
-        return lambda value: value
+        return lambda value, count: _counted(value, count)
     if isinstance(value, types.Array):
         if value.ndim == 1:  # no copy: it is only read
-            return lambda value: value
-        return lambda value: value.copy().reshape(-1)
+            return lambda value, count: _counted(value, count)
+        return lambda value, count: _counted(value.copy().reshape(-1), count)
     if isinstance(value, types.List | types.ListType):
-        return lambda value: np.array(value).reshape(-1)
+        return lambda value, count: _counted(np.array(value).reshape(-1), count)
     if isinstance(value, types.Number | types.Boolean):
-        return lambda value: (value,)
+        return lambda value, count: _counted((value,), count)
     return None

@@ -9,8 +9,8 @@ from typing import Any
 
 from numba.core.compiler import run_frontend
 
-from ._code import CompileError
-from ._emit import Program
+from ..._errors import CompileError
+from .._emit import Program
 
 PLACES = (r'File "([^"]+)", line (\d+)', r"(?:at|from) (\S+) \((\d+)\)")
 HEADINGS = ("(step: ", "During:", "File ", "Return of", "Raised from")

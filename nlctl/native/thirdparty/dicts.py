@@ -9,13 +9,11 @@ takes apart (``x1, x2 = x``) becomes a tuple.
 from __future__ import annotations
 
 import ast
-import inspect
+import functools
 import operator
-import textwrap
 import weakref
 from collections import namedtuple
 from collections.abc import Callable, Sequence
-from functools import partial
 from types import FunctionType
 from typing import Any
 
@@ -24,7 +22,9 @@ import numpy as np
 from numba import types
 from numba.extending import overload, overload_method, register_jitable
 
-from .._errors import UsageError
+from ..._errors import UsageError
+from .source import Unreadable, definition
+from .values import python_function
 
 RECORDS = (types.NamedTuple, types.NamedUniTuple)
 FILLER = "no_parameters"  # numba cannot call methods of a record without fields
@@ -33,7 +33,7 @@ _LIBRARIES = ("numpy", "scipy", "numba")  # numba has its own versions of their 
 
 def params_dict(names: Sequence[str]) -> Callable[..., dict[str, Any]]:
     """Return a function that makes a parameter dict of values, for plain Python."""
-    return partial(_named, tuple(names)) if names else _no_parameters
+    return functools.partial(_named, tuple(names)) if names else _no_parameters
 
 
 def _no_parameters(*_: Any) -> dict[str, Any]:
@@ -60,28 +60,27 @@ def params_record(path: str, names: Sequence[str]) -> type:
         ) from None
 
 
-def readable_source(function: Any) -> tuple[ast.AST, list[str]] | None:
-    """Return a function's syntax tree and argument names; None where it has no readable source."""
-    try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-        return tree, list(inspect.signature(function).parameters)
-    except (OSError, TypeError, SyntaxError, ValueError):
-        return None
-
-
 def unpacked_arguments(function: Any) -> set[int]:
     """Return the positions of the arguments that a function takes apart, as in ``a, b = x``."""
-    found = readable_source(function)
-    if found is None:
+    bound = 0
+    while isinstance(function, functools.partial):
+        function, bound = function.func, bound + len(function.args)
+    plain = python_function(function)
+    bound += plain is not None and plain is not getattr(function, "py_func", function)
+    try:
+        node = definition(plain) if plain is not None else None
+    except Unreadable:
+        node = None
+    if node is None:
         return set()
-    tree, names = found
+    names = [a.arg for a in node.args.posonlyargs + node.args.args][bound:]
     return {
-        names.index(node.value.id)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Assign)
-        and isinstance(node.targets[0], ast.Tuple | ast.List)
-        and isinstance(node.value, ast.Name)
-        and node.value.id in names
+        names.index(part.value.id)
+        for part in ast.walk(node)
+        if isinstance(part, ast.Assign)
+        and isinstance(part.targets[0], ast.Tuple | ast.List)
+        and isinstance(part.value, ast.Name)
+        and part.value.id in names
     }
 
 

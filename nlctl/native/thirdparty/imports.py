@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ast
-import dis
-import inspect
-import textwrap
+import copy
 from types import CodeType, FunctionType
 from typing import Any
+
+from .source import Unreadable, definition
 
 
 def without_imports(function: FunctionType) -> FunctionType:
@@ -15,20 +15,19 @@ def without_imports(function: FunctionType) -> FunctionType:
 
     One whose source cannot be read stays as it is.
     """
-    if not any(i.opname == "IMPORT_NAME" for i in dis.get_instructions(function)):
-        return function
     try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-    except (OSError, TypeError, SyntaxError):
+        found = definition(function)
+    except Unreadable:
+        return function
+    if not any(isinstance(node, ast.Import | ast.ImportFrom) for node in ast.walk(found)):
         return function
     hoisted = _Hoist()
-    body = hoisted.visit(tree)
-    if len(body.body) != 1 or not isinstance(body.body[0], ast.FunctionDef):
+    body = hoisted.visit(copy.deepcopy(found))
+    if not isinstance(body, ast.FunctionDef):
         return function
-    body.body[0].decorator_list = []
+    body.decorator_list = []
     names = dict(function.__globals__)
     exec(compile(ast.Module(hoisted.found, []), "imports", "exec"), names)
-    ast.increment_lineno(body, function.__code__.co_firstlineno - body.body[0].lineno)
     made = _compiled(body, function)
     result = FunctionType(
         made, names, function.__name__, function.__defaults__,
@@ -56,12 +55,12 @@ def _cells(function: FunctionType) -> dict[str, Any]:
     return dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
 
 
-def _compiled(tree: ast.Module, function: FunctionType) -> CodeType:
+def _compiled(node: ast.FunctionDef, function: FunctionType) -> CodeType:
     """Compile one function definition where its free variables are local names."""
     outer = ast.parse(f"def outer({', '.join(function.__code__.co_freevars)}): pass")
     definition = outer.body[0]
     assert isinstance(definition, ast.FunctionDef)
-    definition.body = tree.body
+    definition.body = [node]
     whole = compile(ast.fix_missing_locations(outer), function.__code__.co_filename, "exec")
     return _inside(_inside(whole, "outer"), function.__name__)
 

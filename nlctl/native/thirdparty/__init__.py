@@ -1,0 +1,1 @@
+"""Functions of others: read without being called, and made understandable for numba."""

@@ -1,0 +1,100 @@
+"""What is checked of the functions of a diagram before any is traced or compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..._block import Block
+from ..._errors import CompileError
+from .._parameters import current_values
+from .purity import check_pure
+from .values import FRESH, VECTOR, Impure, captured
+
+
+def check_sizes(system: Any, blocks: Iterable[Any]) -> None:
+    """Hold a diagram to the number of states that its blocks have.
+
+    Raises
+    ------
+    CompileError
+        If it was made with another one.
+    """
+    had = sum(block.nstates or 0 for block in blocks)
+    if had != (system.nstates or 0):
+        raise CompileError(
+            f"diagram '{system.name}' was made with states={system.nstates or 0}, but its blocks "
+            f"have {had}: leave the argument out"
+        )
+
+
+def check_functions(path: str, system: Any) -> None:
+    """Check that a block's functions depend on their arguments alone, and return enough values.
+
+    The functions are read, not called, until they are known to remember nothing.
+
+    Parameters
+    ----------
+    path : str
+    system : control.InputOutputSystem
+        The block, which has this path.
+
+    Raises
+    ------
+    CompileError
+        If a function has a memory, changes something, cannot be read, or returns a wrong number
+        of values.
+    """
+    is_block = isinstance(system, Block)
+    for what, function in _functions(system):
+        values = system._current_params if is_block else current_values(system)
+        try:
+            check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)])
+        except Impure as error:
+            place = f" ({error.place})" if error.place else ""
+            raise CompileError(
+                f"block '{path}' cannot be compiled: its {what} function {error.reason}"
+                f"{place}: {error.advice}; the diagram still runs in python-control"
+            ) from None
+    if not is_block and isinstance(system, ct.NonlinearIOSystem):
+        _check_counts(path, system)  # nlctl's blocks were checked when they were made
+
+
+def _functions(system: Any) -> Iterator[tuple[str, Any]]:
+    """Yield what is called of a block, with its name."""
+    if isinstance(system, ct.StateSpace) or not isinstance(system, ct.NonlinearIOSystem):
+        return
+    if system.nstates:
+        yield "update", system.updfcn
+    if system.noutputs and system.outfcn is not None:
+        yield "output", system.outfcn
+    if isinstance(system, Block):
+        for name in ("corners", "commit"):
+            if hasattr(system.spec, name):
+                yield name, getattr(system.spec, name)
+
+
+def _check_counts(path: str, system: Any) -> None:
+    """Call a block's functions once: as many values must come back as there are signals."""
+    calls = [("update", system._rhs, system.nstates, "states")] if system.nstates else []
+    if system.outfcn is not None and system.noutputs:
+        calls.append(("output", system._out, system.noutputs, "outputs"))
+    x, u = np.zeros(system.nstates or 0), np.zeros(system.ninputs or 0)
+    for what, function, wanted, kind in calls:
+        try:
+            with np.errstate(all="ignore"):
+                got = np.size(function(0.0, x, u))
+        except IndexError as error:
+            raise CompileError(
+                f"block '{path}' reads beyond an array in its {what} function: {error}"
+            ) from error
+        except Exception:  # what fails at this point alone may work at others
+            continue
+        if got != wanted:
+            raise CompileError(
+                f"block '{path}' returns {got} values from its {what} function, needs "
+                f"{wanted}, one for each of its {kind}"
+            )

@@ -1,0 +1,221 @@
+"""What is known of functions that are called by name: NumPy, math, builtins, methods."""
+
+from __future__ import annotations
+
+import builtins
+import functools
+from types import FunctionType, ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .values import (
+    FRESH,
+    OUTSIDE,
+    SLICE,
+    Impure,
+    Local,
+    Unknown,
+    Value,
+    captured,
+    element,
+    forgotten,
+    joined,
+    library,
+    python_function,
+)
+
+if TYPE_CHECKING:
+    from .purity import Walk
+
+MEMORY = "keep what it remembers in a state of the block"
+OUTPUT = "leave output out of equations"
+DRAW = "draw the values before the run and give them as an input"
+# functions and methods that may return part of what they are given
+VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d", "atleast_3d",
+         "reshape", "ravel", "squeeze", "transpose", "swapaxes", "moveaxis", "rollaxis",
+         "expand_dims", "broadcast_to", "broadcast_arrays", "split", "array_split", "hsplit",
+         "vsplit", "dsplit", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90", "real",
+         "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack"}  # fmt: skip
+WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
+           "insort_left", "insort_right"}  # fmt: skip
+VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
+# methods that change nothing, of arrays, numbers, texts, dicts and lists
+READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
+           "copy", "cumprod", "cumsum", "dot", "flatten", "item", "max", "mean", "min", "nonzero",
+           "prod", "repeat", "round", "searchsorted", "std", "sum", "take", "tolist", "trace",
+           "var", "ptp", "is_integer", "bit_length", "as_integer_ratio", "hex", "count", "index",
+           "get", "items", "keys", "values", "_asdict", "_replace", "format", "join", "lower",
+           "upper", "startswith", "endswith", "split", "strip", "difference", "union",
+           "intersection", "isdisjoint", "issubset", "reduce", "accumulate", "outer"}  # fmt: skip
+CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
+            "setdefault", "popitem", "add", "discard", "fill", "put", "itemset", "resize",
+            "partition", "setfield", "setflags", "at"}  # fmt: skip
+CONTAINERS = (
+    np.ndarray
+    | np.generic
+    | np.ufunc
+    | dict
+    | list
+    | tuple
+    | set
+    | frozenset
+    | str
+    | bytes
+    | bool
+    | int
+    | float
+    | complex
+    | range
+)
+MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
+PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float", "format",
+         "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord", "pow", "range",
+         "repr", "round", "slice", "str", "sum", "bytes", "object", "bin", "hex"}  # fmt: skip
+
+
+def call(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]) -> Value:
+    """Return what is known of the result of calling an object.
+
+    Raises
+    ------
+    Impure
+        If it changes something, differs from call to call, or cannot be read.
+    """
+    if isinstance(thing, functools._lru_cache_wrapper):
+        return walk.call(captured(thing.__wrapped__), given, named)
+    if thing in (np.errstate,) or (isinstance(thing, type) and issubclass(thing, BaseException)):
+        return FRESH
+    owner = getattr(thing, "__self__", None)
+    if _is_builtin(thing):
+        return _builtin(walk, thing, given, named)
+    module = library(thing)
+    if module is not None and module.partition(".")[0] != "control":
+        return _library(walk, thing, module, given, named)
+    if isinstance(thing, type):
+        if issubclass(thing, tuple) and hasattr(thing, "_fields"):
+            return Value(True, all(v.own and v.inside for v in given), True)
+        raise Impure(f"makes an object of {thing.__name__}", "use numbers and arrays")
+    function = python_function(thing)
+    if type(owner).__module__.startswith(VARYING):
+        raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
+    if function is None or not _walkable(function):
+        name = getattr(thing, "__qualname__", type(thing).__name__)
+        module = getattr(thing, "__module__", None) or getattr(owner, "__name__", "")
+        text = f"{module}.{name}" if module else name
+        raise Impure(f"calls {text}, whose code cannot be read", "write the formula out")
+    if isinstance(thing, FunctionType) or thing.__class__.__name__ == "CPUDispatcher":
+        return walk.function(function, given, named)
+    return walk.function(function, [captured(owner if owner is not None else thing), *given], named)
+
+
+def method(
+    walk: Walk, base: Value, name: str, given: list[Value], named: dict[str, Value]
+) -> Value | None:
+    """Return what is known of the result of a method of a container; None if it is another's.
+
+    Raises
+    ------
+    Impure
+        If it changes a container that the call has not made.
+    """
+    thing = base.known
+    if isinstance(thing, ModuleType | type):
+        return None
+    if not isinstance(thing, Unknown | CONTAINERS):
+        if name in CHANGING and not isinstance(getattr(type(thing), name, None), FunctionType):
+            _written(base, f"{name}()")
+        return None
+    if type(thing).__module__ not in ("builtins", "numpy", __package__ + ".values"):
+        found = getattr(type(thing), name, None)  # a class of somebody, or a named tuple's field
+        if isinstance(found, FunctionType) or not callable(found):
+            return None
+    if name == "at" and isinstance(thing, np.ufunc):
+        _written(given[0], "an array with .at()")
+        return FRESH
+    if name in READING:
+        return _read(base, name, given)
+    if name in VIEWS or name in ("T", "flat"):
+        return forgotten(base)
+    if name in CHANGING:
+        _written(base, f"{name}()")
+        return element(base) if base.holds else FRESH
+    if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
+        return None
+    raise Impure(f"calls a method '{name}()' that is not known", "use NumPy's functions")
+
+
+def _read(base: Value, name: str, given: list[Value]) -> Value:
+    """Return what is known of the result of a method that changes nothing."""
+    if name == "get" and given:
+        key = given[0].known
+        if isinstance(base.known, dict) and isinstance(key, str) and key in base.known:
+            return captured(base.known[key])
+        return joined([element(base), *given[1:]])
+    kept = base.holds and name in ("items", "keys", "values", "copy", "_asdict", "_replace")
+    return Value(True, base.inside, True) if kept else FRESH
+
+
+def _written(base: Value, what: str) -> None:
+    if not base.own:
+        raise Impure(f"changes with {what} what it did not make", MEMORY)
+
+
+def _walkable(function: FunctionType) -> bool:
+    """Whether a Python function is somebody's, or one of python-control's."""
+    return (library(function) or "control").partition(".")[0] == "control"
+
+
+def _is_builtin(thing: Any) -> bool:
+    name = getattr(thing, "__name__", "")
+    return getattr(builtins, name, None) is thing if isinstance(name, str) else False
+
+
+def _builtin(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]) -> Value:
+    name = thing.__name__
+    if name == "slice":
+        return SLICE
+    if name == "type" and len(given) == 1:
+        known = given[0].known
+        return OUTSIDE if isinstance(known, Unknown) else captured(type(known))
+    if name in ("min", "max"):
+        _call_functions(walk, named.values())
+        return joined([element(given[0])] if len(given) == 1 else [forgotten(v) for v in given])
+    if thing in MAKING:
+        _call_functions(walk, [*given, *named.values()])
+        outside = [v for v in given if not v.own and hasattr(v.known, "__next__")]
+        if outside:
+            raise Impure(f"uses up with {name}() what it did not make", MEMORY)
+        return Value(True, all(v.inside for v in given), True)
+    if name == "next":
+        _written(given[0], "next()")
+        return element(given[0])
+    if name in PLAIN:
+        return FRESH
+    advice = OUTPUT if name in ("print", "input", "open") else "do without it"
+    raise Impure(f"calls {name}()", advice)
+
+
+def _library(
+    walk: Walk, thing: Any, module: str, given: list[Value], named: dict[str, Value]
+) -> Value:
+    name = getattr(thing, "__name__", "")
+    if module.startswith(VARYING):
+        raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
+    _call_functions(walk, [*given, *named.values()])
+    if name in WRITERS:
+        _written(given[0], f"{name}()")
+        return FRESH
+    if name in VIEWS or "copy" in named:
+        return forgotten(given[0]) if given else FRESH
+    return FRESH
+
+
+def _call_functions(walk: Walk, values: Any) -> None:
+    """Walk functions that are handed on: they will be called with anything."""
+    for value in values:
+        thing = value.known
+        if isinstance(thing, Unknown | type):
+            continue
+        if isinstance(thing, Local | functools.partial) or python_function(thing) is not None:
+            walk.call(value, [OUTSIDE] * 8, {})

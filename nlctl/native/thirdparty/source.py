@@ -1,0 +1,112 @@
+"""The syntax tree of a function, if it is certainly that of the code that runs.
+
+A file may have been edited since it was imported, a function may have been made by ``exec`` or
+rewritten by a tool.  So the text is compiled once more, and the function's code must be in what
+comes out.  Nothing here depends on the names of bytecode instructions.
+"""
+
+from __future__ import annotations
+import __future__
+
+import ast
+import functools
+import linecache
+import warnings
+from collections.abc import Iterator
+from types import CodeType, FunctionType
+
+Definition = ast.FunctionDef | ast.Lambda
+_NAMED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
+_LOOPS = ("<listcomp>", "<setcomp>", "<dictcomp>", "<genexpr>")  # code of its own in some Pythons
+
+_FUTURES = functools.reduce(
+    int.__or__, (getattr(__future__, name).compiler_flag for name in __future__.all_feature_names)
+)
+
+
+class Unreadable(Exception):  # noqa: N818 (it says what is the matter with a source)
+    """The source of a function cannot be had; the message says why."""
+
+
+def definition(function: FunctionType) -> Definition:
+    """Return the syntax tree of a function.
+
+    Parameters
+    ----------
+    function : function
+        Made with ``def`` or ``lambda``.
+
+    Raises
+    ------
+    Unreadable
+        If its source is not to be found, or is not what the function was made of.
+    """
+    code = function.__code__
+    linecache.checkcache(code.co_filename)
+    text = "".join(linecache.getlines(code.co_filename, function.__globals__))
+    if not text:
+        raise Unreadable("its source cannot be found: define it in a file or a notebook")
+    try:
+        tree, codes = _compiled(text, code.co_filename, code.co_flags & _FUTURES)
+    except (SyntaxError, ValueError) as error:
+        raise Unreadable(f"its source cannot be parsed ({error})") from error
+    if code not in codes:
+        raise Unreadable("its source is not what it was made of: was the file edited since?")
+    found = [node for node in _candidates(tree, code) if _contains(node, code)]
+    if not found or len({ast.dump(node) for node in found}) > 1:
+        raise Unreadable("its source cannot be told from others on the same line")
+    return found[0]
+
+
+@functools.lru_cache(maxsize=128)
+def _compiled(text: str, file: str, flags: int) -> tuple[ast.Module, frozenset[CodeType]]:
+    """Return the syntax tree of a module and all code inside it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Python has said once what it thinks of this text
+        tree = ast.parse(text, file)
+        module = compile(text, file, "exec", flags=flags, dont_inherit=True)
+    return tree, frozenset(_inside(module))
+
+
+def _inside(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _inside(constant)
+
+
+def _candidates(tree: ast.Module, code: CodeType) -> Iterator[Definition]:
+    """Yield the functions that begin on this line, with this name and these functions inside."""
+    inside = sorted(c.co_name for c in list(_inside(code))[1:] if c.co_name not in _LOOPS)
+    arguments = code.co_varnames[: code.co_argcount]
+    for node in ast.walk(tree):
+        if not isinstance(node, Definition):
+            continue
+        decorators = getattr(node, "decorator_list", [])
+        first = min([node.lineno, *(d.lineno for d in decorators)])
+        here = (_name(node), first, tuple(a.arg for a in node.args.posonlyargs + node.args.args))
+        if here == (code.co_name, code.co_firstlineno, arguments):
+            body = node.body if isinstance(node.body, list) else [node.body]
+            nested = (n for part in body for n in ast.walk(part))
+            if sorted(_name(n) for n in nested if isinstance(n, _NAMED)) == inside:
+                yield node
+
+
+def _name(node: ast.AST) -> str:
+    return getattr(node, "name", "<lambda>")
+
+
+def _contains(node: Definition, code: CodeType) -> bool:
+    """Whether all instructions of a code lie within a node, as far as they say where they lie."""
+    first = (node.lineno, node.col_offset)
+    if isinstance(node, ast.FunctionDef):
+        first = (code.co_firstlineno, 0)  # with its decorators
+    last = (node.end_lineno or node.lineno, node.end_col_offset or 0)
+    for line, end_line, column, end_column in code.co_positions():
+        if line is None or end_line is None or column is None or end_column is None:
+            continue
+        if column == end_column:  # bookkeeping at the beginning, of no place
+            continue
+        if (line, column) < first or (end_line, end_column) > last:
+            return False
+    return True
