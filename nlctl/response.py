@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["EngineWarning", "input_output_response"]
 
 ENGINES = ("python-control", "native", "auto")
-NATIVE_ONLY = ("max_steps", "step")  # settings that python-control does not know
+NATIVE_ONLY = ("max_steps", "step", "audit")  # settings that python-control does not know
 
 STANDSTILL = 200  # steps in a row that do not advance the time
 
@@ -78,7 +78,9 @@ def input_output_response(
         Called with the time after every accepted step (machine code: every 2000 steps).
     **kwargs
         Passed to `control.input_output_response`; machine code takes ``max_steps``, ``step`` (a
-        fixed step in s, 0 for error control) and ``ignore_errors``.
+        fixed step in s, 0 for error control), ``ignore_errors`` and ``audit``: by default the
+        first run of a program is compared with python-control's own right-hand side at some
+        points, with False none is, with "every run" each.
 
     Returns
     -------
@@ -93,6 +95,8 @@ def input_output_response(
         After Ctrl-C; machine code with ``ignore_errors`` returns what it has until then.
     CompileError, AlgebraicLoopError
         If `engine` is "native" and the diagram cannot be compiled.
+    AuditError
+        If machine code and python-control differ, unless `engine` is "auto".
     UnknownNameError, ParameterError
         If a name or a value is refused, or if `timepts` has fewer than two entries, is not
         increasing or not finite.
@@ -102,12 +106,16 @@ def input_output_response(
     if not _takes_machine_code(engine, interpretable):
         run = _Run(system, times, inputs, initial_state, params, rtol, atol, progress, kwargs)
         return _interpreted(run, method)
-    from .native import AlgebraicLoopError, CompileError  # late: others need no compiler
+    from .native import (  # late: others need no compiler
+        AlgebraicLoopError,
+        AuditError,
+        CompileError,
+    )
 
     run = _Run(system, times, inputs, initial_state, params, rtol, atol, progress, kwargs)
     try:
         return _native(run, method)
-    except (CompileError, AlgebraicLoopError) as error:
+    except (CompileError, AlgebraicLoopError, AuditError) as error:
         if engine != "auto" or not interpretable:
             raise
         warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=2)

@@ -213,7 +213,10 @@ class _FunctionCode(Code):
         # an output that does not depend on the inputs must not read them
         inputs = self.inputs(unknown if self.direct else range(len(self.node.inputs)), guesses)
         given = self._inputs("output", inputs)
-        return [f"u{self.index} = {given}", f"y{self.index} = {self._call('output', system.noutputs)}"]
+        return [
+            f"u{self.index} = {given}",
+            f"y{self.index} = {self._call('output', system.noutputs)}",
+        ]
 
     def update_lines(self, ready: bool) -> list[str]:
         n, start = self.node.system.nstates or 0, self.node.state_offset

@@ -20,6 +20,8 @@ from ._machine import WIDTH, compile_for, machine
 from ._members import Members, members
 from ._response import input_array
 from ._simulate import Settings, Trajectory, begin, finish, go_on, made, prepared, trajectory
+from .audit import Audit, Trial
+from .audit import audit as compare
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,6 +80,7 @@ def ensemble_response(
     max_steps: int = 1_000_000,
     method: str | None = None,
     progress: Callable[[int], object] | None = None,
+    audit: Audit = True,
 ) -> Ensemble:
     """Simulate many members that differ in parameters and initial states.
 
@@ -112,6 +115,8 @@ def ensemble_response(
         As in `nlctl.input_output_response`.
     progress : callable, optional
         Called with the number of finished members.
+    audit : bool or "every run", optional
+        As in `nlctl.input_output_response`, for some of the members.
 
     Returns
     -------
@@ -120,6 +125,8 @@ def ensemble_response(
 
     Raises
     ------
+    AuditError
+        If machine code and python-control differ.
     ParameterError
         If `timepts` is no increasing grid or does not fit a discrete-time diagram, arrays have
         different lengths, or a value is refused; the message then names the member.
@@ -138,6 +145,8 @@ def ensemble_response(
     _, p = every.batch(range(1), WIDTH)  # checks all members before anything runs
     compile_for(compiled, p, WIDTH)  # once, before the threads start
 
+    audited = {0, every.size // 2, every.size - 1} if audit else ()
+
     def one(numbers: range, stop: _Stop) -> dict[int, dict[str, Any]]:
         rows = {}
         for number, run in zip(
@@ -146,10 +155,22 @@ def ensemble_response(
             for signal, samples in kept.items():
                 samples[number, : run.time.size] = run.outputs[labels.index(signal)]
             rows[number] = _row(run, labels, metrics)
+            if number in audited:
+                _audit(every, number, run, u, audit)
         return rows
 
     rows = _run(one, every.size, threads or cores(), progress)
     return Ensemble(table=_table(every, rows), time=times, signals=kept)
+
+
+def _audit(every: Members, number: int, run: Trajectory, u: np.ndarray, wanted: Audit) -> None:
+    """Compare one member with python-control."""
+    _, p = every.batch(range(number, number + 1), 1)
+    trial = Trial(
+        time=run.time, states=run.states, inputs=u, p=p[:, 0], params=every.given(number),
+        width=WIDTH,
+    )  # fmt: skip
+    compare(every.compiled, trial, wanted)
 
 
 class _Stop:

@@ -54,6 +54,10 @@ class Members:
         p[places] = varied[:, chosen]
         return x0, p
 
+    def given(self, number: int) -> dict[str, Any]:
+        """Return a member's parameters, as python-control takes them."""
+        return {name: _one(values, number) for name, values in self.params.items()}
+
     def table(self, order: list[int]) -> pd.DataFrame:
         """Return what was varied, one row for each of these members."""
         import pandas as pd
@@ -94,8 +98,7 @@ class Members:
     def _fill(self, p: np.ndarray, number: int, owners: Any) -> None:
         """Write a member's parameters into a parameter vector."""
         if owners is None:
-            given = {name: _one(values, number) for name, values in self.params.items()}
-            p[:] = self.compiled.parameter_vector(given)
+            p[:] = self.compiled.parameter_vector(self.given(number))
             return
         for block, slots, names in owners:
             given = {key: _one(self.params[name], number) for key, name in names.items()}
@@ -115,7 +118,7 @@ class Members:
     def _first_vector(self) -> np.ndarray:
         """Parameters of the first member; python-control has checked their names."""
         try:
-            return self.compiled.parameter_vector({k: _one(v, 0) for k, v in self.params.items()})
+            return self.compiled.parameter_vector(self.given(0))
         except ParameterError as error:
             raise ParameterError(f"{error} (member 0)") from None
 

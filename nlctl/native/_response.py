@@ -13,6 +13,8 @@ from .._errors import DivergedError, ParameterError
 from ._compile import Compiled
 from ._lane import Status
 from ._simulate import Settings, Statistics, Trajectory, trajectory
+from .audit import Audit, Trial
+from .audit import audit as compare
 
 
 class Response(ct.TimeResponseData):
@@ -30,6 +32,7 @@ def respond(
     params: Mapping[str, Any] | None = None,
     ignore_errors: bool = False,
     progress: Callable[[float], object] | None = None,
+    audit: Audit = True,
     **settings: Any,
 ) -> Response:
     """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments.
@@ -48,6 +51,8 @@ def respond(
     u, x0 = input_array(inputs, system.ninputs or 0, times), state_array(system, initial_state)
     p = compiled.parameter_vector(params)
     made = trajectory(compiled, times, u, x0, p, Settings(**settings), progress)
+    trial = Trial(time=made.time, states=made.states, inputs=u, p=p, params=params, width=1)
+    compare(compiled, trial, audit)
     run = made.statistics
     if run.status is Status.STOPPED and not ignore_errors:
         raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error goes on

@@ -1,0 +1,248 @@
+"""Machine code against python-control: the first run of a program is compared, not believed.
+
+A compiled program is a second description of a diagram, and second descriptions can be wrong.  At
+some points of a run's own trajectory its right-hand side and outputs are compared with
+``dynamics`` and ``output`` of the diagram as it stands.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Literal
+
+import control as ct
+import numpy as np
+
+from .._errors import ParameterError, UsageError
+from ._compile import Compiled
+from ._emit import emit
+from ._lower import lower, lowered_code
+from ._machine import Machine, machine
+from ._schedule import Signal
+from .thirdparty.python_control import block_inputs, block_outputs, block_rates
+
+POINTS = 5  # of a trajectory, its start and end among them
+EQUAL = 1e-12  # relative difference that rounding explains without a closer look
+ROUNDING = 1e-10  # the same where values are sums of larger ones
+SHAKEN = 1e-13  # relative change of states and inputs that shows what rounding does to a value
+_ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
+
+Audit = bool | Literal["every run"]
+Values = tuple[np.ndarray, np.ndarray]  # derivatives (or next states), outputs
+Evaluated = Callable[[float, np.ndarray, np.ndarray], Values]
+
+
+class AuditError(UsageError):
+    """Machine code and python-control differ; the message names the block and both numbers."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """A run that is to be compared.
+
+    Attributes
+    ----------
+    time : ndarray of shape (m,)
+    states, inputs : ndarray of shape (nstates, m), (ninputs, m)
+    p : ndarray
+        The program's parameter vector.
+    params : mapping or None
+        The same parameters as python-control takes them.
+    width : int
+        Members that the machine code of the run takes.
+    """
+
+    time: np.ndarray
+    states: np.ndarray
+    inputs: np.ndarray
+    p: np.ndarray
+    params: Mapping[str, Any] | None
+    width: int
+
+
+def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
+    """Compare a run's program with python-control, if that has not been done.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    trial : Trial
+    wanted : bool or "every run"
+
+    Raises
+    ------
+    AuditError
+        If they differ by more than rounding, or if python-control's own values differ from call to
+        call.
+    ParameterError
+        If `wanted` is something else.
+    """
+    if wanted not in (True, False, "every run"):
+        raise ParameterError(f"audit must be True, False or 'every run', got {wanted!r}")
+    if not wanted:
+        return
+    with _ONE_AT_A_TIME, np.errstate(all="ignore"):
+        code = _code(compiled, trial)
+        done = compiled.__dict__.setdefault("_audited", [])
+        if wanted is True and any(known is code for known in done):
+            return
+        done.append(code)
+        for point in _points(trial):
+            _compare(compiled, trial, _evaluated(compiled, trial, code), point)
+
+
+def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+    finite = np.flatnonzero(np.isfinite(trial.states).all(axis=0))
+    for k in np.unique(np.linspace(0, finite.size - 1, POINTS).astype(int)) if finite.size else ():
+        m = finite[k]
+        yield float(trial.time[m]), trial.states[:, m].copy(), trial.inputs[:, m].copy()
+
+
+def _code(compiled: Compiled, trial: Trial) -> Any:
+    """Return the machine code of a run."""
+    if not ct.isctime(compiled.system):
+        return compiled.native
+    return machine(compiled, np.repeat(trial.p[:, None], trial.width, axis=1), trial.width)
+
+
+def _evaluated(compiled: Compiled, trial: Trial, code: Any) -> Evaluated:
+    """Return what machine code computes at a point."""
+    system, events = compiled.system, compiled.program.events
+    if not isinstance(code, Machine):
+        rhs, out = code
+
+        def one(t: float, x: np.ndarray, u: np.ndarray) -> Values:
+            dx, y = np.empty(x.size), np.empty(system.noutputs or 0)
+            rhs(t, x, u, trial.p, dx, np.empty(events))
+            out(t, x, u, trial.p, y)
+            return dx, y
+
+        return one
+    c = np.zeros((code.rows, code.width))
+    code.prepare(np.repeat(trial.p[:, None], code.width, axis=1), c)
+
+    def several(t: float, x: np.ndarray, u: np.ndarray) -> Values:
+        tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), code.width, axis=1) for v in (t, x, u))
+        dx, y = np.empty_like(xx), np.empty((system.noutputs or 0, code.width))
+        code.rhs(tt[0].copy(), xx, uu, c, dx, np.empty((events, code.width)))
+        code.out(tt[0].copy(), xx, uu, c, y)
+        return dx[:, -1], y[:, -1]
+
+    return several
+
+
+def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any) -> None:
+    """Compare one point."""
+    system = compiled.system
+    ours = evaluated(*point)
+    if not all(np.isfinite(values).all() for values in ours):
+        return  # the run says that it diverged
+    try:
+        theirs = _by_python_control(system, point, trial.params)
+        again = _by_python_control(system, point, trial.params)
+    except RuntimeError as error:
+        if "lgebraic loop" not in str(error):
+            raise
+        _compare_blocks(compiled, trial, ours, point)
+        return
+    except Exception as error:
+        raise AuditError(
+            f"machine code of '{system.name}' runs on where python-control raises an error at "
+            f"t = {point[0]:.6g} s: {type(error).__name__}: {error}"
+        ) from error
+    for one, other in zip(theirs, again, strict=True):
+        if not np.array_equal(one, other, equal_nan=True):
+            raise AuditError(
+                f"python-control's own values of '{system.name}' differ from call to call at "
+                f"t = {point[0]:.6g} s: a block has a memory or draws random numbers"
+            )
+    if all(np.all(_close(a, b)) for a, b in zip(ours, theirs, strict=True)):
+        return
+    shaken = _shaken(system, point, trial.params)
+    for what, a, b, moved in zip(("state", "output"), ours, theirs, shaken, strict=True):
+        wrong = np.flatnonzero(~_close(a, b, ROUNDING, 100 * moved))
+        if wrong.size:
+            _compare_blocks(compiled, trial, ours, point)  # it names the block, if it finds one
+            labels = system.state_labels if what == "state" else system.output_labels
+            raise _difference(labels[wrong[0]], system.name, a[wrong[0]], b[wrong[0]], point[0])
+
+
+def _close(a: np.ndarray, b: np.ndarray, relative: float = EQUAL, absolute: Any = 0.0) -> Any:
+    """Whether values are equal to rounding; NaN equals nothing."""
+    return (a == b) | (np.abs(a - b) <= relative * np.maximum(np.abs(a), np.abs(b)) + absolute)
+
+
+def _by_python_control(system: Any, point: Any, params: Any) -> Values:
+    given = {"params": dict(params)} if params else {}
+    rates = system.dynamics(*point, **given) if system.nstates else np.empty(0)
+    outputs = system.output(*point, **given) if system.noutputs else np.empty(0)
+    rates, outputs = (np.asarray(v, dtype=float).reshape(-1) for v in (rates, outputs))
+    return rates, outputs
+
+
+def _shaken(system: Any, point: Any, params: Any) -> Values:
+    """Return how far python-control's values move when states and inputs are rounded."""
+    t, x, u = point
+    rng = np.random.default_rng(0)
+    base = _by_python_control(system, point, params)
+    moved = [np.zeros_like(values) for values in base]
+    for _ in range(4):
+        near = [v * (1 + SHAKEN * rng.choice([-1.0, 1.0], size=v.shape)) for v in (x, u)]
+        found = _by_python_control(system, (t * (1 + SHAKEN * rng.choice([-1, 1])), *near), params)
+        for total, a, b in zip(moved, base, found, strict=True):
+            np.maximum(total, np.abs(a - b), out=total)
+    return moved[0], moved[1]
+
+
+def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) -> None:
+    """Compare block by block: each with python-control's equations at the inputs it has here."""
+    t, x, u = point
+    nodes = compiled.schedule.nodes
+    if compiled.system.nstates:
+        compiled.system._update_params(dict(trial.params) if trial.params else None)
+    y = _signals(compiled, trial, point)
+    counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
+    outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
+    given = list(block_inputs(compiled.system, u, outputs))
+    for i in dict.fromkeys((*compiled.schedule.order, *range(len(nodes)))):
+        node, (block, inputs) = nodes[i], given[i]
+        own = slice(node.state_offset, node.state_offset + (block.nstates or 0))
+        pairs = [(outputs[i], block_outputs, block.output_labels)]
+        pairs += [(ours[0][own], block_rates, block.state_labels)] if block.nstates else []
+        for a, function, labels in pairs if block.noutputs else pairs[1:]:
+            b = function(block, t, x[own], inputs)
+            moved = np.abs(function(block, t, x[own] * (1 + SHAKEN), inputs * (1 - SHAKEN)) - b)
+            wrong = np.flatnonzero(~_close(a, b, ROUNDING, 100 * moved))
+            if wrong.size:
+                raise _difference(labels[wrong[0]], node.path, a[wrong[0]], b[wrong[0]], t)
+
+
+def _signals(compiled: Compiled, trial: Trial, point: Any) -> np.ndarray:
+    """Return the outputs of all blocks, from the generator that the run's program is from."""
+    nodes = compiled.schedule.nodes
+    counts = [node.system.noutputs or 0 for node in nodes]
+    every = tuple({Signal(i, k): 1.0} for i, count in enumerate(counts) for k in range(count))
+    schedule = replace(compiled.schedule, outputs=every)
+    t, x, u = point
+    y = np.empty((len(every), 1))
+    if schedule.loops or not ct.isctime(compiled.system):
+        _, out = Compiled(schedule=schedule, program=emit(schedule)).interpreted
+        out(t, x, u, trial.p, y[:, 0])
+        return y[:, 0]
+    lowered = lower(schedule, compiled.program, 1)
+    prepare, _, out = lowered_code(lowered)
+    c = np.zeros((lowered.size, 1))
+    prepare(np.ascontiguousarray(trial.p[:, None]), c)
+    out(np.array([t]), x[:, None], u[:, None], c, y)
+    return y[:, 0]
+
+
+def _difference(label: str, block: str, ours: float, theirs: float, t: float) -> AuditError:
+    return AuditError(
+        f"machine code and python-control differ at '{label}' of block '{block}': {ours:.17g} and "
+        f"{theirs:.17g} at t = {t:.6g} s; nothing was returned: run it with "
+        "engine='python-control'"
+    )

@@ -1,0 +1,90 @@
+"""What is read of python-control besides its documented interface, and where that is relied on.
+
+* ``InterconnectedSystem.connect_map, input_map, output_map, input_offset, output_offset,
+  state_offset``: the wires of a diagram.
+* ``NonlinearIOSystem._out(t, x, u)`` and ``_rhs(t, x, u)``: the equations of one block with the
+  parameters of the latest ``_update_params(params)``, which ``dynamics`` calls first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import control as ct
+import numpy as np
+
+
+def block_outputs(block: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return a block's outputs with the parameters that it has now."""
+    return np.asarray(block._out(t, x, u), dtype=float).reshape(-1)
+
+
+def block_rates(block: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return a block's derivatives, or next states, with the parameters that it has now."""
+    return np.asarray(block._rhs(t, x, u), dtype=float).reshape(-1)
+
+
+def block_inputs(
+    system: Any, u: np.ndarray, outputs: Mapping[int, np.ndarray]
+) -> Iterator[tuple[Any, np.ndarray]]:
+    """Yield every block of a diagram with its inputs, in the order of the state vector.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram, nested to any depth, or a block.
+    u : ndarray of shape (ninputs,)
+    outputs : mapping
+        Outputs of the blocks, by their places in that order.
+    """
+    places = iter(range(len(outputs)))
+    yield from ((block, given) for block, given, _ in _walked(system, u, outputs, places))
+
+
+def _walked(system: Any, u: np.ndarray, outputs: Any, places: Any) -> list[Any]:
+    """Return (block, inputs, place) of every block."""
+    if not isinstance(system, ct.InterconnectedSystem):
+        return [(system, u, next(places))]
+    counts = [_count(part) for part in system.syslist]
+    own = [[next(places) for _ in range(count)] for count in counts]
+    stacked = _inside(system, u, outputs, own)
+    found = []
+    for part, numbers, offset in zip(system.syslist, own, system.input_offset, strict=True):
+        given = stacked[offset : offset + (part.ninputs or 0)]
+        found += _walked(part, given, outputs, iter(numbers))
+    return found
+
+
+def _count(system: Any) -> int:
+    if isinstance(system, ct.InterconnectedSystem):
+        return sum(map(_count, system.syslist))
+    return 1
+
+
+def _inside(system: Any, u: np.ndarray, outputs: Any, own: list[list[int]]) -> np.ndarray:
+    """Return the stacked inputs of a diagram's parts; wires through parts take some rounds."""
+    y = np.zeros(system.connect_map.shape[1])
+    stacked = np.zeros(system.connect_map.shape[0])
+    for _ in range(len(system.syslist) + 1):
+        stacked = system.connect_map @ y + system.input_map @ u
+        for i, part in enumerate(system.syslist):
+            given = stacked[system.input_offset[i] :][: part.ninputs or 0]
+            made = _delivered(part, given, outputs, own[i])
+            y[system.output_offset[i] : system.output_offset[i] + made.size] = made
+    return system.connect_map @ y + system.input_map @ u
+
+
+def _delivered(system: Any, u: np.ndarray, outputs: Any, numbers: list[int]) -> np.ndarray:
+    """Return the outputs of a part, given those of all blocks."""
+    if not isinstance(system, ct.InterconnectedSystem):
+        return np.asarray(outputs[numbers[0]], dtype=float)
+    rest = iter(numbers)
+    own = [[next(rest) for _ in range(_count(part))] for part in system.syslist]
+    stacked = _inside(system, u, outputs, own)
+    y = np.zeros(system.connect_map.shape[1])
+    for i, part in enumerate(system.syslist):
+        given = stacked[system.input_offset[i] :][: part.ninputs or 0]
+        made = _delivered(part, given, outputs, own[i])
+        y[system.output_offset[i] : system.output_offset[i] + made.size] = made
+    return system.output_map @ np.concatenate((y, stacked))
