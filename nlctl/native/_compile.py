@@ -6,7 +6,7 @@ import pickle
 import threading
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import FunctionType
 from typing import Any, Literal
@@ -19,13 +19,14 @@ from numba.core import config
 from numba.core.errors import NumbaWarning
 from numba.core.registry import CPUDispatcher
 
-from .._errors import CompileError, ParameterError
+from .._errors import CompileError, ParameterError, UsageError
 from .._names import unknown
 from ._cache import loaded
 from ._describe import described
 from ._emit import Program, emit
 from ._parameters import packed
 from ._schedule import Schedule, schedule
+from .thirdparty.captured import changed
 from .thirdparty.checks import check_sizes
 from .thirdparty.dicts import make_callable
 from .thirdparty.errors import explained
@@ -55,7 +56,8 @@ class Compiled:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # functions made at run time are pickled by value; machine code is found on disk again
-        return _restored, (cloudpickle.dumps((self.schedule, self.program)),)
+        read = replace(self.schedule, captured=())  # modules' names stay where they are
+        return _restored, (cloudpickle.dumps((read, self.program)),)
 
     @property
     def system(self) -> Any:
@@ -102,7 +104,15 @@ class Compiled:
         ------
         UnknownNameError, ParameterError
             If a name or a value is refused.
+        UsageError
+            If a value that a function reads from around it has changed since.
         """
+        other = changed(self.schedule.captured)
+        if other is not None:
+            raise UsageError(
+                f"'{other.name}' was {other.then!r} when '{self.system.name}' was compiled and is "
+                f"{other.now!r} now: compile again, or make it a parameter"
+            )
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks
             self.system._update_params(params)
             return packed(self.schedule.nodes, self.program.layout, self.program.fixed)
@@ -167,8 +177,12 @@ def compile(  # noqa: A001 (what it does)
 
     Notes
     -----
-    Objects that a function reads (``self.gain``, a linear system that it closes over) and
-    parameters that are no numbers are constants of the program: compile again to change them.
+    What a function reads from around it (``self.gain``, a global, a linear system that it closes
+    over) and parameters that are no numbers are constants of the program: compile again to change
+    them.  A run whose functions would read something else now is an error.
+
+    Functions are read before they are called.  One that remembers something outside of states,
+    changes what it was given, draws random numbers, or has ``try ... except`` is refused.
     """
     if isinstance(system, ct.TransferFunction):
         system = ct.ss(system)

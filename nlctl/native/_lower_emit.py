@@ -215,7 +215,7 @@ class _Writer:
         if vector.op == "table" and vector not in self.known:
             array, row = self.tables.setdefault(vector, f"K{len(self.tables)}"), 0
             if self.lanes > 1:
-                return f"{array}[i]"
+                return f"repeated({array}[i], L)"  # all members have it, also where it is stored
         elif vector in self.plan.stored:
             array, row = self._memory(vector)
         elif vector.op == "slice":

@@ -19,6 +19,7 @@ import numpy as np
 from ._feedthrough import closer_feedthrough, feedthrough
 from ._tearing import first_loop, tear
 from ._wiring import AlgebraicLoopError, Combination, Signal, Wiring
+from .thirdparty.captured import Captured
 from .thirdparty.checks import check_functions
 
 __all__ = ["AlgebraicLoopError", "Combination", "Loop", "Node", "Schedule", "Signal", "schedule"]
@@ -84,6 +85,8 @@ class Schedule:
         Linear combination of signals that makes each output of the diagram.
     loops : tuple of Loop
         Parts of the order that are solved for; empty unless that was asked for.
+    captured : tuple of Captured
+        What the blocks' functions read from around them.
     """
 
     system: Any
@@ -92,6 +95,7 @@ class Schedule:
     unknown: tuple[frozenset[int], ...]
     outputs: tuple[Combination, ...]
     loops: tuple[Loop, ...]
+    captured: tuple[Captured, ...]
 
     @property
     def simple(self) -> bool:
@@ -121,8 +125,9 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
         If a block's function does not depend on its arguments alone.
     """
     wiring = Wiring(system)
+    read: list[Captured] = []
     for place in wiring.blocks:
-        check_functions(place.path, place.system)  # before anything calls them
+        read += check_functions(place.path, place.system)  # before anything calls them
     nodes = tuple(
         Node(
             path=place.path,
@@ -144,7 +149,13 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
         order, unknown = tuple(ordering.order), tuple(ordering.unknown)
         loops = tuple(ordering.loops)
     return Schedule(
-        system=system, nodes=nodes, order=order, unknown=unknown, outputs=outputs, loops=loops
+        system=system,
+        nodes=nodes,
+        order=order,
+        unknown=unknown,
+        outputs=outputs,
+        loops=loops,
+        captured=tuple(read),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..._block import Block
 from ..._errors import CompileError
 from .._parameters import current_values
+from .captured import Captured
 from .purity import check_pure
 from .values import FRESH, VECTOR, Impure, captured
 
@@ -31,7 +32,7 @@ def check_sizes(system: Any, blocks: Iterable[Any]) -> None:
         )
 
 
-def check_functions(path: str, system: Any) -> None:
+def check_functions(path: str, system: Any) -> list[Captured]:
     """Check that a block's functions depend on their arguments alone, and return enough values.
 
     The functions are read, not called, until they are known to remember nothing.
@@ -42,17 +43,22 @@ def check_functions(path: str, system: Any) -> None:
     system : control.InputOutputSystem
         The block, which has this path.
 
+    Returns
+    -------
+    list of Captured
+        What the functions read from around them.
+
     Raises
     ------
     CompileError
         If a function has a memory, changes something, cannot be read, or returns a wrong number
         of values.
     """
-    is_block = isinstance(system, Block)
+    is_block, found = isinstance(system, Block), []
     for what, function in _functions(system):
         values = system._current_params if is_block else current_values(system)
         try:
-            check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)])
+            found += check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)])
         except Impure as error:
             place = f" ({error.place})" if error.place else ""
             raise CompileError(
@@ -61,6 +67,7 @@ def check_functions(path: str, system: Any) -> None:
             ) from None
     if not is_block and isinstance(system, ct.NonlinearIOSystem):
         _check_counts(path, system)  # nlctl's blocks were checked when they were made
+    return found
 
 
 def _functions(system: Any) -> Iterator[tuple[str, Any]]:

@@ -15,6 +15,7 @@ from .values import (
     SLICE,
     Impure,
     Local,
+    OneOf,
     Unknown,
     Value,
     captured,
@@ -120,7 +121,7 @@ def method(
         If it changes a container that the call has not made.
     """
     thing = base.known
-    if isinstance(thing, ModuleType | type):
+    if isinstance(thing, ModuleType | type | super | OneOf):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
         if name in CHANGING and not isinstance(getattr(type(thing), name, None), FunctionType):
@@ -206,7 +207,7 @@ def _library(
     if name in WRITERS:
         _written(given[0], f"{name}()")
         return FRESH
-    if name in VIEWS or "copy" in named:
+    if name in VIEWS or ("copy" in named and named["copy"].known is not True):
         return forgotten(given[0]) if given else FRESH
     return FRESH
 

@@ -90,6 +90,8 @@ def _method(function: Any, owner: Any) -> Any:
         node = definition(function)
     except Unreadable:
         return None
+    if any(isinstance(n, ast.Name) and n.id in ("super", "__class__") for n in ast.walk(node)):
+        return None  # these need the object itself
     name = function.__code__.co_varnames[0]
     chains = list(_uses(name, node))
     record = _held(owner, chains) if chains else 0.0  # one that it does not read

@@ -14,12 +14,13 @@ import importlib
 import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from types import FunctionType, ModuleType
+from types import FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
 
 from . import known_calls
+from .captured import Captured, noted
 from .known_calls import MEMORY
 from .source import Definition, Unreadable, definition
 from .values import (
@@ -55,7 +56,7 @@ class Frame:
     shared: dict[str, str] = field(default_factory=dict)  # declared global or nonlocal
 
 
-def check_pure(function: Any, arguments: Sequence[Value]) -> None:
+def check_pure(function: Any, arguments: Sequence[Value]) -> list[Captured]:
     """Check that a function depends on its arguments alone and changes nothing.
 
     Parameters
@@ -64,12 +65,19 @@ def check_pure(function: Any, arguments: Sequence[Value]) -> None:
     arguments : sequence of Value
         What is known of its arguments.
 
+    Returns
+    -------
+    list of Captured
+        What it reads from around it: constants, as long as they stay what they are.
+
     Raises
     ------
     Impure
         With the reason, and the place in ``place``.
     """
-    Walk().call(captured(function), list(arguments), {})
+    walk = Walk()
+    walk.call(captured(function), list(arguments), {})
+    return list(walk.read.values())
 
 
 class Walk:
@@ -78,7 +86,14 @@ class Walk:
     def __init__(self) -> None:
         self.done: dict[Any, Value] = {}
         self.walked: set[ast.AST] = set()  # functions inside others, while they are walked
+        self.read: dict[tuple[int, str], Captured] = {}
         self.bodies = 0
+
+    def captured(self, holder: Any, name: str, value: Any) -> Value:
+        """Return what is known of a value that is read from around a function, and note it."""
+        if (id(holder), name) not in self.read:
+            self.read[id(holder), name] = noted(holder, name, value)
+        return captured(value)
 
     def call(self, function: Value, given: list[Value], named: dict[str, Value]) -> Value:
         """Return what is known of the result of a call."""
@@ -195,13 +210,14 @@ class _Body(ast.NodeVisitor):
         cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
         try:
             if name in cells:
-                return captured(cells[name].cell_contents)
+                return self.walk.captured(cells[name], name, cells[name].cell_contents)
         except ValueError:  # an empty cell: the name has no value yet
             return OUTSIDE
         builtin = function.__globals__.get("__builtins__", {})
         builtin = builtin if isinstance(builtin, dict) else vars(builtin)
-        found = function.__globals__.get(name, builtin.get(name, UNKNOWN))
-        return OUTSIDE if isinstance(found, Unknown) else captured(found)
+        if name in function.__globals__:
+            return self.walk.captured(function.__globals__, name, function.__globals__[name])
+        return captured(builtin[name]) if name in builtin else OUTSIDE
 
     def assign(self, name: str, value: Value) -> None:
         kind = self.frame.shared.get(name)
@@ -442,7 +458,10 @@ class _Body(ast.NodeVisitor):
     visit_List = visit_Set = visit_Tuple
 
     def visit_Dict(self, node: ast.Dict) -> Value:
-        return holder([self.visit(part) for part in (*node.keys, *node.values) if part])
+        for part in node.keys:
+            if part is not None:
+                self.visit(part)
+        return holder([self.visit(part) for part in node.values])
 
     def visit_Starred(self, node: ast.Starred) -> Value:
         return element(self.visit(node.value))
@@ -499,7 +518,11 @@ class _Body(ast.NodeVisitor):
             return result if not result.own else FRESH
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
             value = getattr(thing, name, UNKNOWN)
-            return OUTSIDE if isinstance(value, Unknown) else captured(value)
+            if isinstance(value, Unknown):
+                return OUTSIDE
+            if isinstance(value, MethodType) or isinstance(thing, super):
+                return captured(value)  # made anew each time
+            return self.walk.captured(thing, name, value)
         raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
 
     def visit_Call(self, node: ast.Call) -> Value:

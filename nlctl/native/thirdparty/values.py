@@ -17,7 +17,7 @@ class Unknown:
 
 
 UNKNOWN = Unknown()
-_PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
+PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
              "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
              "statistics")  # fmt: skip
@@ -95,11 +95,11 @@ SLICE = Value(True, True, known=slice(None))
 
 def captured(thing: Any) -> Value:
     """Return what is known of an object that was there before the call."""
-    if isinstance(thing, _PLAIN):
+    if isinstance(thing, PLAIN):
         return Value(True, True, known=thing)
     if isinstance(thing, np.ndarray):
         return Value(False, thing.ndim <= 1, known=thing)
-    numbers = isinstance(thing, tuple) and all(isinstance(v, _PLAIN) for v in thing)
+    numbers = isinstance(thing, tuple) and all(isinstance(v, PLAIN) for v in thing)
     return Value(False, numbers, True, known=thing)
 
 
