@@ -24,6 +24,7 @@ from .._names import unknown
 from ._cache import loaded
 from ._describe import described
 from ._emit import Program, emit
+from ._lower_blocks import Equations, equations
 from ._parameters import packed
 from ._schedule import Schedule, schedule
 from .thirdparty.captured import changed
@@ -68,6 +69,12 @@ class Compiled:
     def source(self) -> str:
         """The emitted source of the right-hand side."""
         return self.program.source
+
+    @cached_property
+    def equations(self) -> Equations | None:
+        """What the blocks' functions compute as expressions; None where loops are solved."""
+        read = self.schedule
+        return None if read.loops else equations(read, self.program.layout)
 
     @cached_property
     def interpreted(self) -> tuple[Rhs, Rhs]:
@@ -192,7 +199,9 @@ def compile(  # noqa: A001 (what it does)
     read = schedule(system, solve_loops=algebraic_loops == "solve")
     program = emit(read)
     check_sizes(system, [node.system for node in read.nodes])
-    return Compiled(schedule=read, program=program)
+    made = Compiled(schedule=read, program=program)
+    _ = made.equations  # what expressions would understand otherwise is refused now
+    return made
 
 
 def _restored(content: bytes) -> Compiled:

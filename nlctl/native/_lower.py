@@ -86,7 +86,9 @@ class Lowered:
         return all(bool(np.all(np.asarray(p)[i] == v)) for i, v in self.assumed.items())
 
 
-def lower(schedule: Schedule, program: Program, lanes: int = 8) -> Lowered:
+def lower(
+    schedule: Schedule, program: Program, lanes: int = 8, found: Equations | None = None
+) -> Lowered:
     """Write a diagram as code over members side by side.
 
     Parameters
@@ -96,6 +98,8 @@ def lower(schedule: Schedule, program: Program, lanes: int = 8) -> Lowered:
         What was emitted for it.
     lanes : int, optional
         Number of members.  With 1, loops take several elements at a time.
+    found : Equations, optional
+        What the schedule computes, where that has been read already.
 
     Returns
     -------
@@ -103,7 +107,7 @@ def lower(schedule: Schedule, program: Program, lanes: int = 8) -> Lowered:
     """
     if schedule.loops:
         return _one_by_one(schedule, program, lanes)
-    found = equations(schedule, program.layout)
+    found = found or equations(schedule, program.layout)
     stores = {
         name: [part for row, array in rows for part in _stores(name, row, array)]
         for name, rows in found.results.items()

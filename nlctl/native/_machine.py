@@ -52,7 +52,7 @@ def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:
     """
     known: dict[Any, Any] = compiled.__dict__.setdefault("_machines", {})
     if width not in known:
-        lowered = lower(compiled.schedule, compiled.program, width)
+        lowered = lower(compiled.schedule, compiled.program, width, compiled.equations)
         try:
             prepare, rhs, out = lowered_code(lowered)
         except NumbaError as error:
