@@ -117,8 +117,8 @@ class Compiled:
         other = changed(self.schedule.captured)
         if other is not None:
             raise UsageError(
-                f"'{other.name}' was {other.then!r} when '{self.system.name}' was compiled and is "
-                f"{other.now!r} now: compile again, or make it a parameter"
+                f"'{other.name}' was {_short(other.then)} when '{self.system.name}' was compiled "
+                f"and is {_short(other.now)} now: compile again, or make it a parameter"
             )
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks
             self.system._update_params(params)
@@ -202,6 +202,12 @@ def compile(  # noqa: A001 (what it does)
     made = Compiled(schedule=read, program=program)
     _ = made.equations  # what expressions would understand otherwise is refused now
     return made
+
+
+def _short(value: Any) -> str:
+    """Return a value in one line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _restored(content: bytes) -> Compiled:

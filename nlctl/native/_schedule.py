@@ -8,7 +8,7 @@ evaluated more than once and is no algebraic loop.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
@@ -16,10 +16,11 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from .._diagram import places
 from ._feedthrough import closer_feedthrough, feedthrough
 from ._tearing import first_loop, tear
 from ._wiring import AlgebraicLoopError, Combination, Signal, Wiring
-from .thirdparty.captured import Captured
+from .thirdparty.captured import Captured, noted
 from .thirdparty.checks import check_functions
 
 __all__ = ["AlgebraicLoopError", "Combination", "Loop", "Node", "Schedule", "Signal", "schedule"]
@@ -125,7 +126,7 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
         If a block's function does not depend on its arguments alone.
     """
     wiring = Wiring(system)
-    read: list[Captured] = []
+    read = [note for place in places(system) for note in _equations_of(place.system)]
     for place in wiring.blocks:
         read += check_functions(place.path, place.system)  # before anything calls them
     nodes = tuple(
@@ -157,6 +158,13 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
         loops=loops,
         captured=tuple(read),
     )
+
+
+def _equations_of(system: Any) -> Iterator[Captured]:
+    """Yield notes of what a block or diagram consists of: it may be changed later."""
+    for name in ("connect_map", "input_map", "output_map", "updfcn", "outfcn", *"ABCD"):
+        if hasattr(system, name):
+            yield noted(system, name, getattr(system, name))
 
 
 def _blocks_before(nodes: tuple[Node, ...]) -> dict[int, set[int]]:
