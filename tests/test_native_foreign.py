@@ -9,10 +9,10 @@ from numba.core import config
 from test_native_rhs import compare
 
 from nlctl._errors import ParameterError
-from nlctl.native._cache import program_key
 from nlctl.native._code import CompileError
 from nlctl.native._compile import compile as compile_diagram
 from nlctl.native._frozen import frozen
+from nlctl.native.codegen.fingerprint import program_key
 
 
 class Tank:

@@ -12,8 +12,9 @@ from numba.core import config
 import nlctl
 from analysis.reproduction import CASES, checks, measured, sample_times
 from nlctl.native import Status
-from nlctl.native._cache import cache_folder, program_key
 from nlctl.native._tsit5 import A, B, C, E
+from nlctl.native.codegen.fingerprint import program_key
+from nlctl.native.codegen.store import cache_folder
 
 OSCILLATOR = ct.ss([[0.0, 1.0], [-1.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]], name="osc")
 

@@ -21,7 +21,6 @@ from numba.core.registry import CPUDispatcher
 
 from .._errors import ParameterError
 from .._names import unknown
-from ._cache import loaded
 from ._code import CompileError
 from ._describe import described
 from ._emit import Program, emit
@@ -30,6 +29,8 @@ from ._foreign import make_callable
 from ._parameters import packed
 from ._probe import check_functions, check_sizes
 from ._schedule import Schedule, schedule
+from .codegen.machine_code import Wanted, machine_code
+from .codegen.module import loaded
 
 _RESOLVING = threading.Lock()
 LOOPS = ("error", "solve")  # what may be done with algebraic loops
@@ -85,12 +86,16 @@ class Compiled:
             return self.interpreted
         ready = {name: _jitted(f) for name, f in self.program.functions.items()}
         module = loaded(self.program, ready)
-        options = {"cache": True, "error_model": "numpy", "nogil": True}
+        options = {"error_model": "numpy", "nogil": True}
+        wanted = [
+            Wanted(function=module.rhs, signature=RHS, options=options),
+            Wanted(function=module.out, signature=OUT, options=options),
+        ]
         try:
             with warnings.catch_warnings():  # of what the user need not know
                 warnings.simplefilter("ignore", NumbaWarning)
-                rhs = numba.njit(RHS, **options)(module.rhs)
-                return rhs, numba.njit(OUT, **options)(module.out)
+                rhs, out = machine_code(module.__name__, wanted)
+                return rhs, out
         except Exception as error:  # numba passes on whatever typing raises
             raise explained(error, self.program) from error
 

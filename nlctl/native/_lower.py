@@ -21,7 +21,6 @@ from numba.core.errors import NumbaWarning
 
 from .._equation import equation
 from . import _vector_math, _vector_memory, _vector_type
-from ._cache import loaded
 from ._compile import _jitted
 from ._emit import Program
 from ._lower_blocks import Call, Equations, equations
@@ -31,6 +30,8 @@ from ._parameters import length
 from ._schedule import Schedule
 from ._trace_graph import Expr
 from ._vector_math import FUNCTIONS
+from .codegen.machine_code import Wanted, machine_code
+from .codegen.module import loaded
 
 VECTOR, MATRIX = numba.float64[::1], numba.float64[:, ::1]
 PREPARE = numba.void(MATRIX, MATRIX)
@@ -206,12 +207,16 @@ def lowered_code(lowered: Lowered) -> tuple[Any, Any, Any]:
     if getattr(config, "DISABLE_JIT", False):
         return plain_functions(lowered)
     module = loaded(lowered, {name: _jitted(f) for name, f in lowered.functions.items()})
-    options = {"cache": True, "error_model": "numpy", "nogil": True}
+    options = {"error_model": "numpy", "nogil": True}
+    signatures = {"prepare": PREPARE, "rhs": RHS, "out": OUT}
+    wanted = [
+        Wanted(function=getattr(module, name), signature=signature, options=options)
+        for name, signature in signatures.items()
+    ]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NumbaWarning)  # "cannot cache": that costs time only
-        prepare = numba.njit(PREPARE, **options)(module.prepare)
-        rhs = numba.njit(RHS, **options)(module.rhs)
-        return prepare, rhs, numba.njit(OUT, **options)(module.out)
+        warnings.simplefilter("ignore", NumbaWarning)  # of what the user need not know
+        prepare, rhs, out = machine_code(module.__name__, wanted)
+        return prepare, rhs, out
 
 
 def _stores(name: str, row: int, array: Any) -> list[Store]:
