@@ -4,7 +4,7 @@
 right-hand side that calls the blocks' own functions (`_code`, `_emit`); rings without a state in
 them are refused or solved (`_tearing`, `_algebraic`).  For simulation the same functions are run
 once on symbols (`_trace*`) and written out for several members at a time (`_lower*`,
-`_vector_*`); both kinds of source are kept on disk as machine code (`_cache`).
+`_vector_*`); both kinds of source are kept on disk as machine code (`codegen`).
 
 `_integrate` moves members side by side through time, each with its own steps: an explicit pair
 (`_tsit5`), a stiff method (`_rodas5p`, `_stiff`), decisions (`_control`), corners and memories
