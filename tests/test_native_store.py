@@ -22,12 +22,14 @@ from hypothesis import strategies as st
 from numba.core import config, event
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 
 import nlctl
 from nlctl.native._integrate import integrator_key
+from nlctl.native._lower import TAUGHT
 from nlctl.native.codegen import store
-from nlctl.native.codegen.fingerprint import function_key, program_key
+from nlctl.native.codegen.fingerprint import function_key, module_key, program_key
 from nlctl.native.codegen.machine_code import SETTINGS, Wanted, kept, machine_code
 from nlctl.native.codegen.module import loaded
 from nlctl.native.codegen.store import CacheWarning
@@ -378,8 +380,11 @@ EDITS = {  # module -> what is edited there
 }
 
 
-def key_of_copy(path, edits):
-    """The integrators' key of a copy of the package with an edit, from a process of its own."""
+def keys_of_copy(path, edits):
+    """The integrators' key of an edited copy of the package, and that of code that numba is taught.
+
+    They come from a process of its own.
+    """
     shutil.copytree(PACKAGE, path / "nlctl", ignore=shutil.ignore_patterns("__pycache__"))
     for name, (before, after) in edits.items():
         module = path / "nlctl" / "native" / name
@@ -388,29 +393,38 @@ def key_of_copy(path, edits):
         module.write_text(source.replace(before, after), encoding="utf-8")
     script = (
         "import nlctl; from nlctl.native._integrate import integrator_key\n"
-        "print(nlctl.__file__, integrator_key())"
+        "from nlctl.native._lower import TAUGHT, module_key\n"
+        "print(nlctl.__file__, integrator_key(), module_key(*TAUGHT))"
     )
     run = subprocess.run(
         [sys.executable, "-c", script], cwd=path, env=os.environ | {"PYTHONPATH": str(path)},
         capture_output=True, text=True, check=True,
     )  # fmt: skip
-    file, key = run.stdout.split()
+    file, *keys = run.stdout.split()
     assert Path(file).is_relative_to(path)
-    return key
+    return keys
 
 
 @with_jit
-class TestIntegrators:
-    """Machine code that all diagrams share follows its sources."""
+class TestSources:
+    """Machine code follows the sources of the package."""
 
-    def test_a_copy_has_the_same_key(self, tmp_path):
+    def test_a_copy_has_the_same_keys(self, tmp_path):
         """Paths and processes do not count."""
-        assert key_of_copy(tmp_path, {}) == integrator_key()
+        assert keys_of_copy(tmp_path, {}) == [integrator_key(), module_key(*TAUGHT)]
 
     @pytest.mark.parametrize("name", EDITS)
-    def test_an_edit_of_any_module_gives_another_key(self, tmp_path, name):
+    def test_an_edit_of_any_module_of_the_integrators(self, tmp_path, name):
         """Constants, coefficients, generated code, options."""
-        assert key_of_copy(tmp_path, {name: EDITS[name]}) != integrator_key()
+        assert keys_of_copy(tmp_path, {name: EDITS[name]})[0] != integrator_key()
+
+    def test_an_edit_of_a_code_generator(self, tmp_path):
+        """Machine code of programs: nothing in them names what generates it."""
+        first = "from __future__ import annotations\n"
+        edits = {"_vector_memory.py": (first, f"{first}\nEDITED = True\n")}
+        integrators, taught = keys_of_copy(tmp_path, edits)
+        assert integrators == integrator_key()
+        assert taught != module_key(*TAUGHT)
 
 
 @with_jit
@@ -460,6 +474,11 @@ class TestNumba:
         assert triple
         assert name
         assert isinstance(features, str)
+
+    def test_threads_wait_for_each_other(self):
+        """`global_compiler_lock`: one that its holder may take again."""
+        with global_compiler_lock, global_compiler_lock:
+            assert global_compiler_lock.is_locked()
 
     @pytest.mark.parametrize("name", SETTINGS)
     def test_the_settings_exist(self, name):

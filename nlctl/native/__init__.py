@@ -21,9 +21,11 @@ from ._machine import compile_ahead
 from ._response import Response, uninterrupted
 from ._schedule import AlgebraicLoopError
 from ._simulate import Settings, Statistics
+from .codegen.store import CacheWarning
 
 __all__ = [
     "AlgebraicLoopError",
+    "CacheWarning",
     "CompileError",
     "Compiled",
     "Ensemble",

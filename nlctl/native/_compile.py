@@ -21,6 +21,7 @@ from numba.core.registry import CPUDispatcher
 
 from .._errors import ParameterError
 from .._names import unknown
+from . import _foreign
 from ._code import CompileError
 from ._describe import described
 from ._emit import Program, emit
@@ -29,6 +30,7 @@ from ._foreign import make_callable
 from ._parameters import packed
 from ._probe import check_functions, check_sizes
 from ._schedule import Schedule, schedule
+from .codegen.fingerprint import module_key
 from .codegen.machine_code import Wanted, machine_code
 from .codegen.module import loaded
 
@@ -94,7 +96,7 @@ class Compiled:
         try:
             with warnings.catch_warnings():  # of what the user need not know
                 warnings.simplefilter("ignore", NumbaWarning)
-                rhs, out = machine_code(module.__name__, wanted)
+                rhs, out = machine_code(f"{module.__name__} {module_key(_foreign)}", wanted)
                 return rhs, out
         except Exception as error:  # numba passes on whatever typing raises
             raise explained(error, self.program) from error

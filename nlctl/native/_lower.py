@@ -7,11 +7,9 @@ once, whatever depends on parameters alone in advance.
 
 from __future__ import annotations
 
-import hashlib
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -20,7 +18,7 @@ from numba.core import config
 from numba.core.errors import NumbaWarning
 
 from .._equation import equation
-from . import _vector_math, _vector_memory, _vector_type
+from . import _foreign, _vector_math, _vector_memory, _vector_type
 from ._compile import _jitted
 from ._emit import Program
 from ._lower_blocks import Call, Equations, equations
@@ -30,6 +28,7 @@ from ._parameters import length
 from ._schedule import Schedule
 from ._trace_graph import Expr
 from ._vector_math import FUNCTIONS
+from .codegen.fingerprint import module_key
 from .codegen.machine_code import Wanted, machine_code
 from .codegen.module import loaded
 
@@ -37,6 +36,7 @@ VECTOR, MATRIX = numba.float64[::1], numba.float64[:, ::1]
 PREPARE = numba.void(MATRIX, MATRIX)
 RHS = numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX)
 OUT = numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX)
+TAUGHT = (_foreign, _vector_math, _vector_memory, _vector_type)  # code that numba is taught
 MEMORY = ("load", "store", "gather", "store_first", "repeated", "first", "total", "select")
 
 
@@ -215,7 +215,7 @@ def lowered_code(lowered: Lowered) -> tuple[Any, Any, Any]:
     ]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaWarning)  # of what the user need not know
-        prepare, rhs, out = machine_code(module.__name__, wanted)
+        prepare, rhs, out = machine_code(f"{module.__name__} {module_key(*TAUGHT)}", wanted)
         return prepare, rhs, out
 
 
@@ -281,13 +281,5 @@ def _unpacked(call: Call) -> list[str]:
     return [*given, *call.lines]
 
 
-def _digest() -> str:
-    """Return a number for the code generators that a program's key cannot see into."""
-    digest = hashlib.sha256()
-    for module in (_vector_math, _vector_memory, _vector_type):
-        digest.update(Path(module.__file__ or "").read_bytes())
-    return digest.hexdigest()
-
-
 _NAMES = {name: getattr(_vector_memory, name) for name in MEMORY} | FUNCTIONS
-_NAMES |= {"equation": equation, "vector_code": _digest()}
+_NAMES |= {"equation": equation}

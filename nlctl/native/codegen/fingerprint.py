@@ -1,14 +1,16 @@
 """Keys of functions and programs: they change whenever their machine code may.
 
 A key is made of everything that a function consists of, as it is in memory: its code, its default
-arguments, what it closes over, and the functions and constants that these refer to.  Files are not
-looked at, so a file that was edited after it was imported misleads nobody.
+arguments, what it closes over, and the functions and constants that these refer to.  A file that
+was edited after it was imported misleads nobody.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
+import inspect
 import re
 import sys
 import sysconfig
@@ -44,12 +46,22 @@ def function_key(*things: Any) -> str:
     return _digest(*things)
 
 
-def _digest(*things: Any) -> str:
-    digest = hashlib.sha256()
+@functools.cache
+def module_key(*modules: Any) -> str:
+    """Return a key of all that modules define: numba calls what they teach it, but not by name."""
     seen: set[int] = set()
-    for thing in things:
-        for text in _fingerprint(thing, seen):
-            digest.update(text.encode() + b"\0")
+    return _digest_of(text for module in modules for text in _defined(module, seen))
+
+
+def _digest(*things: Any) -> str:
+    seen: set[int] = set()
+    return _digest_of(text for thing in things for text in _fingerprint(thing, seen))
+
+
+def _digest_of(texts: Iterable[str]) -> str:
+    digest = hashlib.sha256()
+    for text in texts:
+        digest.update(text.encode() + b"\0")
     return digest.hexdigest()[:32]
 
 
@@ -134,9 +146,18 @@ def _of_numba_type(kind: numba.types.Type, seen: set[int]) -> Iterator[str]:
     """Yield text for a type; one of our own also for the module that generates its code."""
     yield f"type {kind}"
     module = sys.modules[type(kind).__module__]
-    if _is_library(module.__name__) or id(type(kind)) in seen:
-        return
-    seen.add(id(type(kind)))
+    if not _is_library(module.__name__) and id(type(kind)) not in seen:
+        seen.add(id(type(kind)))
+        yield from _defined(module, seen)
+
+
+def _defined(module: types.ModuleType, seen: set[int]) -> Iterator[str]:
+    """Yield text for the functions that a module defines, those of its classes too.
+
+    Its source is added, for what it does when it is imported.
+    """
+    with contextlib.suppress(OSError, TypeError):  # there is none
+        yield inspect.getsource(module)
     for name, thing in vars(module).items():
         if getattr(thing, "__module__", None) != module.__name__:
             continue

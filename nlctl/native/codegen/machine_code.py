@@ -9,6 +9,7 @@ held by a test each, are
 - ``CompileResult._reduce`` and ``_rebuild``: compiled code as plain data;
 - ``library.has_dynamic_globals`` and ``lifted``: code that holds addresses of this process;
 - ``codegen().magic_tuple()``: the processor that code is made for;
+- ``global_compiler_lock``: several threads may ask at the same time;
 - the names in `SETTINGS`, of `numba.core.config`.
 """
 
@@ -30,6 +31,7 @@ import numpy as np
 from numba.core import config
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 
 from . import store
@@ -77,7 +79,8 @@ def machine_code(key: str, wanted: Sequence[Wanted]) -> list[Any]:
     if getattr(config, "DISABLE_JIT", False):
         return [each.function for each in wanted]
     key = _full_key(key, *((str(each.signature), each.options) for each in wanted))
-    known = _read(key)
+    with global_compiler_lock:  # types are made, as by a compilation
+        known = _read(key)
     caches = [_Given(data) for data in known or [None] * len(wanted)]
     made = [_compiled(*pair) for pair in zip(wanted, caches, strict=True)]
     if any(cache.is_new for cache in caches):

@@ -48,17 +48,25 @@ def read(key: str) -> bytes | None:
     try:
         if not _is_safe(os.stat(path.parent), path.parent):
             return None
-        flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
-        # no waiting for a named pipe; of a file nothing changes
-        with open(os.open(path, flags | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
-            found = os.fstat(file.fileno())
-            if not stat.S_ISREG(found.st_mode) or not _is_safe(found, path):
-                return None
-            content = file.read()
+        # links are not followed, and a named pipe is not waited for
+        flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+        content = _content(os.open(path, flags | getattr(os, "O_BINARY", 0)), path)
     except OSError:
         return None
     body = content[len(MARK) + DIGEST :]
     return body if content == _entry(key, body) else None
+
+
+def _content(descriptor: int, path: Path) -> bytes:
+    """Return what is in an open file, nothing if it is not safe; close it."""
+    try:
+        found = os.fstat(descriptor)
+        if not stat.S_ISREG(found.st_mode) or not _is_safe(found, path):
+            return b""
+        with open(descriptor, "rb", closefd=False) as file:
+            return file.read()
+    finally:
+        os.close(descriptor)
 
 
 def write(key: str, body: bytes) -> None:
