@@ -418,6 +418,16 @@ class TestSources:
         """Constants, coefficients, generated code, options."""
         assert keys_of_copy(tmp_path, {name: EDITS[name]})[0] != integrator_key()
 
+    def test_use_does_not_change_a_key(self):
+        """What a code generator remembers is no part of it."""
+        before = module_key(*TAUGHT), integrator_key()
+        for k in range(3):
+            exec(f"def helper(v):\n    return {k} * v", scope := {})
+            function = eval("lambda t, x, u, params: [helper(x[0])]", scope)
+            system = ct.nlsys(function, None, inputs=0, outputs=1, states=1, name="used")
+            nlctl.compile(system).native  # noqa: B018
+        assert (module_key(*TAUGHT), integrator_key()) == before
+
     def test_an_edit_of_a_code_generator(self, tmp_path):
         """Machine code of programs: nothing in them names what generates it."""
         first = "from __future__ import annotations\n"

@@ -46,11 +46,9 @@ def function_key(*things: Any) -> str:
     return _digest(*things)
 
 
-@functools.cache
-def module_key(*modules: Any) -> str:
+def module_key(*modules: types.ModuleType) -> str:
     """Return a key of all that modules define: numba calls what they teach it, but not by name."""
-    seen: set[int] = set()
-    return _digest_of(text for module in modules for text in _defined(module, seen))
+    return _digest_of(text for module in modules for text in _defined(module))
 
 
 def _digest(*things: Any) -> str:
@@ -148,23 +146,23 @@ def _of_numba_type(kind: numba.types.Type, seen: set[int]) -> Iterator[str]:
     module = sys.modules[type(kind).__module__]
     if not _is_library(module.__name__) and id(type(kind)) not in seen:
         seen.add(id(type(kind)))
-        yield from _defined(module, seen)
+        yield from _defined(module)
 
 
-def _defined(module: types.ModuleType, seen: set[int]) -> Iterator[str]:
-    """Yield text for the functions that a module defines, those of its classes too.
+def _defined(module: types.ModuleType) -> Iterator[str]:
+    """Yield a module's source, and its functions and methods as they are in memory.
 
-    Its source is added, for what it does when it is imported.
+    What these refer to is in the source, and may change while they are used.
     """
     with contextlib.suppress(OSError, TypeError):  # there is none
         yield inspect.getsource(module)
     for name, thing in vars(module).items():
         if getattr(thing, "__module__", None) != module.__name__:
             continue
-        yield name
         for part in vars(thing).values() if isinstance(thing, type) else [thing]:
-            if isinstance(_plain(part), types.FunctionType):
-                yield from _fingerprint(part, seen)
+            if isinstance(function := _plain(part), types.FunctionType):
+                yield name
+                yield from _code_text(function.__code__)
 
 
 @functools.cache
