@@ -354,6 +354,27 @@ class TestKeys:
         one, other = namedtuple("Point", "a b")(1.0, 2.0), namedtuple("Point", "b a")(1.0, 2.0)
         assert function_key(one) != function_key(other)
 
+    def test_a_key_is_the_same_in_every_process(self):
+        """Whatever the order of sets and the addresses of objects there are."""
+        script = (
+            "import nlctl\n"
+            "from nlctl.native._lower import lower\n"
+            "from nlctl.native.codegen.fingerprint import program_key\n"
+            "for make in (nlctl.paper.example_1, nlctl.paper.example_2):\n"
+            "    compiled = nlctl.compile(make())\n"
+            "    lowered = lower(compiled.schedule, compiled.program)\n"
+            "    print(program_key(compiled.program), program_key(lowered))\n"
+        )
+        keys = [
+            subprocess.run(
+                [sys.executable, "-c", script], env=os.environ | {"PYTHONHASHSEED": seed},
+                capture_output=True, text=True, check=True,
+            ).stdout.split()
+            for seed in ("1", "2")
+        ]  # fmt: skip
+        assert len(set(keys[0])) == 4
+        assert keys[0] == keys[1]
+
     def test_what_contains_itself_has_a_key(self):
         """A list in itself, and functions that call each other."""
         ring: list = []
