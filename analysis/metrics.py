@@ -12,10 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 
 from nlctl._equation import equation
+from nlctl.native.codegen.machine_code import kept
 
 __all__ = [
     "Metric",
@@ -293,4 +293,4 @@ def machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @functools.cache
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    return numba.njit(nogil=True, cache=True, error_model="numpy")(function)
+    return kept(nogil=True, error_model="numpy")(function)

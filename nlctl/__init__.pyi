@@ -36,6 +36,7 @@ from .controllers import (
 from .drawing import draw
 from .native import (
     AlgebraicLoopError,
+    CacheWarning,
     Compiled,
     CompileError,
     Ensemble,
@@ -54,6 +55,7 @@ __all__ = [
     "Backlash",
     "BandLimitedNoise",
     "Block",
+    "CacheWarning",
     "CompileError",
     "Compiled",
     "DeadZone",

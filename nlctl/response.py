@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import control as ct
-import numpy as np
 
-from . import _diagram
-from ._errors import DivergedError, ParameterError
+from ._errors import ParameterError
+from ._interpreted import interpreted
 from ._names import unknown
 from ._param import checked_times
+from ._run_arguments import Run, unified, with_aliases
 
 if TYPE_CHECKING:
     from .native import Compiled
@@ -21,9 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["EngineWarning", "input_output_response"]
 
 ENGINES = ("python-control", "native", "auto")
-NATIVE_ONLY = ("max_steps", "step", "audit")  # settings that python-control does not know
-
-STANDSTILL = 200  # steps in a row that do not advance the time
+NATIVE_ONLY = ("max_steps", "step")  # settings that python-control does not know
 
 
 class EngineWarning(UserWarning):
@@ -32,7 +31,7 @@ class EngineWarning(UserWarning):
 
 def input_output_response(
     system: ct.NonlinearIOSystem | Compiled,
-    timepts: Any,
+    timepts: Any = None,
     inputs: Any = 0.0,
     initial_state: Mapping[str, float] | Any = None,
     *,
@@ -41,8 +40,18 @@ def input_output_response(
     method: str | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
+    evaluation_times: Any = "T",
+    squeeze: bool | None = None,
+    transpose: bool = False,
+    return_states: bool = False,
+    ignore_errors: bool = False,
+    audit: bool | str = True,
+    solve_ivp_method: str | None = None,
+    solve_ivp_kwargs: Mapping[str, Any] | None = None,
+    max_steps: int | None = None,
+    step: float | None = None,
     progress: Callable[[float], object] | None = None,
-    **kwargs: Any,
+    **aliases: Any,
 ) -> ct.TimeResponseData:
     """Simulate a block or diagram, in python-control or as machine code.
 
@@ -56,11 +65,16 @@ def input_output_response(
     system : control.NonlinearIOSystem or Compiled
         A diagram, or what `nlctl.compile` made of it.
     timepts : array_like of shape (m,)
-        Times in s at which the response is computed.
-    inputs : array_like or float, optional
-        Inputs over `timepts`, as in python-control.
-    initial_state : mapping or array_like, optional
-        ``{"plant.x1": 0.8}`` replaces some of the blocks' initial states; an array gives all.
+        Times in s at which the inputs are given and the response is computed.  Also ``T``.
+    inputs : array_like, list or float, optional
+        Inputs over `timepts`, linear in between: a number for all; an array of shape (ninputs, m),
+        or (m,) for one input; or a list, whose entries follow each other: a number is one input,
+        an array of shape (m,) one input over time, one of another length as many constant
+        inputs, one of shape (k, m) k inputs.  Also ``U``.
+    initial_state : mapping, array_like or float, optional
+        ``{"plant.x1": 0.8}`` replaces some of the blocks' initial states.  A number holds for all
+        states; an array, or a list of numbers and arrays behind each other, gives the first ones,
+        and the others start at 0.  Also ``X0``.
     params : mapping, optional
         Qualified parameters, ``{"actuator.b_r": 0.6}``.
     engine : {"python-control", "native", "auto"}, optional
@@ -74,18 +88,38 @@ def input_output_response(
         orders 5(4), and "auto", the default, which takes whichever is faster at each time.
     rtol, atol : float, optional
         Tolerances of the integrator.
+    evaluation_times : array_like of shape (k,), optional
+        Times in s at which the response is wanted, if not at `timepts`; they lie within these.
+        A sampled diagram starts with the first of them.  Also ``t_eval``.
+    squeeze, transpose, return_states : bool, optional
+        Form of the response, as in python-control: whether outputs lose axes of length 1, whether
+        time is the first axis, and whether the response unpacks as time, outputs, states.  Also
+        ``return_x``.
+    ignore_errors : bool, optional
+        Return what was computed until then, with ``success = False``, instead of raising.
+    solve_ivp_method : str, optional
+        Another name of `method` in python-control; machine code has none of these methods.
+    solve_ivp_kwargs : mapping, optional
+        Keywords of `scipy.integrate.solve_ivp`.  Machine code takes ``rtol`` and ``atol``.
+    max_steps : int, optional
+        Machine code: attempted steps after which a run is given up.
+    step : float, optional
+        Machine code: a fixed step in s; 0 for error control.
     progress : callable, optional
         Called with the time after every accepted step (machine code: every 2000 steps).
-    **kwargs
-        Passed to `control.input_output_response`; machine code takes ``max_steps``, ``step`` (a
-        fixed step in s, 0 for error control), ``ignore_errors`` and ``audit``: by default the
-        first run of a program is compared with python-control's own right-hand side at some
-        points, with False none is, with "every run" each.
+    audit : bool or "every run", optional
+        Machine code: by default the first run of a program is compared with python-control's own
+        right-hand side and outputs at some points of the run; with False none is, with
+        "every run" each.
+    **aliases
+        python-control's short names: ``T``, ``U``, ``X0``, ``t_eval``, ``return_x``.
 
     Returns
     -------
     control.TimeResponseData
-        From machine code with an attribute ``statistics``: status, time reached, steps.
+        Outputs have shape (noutputs, k), or (k,) for one input and one output, states
+        (nstates, k).  From machine code with an attribute ``statistics``: status, time reached,
+        steps.
 
     Raises
     ------
@@ -97,30 +131,66 @@ def input_output_response(
         If `engine` is "native" and the diagram cannot be compiled.
     AuditError
         If machine code and python-control differ, unless `engine` is "auto".
-    UnknownNameError, ParameterError
-        If a name or a value is refused, or if `timepts` has fewer than two entries, is not
-        increasing or not finite.
-    """
-    times = checked_times(timepts)
-    interpretable = isinstance(system, ct.InputOutputSystem)
-    if not _takes_machine_code(engine, interpretable):
-        run = _Run(system, times, inputs, initial_state, params, rtol, atol, progress, kwargs)
-        return _interpreted(run, method)
-    from .native import (  # late: others need no compiler
-        AlgebraicLoopError,
-        AuditError,
-        CompileError,
-    )
+    UnknownNameError
+        If a state, a parameter, a method or an argument of that name does not exist.
+    ParameterError
+        If a value is refused: times that are not finite and increasing, inputs or states of a
+        wrong shape or not finite, an argument that has no meaning for the engine.
 
-    run = _Run(system, times, inputs, initial_state, params, rtol, atol, progress, kwargs)
+    Warns
+    -----
+    UserWarning
+        If `initial_state` has fewer values than there are states and the last one is not 0.
+    """
+    named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
+    named |= {"evaluation_times": evaluation_times, "return_states": return_states}
+    defaults = {
+        k: p.default for k, p in inspect.signature(input_output_response).parameters.items()
+    }
+    named = with_aliases(named, aliases, defaults)
+    form = {"squeeze": squeeze, "transpose": transpose, "return_states": named["return_states"]}
+    run = Run(
+        system=system,
+        times=checked_times(named["timepts"]),
+        inputs=named["inputs"],
+        initial_state=named["initial_state"],
+        evaluation_times=named["evaluation_times"],
+        params=params,
+        progress=progress,
+        audit=audit,
+        ignore_errors=ignore_errors,
+        form=form,
+        solver={
+            **{"method": method, "rtol": rtol, "atol": atol, "max_steps": max_steps, "step": step},
+            **{"solve_ivp_method": solve_ivp_method, "solve_ivp_kwargs": solve_ivp_kwargs},
+        },
+    )
+    return _computed(unified(run), engine)
+
+
+def _computed(run: Run, engine: str | None) -> ct.TimeResponseData:
+    interpretable = isinstance(run.system, ct.InputOutputSystem)
+    if not _takes_machine_code(engine, interpretable):
+        for name in NATIVE_ONLY:
+            if run.solver[name] is not None:
+                raise ParameterError(
+                    f"{name}={run.solver[name]!r} has no meaning in python-control: "
+                    "engine='native' has it, solve_ivp_kwargs={'max_step': ...} bounds its steps"
+                )
+        return interpreted(run)
+    from .native import AlgebraicLoopError, AuditError, Compiled, CompileError  # late: needs numba
+
+    if not interpretable and not isinstance(run.system, Compiled):
+        raise ParameterError(
+            f"system needs a diagram or a compiled one, got {type(run.system).__name__}"
+        )
     try:
-        return _native(run, method)
+        return _native(run)
     except (CompileError, AlgebraicLoopError, AuditError) as error:
         if engine != "auto" or not interpretable:
             raise
-        warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=2)
-    run.kwargs = {k: v for k, v in kwargs.items() if k not in NATIVE_ONLY}
-    return _interpreted(run, None)
+        warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=3)
+    return interpreted(replace(run, solver=dict(run.solver) | {"method": None}))
 
 
 def _takes_machine_code(engine: str | None, interpretable: bool) -> bool:
@@ -133,56 +203,13 @@ def _takes_machine_code(engine: str | None, interpretable: bool) -> bool:
     return not interpretable or engine in ("native", "auto")
 
 
-@dataclass
-class _Run:
-    """The arguments of a run that both engines take."""
-
-    system: Any
-    times: np.ndarray
-    inputs: Any
-    initial_state: Any
-    params: Mapping[str, Any] | None
-    rtol: float
-    atol: float
-    progress: Callable[[float], object] | None
-    kwargs: dict[str, Any]
-
-
-def _interpreted(run: _Run, method: str | None) -> ct.TimeResponseData:
-    """Run a diagram in python-control."""
-    system, times, initial_state, params = run.system, run.times, run.initial_state, run.params
-    given_by_name = initial_state is None or isinstance(initial_state, Mapping)
-    x0: Any = _diagram.initial_state(system, initial_state) if given_by_name else initial_state
-    watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
-    settings = {"rtol": run.rtol, "atol": run.atol, "events": watch}
-    settings |= run.kwargs.pop("solve_ivp_kwargs", {})
-    with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
-        try:
-            response = ct.input_output_response(
-                system,
-                times,
-                run.inputs,
-                x0,
-                params=dict(params or {}),
-                method=method or "LSODA",
-                solve_ivp_kwargs=settings,
-                **run.kwargs,
-            )
-        except RuntimeError as error:
-            # python-control takes a NaN signal for an algebraic loop: it never equals itself
-            if watch.reached > times[0] or _overflows(system, times[0], x0, params):
-                raise _diverged(system, watch.reached) from error
-            raise
-    if not np.all(np.isfinite(response.y)):
-        raise _diverged(system, watch.reached)
-    return response
-
-
-def _native(run: _Run, method: str | None) -> ct.TimeResponseData:
+def _native(run: Run) -> ct.TimeResponseData:
     """Run a compiled diagram, or one that is compiled for this run, as machine code."""
     from .native import compile as compile_diagram
     from .native._response import respond
+    from .native._solver_arguments import solver_settings
 
+    settings = solver_settings(**run.solver)
     compiled = run.system
     if isinstance(compiled, ct.InputOutputSystem):
         compiled = compile_diagram(compiled, params=run.params)
@@ -191,53 +218,11 @@ def _native(run: _Run, method: str | None) -> ct.TimeResponseData:
         run.times,
         run.inputs,
         run.initial_state,
+        settings=settings,
         params=run.params,
+        evaluation_times=run.evaluation_times,
+        ignore_errors=run.ignore_errors,
         progress=run.progress,
-        method=method or "auto",
-        rtol=run.rtol,
-        atol=run.atol,
-        **run.kwargs,
-    )
-
-
-@dataclass
-class _Watch:
-    """An event for `solve_ivp` that never happens but sees every accepted step.
-
-    It stops a run whose state is not finite, and one whose time stands still: at a finite escape
-    time LSODA repeats a vanishing step for ever.
-    """
-
-    system: ct.InputOutputSystem
-    reached: float
-    progress: Callable[[float], object] | None
-    repeated: int = 0
-
-    def __call__(self, t: float, x: np.ndarray) -> float:
-        self.repeated = self.repeated + 1 if t <= self.reached else 0
-        if self.repeated > STANDSTILL or not np.all(np.isfinite(x)):
-            raise _diverged(self.system, self.reached)
-        self.reached = max(float(t), self.reached)
-        if self.progress is not None:
-            self.progress(float(t))
-        return 1.0
-
-
-def _overflows(system: ct.NonlinearIOSystem, t: float, x0: Any, params: Any) -> bool:
-    """Whether the right-hand side leaves the finite numbers at the start already."""
-    try:
-        with np.errstate(over="raise", invalid="raise"):
-            system.dynamics(t, x0, np.zeros(system.ninputs or 0), params)
-    except FloatingPointError:
-        return True
-    except RuntimeError:
-        return False
-    return False
-
-
-def _diverged(system: ct.InputOutputSystem, time: float) -> DivergedError:
-    return DivergedError(
-        f"'{system.name}' diverged: no finite state after t = {time:.6g} s; "
-        "simulate up to then to see how",
-        float(time),
+        audit=run.audit,
+        **run.form,
     )

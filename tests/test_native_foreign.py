@@ -10,8 +10,8 @@ from test_native_rhs import compare
 
 from nlctl._errors import ParameterError, UsageError
 from nlctl.native import CompileError
-from nlctl.native._cache import program_key
 from nlctl.native._compile import compile as compile_diagram
+from nlctl.native.codegen.fingerprint import program_key
 from nlctl.native.thirdparty.objects import frozen
 
 

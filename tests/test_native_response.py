@@ -1,6 +1,5 @@
 """Responses of compiled diagrams: closed forms, orders, pulses, statuses, the cache."""
 
-import linecache
 import os
 import subprocess
 import sys
@@ -8,13 +7,15 @@ import sys
 import control as ct
 import numpy as np
 import pytest
+import source_text
 from numba.core import config
 
 import nlctl
 from analysis.reproduction import CASES, checks, measured, sample_times
 from nlctl.native import Status
-from nlctl.native._cache import cache_folder, program_key
 from nlctl.native._tsit5 import A, B, C, E
+from nlctl.native.codegen.fingerprint import program_key
+from nlctl.native.codegen.store import cache_folder
 
 OSCILLATOR = ct.ss([[0.0, 1.0], [-1.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]], name="osc")
 
@@ -262,12 +263,11 @@ class TestCache:
         """Code, closure constants and called functions count; parameters and names do not."""
 
         def program(scale, source):
-            namespace = {"np": np, "inner": (lambda v: scale * v)}
-            text = f"def f(t, x, u, params):\n    return [{source}]\n"
-            file = f"<equation {source}>"
-            linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-            exec(compile(text, file, "exec"), namespace)
-            system = ct.nlsys(None, namespace["f"], inputs=1, outputs=1, name="edited")
+            made = source_text.run(
+                f"def f(t, x, u, params):\n    return [{source}]\n",
+                {"np": np, "inner": (lambda v: scale * v)},
+            )
+            system = ct.nlsys(None, made["f"], inputs=1, outputs=1, name="edited")
             return program_key(nlctl.compile(system).program)
 
         base = program(1.0, "inner(u[0])")

@@ -19,6 +19,7 @@ from nlctl.native import Compiled, Ensemble, Status, ensemble_response
 from nlctl.native import compile as compiled
 
 from ..metrics import Metric, machine_code
+from .piecewise import with_vertices
 from .resolve import diagrams, resolved
 from .space import Space, arguments
 from .spec import Requirement, Spec, unfinished_margin
@@ -249,10 +250,11 @@ def _run(
 
 
 def compile_ahead(prepared: Prepared) -> None:
-    """Compile diagrams and metrics, which otherwise happens with the first row."""
+    """Compile diagrams, metrics and margins, which otherwise happens with the first row."""
     for _, loop in prepared.loops:
         native.compile_ahead(loop, ensemble=True)
     time = np.linspace(0.0, 1.0, 5)
+    with_vertices(time, np.zeros(time.size))
     for metric in prepared.experiment.metrics:
         if isinstance(metric, Metric):
             _fast(metric).function(time, *np.zeros((len(metric.signals), time.size)))

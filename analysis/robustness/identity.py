@@ -16,7 +16,7 @@ import pandas as pd
 
 from nlctl._diagram import initial_state
 from nlctl.native import Compiled
-from nlctl.native._cache import program_key
+from nlctl.native.codegen.fingerprint import program_key
 
 from ..metrics import Metric
 from .design import Design

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
+
+from nlctl.native.codegen.machine_code import kept
 
 from ..metrics import differences, vertex
 
@@ -62,7 +63,7 @@ def with_vertices(t: np.ndarray, y: np.ndarray) -> Trace:
     return Trace(np.insert(t, at, place), np.insert(y, at, value)) if at.size else Trace(t, y)
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
+@kept(nogil=True, error_model="numpy")
 def _vertices(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the vertices between samples: before which sample each is, when, and its value."""
     d = differences(y)

@@ -4,7 +4,7 @@
 right-hand side that calls the blocks' own functions (`_code`, `_emit`); rings without a state in
 them are refused or solved (`_tearing`, `_algebraic`).  For simulation the same functions are run
 once on symbols (`_trace*`) and written out for several members at a time (`_lower*`,
-`_vector_*`); both kinds of source are kept on disk as machine code (`_cache`).
+`_vector_*`); both kinds of source are kept on disk as machine code (`codegen`).
 
 `_integrate` moves members side by side through time, each with its own steps: an explicit pair
 (`_tsit5`), a stiff method (`_rodas5p`, `_stiff`), decisions (`_control`), corners and memories
@@ -22,10 +22,12 @@ from ._response import Response, uninterrupted
 from ._schedule import AlgebraicLoopError
 from ._simulate import Settings, Statistics
 from .audit import AuditError
+from .codegen.store import CacheWarning
 
 __all__ = [
     "AlgebraicLoopError",
     "AuditError",
+    "CacheWarning",
     "CompileError",
     "Compiled",
     "Ensemble",

@@ -21,18 +21,23 @@ from numba.core.registry import CPUDispatcher
 
 from .._errors import CompileError, ParameterError, UsageError
 from .._names import unknown
-from ._cache import loaded
+from . import _numpy, _values
 from ._describe import described
 from ._emit import Program, emit
 from ._lower_blocks import Equations, equations
 from ._parameters import packed
 from ._schedule import Schedule, schedule
+from .codegen.fingerprint import module_key
+from .codegen.machine_code import Wanted, machine_code
+from .codegen.module import loaded
+from .thirdparty import dicts
 from .thirdparty.captured import changed
 from .thirdparty.checks import check_sizes
 from .thirdparty.dicts import make_callable
 from .thirdparty.errors import explained
 
 _RESOLVING = threading.Lock()
+TAUGHT = (dicts, _numpy, _values)  # modules that teach numba what functions of others use
 LOOPS = ("error", "solve")  # what may be done with algebraic loops
 Rhs = Callable[..., None]
 VECTOR = numba.float64[::1]
@@ -93,12 +98,16 @@ class Compiled:
             return self.interpreted
         ready = {name: _jitted(f) for name, f in self.program.functions.items()}
         module = loaded(self.program, ready)
-        options = {"cache": True, "error_model": "numpy", "nogil": True}
+        options = {"error_model": "numpy", "nogil": True}
+        wanted = [
+            Wanted(function=module.rhs, signature=RHS, options=options),
+            Wanted(function=module.out, signature=OUT, options=options),
+        ]
         try:
             with warnings.catch_warnings():  # of what the user need not know
                 warnings.simplefilter("ignore", NumbaWarning)
-                rhs = numba.njit(RHS, **options)(module.rhs)
-                return rhs, numba.njit(OUT, **options)(module.out)
+                rhs, out = machine_code(f"{module.__name__} {module_key(*TAUGHT)}", wanted)
+                return rhs, out
         except Exception as error:  # numba passes on whatever typing raises
             raise explained(error, self.program) from error
 

@@ -8,10 +8,11 @@ from typing import Any
 import control as ct
 import numba
 import numpy as np
-from numba.core import config
 
 from .._errors import ParameterError
 from ._compile import OUT, RHS, VECTOR, Compiled
+from .codegen.fingerprint import function_key
+from .codegen.machine_code import Wanted, machine_code
 
 MATRIX = numba.float64[:, ::1]
 LOOP = numba.int64(
@@ -69,7 +70,7 @@ def _check_times(system: Any, times: np.ndarray) -> None:
     steps = np.diff(times)
     if not ct.isdtime(system, strict=True):
         raise ParameterError(f"'{system.name}' has dt = {system.dt} and is no discrete-time system")
-    wanted = steps[0] if system.dt is True else system.dt
+    wanted = steps[:1].sum() if system.dt is True else system.dt  # a single time fits any
     for k in np.flatnonzero(~np.isclose(steps, wanted))[:1]:
         raise ParameterError(
             f"'{system.name}' is sampled every {wanted:g} s, but timepts {times[k]:g} and "
@@ -80,9 +81,10 @@ def _check_times(system: Any, times: np.ndarray) -> None:
 @functools.cache
 def _loop() -> Any:
     """Return the loop as machine code; without JIT as it stands."""
-    if getattr(config, "DISABLE_JIT", False):
-        return _iterate
-    return numba.njit(LOOP, cache=True, nogil=True, error_model="numpy")(_iterate)
+    options = {"error_model": "numpy", "nogil": True}
+    wanted = Wanted(function=_iterate, signature=LOOP, options=options)
+    (loop,) = machine_code(function_key(_iterate), [wanted])
+    return loop
 
 
 def _iterate(rhs, out, times, inputs, p, states, outputs, g):

@@ -14,11 +14,11 @@ import numpy as np
 
 from .._names import unknown
 from .._param import checked_times
+from .._run_arguments import input_array
 from ._compile import Compiled
 from ._lane import RUNNING, STIFF, Status
 from ._machine import WIDTH, compile_for, machine
 from ._members import Members, members
-from ._response import input_array
 from ._simulate import Settings, Trajectory, begin, finish, go_on, made, prepared, trajectory
 from .audit import Audit, Trial
 from .audit import audit as compare
@@ -129,17 +129,18 @@ def ensemble_response(
         If machine code and python-control differ.
     ParameterError
         If `timepts` is no increasing grid or does not fit a discrete-time diagram, arrays have
-        different lengths, or a value is refused; the message then names the member.
+        different lengths, or a value is refused; the message then names the member.  Inputs and
+        initial states must be finite.
     UnknownNameError
         If a parameter, state or signal does not exist.
     """
     times = checked_times(timepts)
-    every = members(compiled, params or {}, initial_state or {})
+    every = members(compiled, params or {}, {} if initial_state is None else initial_state)
     labels = compiled.system.output_labels
     for signal in (*keep, *(s for m in metrics for s in m.signals)):
         if signal not in labels:
             raise unknown("signal", signal, labels)
-    u = input_array(inputs, compiled.system.ninputs or 0, times)
+    u = input_array(compiled.system, inputs, times)
     settings = Settings(rtol=rtol, atol=atol, max_steps=max_steps, method=method or "auto")
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
     _, p = every.batch(range(1), WIDTH)  # checks all members before anything runs

@@ -22,6 +22,9 @@ from ._lane import INNER, LANES, RUNNING
 from ._restart import memory_rates, restart, start
 from ._stiff import stiff_attempt
 from ._work import AUTO, OUT, RESTART, RHS, STIFF_ATTEMPT, TASK, WORK, inputs_at, outputs
+from .codegen.fingerprint import function_key
+from .codegen.machine_code import Wanted
+from .codegen.machine_code import machine_code as stored_code
 
 _ONCE = threading.Lock()  # of several threads that begin at the same time one compiles
 
@@ -185,25 +188,38 @@ def advance(rhs, restart, stiff_attempt, task, lanes, w, states, rounds):
 
 
 def machine_code() -> dict[str, Callable[..., None]]:
-    """Return the compiled functions: made when first needed, from the cache in later sessions."""
+    """Return the compiled functions: made when first needed, kept for later sessions."""
     with _ONCE:
         return _machine_code()
 
 
-@functools.cache
-def _machine_code() -> dict[str, Callable[..., None]]:
+def integrator_key() -> str:
+    """Return a key that changes with whatever the integrators' machine code is made of."""
+    return function_key(*((each.function, each.signature.args) for each in _wanted()))
+
+
+def _wanted() -> list[Wanted]:
     def code(function, *arguments, **options):
         signature = numba.void(*arguments)
-        return numba.njit(signature, cache=True, error_model="numpy", **options)(function)
+        options = {"error_model": "numpy", **options}
+        return Wanted(function=function, signature=signature, options=options)
 
     rarely, often = {"no_cpython_wrapper": True}, {"nogil": True}
     common, samples = (TASK, LANES, WORK), numba.float64[:, :, ::1]
-    again = code(restart, *RESTART.signature.args, **rarely)
-    stiff = code(stiff_attempt, *STIFF_ATTEMPT.signature.args, **rarely)
-    begin = code(start, RHS, RESTART, *common, **often)
-    go_on = code(advance, RHS, RESTART, STIFF_ATTEMPT, *common, samples, numba.int64, **often)
+    return [
+        code(restart, *RESTART.signature.args, **rarely),
+        code(stiff_attempt, *STIFF_ATTEMPT.signature.args, **rarely),
+        code(start, RHS, RESTART, *common, **often),
+        code(advance, RHS, RESTART, STIFF_ATTEMPT, *common, samples, numba.int64, **often),
+        code(outputs, RHS, OUT, TASK, WORK, samples, samples, **often),
+    ]
+
+
+@functools.cache
+def _machine_code() -> dict[str, Callable[..., None]]:
+    again, stiff, begin, go_on, fill = stored_code(integrator_key(), _wanted())
     return {
         "start": lambda rhs, *rest: begin(rhs, again, *rest),
         "advance": lambda rhs, *rest: go_on(rhs, again, stiff, *rest),
-        "outputs": code(outputs, RHS, OUT, TASK, WORK, samples, samples, **often),
+        "outputs": fill,
     }

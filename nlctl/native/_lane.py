@@ -24,7 +24,6 @@ FIRST_PATIENCE = 15
 # for functions that only machine code calls: without a way in from Python, which would have to be
 # compiled as well
 INNER = {
-    "cache": True,
     "error_model": "numpy",
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,

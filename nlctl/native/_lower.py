@@ -7,11 +7,9 @@ once, whatever depends on parameters alone in advance.
 
 from __future__ import annotations
 
-import hashlib
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -21,8 +19,7 @@ from numba.core.errors import NumbaWarning
 
 from .._equation import equation
 from . import _vector_math, _vector_memory, _vector_type
-from ._cache import loaded
-from ._compile import _jitted
+from ._compile import TAUGHT, _jitted
 from ._emit import Program
 from ._lower_blocks import Call, Equations, equations
 from ._lower_emit import written
@@ -31,11 +28,15 @@ from ._parameters import length
 from ._schedule import Schedule
 from ._trace_graph import Expr
 from ._vector_math import FUNCTIONS
+from .codegen.fingerprint import module_key
+from .codegen.machine_code import Wanted, machine_code
+from .codegen.module import loaded
 
 VECTOR, MATRIX = numba.float64[::1], numba.float64[:, ::1]
 PREPARE = numba.void(MATRIX, MATRIX)
 RHS = numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX)
 OUT = numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX)
+VECTORS = (_vector_math, _vector_memory, _vector_type)  # code that numba is taught
 MEMORY = ("load", "store", "gather", "store_first", "repeated", "first", "total", "select")
 
 
@@ -210,12 +211,18 @@ def lowered_code(lowered: Lowered) -> tuple[Any, Any, Any]:
     if getattr(config, "DISABLE_JIT", False):
         return plain_functions(lowered)
     module = loaded(lowered, {name: _jitted(f) for name, f in lowered.functions.items()})
-    options = {"cache": True, "error_model": "numpy", "nogil": True}
+    options = {"error_model": "numpy", "nogil": True}
+    signatures = {"prepare": PREPARE, "rhs": RHS, "out": OUT}
+    wanted = [
+        Wanted(function=getattr(module, name), signature=signature, options=options)
+        for name, signature in signatures.items()
+    ]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NumbaWarning)  # "cannot cache": that costs time only
-        prepare = numba.njit(PREPARE, **options)(module.prepare)
-        rhs = numba.njit(RHS, **options)(module.rhs)
-        return prepare, rhs, numba.njit(OUT, **options)(module.out)
+        warnings.simplefilter("ignore", NumbaWarning)  # of what the user need not know
+        prepare, rhs, out = machine_code(
+            f"{module.__name__} {module_key(*TAUGHT, *VECTORS)}", wanted
+        )
+        return prepare, rhs, out
 
 
 def _stores(name: str, row: int, array: Any) -> list[Store]:
@@ -280,13 +287,5 @@ def _unpacked(call: Call) -> list[str]:
     return [*given, *call.lines]
 
 
-def _digest() -> str:
-    """Return a number for the code generators that a program's key cannot see into."""
-    digest = hashlib.sha256()
-    for module in (_vector_math, _vector_memory, _vector_type):
-        digest.update(Path(module.__file__ or "").read_bytes())
-    return digest.hexdigest()
-
-
 _NAMES = {name: getattr(_vector_memory, name) for name in MEMORY} | FUNCTIONS
-_NAMES |= {"equation": equation, "vector_code": _digest()}
+_NAMES |= {"equation": equation}

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._block import Block
-from .._diagram import state_names
+from .._diagram import initial_state, state_names
 from .._errors import ParameterError, UsageError
 from .._names import Parameters, base_name, find_name
-from .._param import equation_arguments, with_overrides
+from .._param import as_numbers, equation_arguments, with_overrides
 from ._compile import Compiled
 from ._parameters import Slot, filled
-from ._response import state_array
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -112,7 +111,7 @@ class Members:
 
     @cached_property
     def _first_state(self) -> np.ndarray:
-        return state_array(self.compiled.system, None)
+        return initial_state(self.compiled.system)
 
     @cached_property
     def _first_vector(self) -> np.ndarray:
@@ -151,19 +150,43 @@ def members(compiled: Compiled, params: Mapping[str, Any], states: Mapping[str, 
     Raises
     ------
     ParameterError
-        If arrays have different lengths.
+        If arrays have different lengths, or an initial state is not a finite number.
     UnknownNameError
         If a state does not exist.
     """
+    if not isinstance(states, Mapping):
+        raise ParameterError(
+            "initial_state of an ensemble goes by name, {'plant.x1': array of shape (members,)}, "
+            f"got {type(states).__name__}"
+        )
     index = dict.fromkeys(state_names(compiled.system))
     values = {name: np.asarray(value) for name, value in params.items()}
-    initial = {find_name("state", name, index): np.asarray(v) for name, v in states.items()}
+    initial = {}
+    for name, value in states.items():
+        full = find_name("state", name, index)
+        initial[full] = _finite(full, value)
     columns = {**values, **{f"{k}(0)": v for k, v in initial.items()}}
     sizes = {name: array.shape[0] for name, array in columns.items() if array.ndim}
     if len(set(sizes.values())) > 1:
         raise ParameterError(f"an ensemble needs arrays of one length, got {sizes}")
     size = next(iter(sizes.values()), 1)
     return Members(compiled=compiled, params=values, states=initial, size=size)
+
+
+def _finite(name: str, value: Any) -> np.ndarray:
+    """Return the initial values of a state."""
+    array = as_numbers(value)
+    if array is None or array.ndim > 1:
+        raise ParameterError(
+            f"initial_state of '{name}' needs a number, or one for each member, got {value!r}"
+        )
+    for i in np.flatnonzero(~np.isfinite(array))[:1]:
+        where = f", member {i}" if array.ndim else ""
+        raise ParameterError(
+            f"initial_state has {array.flat[i]} at '{name}'{where}: "
+            "every state needs a finite number"
+        )
+    return array
 
 
 def _one(values: np.ndarray, number: int) -> Any:

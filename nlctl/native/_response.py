@@ -8,8 +8,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._diagram import initial_state as state_of
-from .._errors import DivergedError, ParameterError
+from .._errors import DivergedError
+from .._run_arguments import evaluation_array, input_array, interpolated, state_array
 from ._compile import Compiled
 from ._lane import Status
 from ._simulate import Settings, Statistics, Trajectory, trajectory
@@ -29,13 +29,21 @@ def respond(
     inputs: Any = 0.0,
     initial_state: Mapping[str, float] | Any = None,
     *,
+    settings: Settings,
     params: Mapping[str, Any] | None = None,
+    evaluation_times: Any = "T",
     ignore_errors: bool = False,
     progress: Callable[[float], object] | None = None,
     audit: Audit = True,
-    **settings: Any,
+    **form: Any,
 ) -> Response:
     """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments.
+
+    Parameters
+    ----------
+    settings : Settings
+    **form
+        ``squeeze``, ``transpose`` and ``return_states`` of the response.
 
     Raises
     ------
@@ -48,9 +56,13 @@ def respond(
         If an argument has a wrong shape, or times do not fit a discrete-time diagram.
     """
     system = compiled.system
-    u, x0 = input_array(inputs, system.ninputs or 0, times), state_array(system, initial_state)
+    wanted = evaluation_array(evaluation_times, times)
+    u, x0 = input_array(system, inputs, times), state_array(system, initial_state)
+    grid = times if wanted is times else _grid(system, times, wanted)
+    if grid is not times:
+        u = interpolated(u, times, grid)
     p = compiled.parameter_vector(params)
-    made = trajectory(compiled, times, u, x0, p, Settings(**settings), progress)
+    made = trajectory(compiled, grid, u, x0, p, settings, progress)
     trial = Trial(time=made.time, states=made.states, inputs=u, p=p, params=params, width=1)
     compare(compiled, trial, audit)
     run = made.statistics
@@ -58,7 +70,19 @@ def respond(
         raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error goes on
     if run.status is not Status.OK and not ignore_errors:
         raise DivergedError(_message(system, run), run.time)
-    return _response(compiled, made, u[:, : made.time.size], params)
+    shown = np.flatnonzero(np.isin(made.time, wanted))
+    return _response(compiled, made, u, shown, params, form)
+
+
+def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return the times of a run with inputs at `times` that is `wanted` at other times.
+
+    A sampled system starts with the first of these; in between inputs are linear, and have their
+    corners where they were given.
+    """
+    if system.isdtime(strict=True):
+        return wanted
+    return np.union1d(times if system.ninputs else times[[0, -1]], wanted)
 
 
 def uninterrupted(response: Any) -> Any:
@@ -84,15 +108,20 @@ def _message(system: ct.InputOutputSystem, run: Statistics) -> str:
 
 
 def _response(
-    compiled: Compiled, made: Trajectory, inputs: np.ndarray, params: Mapping[str, Any] | None
+    compiled: Compiled,
+    made: Trajectory,
+    inputs: np.ndarray,
+    shown: np.ndarray,
+    params: Mapping[str, Any] | None,
+    form: Mapping[str, Any],
 ) -> Response:
     system, run = compiled.system, made.statistics
     ok = run.status is Status.OK
     response = Response(
-        made.time,
-        made.outputs,
-        made.states,
-        inputs,
+        made.time[shown],
+        made.outputs[:, shown],
+        made.states[:, shown],
+        inputs[:, shown],
         issiso=system.issiso(),
         params=dict(system.params) | dict(params or {}),
         output_labels=system.output_labels,
@@ -102,51 +131,9 @@ def _response(
         sysname=system.name,
         success=ok,
         message=None if ok else _message(system, run),
+        squeeze=form.get("squeeze"),
+        transpose=form.get("transpose", False),
+        return_x=form.get("return_states", False),
     )
     response.statistics = run
     return response
-
-
-def input_array(inputs: Any, count: int, times: np.ndarray) -> np.ndarray:
-    """Return the inputs as an array of shape (count, m), as python-control reads them.
-
-    Raises
-    ------
-    ParameterError
-        If the shape fits neither one input over time nor all of them.
-    """
-    shape = (count, times.size)
-    if isinstance(inputs, list | tuple) and len(inputs) == count and count > 1:
-        try:
-            rows = [np.broadcast_to(np.asarray(u, dtype=float), times.shape) for u in inputs]
-        except ValueError:
-            raise ParameterError(f"inputs need shape {shape}, or one entry per input") from None
-        return np.ascontiguousarray(rows)
-    array = np.asarray(inputs, dtype=float)
-    if array.ndim == 0:
-        return np.full(shape, float(array))
-    if array.ndim == 1 and count == 1:
-        array = array[None, :]
-    if array.shape != shape:
-        raise ParameterError(f"inputs need shape {shape} for these times, got {array.shape}")
-    return np.ascontiguousarray(array)
-
-
-def state_array(system: ct.InputOutputSystem, initial_state: Any) -> np.ndarray:
-    """Return the initial state as an array: by name, as a whole, or one number for all.
-
-    Raises
-    ------
-    ParameterError
-        If an array has the wrong length.
-    """
-    if initial_state is None or isinstance(initial_state, Mapping):
-        return state_of(system, initial_state)
-    array = np.asarray(initial_state, dtype=float).reshape(-1)
-    if array.size == 1:
-        return np.full(system.nstates or 0, array[0])
-    if array.size != system.nstates:
-        raise ParameterError(
-            f"initial_state needs {system.nstates} values for '{system.name}', got {array.size}"
-        )
-    return array.copy()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import control as ct
@@ -48,6 +49,9 @@ class Settings:
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
+        for name in ("rtol", "atol", "step", "max_steps"):
+            if not isinstance(getattr(self, name), Real):
+                raise ParameterError(f"{name} must be one number, got {getattr(self, name)!r}")
         for name in ("rtol", "atol"):
             if not 0 < getattr(self, name) < np.inf:
                 raise ParameterError(f"{name} must be > 0, got {getattr(self, name)!r}")

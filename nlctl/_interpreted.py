@@ -1,0 +1,98 @@
+"""A run in python-control, which ends where the state leaves the finite numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ._errors import DivergedError
+from ._run_arguments import Run, evaluation_array, input_array, state_array
+
+STANDSTILL = 200  # steps in a row that do not advance the time
+
+
+def interpreted(run: Run) -> ct.TimeResponseData:
+    """Run a diagram in python-control.
+
+    Raises
+    ------
+    DivergedError
+        If the state becomes infinite or NaN.
+    """
+    system, times, params, solver = run.system, run.times, run.params, run.solver
+    # a function that declares no numbers of inputs or states gets what it is given
+    inputs = run.inputs if system.ninputs is None else input_array(system, run.inputs, times)
+    whole = system.nstates is None and run.initial_state is not None
+    x0: Any = run.initial_state if whole else state_array(system, run.initial_state)
+    simulate: Any = ct.input_output_response  # its types are those of the defaults
+    watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
+    settings = {"rtol": solver["rtol"], "atol": solver["atol"], "events": watch}
+    with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
+        try:
+            response = simulate(
+                system,
+                times,
+                inputs,
+                x0,
+                params=dict(params or {}),
+                ignore_errors=run.ignore_errors,
+                evaluation_times=evaluation_array(run.evaluation_times, times),
+                solve_ivp_method=solver["method"] or solver["solve_ivp_method"] or "LSODA",
+                solve_ivp_kwargs=settings | solver["solve_ivp_kwargs"],
+                **run.form,
+            )
+        except RuntimeError as error:
+            # python-control takes a NaN signal for an algebraic loop: it never equals itself
+            if watch.reached > times[0] or _overflows(system, times[0], x0, params):
+                raise _diverged(system, watch.reached) from error
+            raise
+    if not np.all(np.isfinite(response.y)):
+        raise _diverged(system, watch.reached)
+    return response
+
+
+@dataclass
+class _Watch:
+    """An event for `solve_ivp` that never happens but sees every accepted step.
+
+    It stops a run whose state is not finite, and one whose time stands still: at a finite escape
+    time LSODA repeats a vanishing step for ever.
+    """
+
+    system: ct.InputOutputSystem
+    reached: float
+    progress: Callable[[float], object] | None
+    repeated: int = 0
+
+    def __call__(self, t: float, x: np.ndarray) -> float:
+        self.repeated = self.repeated + 1 if t <= self.reached else 0
+        if self.repeated > STANDSTILL or not np.all(np.isfinite(x)):
+            raise _diverged(self.system, self.reached)
+        self.reached = max(float(t), self.reached)
+        if self.progress is not None:
+            self.progress(float(t))
+        return 1.0
+
+
+def _overflows(system: ct.NonlinearIOSystem, t: float, x0: Any, params: Any) -> bool:
+    """Whether the right-hand side leaves the finite numbers at the start already."""
+    try:
+        with np.errstate(over="raise", invalid="raise"):
+            system.dynamics(t, x0, np.zeros(system.ninputs or 0), params)
+    except FloatingPointError:
+        return True
+    except RuntimeError:
+        return False
+    return False
+
+
+def _diverged(system: ct.InputOutputSystem, time: float) -> DivergedError:
+    return DivergedError(
+        f"'{system.name}' diverged: no finite state after t = {time:.6g} s; "
+        "simulate up to then to see how",
+        float(time),
+    )

@@ -1,0 +1,246 @@
+"""The arguments of a run: read as python-control reads them, and checked where they enter."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ._diagram import initial_state as state_of
+from ._diagram import state_names
+from ._errors import ParameterError, UnknownKeywordError
+from ._names import unknown
+from ._param import as_numbers
+
+ALIASES = {  # python-control's short names
+    **{"T": "timepts", "U": "inputs", "X0": "initial_state"},
+    **{"t_eval": "evaluation_times", "return_x": "return_states"},
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """The arguments of a run that both engines take."""
+
+    system: Any
+    times: np.ndarray
+    inputs: Any
+    initial_state: Any
+    evaluation_times: Any
+    params: Mapping[str, Any] | None
+    progress: Callable[[float], object] | None
+    ignore_errors: bool
+    audit: bool | str
+    form: Mapping[str, Any]  # squeeze, transpose, return_states
+    solver: Mapping[str, Any]  # method, rtol, ..., and what SciPy is told
+
+
+def with_aliases(
+    given: Mapping[str, Any], aliases: Mapping[str, Any], defaults: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return arguments by their full names.
+
+    Parameters
+    ----------
+    given : mapping
+        Those that have a short name as well, by their full names.
+    aliases : mapping
+        Those that were given by another name.
+    defaults : mapping
+        Of all arguments, by their full names.
+
+    Raises
+    ------
+    UnknownKeywordError
+        If there is no such name.
+    ParameterError
+        If an argument is given twice, or there are no times.
+    """
+    found = dict(given)
+    for name, value in aliases.items():
+        full = ALIASES.get(name)
+        if full is None:
+            names = [*(k for k in defaults if k != "aliases"), *ALIASES]
+            where = "of input_output_response"
+            raise unknown("argument", name, names, where, UnknownKeywordError)
+        if given[full] is not defaults[full]:
+            raise ParameterError(f"'{full}' is given twice, as {full}= and as {name}=")
+        found[full] = value
+    if found["timepts"] is None:
+        raise ParameterError("timepts is missing: give the times of the response, in s")
+    return found
+
+
+def unified(run: Run) -> Run:
+    """Return a run with each of SciPy's arguments in one place.
+
+    ``solve_ivp_kwargs`` may hold ``method`` and ``t_eval``, which are arguments as well.
+    """
+    keywords, solver = run.solver["solve_ivp_kwargs"] or {}, dict(run.solver)
+    if not isinstance(keywords, Mapping):
+        raise ParameterError(f"solve_ivp_kwargs needs a mapping, got {keywords!r}")
+    keywords, wanted = dict(keywords), run.evaluation_times
+    if keywords.get("t_eval") is not None:
+        if not (isinstance(wanted, str) and wanted == "T"):
+            raise ParameterError("'t_eval' is given twice, also in solve_ivp_kwargs")
+        wanted = keywords["t_eval"]
+    keywords.pop("t_eval", None)
+    inner = keywords.pop("method", None)
+    methods = [m for m in (solver["method"], solver["solve_ivp_method"], inner) if m is not None]
+    if len(methods) > 1:
+        raise ParameterError(f"the method is given twice: {methods[0]!r} and {methods[1]!r}")
+    solver |= {"solve_ivp_method": solver["solve_ivp_method"] or inner}
+    return replace(run, evaluation_times=wanted, solver=solver | {"solve_ivp_kwargs": keywords})
+
+
+def input_array(system: ct.InputOutputSystem, inputs: Any, times: np.ndarray) -> np.ndarray:
+    """Return the inputs of a run over its times.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+    inputs : array_like or float
+        A number for all inputs at all times; an array of shape (ninputs, m), or (m,) for one
+        input; or a list, whose entries follow each other: a number is one input, an array of
+        shape (m,) one input over time, one of another length as many constant inputs, one of
+        shape (k, m) k inputs.
+    times : ndarray of shape (m,)
+
+    Returns
+    -------
+    ndarray of shape (ninputs, m)
+
+    Raises
+    ------
+    ParameterError
+        If the shape does not fit, or a value is not a finite number; the message names the input
+        and the time.
+    """
+    count = system.ninputs or 0
+    shape = (count, times.size)
+    array = as_numbers(inputs)
+    if array is not None and array.ndim == 0:
+        array = np.full(shape, float(array))
+    if array is not None and array.ndim == 1 and count == 1:
+        array = array[None, :]
+    if (array is None or array.shape != shape) and isinstance(inputs, list | tuple):
+        array = _stacked(inputs, times.size)
+    if array is None:
+        raise ParameterError(f"inputs need real numbers, got {_short(inputs)}")
+    if array.shape != shape:
+        raise ParameterError(f"inputs need shape {shape} for these times, got {array.shape}")
+    for i, k in np.argwhere(~np.isfinite(array))[:1]:
+        raise ParameterError(
+            f"inputs has {array[i, k]} at '{system.input_labels[i]}', t = {times[k]:g} s: "
+            "every input needs a finite number at every time"
+        )
+    return np.array(array, dtype=float, order="C")
+
+
+def _stacked(entries: Sequence[Any], samples: int) -> np.ndarray:
+    """Return the rows of all entries of a list of inputs."""
+    rows = []
+    for number, entry in enumerate(entries):
+        array = as_numbers(entry)
+        if array is None:
+            raise ParameterError(f"inputs[{number}] needs real numbers, got {_short(entry)}")
+        if array.ndim < 2 and array.shape != (samples,):
+            array = np.outer(array, np.ones(samples))  # constant inputs
+        array = np.atleast_2d(array)
+        if array.ndim > 2 or array.shape[1] != samples:
+            raise ParameterError(
+                f"inputs[{number}] has shape {array.shape}: a block of inputs needs shape "
+                f"(k, {samples}) for these times"
+            )
+        rows.append(array)
+    return np.vstack(rows) if rows else np.zeros((0, samples))
+
+
+def state_array(system: ct.InputOutputSystem, initial_state: Any = None) -> np.ndarray:
+    """Return the initial state of a run.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+    initial_state : mapping or array_like, optional
+        By name, as in `nlctl.initial_state`; None for the blocks' own.  A number holds for all
+        states; an array, or a list of numbers and arrays behind each other, for the first ones:
+        the others start at 0.
+
+    Returns
+    -------
+    ndarray of shape (nstates,)
+
+    Raises
+    ------
+    ParameterError
+        If there are more values than states, or one is not a finite number; the message names
+        the state.
+
+    Warns
+    -----
+    UserWarning
+        If there are fewer values than states and the last one is not 0.
+    """
+    if initial_state is None or isinstance(initial_state, Mapping):
+        return state_of(system, initial_state)
+    size = system.nstates or 0
+    given = initial_state if isinstance(initial_state, list | tuple) else [initial_state]
+    parts = [as_numbers(part) for part in given]
+    for part, entry in zip(parts, given, strict=True):
+        if part is None:
+            raise ParameterError(f"initial_state needs real numbers, got {_short(entry)}")
+    x = np.concatenate([np.zeros(0), *(part.reshape(-1) for part in parts if part is not None)])
+    if np.isscalar(initial_state):
+        x = np.full(size, x[0])
+    if x.size > size:
+        raise ParameterError(f"initial_state needs {size} values for '{system.name}', got {x.size}")
+    if 0 < x.size < size and x[-1] != 0.0:
+        warnings.warn("initial_state too short; padding with zeros", stacklevel=2)
+    x = np.concatenate([x, np.zeros(size - x.size)])
+    for i in np.flatnonzero(~np.isfinite(x))[:1]:
+        raise ParameterError(
+            f"initial_state has {x[i]} at '{state_names(system)[i]}': "
+            "every state needs a finite number"
+        )
+    return x
+
+
+def evaluation_array(evaluation_times: Any, times: np.ndarray) -> np.ndarray:
+    """Return the times at which a response is wanted: those of the inputs if it is "T".
+
+    Raises
+    ------
+    ParameterError
+        If they are not finite and increasing, or lie outside of `times`.
+    """
+    if isinstance(evaluation_times, str) and evaluation_times == "T":
+        return times
+    wanted = as_numbers(evaluation_times)
+    if wanted is None or wanted.ndim != 1 or not wanted.size:
+        raise ParameterError(
+            "evaluation_times needs a list of times, or 'T' for timepts, got "
+            f"{_short(evaluation_times)}: nlctl keeps no steps of the integrator"
+        )
+    if not np.all(np.isfinite(wanted)) or not np.all(np.diff(wanted) > 0):
+        raise ParameterError("evaluation_times needs finite times in increasing order")
+    for t in wanted[(wanted < times[0]) | (wanted > times[-1])][:1]:
+        raise ParameterError(
+            f"evaluation_times has {t:g} s, outside of timepts from {times[0]:g} to {times[-1]:g} s"
+        )
+    return wanted
+
+
+def interpolated(inputs: np.ndarray, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return inputs (ninputs, m), which are linear between their times, at other times."""
+    rows = [np.interp(wanted, times, row) for row in inputs]
+    return np.array(rows).reshape(len(inputs), wanted.size)
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) < 60 else f"{text[:56]} ..."
