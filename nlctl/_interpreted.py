@@ -9,7 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ._errors import DivergedError
+from ._errors import DivergedError, ParameterError
 from ._run_arguments import Run, evaluation_array, input_array, state_array
 
 STANDSTILL = 200  # steps in a row that do not advance the time
@@ -22,12 +22,19 @@ def interpreted(run: Run) -> ct.TimeResponseData:
     ------
     DivergedError
         If the state becomes infinite or NaN.
+    ParameterError
+        If inputs, initial state or times are refused.
     """
     system, times, params, solver = run.system, run.times, run.params, run.solver
     # a function that declares no numbers of inputs or states gets what it is given
     inputs = run.inputs if system.ninputs is None else input_array(system, run.inputs, times)
     whole = system.nstates is None and run.initial_state is not None
     x0: Any = run.initial_state if whole else state_array(system, run.initial_state)
+    wanted = run.evaluation_times  # None: the integrator's own steps
+    if wanted is not None:
+        wanted = evaluation_array(wanted, times)
+        if wanted.size == 1 and system.isdtime(strict=True):
+            raise ParameterError("evaluation_times of a sampled system needs two times, got one")
     simulate: Any = ct.input_output_response  # its types are those of the defaults
     watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
     settings = {"rtol": solver["rtol"], "atol": solver["atol"], "events": watch}
@@ -40,7 +47,7 @@ def interpreted(run: Run) -> ct.TimeResponseData:
                 x0,
                 params=dict(params or {}),
                 ignore_errors=run.ignore_errors,
-                evaluation_times=evaluation_array(run.evaluation_times, times),
+                evaluation_times=wanted,
                 solve_ivp_method=solver["method"] or solver["solve_ivp_method"] or "LSODA",
                 solve_ivp_kwargs=settings | solver["solve_ivp_kwargs"],
                 **run.form,

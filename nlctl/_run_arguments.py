@@ -224,7 +224,7 @@ def evaluation_array(evaluation_times: Any, times: np.ndarray) -> np.ndarray:
     if wanted is None or wanted.ndim != 1 or not wanted.size:
         raise ParameterError(
             "evaluation_times needs a list of times, or 'T' for timepts, got "
-            f"{_short(evaluation_times)}: nlctl keeps no steps of the integrator"
+            f"{_short(evaluation_times)}: machine code keeps no steps of its own"
         )
     if not np.all(np.isfinite(wanted)) or not np.all(np.diff(wanted) > 0):
         raise ParameterError("evaluation_times needs finite times in increasing order")

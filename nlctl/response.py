@@ -90,7 +90,8 @@ def input_output_response(
         Tolerances of the integrator.
     evaluation_times : array_like of shape (k,), optional
         Times in s at which the response is wanted, if not at `timepts`; they lie within these.
-        A sampled diagram starts with the first of them.  Also ``t_eval``.
+        A sampled diagram starts with the first of them.  With None python-control takes the
+        integrator's own steps, which machine code does not keep.  Also ``t_eval``.
     squeeze, transpose, return_states : bool, optional
         Form of the response, as in python-control: whether outputs lose axes of length 1, whether
         time is the first axis, and whether the response unpacks as time, outputs, states.  Also

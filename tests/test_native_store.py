@@ -242,7 +242,9 @@ class TestMachineCode:
         assert not second._can_compile  # other arguments are refused, as by a given signature
         assert len(list(folder.iterdir())) == 1
 
-    @pytest.mark.parametrize("damage", ["flip", "truncate", "empty", "random", "rename", "pickle"])
+    @pytest.mark.parametrize(
+        "damage", ["flip", "truncate", "empty", "random", "rename", "pickle", "library"]
+    )
     def test_a_damaged_entry_is_made_anew_without_a_word(self, folder, damage):
         """Right numbers, and an entry that is whole again."""
         code()
@@ -254,6 +256,10 @@ class TestMachineCode:
             os.replace(other, file)
         elif damage == "pickle":  # whole, but names what does not exist here
             store.write(file.stem, b"cmissing_module\nname\n.")
+        elif damage == "library":  # whole, but no code that LLVM can read
+            ((library, *rest),) = pickle.loads(store.read(file.stem))
+            broken = (*library[:2], (library[2][0], b"no bitcode"))
+            store.write(file.stem, pickle.dumps([(broken, *rest)]))
         else:
             flipped = bytearray(content)
             flipped[len(content) // 2] ^= 1

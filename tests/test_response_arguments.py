@@ -146,6 +146,19 @@ class TestAsInPythonControl:
         there = reference(SAMPLED, t, np.sin(t), 1.0, t_eval=wanted)
         agree(simulate(system_for("sampled", engine), t, np.sin(t), 1.0, t_eval=wanted), there)
 
+        (first,) = simulate(COMPILED["sampled"], t, np.sin(t), 1.0, t_eval=[0.3]).time
+        assert first == 0.3
+        with pytest.raises(nlctl.ParameterError, match="needs two times, got one"):
+            simulate(SAMPLED, t, np.sin(t), 1.0, t_eval=[0.3])
+
+    def test_the_steps_of_the_integrator(self):
+        """None in python-control; there are other times then than those of the inputs."""
+        made = simulate(ONE, T, 0, [1.0, 0.0], evaluation_times=None)
+        assert made.time[0] == 0.0
+        assert made.time[-1] == 1.0
+        assert made.time.size != M
+        np.testing.assert_allclose(made.outputs, np.cos(made.time), atol=1e-6)
+
     @pytest.mark.parametrize("engine", ENGINES)
     def test_short_names(self, engine):
         """T, U, X0, t_eval, return_x."""

@@ -97,8 +97,8 @@ def ensemble_response(
     compiled : Compiled
     timepts : array_like of shape (m,)
         Times in s at which signals are sampled.
-    inputs : array_like or float, optional
-        Inputs, the same for all members.
+    inputs : array_like, list or float, optional
+        Inputs, the same for all members, as in `nlctl.input_output_response`.
     initial_state, params : mapping, optional
         ``{"plant.p1": array of shape (members,)}``; a number holds for all members.
     metrics : sequence, optional

@@ -177,4 +177,7 @@ def _read(key: str) -> list[Any] | None:
 
 def _rebuilt(data: Any, target_context: Any) -> CompileResult | None:
     target_context.refresh()  # numba's own functions, as for compiling
-    return CompileResult._rebuild(target_context, *data)
+    try:
+        return CompileResult._rebuild(target_context, *data)
+    except Exception:  # LLVM does not find here what the code calls: it is compiled again
+        return None
