@@ -9,6 +9,7 @@ from nlctl._errors import ParameterError, UsageError
 from nlctl.native import AuditError, _lower_emit
 from nlctl.native._lower_blocks import _Reader
 from nlctl.native._trace_graph import Graph
+from nlctl.response import EngineWarning
 
 TIMES = np.linspace(0, 1, 11)
 N = 12
@@ -108,7 +109,7 @@ def test_a_planted_defect_is_found(defect, monkeypatch):
     start = {f"chain.x[{i}]": [value, 2 * value] for i, value in enumerate(X0)}
     with pytest.raises(AuditError, match=r"of block '(chain|sensor)'"):
         nlctl.ensemble_response(compiled, TIMES, initial_state=start)
-    with pytest.warns(nlctl.response.EngineWarning, match="takes over: machine code"):
+    with pytest.warns(EngineWarning, match="takes over: machine code"):
         taken = nlctl.input_output_response(diagram(), TIMES, 0, X0, engine="auto")
     np.testing.assert_allclose(taken.outputs, right.outputs, rtol=1e-6, atol=1e-8)
 

@@ -130,7 +130,7 @@ def holder(values: Iterable[Value]) -> Value:
 def one_of(values: Iterable[Value]) -> Any:
     """Return the choice between functions; UNKNOWN where not all values are functions."""
     values = tuple(values)
-    functions = all(isinstance(v.known, Local) or python_function(v.known) for v in values)
+    functions = all(callable(v.known) or isinstance(v.known, Local) for v in values)
     return OneOf(values) if values and functions else UNKNOWN
 
 
