@@ -50,7 +50,7 @@ def test_help_imports_nothing_heavy():
 
 def test_simulate_writes_what_was_asked_for(tmp_path):
     """The table starts from the initial state that was set; the figure is an SVG."""
-    result = nlctl(
+    result = nlctl_here(
         *("simulate", "example-1", "--until", "0.5", "--plot", "out.svg", "--csv", "out.csv"),
         *("--set", "actuator.b_r=0.6", "--set", "plant.x1(0)=0.8"),
         cwd=tmp_path,

@@ -8,7 +8,7 @@ import shlex
 
 import numpy as np
 import pytest
-from command_line import nlctl, nlctl_here
+from command_line import nlctl_here
 from rich.console import Console
 
 from analysis.lyapunov.ledger import ledger
@@ -32,7 +32,7 @@ def check(*arguments):
 
 def test_the_published_loop_holds_and_the_paper_does_not():
     """All corrected lines hold, and the literal reading of (31) is violated, with the time."""
-    done = nlctl("check", "example-1", "--json")
+    done = nlctl_here("check", "example-1", "--json")
     assert done.returncode == 0
     lines = {line["key"]: line for line in json.loads(done.stdout)["lines"]}
     assert lines["(31)"]["status"] == "checked"

@@ -135,7 +135,7 @@ class TestCertify:
     def test_delta_star_covers_the_run(self):
         """|g + d + G eps_u| along a run, from the plant's acceleration: x_n' - kG u."""
         loop, found = example_1(), plain()
-        run = nlctl.input_output_response(nlctl.compile(loop), np.linspace(0, 20, 2001))
+        run = nlctl.input_output_response(nlctl.compile(loop), np.linspace(0, 20, 501))
         signals = dict(zip(loop.output_labels, np.asarray(run.outputs), strict=True))
         x2_dot = [loop.dynamics(t, x, [])[1] for t, x in zip(run.time, run.states.T, strict=True)]
         u, v, x1 = signals["u"], signals["v"], signals["x1"]
@@ -184,6 +184,7 @@ class TestCertify:
             certify(nlctl.paper.example_1())
 
 
+@pytest.mark.slow
 def test_design_finds_gains_within_the_limit():
     """A smaller proved bound than that of the gains it starts from, for an |u| that is allowed."""
     loop = example_1()

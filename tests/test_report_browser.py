@@ -1,9 +1,9 @@
 """The page in a real browser: nothing fetched, nothing executed, sorting, filtering, reading."""
 
 import math
-import shutil
 
 import pytest
+from extras import needed, needed_program
 from test_report import made_up_runs
 from test_report_history import charted
 from test_report_page import HOSTILE, every_kind
@@ -12,10 +12,10 @@ from analysis.report import write_gallery, write_pdf, write_report
 from analysis.report.browser import BROWSERS
 from analysis.report.paper_report import paper_report
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
-CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=f"none of {', '.join(BROWSERS)} is there")
+pytestmark = pytest.mark.browser
+sync_api = needed("playwright.sync_api", "browser")
+axe = needed("axe_playwright_python.sync_playwright", "browser")
+CHROMIUM = needed_program(BROWSERS)
 
 PAGES = ("plain", "hostile", "long", "paper", "gallery", "charts", "hostile charts")
 PHONE = 390

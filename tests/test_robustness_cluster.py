@@ -7,6 +7,7 @@ import sys
 
 import pytest
 from command_line import nlctl_here
+from extras import needed
 from studies_example import write
 from sweep_examples import experiment, same
 
@@ -14,7 +15,8 @@ from analysis.robustness import independent, prepare
 from analysis.robustness.sweep import sweep
 from analysis.studies import load_result, read_study, run
 
-distributed = pytest.importorskip("distributed")
+pytestmark = pytest.mark.cluster
+distributed = needed("distributed", "cluster")
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,10 @@ from pathlib import Path
 
 import numpy
 import pytest
+from extras import needed
 
+pytestmark = pytest.mark.slow
+needed("build", "dev")
 ROOT = Path(__file__).parents[1]
 
 
