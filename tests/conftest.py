@@ -32,6 +32,11 @@ def pytest_collection_modifyitems(items):
             item.add_marker("slow")
 
 
+def many(examples):
+    """Number of examples of a test of random programs: a fifth where CI is not set."""
+    return examples if os.environ.get("CI") else examples // 5
+
+
 @pytest.fixture
 def ctrl_c():
     """Listen to Ctrl-C, here and in the processes that a test starts.

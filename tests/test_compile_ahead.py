@@ -75,6 +75,7 @@ def test_rows_of_an_experiment_and_their_metrics():
     assert np.all(np.isfinite(found["peak"]))
 
 
+@pytest.mark.slow
 def test_the_observed_loop_of_a_proof():
     loop = nlctl.paper.example_1()
     with compiling() as before:

@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from rows import each_row
 from test_report import made_up_runs, outline
 
 import nlctl
@@ -282,7 +283,7 @@ def test_the_envelope_is_the_largest_value_of_each_whole_window():
     np.testing.assert_array_equal(largest, [1, 7, 1])
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("plain", "shown"),
     [
         ("V' <= -alpha_1 V + [k G N + 1] zeta' + alpha_0", "V′ ≤ −α₁ V + [k G N + 1] ζ′ + α₀"),

@@ -20,6 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jinja2 import Environment, UndefinedError, nodes
 from matplotlib.figure import Figure as MatplotlibFigure
+from rows import each_row
 
 import analysis.report
 from analysis.report import (
@@ -362,7 +363,7 @@ def test_sort_keys_are_the_numbers_themselves(number):
         np.testing.assert_equal(float(key), float(number))
 
 
-@pytest.mark.parametrize("value", ["", "abc", "1 s", True, np.True_, None, [1]])
+@each_row("value", ["", "abc", "1 s", True, np.True_, None, [1]])
 def test_what_is_no_number_has_no_sort_key(value):
     """Units, words, truth values."""
     assert sort_key(value) == ""
@@ -424,7 +425,7 @@ def test_a_claim_shows_its_margin_and_leads_to_its_evidence():
     assert "margin" not in without.text
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "dois"),
     [
         ("see doi 10.1007/978-3-319-70136-3_22.", ["10.1007/978-3-319-70136-3_22"]),
