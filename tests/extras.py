@@ -1,28 +1,29 @@
-"""What only some machines have: skipped where it is missing, but never where CI is set."""
+"""What only some machines have: tests skip where it is missing, but fail where CI is set."""
 
 import importlib
 import os
 import shutil
 from types import ModuleType
+from typing import NoReturn
 
 import pytest
 
 
 def needed(module: str, extra: str) -> ModuleType:
-    """Import a module of an extra, or skip all tests of the module that asks for it."""
+    """Import a module of an extra; for fixtures and tests, since what is not run needs nothing."""
     try:
         return importlib.import_module(module)
     except ImportError:
-        if os.environ.get("CI"):
-            raise
-    pytest.skip(f"needs {module}: pip install '.[{extra}]'", allow_module_level=True)
+        missing(f"needs {module}: pip install '.[{extra}]'")
 
 
 def needed_program(names: tuple[str, ...]) -> str:
-    """Find a program by any of its names, or skip all tests of the module that asks for it."""
-    found = next(filter(None, map(shutil.which, names)), None)
-    if found is None and os.environ.get("CI"):
-        raise FileNotFoundError(f"none of {', '.join(names)} is installed")
-    if found is None:
-        pytest.skip(f"needs one of {', '.join(names)}", allow_module_level=True)
-    return found
+    """Find a program by any of its names."""
+    return next(filter(None, map(shutil.which, names)), None) or missing(f"needs {names[0]}")
+
+
+def missing(reason: str) -> NoReturn:
+    """Skip the test that is running, or fail it in continuous integration."""
+    if os.environ.get("CI"):
+        pytest.fail(reason)
+    pytest.skip(reason)

@@ -16,11 +16,15 @@ from analysis.robustness.sweep import sweep
 from analysis.studies import load_result, read_study, run
 
 pytestmark = pytest.mark.cluster
-distributed = needed("distributed", "cluster")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def distributed():
+    return needed("distributed", "cluster")
 
 
 @pytest.fixture(scope="module")
-def client():
+def client(distributed):
     """Two worker processes; their nannies start new ones in place of killed ones."""
     with (
         distributed.LocalCluster(
