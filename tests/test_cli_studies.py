@@ -17,7 +17,7 @@ from studies_example import HEAD, ROWS, write
 from analysis.studies import load_result, read_study
 from analysis.studies import run as run_study
 
-MANY = ROWS.replace("size = 200", "size = 6000")
+MANY = ROWS.replace("size = 200", "size = 3000")
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +142,7 @@ def test_ctrl_c_is_exit_code_130_and_prints_how_to_go_on(folder):
     code, out, told = interrupted(arguments, lambda: list(chunks.glob("*.parquet")), folder)
     assert code == 130, (out, told)
     kept = load_result(folder / "long")
-    assert 0 < kept.rows.done < 6000
+    assert 0 < kept.rows.done < 3000
     assert not kept.complete
     command = told.strip().splitlines()[-1].removeprefix("continue with: ")
     assert command == "nlctl run long.toml --resume --out long --jobs 1"
@@ -198,7 +198,7 @@ def assert_same(one, other):
     assert one.plain() == other.plain()
     first, second = (made.rows.table.drop(columns="wall_time") for made in (one, other))
     pd.testing.assert_frame_equal(first, second)
-    np.testing.assert_array_equal(first.index, range(6000))
+    np.testing.assert_array_equal(first.index, range(3000))
 
 
 @pytest.mark.slow

@@ -148,6 +148,7 @@ def test_flat_parameters_of_foreign_blocks_resolve_as_in_python_control(diagram,
     compare(diagram, params={"gain": gain, "k": k}, points=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [nlctl.paper.example_1, nlctl.paper.example_2])
 def test_examples_in_machine_code(make):
     """Compiled right-hand sides of the paper's loops equal the interpreted ones."""

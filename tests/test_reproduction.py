@@ -55,6 +55,7 @@ def measure(result):
     return measured(result.case, result.time, result.signals)
 
 
+@pytest.mark.slow
 def test_example_1_holds_to_the_digits_given():
     """States at the end agree in every digit given, peaks to 1e-6 (read between samples)."""
     tight = {"method": "DOP853", "solve_ivp_kwargs": {"rtol": 1e-13, "atol": 1e-14}}
