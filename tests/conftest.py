@@ -1,7 +1,11 @@
 """What several test modules share: hypothesis settings, gains to make diagrams of, margins."""
 
+import os
+import signal
+
 import control as ct
 import pandas as pd
+import pytest
 from hypothesis import settings
 
 import nlctl
@@ -9,6 +13,39 @@ import nlctl
 # The same examples in every run, and no clocks.
 settings.register_profile("nlctl", deadline=None, derandomize=True, database=None, max_examples=50)
 settings.load_profile("nlctl")
+
+
+def pytest_configure(config):
+    """Keep machine code in one folder for all workers, the processes they start and later runs.
+
+    `pytest --cache-clear` empties it.
+    """
+    if "NLCTL_CACHE_DIR" not in os.environ and getattr(config, "cache", None) is not None:
+        os.environ["NLCTL_CACHE_DIR"] = str(config.cache.mkdir("machine-code"))
+
+
+@pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
+def pytest_collection_modifyitems(items):
+    """Count what needs a browser, a cluster or other people's tests as slow."""
+    for item in items:
+        if any(item.get_closest_marker(name) for name in ("browser", "cluster", "upstream")):
+            item.add_marker("slow")
+
+
+def many(examples):
+    """Number of examples of a test of random programs: a fifth where CI is not set."""
+    return examples if os.environ.get("CI") else examples // 5
+
+
+@pytest.fixture
+def ctrl_c():
+    """Listen to Ctrl-C, here and in the processes that a test starts.
+
+    Shells let what they start in the background ignore SIGINT, and children inherit that.
+    """
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @nlctl.record

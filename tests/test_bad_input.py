@@ -7,6 +7,7 @@ import control as ct
 import numpy as np
 import pytest
 from conftest import chain, foreign, gain, out
+from rows import each_row
 
 import nlctl
 from nlctl import AmbiguousNameError, DiagramError, ParameterError, UnknownNameError
@@ -23,7 +24,7 @@ def refused(error, *told):
     return pytest.raises(error, match=f"(?s)^{pieces}")
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("cls", "values", "told"),
     [
         ("GaussianBasis", {"widths": -2.0}, ["widths[0] > 0", "-2"]),
@@ -65,7 +66,7 @@ def low_order(order):
     return {"reference": nlctl.SumOfSines(order=order)}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("make", "choices", "error", "told"),
     [
         (example_1, low_order(1), ParameterError, ["1 derivatives", "order 2 needs 2"]),
@@ -99,7 +100,7 @@ def test_examples(make, choices, error, told):
 
 
 class TestJoining:
-    @pytest.mark.parametrize(
+    @each_row(
         ("parts", "inputs", "outputs", "error", "told"),
         [
             ("u>a>m mm>b>y", "u", "y", DiagramError, ["'b'", "'mm'", "nearest: 'm'"]),
@@ -134,7 +135,7 @@ class TestJoining:
 
 class TestNames:
     @makers
-    @pytest.mark.parametrize(
+    @each_row(
         "change",
         [
             lambda d: out(d, {"first.kk": 1.0}),
@@ -188,7 +189,7 @@ class TestNames:
         with refused(ParameterError, "'plant.x1' needs a finite initial value, got nan"):
             nlctl.initial_state(diagram, {"plant.x1": np.nan})
 
-    @pytest.mark.parametrize(
+    @each_row(
         ("name", "value"),
         [
             ("filtered_error.lambdas", (1.0,)),
@@ -203,7 +204,7 @@ class TestNames:
         with refused(ParameterError, f"block '{name.partition('.')[0]}'"):
             diagram.output(0.3, nlctl.initial_state(diagram) + 0.1, [], params={name: value})
 
-    @pytest.mark.parametrize("bad", ["a", [1.0, 2.0], None, 1j])
+    @each_row("bad", ["a", [1.0, 2.0], None, 1j])
     def test_an_initial_value_is_one_number(self, bad):
         """The state and the value are named."""
         with refused(ParameterError, "'plant.x1'", str(bad)):

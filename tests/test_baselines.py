@@ -224,6 +224,7 @@ class TestContenders:
         loop = EXAMPLES[example](controller=contenders(example)["certified"])
         assert certify(loop).C_0 < 1.0
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("example", EXAMPLES)
     def test_the_baselines_are_tuned(self, example):
         """Twice or half of a gain costs more, or exceeds the paper's peak or the search's steps."""

@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 import numba
 import numpy as np
 import pytest
+from rows import each_row
 
 import nlctl
 from nlctl._catalogue import block_records
@@ -254,7 +255,7 @@ def liar(**changes):
     return nlctl.record(type("Liar", (), {k: v for k, v in body.items() if v is not None}))()
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("changes", "told"),
     [
         ({"output": staticmethod(lambda t, x, u, p: (x[0] + 0 * u[0],))}, "'y' depends on the in"),

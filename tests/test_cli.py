@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import nlctl, nlctl_here
+from rows import each_row
 
 from nlctl.cli_report import _other_process
 
@@ -50,7 +51,7 @@ def test_help_imports_nothing_heavy():
 
 def test_simulate_writes_what_was_asked_for(tmp_path):
     """The table starts from the initial state that was set; the figure is an SVG."""
-    result = nlctl(
+    result = nlctl_here(
         *("simulate", "example-1", "--until", "0.5", "--plot", "out.svg", "--csv", "out.csv"),
         *("--set", "actuator.b_r=0.6", "--set", "plant.x1(0)=0.8"),
         cwd=tmp_path,
@@ -66,7 +67,7 @@ def test_simulate_writes_what_was_asked_for(tmp_path):
     np.testing.assert_array_equal(inside["v"], 0.0)  # b_r = 0.6 has reached the actuator
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("setting", "message"),
     [
         ("actuator.b_x=1", "unknown parameter 'actuator.b_x'; nearest: 'actuator.b_r'"),

@@ -8,8 +8,9 @@ import shlex
 
 import numpy as np
 import pytest
-from command_line import nlctl, nlctl_here
+from command_line import nlctl_here
 from rich.console import Console
+from rows import each_row
 
 from analysis.lyapunov.ledger import ledger
 from nlctl import paper
@@ -32,7 +33,7 @@ def check(*arguments):
 
 def test_the_published_loop_holds_and_the_paper_does_not():
     """All corrected lines hold, and the literal reading of (31) is violated, with the time."""
-    done = nlctl("check", "example-1", "--json")
+    done = nlctl_here("check", "example-1", "--json")
     assert done.returncode == 0
     lines = {line["key"]: line for line in json.loads(done.stdout)["lines"]}
     assert lines["(31)"]["status"] == "checked"
@@ -90,7 +91,7 @@ def test_random_states_are_the_plants_and_lie_within_the_spread():
     assert not np.any(other["plant.x1"] == drawn["plant.x1"])
 
 
-@pytest.mark.parametrize("spread", [0.0, -1.0, np.inf, np.nan])
+@each_row("spread", [0.0, -1.0, np.inf, np.nan])
 def test_a_spread_that_draws_nothing_is_refused(spread):
     """Zero, negative, infinite, NaN."""
     with pytest.raises(ParameterError, match="finite spread > 0"):
@@ -155,7 +156,7 @@ def test_summary_counts_every_line_once_and_names_what_fails(found):
     assert "Lemma 1" in said.splitlines()[-1]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "message"),
     [
         (["example-3"], "unknown example 'example-3'"),

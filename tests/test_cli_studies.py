@@ -17,7 +17,7 @@ from studies_example import HEAD, ROWS, write
 from analysis.studies import load_result, read_study
 from analysis.studies import run as run_study
 
-MANY = ROWS.replace("size = 200", "size = 6000")
+MANY = ROWS.replace("size = 200", "size = 3000")
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def test_a_study_is_validated_run_and_replayed(folder):
     planned = nlctl_here("validate", path, cwd=folder)
     assert planned.returncode == 0, planned.stderr
     assert "rows: 200 runs" in planned.stdout
-    done = nlctl("run", path, "--jobs", "1", cwd=folder)
+    done = nlctl_here("run", path, "--jobs", "1", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert "The claim holds." in done.stdout
     assert "Assumed: rows are independent draws" in done.stdout
@@ -101,6 +101,7 @@ def test_an_error_in_the_users_own_function_is_exit_code_3(folder):
     assert json.loads(told.stdout) == {"error": "RuntimeError: no such luck"}
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_exit_code_4_and_can_be_continued(folder):
     """Files may grow to 20 kB only: the first chunk cannot be written; later it can."""
     path = write(folder, HEAD, MANY, name="many.toml")
@@ -132,6 +133,7 @@ def interrupted(arguments, is_time, cwd):
     return process.returncode, out, told
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_is_exit_code_130_and_prints_how_to_go_on(folder):
     """The chunk in hand is kept; the printed command ends with the uninterrupted table."""
     path = write(folder, HEAD, MANY, name="long.toml")
@@ -140,7 +142,7 @@ def test_ctrl_c_is_exit_code_130_and_prints_how_to_go_on(folder):
     code, out, told = interrupted(arguments, lambda: list(chunks.glob("*.parquet")), folder)
     assert code == 130, (out, told)
     kept = load_result(folder / "long")
-    assert 0 < kept.rows.done < 6000
+    assert 0 < kept.rows.done < 3000
     assert not kept.complete
     command = told.strip().splitlines()[-1].removeprefix("continue with: ")
     assert command == "nlctl run long.toml --resume --out long --jobs 1"
@@ -162,6 +164,7 @@ def waiting(name="loop"):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kept", "command"),
     [
@@ -169,6 +172,7 @@ def waiting(name="loop"):
         ("out/study.toml", "continue with: nlctl run study.toml --resume --out out --jobs 1"),
     ],
 )
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_before_the_first_row_says_how_to_go_on(tmp_path, kept, command):
     """While the file is checked nothing is kept; while diagrams are compiled the study is.
 
@@ -194,9 +198,10 @@ def assert_same(one, other):
     assert one.plain() == other.plain()
     first, second = (made.rows.table.drop(columns="wall_time") for made in (one, other))
     pd.testing.assert_frame_equal(first, second)
-    np.testing.assert_array_equal(first.index, range(6000))
+    np.testing.assert_array_equal(first.index, range(3000))
 
 
+@pytest.mark.slow
 def test_processes_give_the_same_rows(folder):
     """The user's loop from a file travels to other processes."""
     path = write(folder)

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from numba.core import config, event
 from sweep_examples import experiment
+from sweep_examples import loop as lag
 
 import nlctl
 from analysis.lyapunov.examine import compile_ahead as examine_ahead
@@ -26,7 +27,7 @@ pytestmark = pytest.mark.skipif(
 @pytest.fixture(autouse=True)
 def empty_cache(tmp_path, monkeypatch):
     """The integrators are there, programs are not."""
-    nlctl.input_output_response(nlctl.compile(nlctl.paper.example_1()), T)
+    nlctl.input_output_response(nlctl.compile(lag()), T)
     monkeypatch.setenv("NLCTL_CACHE_DIR", str(tmp_path))
 
 
@@ -47,7 +48,12 @@ def sampled():
 @pytest.mark.parametrize(
     ("make", "functions", "varied"),
     [
-        (nlctl.paper.example_1, {"prepare", "rhs", "out"}, {"params": {"law.beta": [2.0, 3.0]}}),
+        (lag, {"prepare", "rhs", "out"}, {"params": {"lag.rate": [2.0, 3.0]}}),
+        pytest.param(
+            *(nlctl.paper.example_1, {"prepare", "rhs", "out"}),
+            {"params": {"law.beta": [2.0, 3.0]}},
+            marks=pytest.mark.slow,
+        ),
         (sampled, {"rhs", "out"}, {"initial_state": {"x[0]": [2.0, 3.0]}}),
     ],
 )
@@ -75,6 +81,7 @@ def test_rows_of_an_experiment_and_their_metrics():
     assert np.all(np.isfinite(found["peak"]))
 
 
+@pytest.mark.slow
 def test_the_observed_loop_of_a_proof():
     loop = nlctl.paper.example_1()
     with compiling() as before:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
+from rows import each_row
 
 import nlctl
 from nlctl._param import equation_arguments
@@ -85,7 +86,7 @@ class TestFilteredError:
             with pytest.raises(nlctl.ParameterError, match="Hurwitz"):
                 nlctl.FilteredError(lambdas=lambdas)
 
-    @pytest.mark.parametrize("lambdas", [(0,), (0, 4), (2, 0), (1, 1, 1), (1, 2, 2), (2, 2, 2, 1)])
+    @each_row("lambdas", [(0,), (0, 4), (2, 0), (1, 1, 1), (1, 2, 2), (2, 2, 2, 1)])
     def test_the_boundary_is_refused(self, lambdas):
         """Roots on the imaginary axis: e does not follow r to zero."""
         with pytest.raises(nlctl.ParameterError, match="Hurwitz"):
@@ -227,7 +228,7 @@ class TestJoined:
             u = diagram.output(0.0, state, inputs)[diagram.output_index["u"]]
             assert u == pytest.approx(N * eta, rel=1e-9, abs=1e-9)
 
-    @pytest.mark.parametrize(
+    @each_row(
         ("order", "pieces", "told"),
         [
             (1, {}, "order >= 2, got 1"),

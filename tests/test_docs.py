@@ -6,6 +6,7 @@ import typing
 from pathlib import Path
 
 import pytest
+from rows import each_row
 
 from analysis.robustness.quantity import QUANTILES
 from analysis.studies import read_study
@@ -30,14 +31,14 @@ def test_the_whole_study_of_the_guide_is_valid(tmp_path):
     assert file.experiment.space.names == ["law.beta", "plant.x1(0)", "actuator"]
 
 
-@pytest.mark.parametrize("text", blocks("text")[0].splitlines())
+@each_row("text", blocks("text")[0].splitlines())
 def test_every_requirement_of_the_guide_reads_back(text):
     """Written out again and read again it is the same formula."""
     formula = parse_formula(text)
     assert parse_formula(str(formula)) == formula
 
 
-@pytest.mark.parametrize("text", re.findall(r"^\| `(\{.*\})` \|", GUIDE, flags=re.MULTILINE))
+@each_row("text", re.findall(r"^\| `(\{.*\})` \|", GUIDE, flags=re.MULTILINE))
 def test_every_law_of_the_guide_is_one(text):
     """Its box is where the law lives, or what lies between the two quantiles of `QUANTILES`."""
     quantity = uncertain("k", Law(**tomllib.loads(f"k = {text}")["k"]))

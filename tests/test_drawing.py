@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from rows import each_row
 
 import nlctl
 from nlctl.drawing import draw, lay_out, signal_graph
@@ -518,7 +519,7 @@ def test_expand_shows_the_inside_of_nested_diagrams():
     assert {"inside loop", "inside loop.controller", "basis", "plant"} <= set(written[1])
 
 
-@pytest.mark.parametrize("thing", [ct.tf([1], [1, 1]), block("plant", ["u"], ["y"]), "loop", None])
+@each_row("thing", [ct.tf([1], [1, 1]), block("plant", ["u"], ["y"]), "loop", None])
 def test_what_is_not_a_diagram_is_refused(thing):
     with pytest.raises(TypeError, match=rf"{type(thing).__name__}.*interconnect"):
         draw(thing)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import each_row
 from scipy.integrate import quad
 
 from nlctl.functions import (
@@ -178,7 +179,7 @@ class TestBandLimited:
         assert np.abs(single).max() == pytest.approx(2 * np.sqrt(2), rel=1e-5)
         assert (sampled(band_limited(0.0, low=1, high=2, seed=3), t) == 0).all()
 
-    @pytest.mark.parametrize(
+    @each_row(
         ("changed", "told"),
         [
             ({"rms": -0.1}, "rms >= 0, got -0.1"),

@@ -70,7 +70,7 @@ class TestItsPlace:
         """
         loop = nlctl.paper.example_1(controller=known_sign_loop())
         times, delta = np.linspace(0, 10, 401), 9.3
-        run = nlctl.input_output_response(loop, times)
+        run = nlctl.input_output_response(nlctl.compile(loop), times)
         p = nlctl.parameters(loop)["value"]
         x, r = run.states, run.outputs[loop.output_index["r"]]
         W, delta_hat = x[2:29], x[29]

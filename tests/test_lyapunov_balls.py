@@ -5,6 +5,7 @@ import pytest
 from flint import arb
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 
 import nlctl
 from analysis.lyapunov.ball import Ball, as_ball
@@ -95,7 +96,7 @@ def test_minimum_and_maximum_join_instead_of_choosing(a, b, wa, wb, s, r):
     assert holds(abs(x).value, abs(p))
 
 
-@pytest.mark.parametrize("other", [interval(0.5, 2), 0.5, np.float64(0.5)])
+@each_row("other", [interval(0.5, 2), 0.5, np.float64(0.5)])
 def test_a_comparison_that_balls_cannot_decide_is_refused(other):
     """The error says so; decided comparisons are plain."""
     x = interval(0, 1)

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rows import each_row
 from scipy.integrate import quad, solve_ivp
 
 import nlctl
@@ -231,9 +232,7 @@ class TestWhatLemma1Leaves:
             drift_margin(run, 0.0, 0.0, l_min=1.0, l_max=2.0, V=V).values, 0, atol=1e-12
         )
 
-    @pytest.mark.parametrize(
-        ("l_min", "l_max"), [(0.0, 1.0), (2.0, 1.0), (np.nan, 1.0), (-1.0, 1.0)]
-    )
+    @each_row(("l_min", "l_max"), [(0.0, 1.0), (2.0, 1.0), (np.nan, 1.0), (-1.0, 1.0)])
     def test_gains_that_are_no_sector(self, l_min, l_max):
         """0 < l_min <= l_max."""
         with pytest.raises(ParameterError, match="0 < l_min <= l_max"):

@@ -201,6 +201,7 @@ class TestFaults:
         assert "run 2" in many["A2"].text(10)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_ends_the_examination_and_no_run_is_taken_for_a_whole_one():
     """Wherever it comes: in a run it was once the end of a response, and the report went on."""
     examine(example(1), 1.0, box=BOXES[1])  # compiled

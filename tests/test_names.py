@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 import pytest
-from conftest import chain, gain, out
+from conftest import chain, gain, many, out
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -276,7 +276,7 @@ class TestRandomNesting:
         assert out(tree.build(iter(range(99)))) == pytest.approx(expected)
 
     @given(trees, st.data())
-    @settings(max_examples=150)
+    @settings(max_examples=many(150))
     def test_a_name_overrides_the_one_block_that_it_means(self, tree, data):
         """A path, or the end of one path, reaches one block; other names are refused."""
         paths = [name for name, _ in tree.leaves()]

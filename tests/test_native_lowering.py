@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 import pytest
 import test_native_rhs as diagrams_of
+from conftest import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba.core import config
@@ -64,7 +65,7 @@ def static(function, inputs=1, outputs=1, **params):
     return ct.nlsys(None, function, inputs=inputs, outputs=outputs, name="b", params=params)
 
 
-@settings(max_examples=150)
+@settings(max_examples=many(150))
 @given(diagrams_of.diagrams(), st.integers(0, 1000), st.sampled_from([1, 2]))
 def test_random_diagrams_agree_with_python_control(diagram, seed, lanes):
     """Random blocks, wiring, gains, nesting, linear parts."""
@@ -494,7 +495,7 @@ def array_program(steps, n, opaque):
 STEPS = st.tuples(st.integers(0, 9), *[st.integers(0, 20)] * 3)
 
 
-@settings(max_examples=100)
+@settings(max_examples=many(100))
 @given(st.lists(STEPS, max_size=7), st.sampled_from([9, 16, 20]), st.sampled_from([1, 2]),
        st.booleans())  # fmt: skip
 def test_random_programs_of_vectors_agree_with_numpy(steps, n, lanes, opaque):

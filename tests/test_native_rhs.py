@@ -4,6 +4,7 @@ import control as ct
 import numpy as np
 import pytest
 import scipy.special
+from conftest import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba.core import config
@@ -133,20 +134,21 @@ def diagrams(draw):
     )
 
 
-@settings(max_examples=500)
+@settings(max_examples=many(500))
 @given(diagrams(), st.integers(0, 1000))
 def test_random_diagrams_agree_with_python_control(diagram, seed):
     """Random blocks, wiring, gains, nesting, linear parts: the emitted source agrees."""
     compare(diagram, points=1, seed=seed)
 
 
-@settings(max_examples=60)
+@settings(max_examples=many(60))
 @given(diagrams(), st.floats(-3, 3), st.floats(0.1, 5))
 def test_flat_parameters_of_foreign_blocks_resolve_as_in_python_control(diagram, gain, k):
     """'k' and the undeclared 'gain' reach the same blocks, nested ones too."""
     compare(diagram, params={"gain": gain, "k": k}, points=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [nlctl.paper.example_1, nlctl.paper.example_2])
 def test_examples_in_machine_code(make):
     """Compiled right-hand sides of the paper's loops equal the interpreted ones."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 
 import nlctl
 from nlctl._errors import UnknownNameError
@@ -83,7 +84,7 @@ class TestBounds:
             with pytest.raises(ParameterError, match=re.escape(f"v[1] {text}, got")):
                 cls(v=(good, value))
 
-    @pytest.mark.parametrize("kind", BOUNDS)
+    @each_row("kind", BOUNDS)
     def test_bounds_are_told_as_text(self, kind):
         """The declared rule reads as in the error message."""
         assert declared_params(bounded(kind))["v"].bounds == BOUNDS[kind][1]
@@ -96,8 +97,8 @@ class TestBounds:
             with pytest.raises(ParameterError, match=re.escape(f"Mixed needs x {rule}, got {bad}")):
                 Mixed(x=bad)
 
-    @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-    @pytest.mark.parametrize(
+    @each_row("bad", [np.nan, np.inf, -np.inf])
+    @each_row(
         ("name", "where", "make"),
         [
             ("x", "x", lambda b: b),
@@ -113,7 +114,7 @@ class TestBounds:
 
 
 class TestKinds:
-    @pytest.mark.parametrize(
+    @each_row(
         ("name", "value", "told"),
         [
             ("x", [1.0, 2.0], "x to be a number, got shape (2,)"),
@@ -240,7 +241,7 @@ class TestOverrides:
         ):
             assert with_overrides(Mixed(), overrides, "b").vector == (5.0, 0.5, 7.0)
 
-    @pytest.mark.parametrize(
+    @each_row(
         "key",
         ["vector[2]", "vector[0, 0]", "vector[x]", "vector[]", "vector[0.5]", "matrix[1]", "x[0]"]
         + ["vector[0", "vector[0]]", "vector[0]x"],
@@ -250,13 +251,13 @@ class TestOverrides:
         with pytest.raises(ParameterError, match=rf"Mixed has {key[0]}.*\(block 'b'\)"):
             with_overrides(Mixed(), {key: 1.0}, "b")
 
-    @pytest.mark.parametrize("value", [np.nan, -1.0, (1.0, 2.0), "text"])
+    @each_row("value", [np.nan, -1.0, (1.0, 2.0), "text"])
     def test_a_bad_element_is_refused(self, value):
         """An element obeys the bounds of its vector."""
         with pytest.raises(ParameterError, match=r"vector.*\(block 'b'\)"):
             with_overrides(Mixed(), {"vector[1]": value}, "b")
 
-    @pytest.mark.parametrize(
+    @each_row(
         ("name", "bad"), [("count", 1.5), ("count", np.nan), ("flag", 1), ("x", "3"), ("x", None)]
     )
     def test_overrides_obey_the_kind(self, name, bad):

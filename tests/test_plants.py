@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import each_row
 from scipy.integrate import quad
 
 import nlctl
@@ -74,7 +75,7 @@ class TestPureFeedback:
         plant.update_names(states=["position", "speed", "acceleration"])
         np.testing.assert_array_equal(nlctl.initial_state(plant), [1, 0, 0])
 
-    @pytest.mark.parametrize(
+    @each_row(
         ("changed", "error", "told"),
         [
             ({"initial": {"x4": 1.0}}, nlctl.UnknownNameError, "'x4' in initial of PureFeedback"),

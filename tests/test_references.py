@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import each_row
 
 import nlctl
 from nlctl._param import equation_arguments
@@ -65,7 +66,7 @@ class TestSumOfSines:
         spec = nlctl.SumOfSines(amplitudes=2, frequencies=0, phases=np.pi / 2)
         np.testing.assert_array_equal(value(spec, 5.0), [2, 0, 0])
 
-    @pytest.mark.parametrize("field", ["amplitudes", "frequencies", "phases"])
+    @each_row("field", ["amplitudes", "frequencies", "phases"])
     def test_as_many_of_each(self, field):
         """One amplitude, frequency and phase per sine."""
         with pytest.raises(nlctl.ParameterError, match=r"SumOfSines needs as many .* 1"):
@@ -139,7 +140,7 @@ class TestFunctionReference:
         np.testing.assert_array_equal(value(spec, t), [t**2, 2 * t])
         assert spec.outputs == ("yd", "yd1")
 
-    @pytest.mark.parametrize(
+    @each_row(
         ("order", "function", "told"),
         [
             (2, lambda t: (t, 1.0), r"3 values \(yd, yd1, yd2\), got 2"),
@@ -197,7 +198,7 @@ class TestBandLimitedNoise:
         sines = (np.cos(phase) - np.cos(omega * 3 + phase)) / omega
         np.testing.assert_allclose(ends, np.sqrt(2 / omega.size) * sines.sum(), atol=1e-6)
 
-    @pytest.mark.parametrize(
+    @each_row(
         ("changed", "told"),
         [
             ({"takes": ("x1",)}, "as many signals in takes as in delivers"),

@@ -1,9 +1,9 @@
 """The page in a real browser: nothing fetched, nothing executed, sorting, filtering, reading."""
 
 import math
-import shutil
 
 import pytest
+from extras import needed, needed_program
 from test_report import made_up_runs
 from test_report_history import charted
 from test_report_page import HOSTILE, every_kind
@@ -12,19 +12,21 @@ from analysis.report import write_gallery, write_pdf, write_report
 from analysis.report.browser import BROWSERS
 from analysis.report.paper_report import paper_report
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
-CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=f"none of {', '.join(BROWSERS)} is there")
+pytestmark = pytest.mark.browser
 
 PAGES = ("plain", "hostile", "long", "paper", "gallery", "charts", "hostile charts")
 PHONE = 390
 
 
 @pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=CHROMIUM, args=["--disable-quic"])
+def chromium():
+    return needed_program(BROWSERS)
+
+
+@pytest.fixture(scope="module")
+def browser(chromium):
+    with needed("playwright.sync_api", "browser").sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=chromium, args=["--disable-quic"])
         yield running
         running.close()
 
@@ -84,6 +86,7 @@ def test_nothing_is_fetched_and_the_console_is_silent(visit, name):
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_violation(visit, name, scheme):
     """Contrast, names, roles, headings, keyboard, in both colour schemes."""
+    axe = needed("axe_playwright_python.sync_playwright", "browser")
     inside = {"exclude": [["svg > g"]]}  # an image by its role: what it is drawn of has none
     found = axe.Axe().run(visit(name, scheme=scheme), context=inside, options=None).response
     assert "color-contrast" in {rule["id"] for rule in found["passes"]}
@@ -371,7 +374,7 @@ def test_hostile_names_of_signals_do_nothing_and_are_shown(visit):
     assert page.seen == []
 
 
-def test_a_page_is_printed_to_pdf(pages, tmp_path):
+def test_a_page_is_printed_to_pdf(chromium, pages, tmp_path):
     """Through the same Chromium, without its address and date in the margins."""
     made = write_pdf(pages["plain"], tmp_path / "report.pdf")
     content = made.read_bytes()

@@ -9,6 +9,7 @@ import pytest
 from command_line import nlctl
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 from test_report_page import HOSTILE, Reader
 
 from analysis.report import (
@@ -113,7 +114,7 @@ def test_rows_get_names_of_their_own(rows):
     assert len(names) == len(set(names)) == len(rows)
 
 
-@pytest.mark.parametrize("content", ["{", "[]", '{"title": "t"}', '"text"'])
+@each_row("content", ["{", "[]", '{"title": "t"}', '"text"'])
 def test_what_is_no_report_is_refused_by_name(tmp_path, content):
     """Damaged, or another file."""
     (tmp_path / "report.json").write_text(content)
@@ -121,7 +122,7 @@ def test_what_is_no_report_is_refused_by_name(tmp_path, content):
         compare(tmp_path, tmp_path)
 
 
-@pytest.mark.parametrize("rtol", [-1.0, float("nan"), float("inf")])
+@each_row("rtol", [-1.0, float("nan"), float("inf")])
 def test_a_tolerance_is_finite_and_not_negative(rtol):
     """Otherwise everything would be equal, or nothing."""
     with pytest.raises(UsageError, match="rtol"):
@@ -175,6 +176,7 @@ def test_gallery_shows_hostile_titles_as_text(tmp_path, name):
     assert two.text.count(HOSTILE[name]) == 2
 
 
+@pytest.mark.slow
 def test_a_page_is_opened_in_the_browser_of_the_user(tmp_path, monkeypatch):
     """Here a program that writes down what it was given; without any, a sentence says so."""
     folder, seen = write_report(small(), tmp_path / "reports" / "one").parents[1], tmp_path / "seen"

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 from fontTools.ttLib import TTFont
+from rows import each_row
 
 from analysis.report import Equation
 from analysis.report import paper_text as text
@@ -69,19 +70,19 @@ def test_font_comes_with_its_licence_and_in_the_page():
     assert re.search(r'url\("data:font/woff2;base64,[A-Za-z0-9+/=]+"\)', font_face())
 
 
-@pytest.mark.parametrize("latex", HARMFUL)
+@each_row("latex", HARMFUL)
 def test_what_is_not_on_the_lists_is_shown_as_its_source(latex):
     """Addresses, styles, classes and ids of others never get into the page."""
     assert mathml(Equation(latex=latex)) == f"<code>{latex}</code>"
 
 
-@pytest.mark.parametrize("latex", UNREADABLE, ids=lambda s: s[:10])
+@each_row("latex", UNREADABLE)
 def test_what_cannot_be_read_is_shown_as_its_source(latex):
     """A slip in a formula costs the formula, not the report."""
     assert mathml(Equation(latex=latex)) == f"<code>{latex}</code>"
 
 
-@pytest.mark.parametrize(
+@each_row(
     "latex", [r"\text{<script>alert(1)</script>}", "a < b & c", r"\text{&lt;i&gt;}", "<img src=x>"]
 )
 def test_markup_in_a_formula_is_text(latex):

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure as MatplotlibFigure
+from rows import each_row
 from studies_example import write
 from test_report import made_up_runs
 from test_report_page import HOSTILE, LADDER, Reader
@@ -161,7 +162,7 @@ def test_a_spike_in_a_long_run_is_drawn_at_its_time():
     assert np.max(np.diff(time)) <= 0.11
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("wrong", "said"),
     [
         ({"signals": {"y": [1.0]}}, r"signal 'y' of history 'k' has shape \(1,\), its time \(2,\)"),

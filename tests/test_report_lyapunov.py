@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from rows import each_row
 from test_report import made_up_runs, outline
 
 import nlctl
@@ -126,6 +127,7 @@ def test_commands_in_the_text_are_python():
         compile(command, "command", "exec")
 
 
+@pytest.mark.slow
 def test_the_part_is_in_the_papers_report_when_there_is_evidence():
     """With it: sections, figures, valid page, the same numbers in JSON.  Without: as before."""
     report = paper_report(made_up_runs(), proofs=found())
@@ -281,7 +283,7 @@ def test_the_envelope_is_the_largest_value_of_each_whole_window():
     np.testing.assert_array_equal(largest, [1, 7, 1])
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("plain", "shown"),
     [
         ("V' <= -alpha_1 V + [k G N + 1] zeta' + alpha_0", "V′ ≤ −α₁ V + [k G N + 1] ζ′ + α₀"),

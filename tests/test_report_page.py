@@ -2,6 +2,7 @@
 
 import base64
 import dataclasses
+import functools
 import hashlib
 import html.parser
 import json
@@ -19,6 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jinja2 import Environment, UndefinedError, nodes
 from matplotlib.figure import Figure as MatplotlibFigure
+from rows import each_row
 
 import analysis.report
 from analysis.report import (
@@ -116,6 +118,12 @@ def every_kind(text="plain", key="key"):
     )
 
 
+@functools.cache
+def page_of(text="plain"):
+    """The page of that report."""
+    return render_html(every_kind(text, "key" if text == "plain" else text))
+
+
 class Reader(html.parser.HTMLParser):
     """Collects what a browser would take for elements, ids and text."""
 
@@ -142,7 +150,7 @@ class Reader(html.parser.HTMLParser):
 
 def test_policy_allows_this_style_and_this_script_by_hash_and_nothing_else():
     """The hashes are those of the bytes between the tags."""
-    page = render_html(every_kind())
+    page = page_of()
     (policy,) = (a["content"] for t, a in Reader(page).tags
                  if a.get("http-equiv") == "Content-Security-Policy")  # fmt: skip
     rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
@@ -156,7 +164,7 @@ def test_policy_allows_this_style_and_this_script_by_hash_and_nothing_else():
 
 def test_no_inline_style_no_event_and_no_address_but_dois():
     """What the policy would block is not on the page at all."""
-    page = render_html(every_kind())
+    page = page_of()
     for tag, attributes in Reader(page).tags:
         assert "style" not in attributes, tag
         assert not [name for name in attributes if name.startswith("on")]
@@ -172,11 +180,15 @@ def test_the_shell_is_under_60_kilobytes():
     assert len(render_html(empty).encode()) < 60_000
 
 
-@pytest.mark.parametrize("name", HOSTILE)
-def test_whatever_a_user_names_is_shown_and_is_no_markup(name):
+APART = ("latex", "long")  # a formula that can be read, and what would hide the others
+TOGETHER = [text for name, text in HOSTILE.items() if name not in APART]
+
+
+@pytest.mark.parametrize("texts", [TOGETHER, *([HOSTILE[name]] for name in APART)])
+def test_whatever_a_user_names_is_shown_and_is_no_markup(texts):
     """In every field: same elements as with plain text, and the text in full."""
-    text = HOSTILE[name]
-    plain, read = Reader(render_html(every_kind())), Reader(render_html(every_kind(text, text)))
+    text = " ".join(texts)
+    plain, read = Reader(page_of()), Reader(page_of(text))
     assert read.scripts == plain.scripts
     assert read.styles == plain.styles
     extra = {tag for tag, _ in read.tags} - {tag for tag, _ in plain.tags}
@@ -213,7 +225,7 @@ def test_anchors_are_unique_and_harmless_whatever_the_keys(keys):
 def test_every_id_is_unique_and_every_link_inside_leads_to_one():
     """Also with two sections and two figures of the same key."""
     for text in ("plain", HOSTILE["markup"]):
-        tags = Reader(render_html(every_kind(text, text))).tags
+        tags = Reader(page_of(text)).tags
         ids = [a["id"] for _, a in tags if "id" in a]
         assert len(ids) == len(set(ids))
         named = {i for _, a in tags for i in a.get("aria-labelledby", "").split()}
@@ -276,6 +288,7 @@ def test_letters_are_drawn_once_for_all_figures_of_a_page():
     assert first.replace("first", "second") == second
 
 
+@pytest.mark.slow
 def test_a_pool_that_helps_with_drawing_changes_no_byte():
     """Figures are the same files wherever they are drawn, and in the same order."""
 
@@ -340,7 +353,7 @@ def numbers_in(value):
 def test_every_numeric_cell_of_the_page_is_in_the_json_file():
     """To the last digit, and the texts of claims and tables too."""
     report = every_kind()
-    cells = [a["data-value"] for t, a in Reader(render_html(report)).tags if "data-value" in a]
+    cells = [a["data-value"] for t, a in Reader(page_of()).tags if "data-value" in a]
     content = json.loads(render_json(report), parse_constant=lambda name: pytest.fail(name))
     assert len(cells) > 80
     assert set(cells) <= numbers_in(content["sections"]) | numbers_in(content["provenance"])
@@ -354,7 +367,7 @@ def test_sort_keys_are_the_numbers_themselves(number):
         np.testing.assert_equal(float(key), float(number))
 
 
-@pytest.mark.parametrize("value", ["", "abc", "1 s", True, np.True_, None, [1]])
+@each_row("value", ["", "abc", "1 s", True, np.True_, None, [1]])
 def test_what_is_no_number_has_no_sort_key(value):
     """Units, words, truth values."""
     assert sort_key(value) == ""
@@ -407,7 +420,7 @@ def test_the_first_sentence_says_how_the_claims_are_known():
 def test_a_claim_shows_its_margin_and_leads_to_its_evidence():
     """The margin has a column only where there is one; unknown evidence is told as text."""
     report = every_kind()
-    page = Reader(render_html(report))
+    page = Reader(page_of())
     assert "margin" in page.text
     links = [a["href"] for t, a in page.tags if a.get("aria-label", "").startswith("evidence")]
     assert links == ["#key", "#key"]
@@ -416,7 +429,7 @@ def test_a_claim_shows_its_margin_and_leads_to_its_evidence():
     assert "margin" not in without.text
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "dois"),
     [
         ("see doi 10.1007/978-3-319-70136-3_22.", ["10.1007/978-3-319-70136-3_22"]),
@@ -451,6 +464,7 @@ def test_hashes_are_those_of_the_files(tmp_path):
     assert hashlib.sha256((tmp_path / "report.json").read_bytes()).hexdigest() in shown
 
 
+@pytest.mark.slow
 def test_every_kind_is_the_same_bytes_in_another_process(tmp_path):
     """Neither hash seeds nor time leave a trace, in claims, tables, formulas or figures."""
     code = (

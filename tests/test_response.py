@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from rows import each_row
 
 import nlctl
 
@@ -50,9 +51,7 @@ def test_an_algebraic_loop_keeps_its_own_message():
         nlctl.input_output_response(ring, [0, 1])
 
 
-@pytest.mark.parametrize(
-    "times", [[0], [], [0, 1, 1], [1, 0], [0, np.nan], [0, np.inf], [[0, 1], [2, 3]]]
-)
+@each_row("times", [[0], [], [0, 1, 1], [1, 0], [0, np.nan], [0, np.inf], [[0, 1], [2, 3]]])
 def test_bad_time_grids_are_refused(times):
     """Times must be finite, increasing, at least two."""
     with pytest.raises(nlctl.ParameterError, match="timepts needs"):

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 from command_line import nlctl_here
+from extras import needed
 from studies_example import write
 from sweep_examples import experiment, same
 
@@ -14,11 +15,16 @@ from analysis.robustness import independent, prepare
 from analysis.robustness.sweep import sweep
 from analysis.studies import load_result, read_study, run
 
-distributed = pytest.importorskip("distributed")
+pytestmark = pytest.mark.cluster
+
+
+@pytest.fixture(scope="module", autouse=True)
+def distributed():
+    return needed("distributed", "cluster")
 
 
 @pytest.fixture(scope="module")
-def client():
+def client(distributed):
     """Two worker processes; their nannies start new ones in place of killed ones."""
     with (
         distributed.LocalCluster(

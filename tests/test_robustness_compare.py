@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 from scipy import stats
 
 import nlctl
@@ -171,7 +172,7 @@ class TestInvariance:
 
 
 class TestRefused:
-    @pytest.mark.parametrize(
+    @each_row(
         ("change", "message"),
         [
             (lambda t: t.drop(index=4), r"1 of 12 rows are missing, the first is row 4 \('two'\)"),

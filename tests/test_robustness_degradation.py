@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
+from rows import each_row
 from scipy import stats
 
 import nlctl
@@ -95,7 +96,7 @@ def test_nan_counts_as_a_violation():
     assert made.statements[0].violations == np.sum(np.isnan(made.margins[0])) > 20
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("changes", "error", "message"),
     [
         ({"factors": ()}, nlctl.ParameterError, "at least one factor"),

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 from scipy import stats
 
 import nlctl
@@ -138,7 +139,7 @@ def test_a_users_table_is_taken_as_it_is():
 GOOD = {"a": [1.0], "b": [0.0], "arm": ["x"]}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("make", "error", "message"),
     [
         (lambda: independent(SPACE, 0), nlctl.ParameterError, "size >= 1, got 0"),

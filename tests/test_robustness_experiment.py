@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from lag import Lag, loop
+from rows import each_row
 from scipy import stats
 
 import nlctl
@@ -93,7 +94,7 @@ def test_choices_run_in_their_own_diagrams_and_rows_keep_their_order():
         pd.testing.assert_frame_equal(evaluate(made, table.loc[[row]]), found.loc[[row]])
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("changes", "message"),
     [
         ({"timepts": T + 1}, "times from 0 s, got 1 s"),

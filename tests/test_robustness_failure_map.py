@@ -6,6 +6,7 @@ import pytest
 from conftest import function
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import each_row
 from scipy import stats
 
 import nlctl
@@ -124,7 +125,7 @@ def test_diverged_runs_draw_no_refinement_of_their_own():
     assert np.all(np.abs(boundary(made)["a"] - 0.5) <= made.cell[0])
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("changes", "error", "message"),
     [
         ({"x": "aa"}, nlctl.UnknownNameError, "nearest: 'a'"),

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 from scipy import stats
 
 import nlctl
@@ -112,7 +113,7 @@ def test_whatever_is_not_above_zero_is_a_violation(margin):
 TABLE = pd.DataFrame({"a": [0.1, 0.2, 0.4, 0.8]})
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("design", "message"),
     [
         (sobol(SPACE, 4), "kind 'Sobol'': its rows avoid each other.*Run independent"),
@@ -123,9 +124,8 @@ TABLE = pd.DataFrame({"a": [0.1, 0.2, 0.4, 0.8]})
         (listed(SPACE, "adaptive", TABLE, 0), "looking at earlier results"),
         (from_table(SPACE, TABLE), "unless the user says so: from_table"),
     ],
-    ids=lambda value: getattr(value, "kind", None),
 )
-@pytest.mark.parametrize("statement", [violation_probability, confidence_sequence])
+@each_row("statement", [violation_probability, confidence_sequence])
 def test_no_guarantee_without_independent_draws(statement, design, message):
     """The error says why and what to do instead."""
     with pytest.raises(NoGuaranteeError, match=message):
@@ -256,7 +256,7 @@ def test_known_failure_probabilities_are_covered():
     assert missed == 0
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "message"),
     [
         (lambda: clopper_pearson(3, 2), "violations <= runs, got 3 of 2"),

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 from scipy import stats
 
 import nlctl
@@ -174,7 +175,7 @@ def test_p_values_are_adjusted_for_the_number_of_pairs():
 TWO = {"a": np.zeros(4), "b": np.ones(4)}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "error", "message"),
     [
         (lambda: differences(sobol(SPACE, 4), TWO), NoGuaranteeError, "kind 'Sobol''"),

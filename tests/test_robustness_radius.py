@@ -9,6 +9,7 @@ import pytest
 from conftest import function
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import each_row
 from scipy import stats
 
 import nlctl
@@ -147,7 +148,7 @@ def test_refused_draws_leave_the_search_as_it_is():
     assert "a draw was refused, DeadZone" in str(made)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("changes", "error", "message"),
     [
         ({"largest": 0.0}, nlctl.ParameterError, "largest > 0, got 0"),

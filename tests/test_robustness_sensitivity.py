@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 from scipy import stats
 
 import nlctl
@@ -252,7 +253,7 @@ def test_space_filling_designs_get_no_p_values():
 DRAWN = independent(cube(2), 8, entropy=1)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("call", "message"),
     [
         (lambda: morris(cube(2), 1), "trajectories >= 2"),

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 from scipy import stats
 
 import nlctl
@@ -53,7 +54,7 @@ def test_names_units_and_nominal_values_come_from_the_diagram(loop):
     assert (frequency.unit, frequency.nominal) == ("rad/s", 0.45)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("quantity", "error", "message"),
     [
         ({"name": "actuator.br", "bounds": (0, 1)}, nlctl.UnknownNameError, "nearest: 'actuator.b"),
@@ -172,7 +173,7 @@ def test_every_combination_of_choices_is_built_and_checked():
         diagrams(wrong, nlctl.paper.example_1)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("make", "message"),
     [
         (lambda: Uncertain(name="a"), "needs a law .* or bounds, got neither"),

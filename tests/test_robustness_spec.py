@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 
 import nlctl
 from analysis.metrics import peak
@@ -272,7 +273,7 @@ def test_a_requirement_is_a_metric_of_an_ensemble():
     np.testing.assert_allclose(table["decays"], 1 - 2 * np.exp(-k), atol=1e-5)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("make", "error", "message"),
     [
         (lambda: in_band("e"), nlctl.ParameterError, "one of them finite"),

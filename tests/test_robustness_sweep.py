@@ -67,6 +67,7 @@ def test_threads_of_an_executor_compute_the_same_table(made, design, whole):
         same(sweep(made, design, executor=pool, chunk=7).table, whole)
 
 
+@pytest.mark.slow
 def test_spawned_processes_compute_the_same_table(made, design, whole):
     """Also the rows of a listed design, whose points travel with their chunks.
 
@@ -196,6 +197,7 @@ def test_a_refused_row_costs_only_its_chunk(tmp_path):
     assert not {*range(20, 30)} & {*kept.index}
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_finishes_the_chunk(made, design, whole):
     """What is done is a part of the whole; the handler is the old one again."""
     before = signal.getsignal(signal.SIGINT)
@@ -213,6 +215,7 @@ def test_ctrl_c_finishes_the_chunk(made, design, whole):
 
 
 @pytest.mark.parametrize("presses_at", [0, 30])
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_twice_drops_the_chunk(made, design, whole, presses_at):
     """Only whole chunks are kept; without one the table has its columns all the same."""
 
@@ -238,6 +241,7 @@ def once(press):
     return tell
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_waits_for_the_chunks_of_an_executor(made, design, whole):
     """Those that run are finished, those that wait are not begun."""
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rows import each_row
 from studies_example import HEAD, ROWS, write
 
 from analysis.robustness import nominal, resolved
@@ -92,7 +93,7 @@ kind = "regional"
     assert "greater than or equal to 0, got -1" in said["study.seed"]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("old", "new", "place", "message"),
     [
         ('loop = "loop.py:loop"', 'loop = "example-3"', "loop", "nearest: 'example-2'"),
@@ -290,7 +291,7 @@ def test_settings_replace_what_stands_in_the_file(tmp_path):
     assert study.solver.rtol == 1e-7
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("setting", "message"),
     [
         ("runs.size", "KEY=VALUE"),

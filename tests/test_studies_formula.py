@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_row
 
 from analysis.robustness.formula import (
     And,
@@ -78,7 +79,7 @@ def test_and_binds_tighter_than_or_and_prefixes_tighter_than_both():
     assert str(parse_formula("not a <= 1 and b <= 2")) == "(not a <= 1 and b <= 2)"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "message"),
     [
         ("", "needs a band such as |e| <= 0.15, found the end"),

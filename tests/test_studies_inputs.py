@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rows import each_row
 
 from analysis.robustness import nominal
 from analysis.robustness.evaluation import as_table
@@ -59,7 +60,7 @@ def test_inputs_have_the_values_of_the_file_all_the_time(tmp_path):
         assert found["low"].to_numpy() == pytest.approx(1 - peak / 4, abs=1e-6)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("parts", "message"),
     [
         (["[inputs]\npush = 1.5\n"], "input 'pull' is fed by nothing"),

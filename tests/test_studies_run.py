@@ -267,6 +267,7 @@ size = 8
 
 
 @pytest.mark.parametrize(("part", "findings"), [("rows", 0), ("morris", 2), ("sobol", 3)])
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_in_a_last_chunk_is_not_forgotten(folder, part, findings):
     """All rows of that part are there; what follows waits for --resume all the same."""
     file = read_study(write(folder, HEAD, THREE, name="three.toml"))

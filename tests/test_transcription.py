@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import transcription as paper
+from conftest import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -102,7 +103,7 @@ def test_right_hand_side_agrees_with_the_independent_transcription(example, actu
     order = example + 1
     centres = paper.diagonal_centres(27, 2) if example == 1 else paper.grid_centres((3, 3, 3))
 
-    @settings(max_examples=150, deadline=None, derandomize=True)
+    @settings(max_examples=many(150), deadline=None, derandomize=True)
     @given(st.floats(0, 200), states(order, 27), parameters(example))
     def check(t, state, both):
         check_rhs(example, actuator, diagram, centres, t, state, both)

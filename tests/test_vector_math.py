@@ -1,5 +1,6 @@
 """exp, sin, cos and tanh against decimal arithmetic, and vectors against NumPy."""
 
+import functools
 import math
 from decimal import Decimal, getcontext, localcontext
 
@@ -79,6 +80,7 @@ POINTS = {
 ULPS = {"exp": 1.0, "sin": 1.0, "cos": 1.0, "tanh": 2.0}
 
 
+@functools.cache  # compiled once for all tests
 def kernel(function):
     """Return a function that fills an array from another one, `WIDTH` numbers at a time."""
     load, store = memory.load, memory.store

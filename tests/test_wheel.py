@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy
 import pytest
+from extras import needed
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[1]
 
 
@@ -24,6 +26,7 @@ def run(*command, cwd):
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     """The wheel built from a copy of the sources, which stay as they are."""
+    needed("build", "dev")
     folder = tmp_path_factory.mktemp("wheel")
     source = folder / "source"
     ignored = shutil.ignore_patterns(".git", ".venv*", "__pycache__", ".*_cache", "*.egg-info")
