@@ -67,7 +67,9 @@ def report(job, n, names):
     found = run(job, n, names)
     assert set(found) == set(names)
     bad = {name: verdict for name, verdict in found.items() if verdict[0] not in GOOD}
-    assert not bad, "\n".join(f"{name}, n={n}: {kind}: {text}" for name, (kind, text) in bad.items())
+    assert not bad, "\n".join(
+        f"{name}, n={n}: {kind}: {text}" for name, (kind, text) in bad.items()
+    )
     return found
 
 

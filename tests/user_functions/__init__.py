@@ -27,4 +27,6 @@ from . import (
 )
 from ._entry import FOUND, SIZES, Entry, Pieces, system
 
+__all__ = ["ENTRIES", "SIZES", "Entry", "Pieces", "system"]
+
 ENTRIES: tuple[Entry, ...] = tuple(FOUND)

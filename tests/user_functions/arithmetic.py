@@ -12,7 +12,7 @@ from ._entry import entry, pieces
 @entry
 def powers(n):
     def update(t, x, u, params):
-        return x**2 - x**3 + abs(x) ** 0.5 + (x**2 + 1) ** -1 + (x**2 + 1) ** (-1.5) + 2.0**u[0]
+        return x**2 - x**3 + abs(x) ** 0.5 + (x**2 + 1) ** -1 + (x**2 + 1) ** (-1.5) + 2.0 ** u[0]
 
     return pieces(update, states=n)
 
