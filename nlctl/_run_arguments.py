@@ -34,7 +34,7 @@ class Run:
     params: Mapping[str, Any] | None
     progress: Callable[[float], object] | None
     ignore_errors: bool
-    audit: bool | str
+    audit: Any  # True, False or "every run"
     form: Mapping[str, Any]  # squeeze, transpose, return_states
     solver: Mapping[str, Any]  # method, rtol, ..., and what SciPy is told
 

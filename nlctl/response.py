@@ -45,7 +45,7 @@ def input_output_response(
     transpose: bool = False,
     return_states: bool = False,
     ignore_errors: bool = False,
-    audit: bool | str = True,
+    audit: Any = True,
     solve_ivp_method: str | None = None,
     solve_ivp_kwargs: Mapping[str, Any] | None = None,
     max_steps: int | None = None,

@@ -118,7 +118,7 @@ class Tracer:
             cells = boxed(self.cells[tuple(keys)])
             place = self._place(keys[0]) if len(keys) == 1 else None
             if not cells.shape:
-                return number(self.graph, cells[()])
+                return Tracer(self.graph, cells)
             return self._part(cells, None, 1, place)
         position = [i for i, k in enumerate(keys) if k is not None][self.axis]
         before = sum(k is None or isinstance(k, slice) for k in keys[:position])
@@ -141,7 +141,8 @@ class Tracer:
         """Return where a part of one dimension lies in the origin."""
         whole = self.place if self.origin is not None else range(self.length)
         known = whole is not None and (self.origin is not None or self.axis is not None)
-        return whole[key] if known and isinstance(key, slice) and self.ndim == 1 else None
+        is_part = known and isinstance(key, slice) and self.ndim == 1
+        return whole[key] if is_part and whole is not None else None
 
     def _taken(self, places: np.ndarray) -> Tracer:
         """Return copies of the elements at fixed places; many only where these are equally far."""

@@ -167,7 +167,7 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
         if wrong.size:
             _compare_blocks(compiled, trial, ours, point)  # it names the block, if it finds one
             labels = system.state_labels if what == "state" else system.output_labels
-            raise _difference(labels[wrong[0]], system.name, a[wrong[0]], b[wrong[0]], point[0])
+            raise _difference(labels[wrong[0]], system.name, (a[wrong[0]], b[wrong[0]]), point[0])
 
 
 def _close(a: np.ndarray, b: np.ndarray, relative: float = EQUAL, absolute: Any = 0.0) -> Any:
@@ -217,7 +217,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
             moved = np.abs(function(block, t, x[own] * (1 + SHAKEN), inputs * (1 - SHAKEN)) - b)
             wrong = np.flatnonzero(~_close(a, b, ROUNDING, 100 * moved))
             if wrong.size:
-                raise _difference(labels[wrong[0]], node.path, a[wrong[0]], b[wrong[0]], t)
+                raise _difference(labels[wrong[0]], node.path, (a[wrong[0]], b[wrong[0]]), t)
 
 
 def _signals(compiled: Compiled, trial: Trial, point: Any) -> np.ndarray:
@@ -240,7 +240,8 @@ def _signals(compiled: Compiled, trial: Trial, point: Any) -> np.ndarray:
     return y[:, 0]
 
 
-def _difference(label: str, block: str, ours: float, theirs: float, t: float) -> AuditError:
+def _difference(label: str, block: str, values: tuple[Any, Any], t: float) -> AuditError:
+    ours, theirs = values
     return AuditError(
         f"machine code and python-control differ at '{label}' of block '{block}': {ours:.17g} and "
         f"{theirs:.17g} at t = {t:.6g} s; nothing was returned: run it with "

@@ -127,7 +127,7 @@ def method(
         if name in CHANGING and not isinstance(getattr(type(thing), name, None), FunctionType):
             _written(base, f"{name}()")
         return None
-    if type(thing).__module__ not in ("builtins", "numpy", __package__ + ".values"):
+    if type(thing).__module__ not in ("builtins", "numpy", Unknown.__module__):
         found = getattr(type(thing), name, None)  # a class of somebody, or a named tuple's field
         if isinstance(found, FunctionType) or not callable(found):
             return None

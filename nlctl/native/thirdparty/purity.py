@@ -51,7 +51,7 @@ class Frame:
     """The names of one call."""
 
     names: dict[str, Value]
-    function: FunctionType
+    function: Any  # the plain function that is called, or around it
     parent: Frame | None = None
     shared: dict[str, str] = field(default_factory=dict)  # declared global or nonlocal
 
@@ -274,12 +274,11 @@ class _Body(ast.NodeVisitor):
     def visit_Assign(self, node: ast.Assign) -> None:
         value, parts = self.visit(node.value), node.value
         for target in node.targets:
-            pairs = isinstance(target, ast.Tuple) and isinstance(parts, ast.Tuple)
-            if pairs and len(target.elts) == len(parts.elts):  # a, b = c, d
-                values = [self.visit(part) for part in parts.elts]
-                for part, each in zip(target.elts, values, strict=True):
-                    self.bind(part, each)
-            else:
+            pairs = _pairs(target, parts)
+            values = [self.visit(part) for _, part in pairs]  # a, b = c, d
+            for (part, _), each in zip(pairs, values, strict=True):
+                self.bind(part, each)
+            if not pairs:
                 self.bind(target, value)
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
@@ -376,7 +375,7 @@ class _Body(ast.NodeVisitor):
         if node.exc is not None:
             self.visit(node.exc)
 
-    def visit_Try(self, node: ast.Try) -> None:
+    def visit_Try(self, node: ast.Try | ast.TryStar) -> None:
         raise Impure("has try ... except or finally", "write an if for the case that fails")
 
     visit_TryStar = visit_Try
@@ -490,7 +489,8 @@ class _Body(ast.NodeVisitor):
             return replace(element(base), known=one_of(map(captured, parts)))
         if isinstance(base.known, dict | list | tuple):
             try:
-                return captured(base.known[keys[0] if len(keys) == 1 else tuple(keys)])
+                key: Any = keys[0] if len(keys) == 1 else tuple(keys)
+                return captured(base.known[key])
             except (LookupError, TypeError):
                 return OUTSIDE  # it raises where it runs
         self.operands([base])
@@ -571,6 +571,14 @@ class _Body(ast.NodeVisitor):
 
 
 _SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.MatMult: "@"}
+
+
+def _pairs(target: ast.expr, value: ast.expr) -> list[tuple[ast.expr, ast.expr]]:
+    """Return what is assigned to what where both sides are written out, otherwise nothing."""
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+        if len(target.elts) == len(value.elts):
+            return list(zip(target.elts, value.elts, strict=True))
+    return []
 
 
 def _is_plain_attribute(thing: Any, name: str) -> bool:
