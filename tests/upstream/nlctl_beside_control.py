@@ -87,6 +87,8 @@ def native(given: dict) -> Any:
 def compared(wanted: Any, found: Any) -> tuple[str, str]:
     """Compare outputs and states at all times."""
     for part in ("y", "x"):
+        if part == "x" and wanted.x is None:  # a system without states
+            continue
         one, two = (np.asarray(getattr(run, part), dtype=float) for run in (wanted, found))
         if one.shape != two.shape:
             return "different", f"{part} has shape {two.shape}, python-control {one.shape}"
@@ -104,7 +106,7 @@ def tell(kind: str, text: str) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
-    _running["test"] = item.nodeid
+    _running["test"] = item.name
 
 
 for module in [m for name, m in sys.modules.items() if name.split(".")[0] == "control"]:
