@@ -18,6 +18,7 @@ from typing import Any
 import control as ct
 import numpy as np
 import user_functions
+from numba.core.errors import NumbaError
 from user_function_checks import Points, agrees, called, expected, judged, points, quiet, shown
 
 import nlctl
@@ -97,9 +98,17 @@ def single(name: str, n: int) -> tuple[str, str]:
     try:
         compiled = nlctl.compile(system)
         for lane in (0, 1, 2, 3, 16, 17, 18, 19):
-            found = computed(compiled, at.only(lane))
             wanted = expected(system, at.at(lane))
-            apart = compared([one[:, 0] for one in found], wanted, f"point {lane}")
+            try:
+                dx, y = computed(compiled, at.only(lane))
+            except NumbaError:
+                nlctl.native.compile_ahead(compiled)  # says the same in the user's words
+                raise
+            except Exception:
+                if any(one is None for one in wanted):  # both raise
+                    continue
+                raise
+            apart = compared((dx[:, 0], y[:, 0]), wanted, f"point {lane}")
             if apart:
                 return "different", apart
     except nlctl.CompileError as error:
@@ -201,13 +210,13 @@ def stepped(name: str, n: int) -> tuple[str, str]:
     rng = np.random.default_rng(3)
     x, times = 0.3 * rng.normal(size=made.states), 0.1 * np.arange(6)
     u = rng.normal(size=(made.inputs, 6))
-    wanted = ct.input_output_response(system, times, u, x, squeeze=False)
+    wanted = ct.input_output_response(system, times, u, x)
     try:
         compiled = nlctl.compile(user_functions.system(NAMED[name].make(n), name, 0.1))
-        found = nlctl.input_output_response(compiled, times, u, x, squeeze=False)
+        found = nlctl.input_output_response(compiled, times, u, x)
     except nlctl.CompileError as error:
         return "refused", str(error)
-    for part in ("states", "outputs"):
+    for part in ("x", "y"):
         apart = np.abs(getattr(found, part) - getattr(wanted, part))
         scale = np.max(np.abs(getattr(wanted, part)), initial=0.0)
         if not np.all(apart <= 1e-11 * scale):

@@ -213,6 +213,12 @@ class _Reader:
     def _called(self, i: int, kind: str, inputs: Tracer, count: int, reason: str) -> Tracer:
         """Return the results of an opaque call."""
         node, slots = self.blocks[i], self.layout[i]
+        if node.unbound:
+            raise CompileError(
+                f"block '{node.path}' cannot be compiled: its {kind} function reads "
+                f"'{node.unbound[0]}', which has no value on one of the ways there: give it one "
+                "before; the diagram still runs in python-control"
+            )
         name = f"{self.code(i).name}_{kind}_of_one"
         size = sum(s.size for s in slots.values())
         start = min((s.offset for s in slots.values()), default=0)

@@ -10,7 +10,6 @@ import control as ct
 import numba
 import numpy as np
 from numba.core import config
-from numba.core.errors import NumbaError
 
 from ._compile import Compiled
 from ._discrete import compile_discrete
@@ -55,7 +54,7 @@ def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:
         lowered = lower(compiled.schedule, compiled.program, width, compiled.equations)
         try:
             prepare, rhs, out = lowered_code(lowered)
-        except NumbaError as error:
+        except Exception as error:  # numba passes on whatever typing raises
             raise explained(error, compiled.program) from error
         known[width] = (
             lowered,

@@ -41,6 +41,8 @@ class Node:
         For every input the linear combination of signals that feeds it.
     direct : ndarray of bool, shape (noutputs, ninputs)
         Which outputs depend on which inputs at the same instant.
+    unbound : tuple of str
+        Names in its functions that have no value on one of the ways: only traced are these right.
     """
 
     path: str
@@ -48,6 +50,7 @@ class Node:
     state_offset: int
     inputs: tuple[Combination, ...]
     direct: np.ndarray
+    unbound: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,8 +130,8 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
     """
     wiring = Wiring(system)
     read = [note for place in places(system) for note in _equations_of(place.system)]
-    for place in wiring.blocks:
-        read += check_functions(place.path, place.system)  # before anything calls them
+    readings = [check_functions(b.path, b.system) for b in wiring.blocks]  # before any is called
+    read += [note for reading in readings for note in reading.captured]
     nodes = tuple(
         Node(
             path=place.path,
@@ -136,8 +139,9 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
             state_offset=place.state_offset,
             inputs=tuple(wiring.inputs(place)),
             direct=feedthrough(place.system),
+            unbound=reading.unbound,
         )
-        for place in wiring.blocks
+        for place, reading in zip(wiring.blocks, readings, strict=True)
     )
     outputs = tuple(wiring.output(wiring.top, i) for i in range(system.noutputs or 0))
     try:

@@ -11,8 +11,7 @@ import numpy as np
 from ..._block import Block
 from ..._errors import CompileError
 from .._parameters import current_values
-from .captured import Captured
-from .purity import check_pure
+from .purity import Reading, check_pure
 from .values import FRESH, VECTOR, Impure, captured
 
 
@@ -32,7 +31,7 @@ def check_sizes(system: Any, blocks: Iterable[Any]) -> None:
         )
 
 
-def check_functions(path: str, system: Any) -> list[Captured]:
+def check_functions(path: str, system: Any) -> Reading:
     """Check that a block's functions depend on their arguments alone, and return enough values.
 
     The functions are read, not called, until they are known to remember nothing.
@@ -45,8 +44,8 @@ def check_functions(path: str, system: Any) -> list[Captured]:
 
     Returns
     -------
-    list of Captured
-        What the functions read from around them.
+    Reading
+        Of all functions together.
 
     Raises
     ------
@@ -58,7 +57,7 @@ def check_functions(path: str, system: Any) -> list[Captured]:
     for what, function in _functions(system):
         values = system._current_params if is_block else current_values(system)
         try:
-            found += check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)])
+            found.append(check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)]))
         except Impure as error:
             place = f" ({error.place})" if error.place else ""
             raise CompileError(
@@ -67,7 +66,10 @@ def check_functions(path: str, system: Any) -> list[Captured]:
             ) from None
     if not is_block and isinstance(system, ct.NonlinearIOSystem):
         _check_counts(path, system)  # nlctl's blocks were checked when they were made
-    return found
+    return Reading(
+        captured=tuple(note for each in found for note in each.captured),
+        unbound=tuple(name for each in found for name in each.unbound),
+    )
 
 
 def _functions(system: Any) -> Iterator[tuple[str, Any]]:

@@ -1,0 +1,316 @@
+"""What is known of the values of expressions, and of the names in one call."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from types import FunctionType, MethodType, ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import known_calls
+from .known_calls import MEMORY
+from .values import (
+    FRESH,
+    OUTSIDE,
+    SLICE,
+    UNKNOWN,
+    Impure,
+    Local,
+    OneOf,
+    Unknown,
+    Value,
+    captured,
+    element,
+    forgotten,
+    holder,
+    joined,
+    library,
+    one_of,
+)
+
+if TYPE_CHECKING:
+    from .purity import Walk
+
+CHANGES = "work on a copy, as in x.copy()"
+
+
+@dataclass(eq=False)
+class Frame:
+    """The names of one call."""
+
+    names: dict[str, Value]
+    function: Any  # the plain function that is called, or around it
+    parent: Frame | None = None
+    shared: dict[str, str] = field(default_factory=dict)  # declared global or nonlocal
+    unbound: set[str] = field(default_factory=set)  # without a value on one of the ways so far
+
+
+class Expressions(ast.NodeVisitor):
+    """Walks expressions to what is known of their values; `visit` does so for any node."""
+
+    def __init__(self, walk: Walk, frame: Frame) -> None:
+        self.walk, self.frame = walk, frame
+
+    def visit(self, node: ast.AST) -> Any:
+        try:
+            return super().visit(node)
+        except Impure as error:
+            if not error.place and hasattr(node, "lineno"):
+                code = self.frame.function.__code__
+                error.place = f"{code.co_filename}, line {node.lineno}"  # type: ignore[attr-defined]
+            raise
+
+    def generic_visit(self, node: ast.AST) -> Any:
+        what = type(node).__name__
+        raise Impure(f"has a {what} statement or expression", f"write it without {what}")
+
+    # names
+
+    def lookup(self, name: str) -> Value:
+        frame: Frame | None = self.frame
+        while frame is not None:
+            if name in frame.names:
+                self.walk.unbound += [name] if name in frame.unbound else []
+                return frame.names[name]
+            frame = frame.parent
+        function = self.frame.function
+        cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+        try:
+            if name in cells:
+                return self.walk.captured(cells[name], name, cells[name].cell_contents)
+        except ValueError:  # an empty cell: the name has no value yet
+            return OUTSIDE
+        builtin = function.__globals__.get("__builtins__", {})
+        builtin = builtin if isinstance(builtin, dict) else vars(builtin)
+        if name in function.__globals__:
+            return self.walk.captured(function.__globals__, name, function.__globals__[name])
+        return captured(builtin[name]) if name in builtin else OUTSIDE
+
+    def assign(self, name: str, value: Value) -> None:
+        kind = self.frame.shared.get(name)
+        if kind == "global":
+            raise Impure(f"writes the global '{name}'", MEMORY)
+        if kind is None:
+            self.frame.names[name] = value
+            self.frame.unbound.discard(name)
+            return
+        frame = self.frame.parent
+        while frame is not None and name not in frame.names:
+            frame = frame.parent
+        if frame is None:
+            raise Impure(f"writes '{name}', a variable of the function around it", MEMORY)
+        frame.names[name] = joined([frame.names[name], value])
+
+    def bind(self, target: ast.expr, value: Value) -> None:
+        """Assign to a name, an item, an attribute, or several of these."""
+        if isinstance(target, ast.Name):
+            self.assign(target.id, value)
+        elif isinstance(target, ast.Tuple | ast.List):
+            for part in target.elts:
+                self.bind(part, element(value))
+        elif isinstance(target, ast.Starred):
+            self.bind(target.value, replace(element(value), own=True, holds=True))
+        elif isinstance(target, ast.Subscript | ast.Attribute):
+            self.write(target, value)
+        else:
+            self.generic_visit(target)
+
+    def write(self, target: ast.Subscript | ast.Attribute, value: Value) -> None:
+        base = self.visit(target.value)
+        if isinstance(target, ast.Subscript):
+            self.visit(target.slice)
+        if not base.own:
+            text = ast.unparse(target.value)
+            raise Impure(f"writes into '{text}', which it did not make", f"{MEMORY}, or {CHANGES}")
+        if base.holds and isinstance(target.value, ast.Name):
+            inside = base.inside and value.own and value.inside
+            self.assign(target.value.id, replace(base, inside=inside))
+
+    # expressions
+
+    def visit_Lambda(self, node: ast.Lambda) -> Value:
+        return Value(True, True, known=Local(node, self.frame))
+
+    def visit_Constant(self, node: ast.Constant) -> Value:
+        return captured(node.value) if node.value is not ... else SLICE
+
+    def visit_Name(self, node: ast.Name) -> Value:
+        return self.lookup(node.id)
+
+    def visit_NamedExpr(self, node: ast.NamedExpr) -> Value:
+        value = self.visit(node.value)
+        self.assign(node.target.id, value)
+        return value
+
+    def visit_BinOp(self, node: ast.BinOp) -> Value:
+        self.operands([self.visit(node.left), self.visit(node.right)])
+        return FRESH
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> Value:
+        self.operands([self.visit(node.operand)])
+        return FRESH
+
+    def operands(self, values: Sequence[Value]) -> None:
+        """Check that operators are those of numbers, arrays and containers."""
+        for value in values:
+            kind = type(value.known)
+            if not isinstance(value.known, Unknown) and library(kind) is None:
+                raise Impure(f"computes with an object of type {kind.__name__}", "use arrays")
+
+    def visit_Compare(self, node: ast.Compare) -> Value:
+        self.operands([self.visit(part) for part in (node.left, *node.comparators)])
+        for test, part in zip(node.ops, node.comparators, strict=True):
+            is_none = isinstance(part, ast.Constant) and part.value is None
+            if isinstance(test, ast.Is | ast.IsNot) and not is_none:
+                raise Impure("tests identity with 'is'", "write == or !=")
+        return FRESH
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> Value:
+        return joined([self.visit(part) for part in node.values])
+
+    def visit_IfExp(self, node: ast.IfExp) -> Value:
+        self.visit(node.test)
+        return joined([self.visit(node.body), self.visit(node.orelse)])
+
+    def visit_Tuple(self, node: ast.Tuple | ast.List | ast.Set) -> Value:
+        return holder([self.visit(part) for part in node.elts])
+
+    visit_List = visit_Set = visit_Tuple
+
+    def visit_Dict(self, node: ast.Dict) -> Value:
+        for part in node.keys:
+            if part is not None:
+                self.visit(part)
+        return holder([self.visit(part) for part in node.values])
+
+    def visit_Starred(self, node: ast.Starred) -> Value:
+        return element(self.visit(node.value))
+
+    def visit_Slice(self, node: ast.Slice) -> Value:
+        for part in (node.lower, node.upper, node.step):
+            if part is not None:
+                self.visit(part)
+        return SLICE
+
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> Value:
+        for part in ast.walk(node):
+            if isinstance(part, ast.FormattedValue):
+                self.visit(part.value)
+        return FRESH
+
+    def visit_Subscript(self, node: ast.Subscript) -> Value:
+        base = self.visit(node.value)
+        indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        values = [self.visit(index) for index in indices]
+        keys = [v.known for v in values]
+        if isinstance(base.known, OneOf):
+            return base
+        if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
+            parts = base.known.values() if isinstance(base.known, dict) else base.known
+            return replace(element(base), known=one_of(map(captured, parts)))
+        if isinstance(base.known, dict | list | tuple):
+            try:
+                key: Any = keys[0] if len(keys) == 1 else tuple(keys)
+                return captured(base.known[key])
+            except (LookupError, TypeError):
+                return OUTSIDE  # it raises where it runs
+        self.operands([base])
+        if any(isinstance(key, slice | type(None)) for key in keys):
+            return forgotten(base)  # a view
+        if any(isinstance(v.known, Unknown) and not v.own for v in values):
+            return forgotten(base)
+        whole = isinstance(base.known, np.ndarray) and len(keys) == base.known.ndim
+        return FRESH if whole else element(base)
+
+    def visit_Attribute(self, node: ast.Attribute) -> Value:
+        return self.attribute(self.visit(node.value), node.attr)
+
+    def attribute(self, base: Value, name: str) -> Value:
+        """Return what is known of an attribute; a property is walked."""
+        thing = base.known
+        if isinstance(thing, Unknown):
+            return base
+        if isinstance(thing, np.ndarray):
+            return forgotten(base)
+        found = inspect.getattr_static(type(thing), name, None)
+        if isinstance(found, property | functools.cached_property) and library(type(thing)) is None:
+            getter = found.fget if isinstance(found, property) else found.func
+            result = self.walk.call(captured(getter), [base], {})
+            return result if not result.own else FRESH
+        if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
+            value = getattr(thing, name, UNKNOWN)
+            if isinstance(value, Unknown):
+                return OUTSIDE
+            if isinstance(value, MethodType) or isinstance(thing, super):
+                return captured(value)  # made anew each time
+            return self.walk.captured(thing, name, value)
+        raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
+
+    def visit_Call(self, node: ast.Call) -> Value:
+        given = [self.visit(part) for part in node.args]
+        named = {k.arg or "**": self.visit(k.value) for k in node.keywords}
+        if "out" in named and not named["out"].own:
+            raise Impure("writes into an array with out=, which it did not make", CHANGES)
+        if isinstance(node.func, ast.Attribute):
+            base = self.visit(node.func.value)
+            bound = known_calls.method(self.walk, base, node.func.attr, given, named)
+            if bound is not None:
+                return bound
+        function = self.visit(node.func)
+        if function.known is super and not given:
+            return self.parent_class()
+        if function.known is getattr and isinstance(given[1].known, str):
+            return self.attribute(given[0], given[1].known)
+        return self.walk.call(function, given, named)
+
+    def parent_class(self) -> Value:
+        """Return what ``super()`` stands for."""
+        own, cls = next(iter(self.frame.names.values()), OUTSIDE), self.lookup("__class__")
+        if isinstance(own.known, Unknown) or not isinstance(cls.known, type):
+            raise Impure("calls super() of what is only known when it runs", "name the class")
+        return captured(super(cls.known, own.known))
+
+    def visit_ListComp(self, node: ast.ListComp | ast.SetComp | ast.GeneratorExp) -> Value:
+        return self.comprehended(node.generators, [node.elt])
+
+    visit_SetComp = visit_GeneratorExp = visit_ListComp
+
+    def visit_DictComp(self, node: ast.DictComp) -> Value:
+        return self.comprehended(node.generators, [node.key, node.value])
+
+    def comprehended(self, loops: Sequence[ast.comprehension], parts: Sequence[ast.expr]) -> Value:
+        before = dict(self.frame.names)
+        for loop in loops:
+            over = self.visit(loop.iter)
+            self.iterated(over, loop.iter)
+            self.bind(loop.target, element(over))
+            for condition in loop.ifs:
+                self.visit(condition)
+        made = holder([self.visit(part) for part in parts])
+        self.frame.names = before
+        return made
+
+    def iterated(self, value: Value, node: ast.AST) -> None:
+        if not value.own and hasattr(value.known, "__next__"):
+            raise Impure(f"uses up '{ast.unparse(node)}', which it did not make", MEMORY)
+
+
+def _is_plain_attribute(thing: Any, name: str) -> bool:
+    """Whether reading an attribute of an object runs no code that could do anything."""
+    if library(type(thing)) is not None or isinstance(thing, type | super):
+        return True
+    missing = object()
+    found = inspect.getattr_static(thing, name, missing)
+    if found is missing:
+        return not any(hasattr(type(thing), special) for special in ("__getattr__",))
+    simple = (FunctionType, staticmethod, classmethod)
+    return (
+        isinstance(found, simple)
+        or not hasattr(type(found), "__get__")
+        or (type(found).__name__ in ("member_descriptor", "_tuplegetter", "getset_descriptor"))
+    )
