@@ -26,9 +26,14 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
-    """Count what needs a browser, a cluster or other people's tests as slow."""
+    """Count as slow what needs a browser, a cluster or other people's tests.
+
+    So is the machine code, ``native=True``, of what the same test compares as plain Python.
+    """
     for item in items:
-        if any(item.get_closest_marker(name) for name in ("browser", "cluster", "upstream")):
+        values = item.callspec.params if hasattr(item, "callspec") else {}
+        marked = any(item.get_closest_marker(name) for name in ("browser", "cluster", "upstream"))
+        if marked or values.get("native") is True:
             item.add_marker("slow")
 
 

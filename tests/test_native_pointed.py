@@ -51,6 +51,7 @@ def copied(record, line, grid, cube, places):
     return record.number, record.count, record.line.shape, record.grid.shape, record.cube.shape
 
 
+@pytest.mark.slow
 @given(RECORDS)
 def test_every_field_is_the_same_in_machine_code(record):
     """All bits of all numbers, and all shapes, empty arrays included."""
