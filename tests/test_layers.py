@@ -136,11 +136,11 @@ def lines_of_functions(path, lines):
 
 
 def test_modules_and_functions_are_small():
-    """Under 300 lines a module, 40 lines of code a function."""
+    """At most 500 lines a module, 40 lines of code a function."""
     large = []
     for path in FILES:
         name, lines = str(path.relative_to(ROOT)), path.read_text(encoding="utf-8").splitlines()
-        if len(lines) >= 300:
+        if len(lines) > 500:
             large.append((name, len(lines)))
         large += [(f"{name}: {f}", n) for f, n in lines_of_functions(path, lines) if n > 40]
     assert large == []

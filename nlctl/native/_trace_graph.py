@@ -240,6 +240,8 @@ class Graph:
         if name == "select":
             if args[1] is args[2] or (is_const[0] and a.data):
                 return args[1]
+            if a.size is None and all(arg.op == "concat" for arg in args[1:]):
+                return self._choice_of_pieces(*args)
             return args[2] if is_const[0] else self._inner_select(*args)
         for this, other, known in ((a, b, is_const[-1]), (b, a, is_const[0])):
             neutral = {"mul": 1.0, "div": 1.0, "add": 0.0, "sub": 0.0}.get(name)
@@ -249,6 +251,13 @@ class Graph:
         if name == "sub" and is_const[0] and a.data == 0.0:
             return self.op("neg", b)
         return a.args[0] if name == "neg" and a.op == "neg" else None
+
+    def _choice_of_pieces(self, condition: Expr, a: Expr, b: Expr) -> Expr | None:
+        """Choose piece by piece: what is the same on both ways depends on no condition."""
+        if a.data != b.data:
+            return None
+        pairs = zip(a.args, b.args, a.data, strict=True)
+        return self.joined([(self.op("select", condition, x, y), n) for x, y, n in pairs])
 
     def _inner_select(self, condition: Expr, a: Expr, b: Expr) -> Expr | None:
         """Choose between two operations that differ in one argument by choosing that."""
