@@ -9,6 +9,8 @@ from user_function_native import accepted, run
 ENTRIES = {entry.name: entry for entry in user_functions.ENTRIES}
 PURE = [entry for entry in ENTRIES.values() if entry.pure]
 IMPURE = [entry for entry in ENTRIES.values() if not entry.pure]
+# in the everyday tests the size at which arrays become loops
+SIZES = [n if n == 9 else pytest.param(n, marks=pytest.mark.slow) for n in user_functions.SIZES]
 GROUPS = 8  # of entries that are compiled one by one
 
 machine_code = pytest.mark.skipif(
@@ -27,21 +29,21 @@ def hold(entry, n, dt=0):
     assert verdict.good, f"{where}: {verdict.kind}: {verdict.text}"
 
 
-@pytest.mark.parametrize("n", user_functions.SIZES)
+@pytest.mark.parametrize("n", SIZES)
 @pytest.mark.parametrize("entry", **named(PURE))
 def test_a_pure_function_agrees_or_is_refused(entry, n):
     """At points of several scales, also with other parameters; python-control is as before."""
     hold(entry, n)
 
 
-@pytest.mark.parametrize("n", user_functions.SIZES)
+@pytest.mark.parametrize("n", SIZES)
 @pytest.mark.parametrize("entry", **named([entry for entry in PURE if entry.discrete]))
 def test_in_discrete_time_as_well(entry, n):
     """The same numbers are the next state."""
     hold(entry, n, 0.1)
 
 
-@pytest.mark.parametrize("n", user_functions.SIZES)
+@pytest.mark.parametrize("n", SIZES)
 @pytest.mark.parametrize("entry", **named(IMPURE))
 def test_an_impure_function_is_refused(entry, n):
     """Its memory stays as it was: python-control goes on as with a fresh instance."""
@@ -56,6 +58,7 @@ def test_the_corpus_is_large():
     assert len(IMPURE) >= 50
 
 
+@pytest.mark.slow
 def test_most_pure_functions_are_accepted():
     """Refusing all would be right and of no use."""
     kinds = [judged(entry, 9).kind for entry in PURE]
@@ -82,13 +85,16 @@ def test_traced_functions_in_one_diagram_in_machine_code(n):
     assert {kind for kind, _ in found.values()} == {"equal"}
 
 
+def part(group):
+    """The first groups in each run of all tests, the others once a week."""
+    return pytest.param(group, marks=pytest.mark.slow if group < 2 else pytest.mark.weekly)
+
+
 @machine_code
-@pytest.mark.slow
-@pytest.mark.parametrize("group", range(GROUPS))
-@pytest.mark.parametrize("n", user_functions.SIZES)
-def test_functions_called_as_they_stand_in_machine_code(n, group):
+@pytest.mark.parametrize("group", [part(group) for group in range(GROUPS)])
+def test_functions_called_as_they_stand_in_machine_code(group):
     """numba compiles each, or the refusal names the reason."""
-    report("single", n, accepted(n, opaque=True)[group::GROUPS])
+    report("single", 9, accepted(9, opaque=True)[group::GROUPS])
 
 
 @machine_code

@@ -22,7 +22,7 @@ from numba.core.errors import NumbaError
 from user_function_checks import Points, agrees, called, expected, judged, points, quiet, shown
 
 import nlctl
-from nlctl.native._lower import lower, lowered_code
+from nlctl.native._machine import machine
 
 JOB = Path(__file__)
 WIDTH = 8  # members side by side in an ensemble
@@ -70,15 +70,14 @@ def tell(name: str, **found: str) -> None:
 def computed(compiled: nlctl.Compiled, at: Points) -> tuple[np.ndarray, np.ndarray]:
     """Return dx and y of the machine code for as many members as there are points."""
     system, lanes = compiled.system, at.t.size
-    lowered = lower(compiled.schedule, compiled.program, lanes)
-    prepare, rhs, out = lowered_code(lowered)
     p = np.repeat(compiled.parameter_vector()[:, None], lanes, axis=1)
-    sizes = (lowered.size, system.nstates, compiled.program.events, system.noutputs)
+    code = machine(compiled, p, lanes)
+    sizes = (code.rows, system.nstates, compiled.program.events, system.noutputs)
     c, dx, g, y = (np.full((n or 0, lanes), np.nan) for n in sizes)
-    prepare(p, c)
+    code.prepare(p, c)
     given = [np.ascontiguousarray(a) for a in (at.t, at.x, at.u)]
-    rhs(*given, c, dx, g)
-    out(*given, c, y)
+    code.rhs(*given, c, dx, g)
+    code.out(*given, c, y)
     return dx, y
 
 
