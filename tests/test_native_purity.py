@@ -4,6 +4,7 @@ import ast
 import collections
 import functools
 import linecache
+import operator
 import random
 import time
 
@@ -59,12 +60,27 @@ class Tank:
         return -x
 
 
+class Counter:
+    """An object whose special methods count."""
+
+    def __init__(self):
+        self.count = 0
+
+    def __iter__(self):
+        self.count += 1
+        return iter([1.0])
+
+    def __len__(self):
+        self.count += 1
+        return 1
+
+
 class Heavy(Tank):
     def update(self, t, x, u, params):
         return super().update(t, x, u, params)
 
 
-TANK, HEAVY = Tank(), Heavy()
+TANK, HEAVY, COUNTER = Tank(), Heavy(), Counter()
 
 
 def fill(array, value):
@@ -193,6 +209,44 @@ def sets_an_attribute(t, x, u, params):
     setattr(TANK, "gain", 3.0)
     return x
 
+def sums_an_iterator(t, x, u, params):
+    return x + sum(ENDLESS)
+
+def unpacks_an_iterator(t, x, u, params):
+    a, b = ENDLESS
+    return x + a
+
+def looks_for_it_in_an_iterator(t, x, u, params):
+    return x if 3 in ENDLESS else -x
+
+def makes_an_array_of_an_iterator(t, x, u, params):
+    return x + np.fromiter(ENDLESS, float)[0]
+
+def adds_with_a_function(t, x, u, params):
+    return operator.iadd(x, 1.0)
+
+def keeps_a_view_in_a_list(t, x, u, params):
+    parts, other = [], []
+    also = parts
+    also.append(x[:1])
+    parts[0][0] = 1.0
+    return x
+
+def takes_a_view_by_a_tuple(t, x, u, params):
+    places = (slice(0, 1),)
+    part = x[places]
+    part[0] = 1.0
+    return x
+
+def goes_through_an_object(t, x, u, params):
+    return x + [v for v in COUNTER][0]
+
+def asks_an_object(t, x, u, params):
+    return x if COUNTER else -x
+
+def measures_an_object(t, x, u, params):
+    return x * len(COUNTER)
+
 def yields(t, x, u, params):
     yield x
 """
@@ -276,7 +330,7 @@ def imports(t, x, u, params):
 NAMES = {
     "np": np, "GAIN": GAIN, "HISTORY": HISTORY, "TABLE": TABLE, "MATRIX": MATRIX, "RNG": RNG,
     "ENDLESS": ENDLESS, "TANK": TANK, "fill": fill, "random": random, "time": time,
-    "functools": functools,
+    "functools": functools, "operator": operator, "COUNTER": COUNTER,
 }  # fmt: skip
 ARGUMENTS = [FRESH, VECTOR, VECTOR, captured(PARAMS)]
 
@@ -314,6 +368,7 @@ def test_what_is_no_function_of_its_arguments_is_found():
     assert HISTORY == []
     assert TABLE == {"k": 1.0}
     assert next(ENDLESS) == 0
+    assert COUNTER.count == 0
 
 
 def test_what_is_a_function_of_its_arguments_is_accepted():

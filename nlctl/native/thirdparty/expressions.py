@@ -111,6 +111,7 @@ class Expressions(ast.NodeVisitor):
         if isinstance(target, ast.Name):
             self.assign(target.id, value)
         elif isinstance(target, ast.Tuple | ast.List):
+            self.iterated(value)
             for part in target.elts:
                 self.bind(part, element(value))
         elif isinstance(target, ast.Starred):
@@ -127,9 +128,13 @@ class Expressions(ast.NodeVisitor):
         if not base.own:
             text = ast.unparse(target.value)
             raise Impure(f"writes into '{text}', which it did not make", f"{MEMORY}, or {CHANGES}")
-        if base.holds and isinstance(target.value, ast.Name):
-            inside = base.inside and value.own and value.inside
-            self.assign(target.value.id, replace(base, inside=inside))
+        self.kept(base, [value])
+
+    def kept(self, base: Value, values: Sequence[Value]) -> None:
+        """Note that a list or dict keeps what the call has not made: any other may be the same."""
+        if base.holds and not all(v.own and v.inside for v in values):
+            names = self.frame.names
+            names.update({k: replace(v, inside=False) for k, v in names.items() if v.holds})
 
     # expressions
 
@@ -158,9 +163,10 @@ class Expressions(ast.NodeVisitor):
     def operands(self, values: Sequence[Value]) -> None:
         """Check that operators are those of numbers, arrays and containers."""
         for value in values:
-            kind = type(value.known)
-            if not isinstance(value.known, Unknown) and library(kind) is None:
-                raise Impure(f"computes with an object of type {kind.__name__}", "use arrays")
+            known_calls.check_object(value, "computes with")
+
+    def condition(self, node: ast.expr) -> None:
+        self.operands([self.visit(node)])
 
     def visit_Compare(self, node: ast.Compare) -> Value:
         self.operands([self.visit(part) for part in (node.left, *node.comparators)])
@@ -171,10 +177,12 @@ class Expressions(ast.NodeVisitor):
         return FRESH
 
     def visit_BoolOp(self, node: ast.BoolOp) -> Value:
-        return joined([self.visit(part) for part in node.values])
+        values = [self.visit(part) for part in node.values]
+        self.operands(values)
+        return joined(values)
 
     def visit_IfExp(self, node: ast.IfExp) -> Value:
-        self.visit(node.test)
+        self.condition(node.test)
         return joined([self.visit(node.body), self.visit(node.orelse)])
 
     def visit_Tuple(self, node: ast.Tuple | ast.List | ast.Set) -> Value:
@@ -189,7 +197,9 @@ class Expressions(ast.NodeVisitor):
         return holder([self.visit(part) for part in node.values])
 
     def visit_Starred(self, node: ast.Starred) -> Value:
-        return element(self.visit(node.value))
+        value = self.visit(node.value)
+        self.iterated(value)
+        return element(value)
 
     def visit_Slice(self, node: ast.Slice) -> Value:
         for part in (node.lower, node.upper, node.step):
@@ -222,8 +232,8 @@ class Expressions(ast.NodeVisitor):
         self.operands([base])
         if any(isinstance(key, slice | type(None)) for key in keys):
             return forgotten(base)  # a view
-        if any(isinstance(v.known, Unknown) and not v.own for v in values):
-            return forgotten(base)
+        if any(v.holds or (isinstance(v.known, Unknown) and not v.own) for v in values):
+            return forgotten(base)  # it may be one
         whole = isinstance(base.known, np.ndarray) and len(keys) == base.known.ndim
         return FRESH if whole else element(base)
 
@@ -260,13 +270,17 @@ class Expressions(ast.NodeVisitor):
             base = self.visit(node.func.value)
             bound = known_calls.method(self.walk, base, node.func.attr, given, named)
             if bound is not None:
+                self.kept(base, [*given, *named.values()])
                 return bound
         function = self.visit(node.func)
         if function.known is super and not given:
             return self.parent_class()
         if function.known is getattr and isinstance(given[1].known, str):
             return self.attribute(given[0], given[1].known)
-        return self.walk.call(function, given, named)
+        result = self.walk.call(function, given, named)
+        for value in (*given, *named.values()):  # a list may have been given something to keep
+            self.kept(value, [*given, *named.values()])
+        return result
 
     def parent_class(self) -> Value:
         """Return what ``super()`` stands for."""
@@ -287,17 +301,16 @@ class Expressions(ast.NodeVisitor):
         before = dict(self.frame.names)
         for loop in loops:
             over = self.visit(loop.iter)
-            self.iterated(over, loop.iter)
+            self.iterated(over)
             self.bind(loop.target, element(over))
             for condition in loop.ifs:
-                self.visit(condition)
+                self.condition(condition)
         made = holder([self.visit(part) for part in parts])
         self.frame.names = before
         return made
 
-    def iterated(self, value: Value, node: ast.AST) -> None:
-        if not value.own and hasattr(value.known, "__next__"):
-            raise Impure(f"uses up '{ast.unparse(node)}', which it did not make", MEMORY)
+    def iterated(self, value: Value) -> None:
+        known_calls.check_object(value, "goes through")
 
 
 def _is_plain_attribute(thing: Any, name: str) -> bool:

@@ -40,6 +40,8 @@ VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d
          "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack"}  # fmt: skip
 WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
            "insort_left", "insort_right"}  # fmt: skip
+IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
+            "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
@@ -167,6 +169,22 @@ def _walkable(function: FunctionType) -> bool:
     return (library(function) or "control").partition(".")[0] == "control"
 
 
+def check_object(value: Value, what: str) -> None:
+    """Check that what a value does by itself is known: no iterator, no class of somebody.
+
+    Raises
+    ------
+    Impure
+    """
+    thing = value.known
+    if isinstance(thing, Unknown | Local | OneOf):
+        return
+    if not value.own and hasattr(thing, "__next__"):
+        raise Impure(f"uses up {type(thing).__name__}, which it did not make", MEMORY)
+    if library(type(thing)) is None:
+        raise Impure(f"{what} an object of type {type(thing).__name__}", "use arrays")
+
+
 def _is_builtin(thing: Any) -> bool:
     name = getattr(thing, "__name__", "")
     return getattr(builtins, name, None) is thing if isinstance(name, str) else False
@@ -174,6 +192,8 @@ def _is_builtin(thing: Any) -> bool:
 
 def _builtin(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]) -> Value:
     name = thing.__name__
+    for value in given if name not in ("isinstance", "issubclass", "callable", "type") else ():
+        check_object(value, f"calls {name}() of")
     if name == "slice":
         return SLICE
     if name == "type" and len(given) == 1:
@@ -184,9 +204,6 @@ def _builtin(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]
         return joined([element(given[0])] if len(given) == 1 else [forgotten(v) for v in given])
     if thing in MAKING:
         _call_functions(walk, [*given, *named.values()])
-        outside = [v for v in given if not v.own and hasattr(v.known, "__next__")]
-        if outside:
-            raise Impure(f"uses up with {name}() what it did not make", MEMORY)
         return Value(True, all(v.inside for v in given), True)
     if name == "next":
         _written(given[0], "next()")
@@ -204,7 +221,10 @@ def _library(
     if module.startswith(VARYING):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
     _call_functions(walk, [*given, *named.values()])
-    if name in WRITERS:
+    for value in (*given, *named.values()):
+        if not callable(value.known):
+            check_object(value, f"hands {name}")
+    if name in WRITERS or (module.endswith("operator") and name in IN_PLACE):
         _written(given[0], f"{name}()")
         return FRESH
     if name in VIEWS or ("copy" in named and named["copy"].known is not True):
@@ -218,5 +238,5 @@ def _call_functions(walk: Walk, values: Any) -> None:
         thing = value.known
         if isinstance(thing, Unknown | type):
             continue
-        if isinstance(thing, Local | functools.partial) or python_function(thing) is not None:
+        if isinstance(thing, Local) or callable(thing):
             walk.call(value, [OUTSIDE] * 8, {})

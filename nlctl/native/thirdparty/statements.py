@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import importlib
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,10 +83,8 @@ class Body(Expressions):
                     f"changes '{name}' in place with {mark}=, which it did not make",
                     f"write {name} = {name} {mark} ...",
                 )
-            keeps = value.holds and not (added.own and added.inside)
-            self.assign(
-                node.target.id, forgotten(replace(value, inside=value.inside and not keeps))
-            )
+            self.assign(node.target.id, forgotten(value))
+            self.kept(value, [added])
             return
         base = self.visit(node.target.value)
         if base.holds and not base.inside:
@@ -109,7 +106,7 @@ class Body(Expressions):
         self.frame.shared |= dict.fromkeys(node.names, "nonlocal")
 
     def visit_If(self, node: ast.If) -> None:
-        self.visit(node.test)
+        self.condition(node.test)
         self.either([node.body, node.orelse])
 
     def either(self, bodies: Sequence[Sequence[ast.stmt]]) -> None:
@@ -126,11 +123,11 @@ class Body(Expressions):
 
     def visit_For(self, node: ast.For) -> None:
         over = self.visit(node.iter)
-        self.iterated(over, node.iter)
+        self.iterated(over)
         self.repeated(node, lambda: self.bind(node.target, element(over)))
 
     def visit_While(self, node: ast.While) -> None:
-        self.repeated(node, lambda: self.visit(node.test))
+        self.repeated(node, lambda: self.condition(node.test))
 
     def repeated(self, node: ast.For | ast.While, begin: Any) -> None:
         """Walk a loop until nothing new is learnt."""
