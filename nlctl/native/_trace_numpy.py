@@ -93,7 +93,7 @@ class Stage:
             return self.numpy if value is np else self.math
         if isinstance(value, ModuleType):
             inside = value.__name__.partition(".")[0] in _LIBRARIES
-            return _Module(value, _forbidden if inside else lambda _, real: self.instead(real))
+            return _Module(value, _constant if inside else lambda _, real: self.instead(real))
         if type(value) in _RAW or isinstance(value, type | np.generic | Tracer):
             return value
         if type(value) in (list, tuple):
@@ -149,7 +149,7 @@ class Stage:
         if isinstance(real, np.ufunc) and operation:
             return self._ufunc(operation, real)
         if isinstance(real, ModuleType):
-            return _Module(real, _forbidden)
+            return _Module(real, _constant)
         return _for_numbers(real)
 
     def _math_function(self, name: str, real: Any) -> Any:
@@ -261,8 +261,9 @@ def _is_of_a_library(thing: Any) -> bool:
     return module.partition(".")[0] in _LIBRARIES
 
 
-def _forbidden(name: str, real: Any) -> Any:
-    raise Untraceable(f"{name} is not known here")
+def _constant(name: str, real: Any) -> Any:
+    """Return a function or module of a library, for constants alone."""
+    return _Module(real, _constant) if isinstance(real, ModuleType) else _for_numbers(real)
 
 
 def _for_numbers(real: Callable[..., Any]) -> Callable[..., Any]:
