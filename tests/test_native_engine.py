@@ -23,7 +23,7 @@ def decay(function=lambda t, x, u, params: [-params["k"] * x[0]]):
 
 
 def special(t, x, u, params):
-    rate = scipy.special.erfcx(0.0)
+    rate = scipy.special.erfcx(0.0 * x[0])
     return [-rate * params["k"] * x[0]]
 
 
