@@ -10,7 +10,7 @@ import numpy as np
 from .._block import Block
 from ._parameters import slots_of
 from ._trace_block import dependence
-from ._trace_graph import Ambiguous
+from ..expressions.graph import Ambiguous
 
 
 def feedthrough(system: Any) -> np.ndarray:

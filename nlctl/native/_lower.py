@@ -26,7 +26,7 @@ from ._lower_emit import written
 from ._lower_plan import Store, needed, plan, split
 from ._parameters import length
 from ._schedule import Schedule
-from ._trace_graph import Expr
+from ..expressions.graph import Expr
 from ._vector_math import FUNCTIONS
 from .codegen.fingerprint import module_key
 from .codegen.machine_code import Wanted, machine_code

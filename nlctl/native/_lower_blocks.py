@@ -13,11 +13,11 @@ from .._errors import CompileError
 from ._code import Code, code
 from ._parameters import length
 from ._schedule import Combination, Node, Schedule, Signal
-from ._trace import trace
-from ._trace_array import Tracer, boxed, concatenated, full, number, traced, vector
+from ..expressions.trace import trace
+from ..expressions.arrays import Tracer, boxed, concatenated, full, number, traced, vector
 from ._trace_block import parameters, time
-from ._trace_graph import SMALL, Ambiguous, Expr, Graph, Untraceable
-from ._trace_operators import elementwise
+from ..expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable
+from ..expressions.operators import elementwise
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from typing import Any
 
 from ._lower_blocks import Call
 from ._lower_plan import Loop, Plan, Store
-from ._trace_graph import Expr
+from ..expressions.graph import Expr
 
 WIDE = 8
 INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "gt": ">",

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
-from ._trace_graph import Expr
+from ..expressions.graph import Expr
 
 Loop = tuple[int, int]  # level and length
 STORED = ("concat", "call")  # vectors that are made in memory

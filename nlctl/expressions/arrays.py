@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ._trace_graph import SMALL, Expr, Graph, Untraceable
+from .graph import SMALL, Expr, Graph, Untraceable
 
 
 @dataclass(eq=False, repr=False)
