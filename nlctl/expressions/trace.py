@@ -9,8 +9,8 @@ import numpy as np
 
 from .arrays import Tracer, concatenated, number, traced
 from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, Undecided, Untraceable
-from .stage import Stage
 from .operators import elementwise
+from .stage import Stage
 
 PATHS = 32  # ways through one function that are followed
 

@@ -10,14 +10,14 @@ import control as ct
 import numpy as np
 
 from .._errors import CompileError
+from ..expressions.arrays import Tracer, boxed, concatenated, full, number, traced, vector
+from ..expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable
+from ..expressions.operators import elementwise
+from ..expressions.trace import trace
 from ._code import Code, code
 from ._parameters import length
 from ._schedule import Combination, Node, Schedule, Signal
-from ..expressions.trace import trace
-from ..expressions.arrays import Tracer, boxed, concatenated, full, number, traced, vector
 from ._trace_block import parameters, time
-from ..expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable
-from ..expressions.operators import elementwise
 
 
 @dataclass(frozen=True, kw_only=True)
