@@ -182,6 +182,12 @@ class Tracer:
             return self
         raise Untraceable("reshaping a long array")
 
+    def pieces(self) -> list[tuple[Expr, int]]:
+        """Return the elements in order, each expression with its number of elements."""
+        if self.axis is not None:
+            return [(self.only, self.length)]
+        return [(self.graph.number(e), 1) for e in self.cells.flat]
+
     @property
     def only(self) -> Expr:
         """The expression of an array of one element."""

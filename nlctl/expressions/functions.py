@@ -79,7 +79,7 @@ _ROWS = (
     _row("floor", "llvm.floor", r"\left\lfloor {0} \right\rfloor", _zero,
          ball=lambda x: x.floor(), math="-"),
     _row("copysign", "llvm.copysign", r"\left|{0}\right| \operatorname{{sgn}} {1}",
-         lambda x, y: np.copysign(np.where(x < 0.0, -1.0, 1.0), y), _zero),
+         lambda x, y: np.where(x < 0.0, -1.0, 1.0) * np.copysign(1.0, y), _zero),
     _row("sign", "own", r"\operatorname{{sgn}} {0}", _zero, ball=lambda x: x.sgn(), math="-"),
     _row("minimum", "own", r"\min\left({0}, {1}\right)",
          lambda x, y: np.where(x < y, 1.0, 0.0), lambda x, y: np.where(x < y, 0.0, 1.0), math="-"),
