@@ -159,6 +159,8 @@ class Reader:
                 value = self.comparison() and value
             elif self.take(r"\text{ or }"):
                 value = self.comparison() or value
+            elif self.take(r"\text{ xor }"):
+                value = self.comparison() != value
             else:
                 return value
 

@@ -41,7 +41,11 @@ def scalars(system, t, x, u):
     known = {"t": t}
     known |= {symbol(name): v for name, v in zip(system.state_labels, x, strict=True)}
     known |= {symbol(name): v for name, v in zip(system.input_labels, u, strict=True)}
-    return known | {symbol(k): v for k, v in system.params.items() if np.ndim(v) == 0}
+    for name, given in system.params.items():
+        for place, v in np.ndenumerate(given) if np.asarray(given).dtype.kind in "fib" else ():
+            index = ",".join(str(k + 1) for k in place)
+            known[f"{symbol(name)}_{{{index}}}" if place else symbol(name)] = v
+    return known
 
 
 def judged(system, t, x, u):

@@ -18,7 +18,7 @@ GREEK_LETTERS = frozenset(GREEK.split())
 MARKS = {"hat": r"\hat", "bar": r"\bar", "tilde": r"\tilde", "dot": r"\dot", "ddot": r"\ddot"}
 RELATIONS = {"lt": "<", "le": r"\le", "gt": ">", "ge": r"\ge", "eq": "=", "ne": r"\ne"}
 WORDS = {"and": r"\text{ and }", "or": r"\text{ or }", "xor": r"\text{ xor }"}
-SUM, TERM, SIGNED, FACTOR, ATOM = range(5)  # how tightly a formula holds together
+WORD, SUM, TERM, SIGNED, FACTOR, ATOM = range(6)  # how tightly a formula holds together
 LETTERS = "ijklm"
 Index = tuple[int, int, str]  # element start + step (letter - 1) of a vector, from 0
 ENCLOSED = r"(?:\{{\{{|\\left\(|\\left\||\\l[a-z]+ |, |\(1 \+ )\{{{}\}}"  # where {0} needs no ( )
@@ -253,8 +253,10 @@ class Writer:
             left, right = (self._held(arg, index, depth, SUM) for arg in expr.args)
             return f"{left} {RELATIONS[expr.op]} {right}", SUM
         if expr.op in WORDS:
-            left, right = (self._held(arg, index, depth, SUM) for arg in expr.args)
-            return f"{left}{WORDS[expr.op]}{right}", SUM
+            least = [WORD if arg.op == expr.op != "xor" else SUM for arg in expr.args]
+            pairs = zip(expr.args, least, strict=True)
+            left, right = (self._held(arg, index, depth, own) for arg, own in pairs)
+            return f"{left}{WORDS[expr.op]}{right}", WORD
         raise Untraceable(f"{expr.op} of {expr.data} has no formula")
 
 
