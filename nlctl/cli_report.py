@@ -125,10 +125,11 @@ def _reproduced(
 @contextmanager
 def _other_process() -> Iterator[Executor]:
     """Lend a process for the other core; it ends when the body fails, whatever it is doing."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import active_children, get_context
+    from multiprocessing import active_children
 
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    from ._workers import process_pool
+
+    with process_pool(1) as pool:
         try:
             yield pool
         except BaseException:
