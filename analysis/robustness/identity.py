@@ -148,8 +148,17 @@ def differences_of(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[st
     return [
         f"{place} was {old.get(place, missing)}, now {new.get(place, missing)}"
         for place in places
-        if old.get(place, missing) != new.get(place, missing)
+        if not _same(old.get(place, missing), new.get(place, missing))
     ]
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values of JSON are equal; NaN equals NaN, here and inside of lists."""
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
+    return one == other or (one != one and other != other)
 
 
 def _flat(content: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:
