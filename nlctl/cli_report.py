@@ -257,7 +257,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
         If a file is no report, or cannot be read.
     """
     from analysis.report.compare import compare
-    from analysis.studies import run_differences
+    from analysis.studies import origin_differences, run_differences
 
     paths = (first, second)
     without = [p for p in paths if p.is_dir() and not (p / "report.json").exists()]
@@ -268,6 +268,8 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
     found: list[Any] = (
         run_differences(first, second) if as_runs else compare(first, second, rtol=rtol)
     )
+    if as_runs and (told := origin_differences(first, second)):
+        print(f"nlctl: the two runs were not computed from the same: {told}", file=sys.stderr)
     if as_json:
         told = [text if isinstance(text, str) else vars(text) for text in found]
         print(json_text.dumps(told, indent=1, ensure_ascii=False))

@@ -184,7 +184,7 @@ def loop():
         ("Soft(limit=30.0)", "Soft(limit=31.0)", "parameters", "actuator.limit"),
         ('{"x1": 0.5}', '{"x1": 0.6}', "initial_state", "plant.x1"),
         ('"actuator": Soft', '"motor": Soft', "wiring", "diagram"),
-        ("order=2),\n        \"actuator\"", "order=2, law=nlctl.KnownSignLaw()),\n        \"actuator\"",
+        ("neural(order=2)", "neural(order=2, law=nlctl.KnownSignLaw())",
          "blocks", "controller.law"),
     ],
 )  # fmt: skip

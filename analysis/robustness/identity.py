@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-import nlctl
+from nlctl import _errors
 from nlctl.native.codegen.fingerprint import program_key
 
 from ..metrics import Metric
@@ -27,8 +27,12 @@ from .space import Space
 __all__ = ["differences_of", "experiment_facts", "identity_of", "labels_text", "versions"]
 
 VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
-COMPUTING = ("nlctl", "analysis/robustness", "analysis/studies", "analysis/metrics.py")
-TOLD = ("nlctl/cli", "nlctl/_layout", "nlctl/drawing")  # they print and draw, and compute nothing
+COMPUTING = {
+    Path(_errors.__file__).parent: ("**/*.py",),
+    Path(__file__).parents[1]: ("robustness/**/*.py", "studies/**/*.py", "metrics*/**/*.py")
+    + ("metrics.py",),
+}
+TOLD = ("cli", "_layout", "drawing", "_terminal", "analysis")  # compute nothing, or are counted
 PROBES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])
 
 
@@ -100,10 +104,9 @@ def labels_text(labels: Mapping[str, str]) -> str:
 @functools.cache
 def versions() -> dict[str, str]:
     """Return the versions of all that computes numbers; nlctl's with a key of its source."""
-    source, root = hashlib.sha256(), Path(nlctl.__file__).parents[1]
-    for part in COMPUTING:
-        place = root / part
-        for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+    source = hashlib.sha256()
+    for root, parts in COMPUTING.items():
+        for path in (path for part in parts for path in sorted(root.glob(part))):
             name = path.relative_to(root).as_posix()
             if not name.startswith(TOLD):
                 source.update(f"{name}\0".encode() + path.read_bytes())
