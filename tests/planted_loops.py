@@ -1,7 +1,6 @@
 """Loops that differ from the certified one in one planted thing, by what was changed."""
 
 import control as ct
-import numpy as np
 
 import nlctl
 
@@ -62,8 +61,9 @@ def wired(wires=None, *, inputs=None, outputs=None, params=None, more=(), **part
     connections = []
     for target, sources in {**WIRES, **(wires or {})}.items():
         listed = [] if sources is None else sources if isinstance(sources, list) else [sources]
-        into = tuple(numbered(target, "input")[:2])
-        connections += [[into, *(tuple(numbered(s, "output")) for s in listed)]] if listed else []
+        if listed:
+            into = tuple(numbered(target, "input")[:2])
+            connections += [[into, *(tuple(numbered(s, "output")) for s in listed)]]
     outputs = OUTPUTS if outputs is None else outputs
     inputs = inputs or {}
     return ct.interconnect(

@@ -18,6 +18,7 @@ from nlctl._equation import equation
 C_0 = 0.47662  # of the loop without a difference
 K = (0.9, 1.1)
 COUNTS = [0]
+TIMES = np.linspace(0, 10, 2001)
 
 
 def doubled(system):
@@ -319,7 +320,7 @@ class TestNoneIsCertified:
         assert known["eps_u*"] == known["delta*"] == known["alpha_0"] == known["V(0)"] == "given"
 
 
-def largest_r(loop, times=np.linspace(0, 10, 2001), inputs=0):
+def largest_r(loop, times=TIMES, inputs=0):
     run = nlctl.input_output_response(nlctl.compile(loop), times, inputs)
     return float(np.abs(np.asarray(run.outputs)[list(run.output_labels).index("r")]).max())
 
