@@ -210,7 +210,10 @@ def checked_times(timepts: Any) -> np.ndarray:
     ParameterError
         If it has fewer than two times, or they are not finite and increasing.
     """
-    times = np.array(timepts, dtype=float)
+    times = as_numbers(timepts)
+    if times is None:
+        raise ParameterError(f"timepts needs numbers, got {str(timepts)[:60]!r}")
+    times = times.copy()
     if times.ndim != 1 or times.size < 2:
         raise ParameterError(f"timepts needs at least two times, got shape {times.shape}")
     if not np.all(np.isfinite(times)) or not np.all(np.diff(times) > 0):

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlctl._arguments import flag, of_type
 from nlctl._errors import DivergedError
 from nlctl.native import Status
 from nlctl.response import input_output_response
 
 from .evaluation import as_table
 from .experiment import Experiment, Prepared, by_diagram, evaluate
-from .space import arguments
+from .space import arguments, checked_row
 from .spec import margins, unfinished_margin
 
 __all__ = ["TIGHTER", "Confirmation", "confirm"]
@@ -87,8 +88,15 @@ def confirm(
     python_control : bool, optional
         Also run it in python-control, at the tighter tolerances: another engine, and other code of
         the diagram.  There memory blocks relax instead of being exact, see `nlctl.Backlash`.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        If the row lacks a quantity, has another one, or a number is not finite.
     """
-    study = prepared.experiment
+    study = of_type("confirm", "prepared", prepared, Prepared, "prepare(experiment)").experiment
+    row = checked_row(study.space, row)
+    python_control = flag("confirm", "python_control", python_control)
     tighter = replace(study, rtol=study.rtol / TIGHTER, atol=study.atol / TIGHTER)
     table = as_table(study.space, [row])
     replays = []
