@@ -233,13 +233,10 @@ def _executor(text: str, jobs: int) -> Iterator[Any]:
     if text == "threads":
         yield None
     elif text == "processes":
-        import multiprocessing
-        from concurrent.futures import ProcessPoolExecutor
-
+        from ._workers import process_pool
         from .native._ensemble import cores
 
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(jobs or cores(), mp_context=context) as pool:
+        with process_pool(jobs or cores()) as pool:
             yield pool
     elif text.startswith("dask:"):
         with _dask_client(text.removeprefix("dask:")) as client:

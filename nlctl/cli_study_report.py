@@ -122,22 +122,33 @@ def _run(path: Path, threads: int | None, watch: Watch | None) -> Result:
 
 
 def _histories(result: Result, threads: int | None) -> Histories | None:
-    """Simulate some rows of the main table again; None without rows, or if the loop has gone."""
+    """Simulate some rows of the main table again; None without rows, or if the loop has gone.
+
+    Raises
+    ------
+    RunFolderError
+        If the results were computed from another loop than today's: nothing is drawn from it.
+    """
     from analysis.report.robustness_histories import histories
-    from analysis.robustness import prepare
-    from analysis.studies.run import rerun_file
+    from analysis.studies import RunFolderError
+    from analysis.studies.run import reopened
 
     from ._errors import UsageError
 
+    try:
+        run = reopened(result.folder)
+    except RunFolderError:
+        raise
+    except UsageError as error:  # what was found is shown all the same
+        print(f"nlctl: the report has no fans: {error}", file=sys.stderr)
+        return None
+    if run.versions:
+        told = f"computed with other versions ({run.versions}): fans are drawn with those of today"
+        print(f"nlctl: '{result.folder}' was {told}", file=sys.stderr)
     if result.rows is None or not result.rows.done:
         return None
     searched = [f.numbers for f in result.findings if f.kind == "worst case" and f.is_answered]
     witness = min(
         ((n["witness"], n["margin"]) for n in searched), key=lambda pair: pair[1], default=None
     )
-    try:
-        prepared = prepare(rerun_file(result.folder).experiment)
-    except UsageError as error:  # what was found is shown all the same
-        print(f"nlctl: the report has no fans: {error}", file=sys.stderr)
-        return None
-    return histories(prepared, result.rows.table, witness, threads=threads)
+    return histories(run.prepared, result.rows.table, witness, threads=threads)

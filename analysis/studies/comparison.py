@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import control as ct
 
 from analysis.robustness import (
     Choice,
@@ -29,7 +31,7 @@ from .parts import option
 from .result import Finding
 from .schema import Choices, Study
 
-__all__ = ["alternatives", "comparison", "widened"]
+__all__ = ["alternatives", "compared", "comparison", "widened"]
 
 
 def alternatives(asked: Compare, build: Callable[..., Any], folder: Path) -> Choice:
@@ -72,8 +74,7 @@ def widened(
         If the loop has no such keyword, or a quantity, a requirement or its signal does not exist
         with every option.
     """
-    others = tuple(c for c in experiment.space.choices if c.name != options.name)
-    space = Space(quantities=experiment.space.quantities, choices=(*others, options))
+    space = _with_options(experiment, options)
     built = diagrams(space, experiment.build)
     inputs_of(study, [diagram for _, diagram in built])
     signals = frozenset.intersection(*(frozenset(d.output_labels) for _, d in built))
@@ -91,6 +92,26 @@ def widened(
             )
     metrics = metrics_of(study, folder, signals)
     return replace(experiment, space=space, spec=spec, metrics=metrics)
+
+
+def _with_options(experiment: Experiment, options: Choice) -> Space:
+    """Return the space with a choice more, which takes the place of one of its name."""
+    others = tuple(c for c in experiment.space.choices if c.name != options.name)
+    return Space(quantities=experiment.space.quantities, choices=(*others, options))
+
+
+def compared(
+    experiment: Experiment, asked: Compare, folder: Path
+) -> list[tuple[Mapping[str, str], ct.InputOutputSystem]]:
+    """Return the diagrams of a comparison, each with its labels.
+
+    Raises
+    ------
+    UsageError
+        As in `alternatives` and `analysis.robustness.diagrams`.
+    """
+    options = alternatives(asked, experiment.build, folder)
+    return diagrams(_with_options(experiment, options), experiment.build)
 
 
 def comparison(asked: Compare, ground: Ground) -> Finding | None:

@@ -98,6 +98,8 @@ class Result:
         Whether Ctrl-C was pressed in the run that returned this; not kept in the folder.
     notes : tuple of str
         What the user has to know, such as lost workers.
+    origin : mapping
+        What all of it was computed from, see `origin.origin_of`.
     """
 
     folder: Path
@@ -110,6 +112,7 @@ class Result:
     complete: bool
     interrupted: bool = False
     notes: tuple[str, ...] = ()
+    origin: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def asked(self) -> dict[str, Any]:
