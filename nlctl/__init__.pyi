@@ -1,5 +1,5 @@
 from . import actuators, controllers, functions, native, paper, plants, references
-from ._block import Block, block
+from ._block import Block, Spec, block
 from ._diagram import initial_state, interconnect, parameters, state_names
 from ._equation import equation
 from ._errors import (
@@ -84,6 +84,7 @@ __all__ = [
     "RobustTerm",
     "Saturation",
     "SlidingModeLaw",
+    "Spec",
     "SumOfSines",
     "UnknownNameError",
     "Zero",

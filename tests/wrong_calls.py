@@ -380,7 +380,7 @@ RUNS = {
     "response rtol": lambda: nlctl.input_output_response(loop(), T, rtol=-1),
     "response rtol nan": lambda: nlctl.input_output_response(loop(), T, rtol=NAN, engine="native"),
     "response rtol text": lambda: nlctl.input_output_response(loop(), T, rtol="a"),
-    "response method": lambda: nlctl.input_output_response(loop(), T, method="euler"),
+    "response method": lambda: nlctl.input_output_response(example(), T, method="euler"),
     "response engine": lambda: nlctl.input_output_response(loop(), T, engine="fast"),
     "response audit": lambda: nlctl.input_output_response(
         loop(), T, engine="native", audit="sometimes"
@@ -411,7 +411,6 @@ RUNS = {
     "ensemble 2d": lambda: nlctl.ensemble_response(
         nlctl.compile(loop()), T, 1.0, params={"first.k": np.ones((2, 2))}
     ),
-    "ensemble none": lambda: nlctl.ensemble_response(nlctl.compile(loop()), T, 1.0),
     "ensemble unknown": lambda: nlctl.ensemble_response(
         nlctl.compile(loop()), T, 1.0, params={"first.kk": [1]}
     ),
@@ -472,11 +471,11 @@ RUNS = {
         nlctl.PureFeedback(order=2, f=lambda x, v: v, initial={"x1": NAN}), "p"
     ),
     "diagonal_centres": lambda: nlctl.diagonal_centres(0, -1, 1),
-    "grid_centres": lambda: nlctl.grid_centres(-1),
-    "latin_hypercube_centres": lambda: nlctl.latin_hypercube_centres(0, 0, 0),
+    "grid_centres": lambda: nlctl.grid_centres([3, -1]),
+    "latin_hypercube_centres": lambda: nlctl.latin_hypercube_centres(0, 2, seed=1),
     "replaced": lambda: nlctl.replaced(3),
     "named example": lambda: nlctl.paper.named_example("example-3"),
-    "linearize": lambda: nlctl.compile(example()).linearize([NAN]),
+    "linearize": lambda: nlctl.compile(example()).linearize(np.full(31, NAN)),
 }
 
 
@@ -492,7 +491,7 @@ LYAPUNOV = {
     "certify loop": lambda: lyapunov.certify(3),
     "certify u_max": lambda: lyapunov.certify(certified(), u_max=NAN),
     "certify u_max neg": lambda: lyapunov.certify(certified(), u_max=-1),
-    "certify tol": lambda: lyapunov.certify(certified(), tol=0),
+    "certify tol": lambda: lyapunov.certify(certified(), tol=0.0),
     "certify k": lambda: lyapunov.certify(certified(), k=(1.0,)),
     "certify k number": lambda: lyapunov.certify(certified(), k=1.0),
     "certify k order": lambda: lyapunov.certify(certified(), k=(2.0, 1.0)),
@@ -536,12 +535,12 @@ LYAPUNOV = {
     "box order": lambda: Box(names=("x",), low=(1.0,), high=(0.0,)),
     "box nan": lambda: Box(names=("x",), low=(NAN,), high=(0.0,)),
     "box lengths": lambda: Box(names=("x",), low=(0.0, 1.0), high=(2.0,)),
-    "enclose box": lambda: lyapunov.enclose(lambda *x: x[0], None),
-    "enclose tol": lambda: lyapunov.enclose(lambda *x: x[0], SQUARE, tol=-1),
-    "enclose boxes": lambda: lyapunov.enclose(lambda *x: x[0], SQUARE, max_boxes=0),
+    "enclose box": lambda: lyapunov.enclose(lambda x: x[0], None),
+    "enclose tol": lambda: lyapunov.enclose(lambda x: x[0], SQUARE, tol=-1),
+    "enclose boxes": lambda: lyapunov.enclose(lambda x: x[0], SQUARE, max_boxes=0),
     "enclose function": lambda: lyapunov.enclose(3, SQUARE),
-    "prove bounds": lambda: lyapunov.prove(lambda *x: x[0], SQUARE, low=1.0, high=0.0),
-    "prove nan": lambda: lyapunov.prove(lambda *x: x[0], SQUARE, high=NAN),
+    "prove bounds": lambda: lyapunov.prove(lambda x: x[0], SQUARE, low=1.0, high=0.0),
+    "prove nan": lambda: lyapunov.prove(lambda x: x[0], SQUARE, high=NAN),
     "prove_decrease level": lambda: lyapunov.prove_decrease(
         lambda x: x[0] ** 2, lambda x: x, lambda x: x, SQUARE, level=NAN, floor=0.0
     ),

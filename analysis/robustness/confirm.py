@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -110,11 +111,16 @@ def confirm(
 
 
 def _replay(
-    engine: str, experiment: Experiment, status: str, time: float, margin: float
+    engine: str,
+    experiment: Experiment,
+    status: str,
+    time: float,
+    margin: float,
+    method: str = "",
 ) -> dict[str, Any]:
     return {
         "engine": engine,
-        "method": experiment.method,
+        "method": method or experiment.method,
         "rtol": experiment.rtol,
         "atol": experiment.atol,
         "status": status,
@@ -126,17 +132,17 @@ def _replay(
 def _in_python_control(
     prepared: Prepared, experiment: Experiment, table: pd.DataFrame
 ) -> dict[str, Any]:
-    experiment = replace(experiment, method=REFERENCE)
     ((loop, _),) = by_diagram(prepared, table)
     given = arguments(experiment.space, table)
     end = float(experiment.timepts[-1])
+    told = partial(_replay, "python-control", experiment, method=REFERENCE)
     try:
         response = input_output_response(
             loop.system,
             experiment.timepts,
             experiment.inputs,
             engine="python-control",
-            method=experiment.method,
+            method=REFERENCE,
             rtol=experiment.rtol,
             atol=experiment.atol,
             initial_state={name: values[0] for name, values in given["initial_state"].items()},
@@ -144,10 +150,10 @@ def _in_python_control(
         )
     except DivergedError as error:
         margin = unfinished_margin(error.time, end)
-        return _replay("python-control", experiment, Status.DIVERGED.name, error.time, margin)
+        return told(Status.DIVERGED.name, error.time, margin)
     signals = dict(zip(loop.system.output_labels, np.atleast_2d(response.outputs), strict=True))
     margin = margins(experiment.spec, experiment.timepts, signals)["spec"]
-    return _replay("python-control", experiment, Status.OK.name, end, margin)
+    return told(Status.OK.name, end, margin)
 
 
 def _reason(replays: pd.DataFrame) -> str:

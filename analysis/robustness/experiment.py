@@ -15,7 +15,7 @@ from nlctl import native
 from nlctl._arguments import a_function, of_type
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
-from nlctl._param import checked_times
+from nlctl._param import as_numbers, checked_times
 from nlctl._run_arguments import input_array
 from nlctl.native import Compiled, Ensemble, Status, ensemble_response
 from nlctl.native import compile as compiled
@@ -93,6 +93,9 @@ class Experiment:
                     f"{who} needs metrics such as analysis.metrics.Metric, got {metric!r}"
                 )
         Settings(rtol=self.rtol, atol=self.atol, max_steps=self.max_steps, method=self.method)
+        given = as_numbers(self.inputs)
+        if given is not None and not np.all(np.isfinite(given)):
+            raise ParameterError(f"{who} needs finite inputs, got {self.inputs!r}")
         times = checked_times(self.timepts)
         object.__setattr__(self, "timepts", times)
         if times[0] != 0:

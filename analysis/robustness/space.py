@@ -62,7 +62,8 @@ class Space:
         twice = {name for name in self.names if self.names.count(name) > 1}
         if twice:
             raise SpaceError(f"a space needs each name once, got twice: {sorted(twice)}")
-        number("a space", "scale", self.scale, at_least=0)
+        if not number("a space", "scale", self.scale) >= 0:
+            raise SpaceError(f"a space needs a finite scale >= 0, got {self.scale}")
         for quantity in self.quantities if self.scale != 1 else ():
             _nominal_of(quantity)
 
@@ -106,9 +107,7 @@ def nominal(space: Space) -> dict[str, Any]:
 def scaled(space: Space, factor: float) -> Space:
     """Return the space with all deviations from the nominal values multiplied by `factor`."""
     of_type("a scaled space", "space", space, Space)
-    return replace(
-        space, scale=space.scale * number("a scaled space", "factor", factor, at_least=0)
-    )
+    return replace(space, scale=space.scale * number("a scaled space", "factor", factor))
 
 
 def moved(middle: float, value: Any, factor: float) -> Any:

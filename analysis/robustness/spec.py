@@ -163,7 +163,8 @@ def _samples(requirement: Requirement, t: Any, signals: Mapping[str, Any]) -> np
     """Return the times and the signals that count as rows of one array."""
     given = {"t": t} | {f"signal '{name}'": signals[name] for name in requirement.signals}
     rows = {name: as_numbers(values) for name, values in given.items()}
-    size = np.shape(rows["t"])
+    times = rows["t"]
+    size = (0,) if times is None else times.shape
     for name, row in rows.items():
         if row is None or row.shape != size or row.ndim != 1:
             what = "no numbers" if row is None else f"shape {row.shape}"
@@ -171,7 +172,6 @@ def _samples(requirement: Requirement, t: Any, signals: Mapping[str, Any]) -> np
                 f"requirement '{requirement.key}' needs numbers of shape {size} for {name}, as "
                 f"many as there are times, got {what}"
             )
-    times = rows["t"]
     good = times[np.isfinite(times)] if times is not None else np.empty(0)
     if np.any(np.diff(good) <= 0):
         raise ParameterError(f"requirement '{requirement.key}' needs increasing times")
