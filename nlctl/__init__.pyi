@@ -4,6 +4,7 @@ from ._diagram import initial_state, interconnect, parameters, state_names
 from ._equation import equation
 from ._errors import (
     AmbiguousNameError,
+    BlockError,
     DiagramError,
     DivergedError,
     ParameterError,
@@ -58,6 +59,7 @@ __all__ = [
     "BandLimitedNoise",
     "Block",
     "BlockEquations",
+    "BlockError",
     "CacheWarning",
     "CompileError",
     "Compiled",

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import control as ct
 import numpy as np
 
-from ._errors import ParameterError
+from ._errors import BlockError, ParameterError
 from ._names import Parameters, base_name, unknown
 from ._param import declared_params, ensure_checked, equation_arguments, with_overrides
 
@@ -235,7 +235,7 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     ------
     ParameterError
         If a parameter is out of bounds, the name is none, or `dt` does not fit the record.
-    TypeError
+    BlockError
         If `spec` lacks something that a block needs, or its equations return the wrong number
         of values, or ``feedthrough = False`` is not true.
     """
@@ -245,8 +245,8 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     if missing or isinstance(spec, type):
         what = spec.__name__ if isinstance(spec, type) else type(spec).__name__
         why = "is a class: make a record of it first" if isinstance(spec, type) else None
-        raise TypeError(f"{what} {why or 'is no block: it lacks ' + ', '.join(missing)}")
-    if not (isinstance(name, str) and name):
+        raise BlockError(f"{what} {why or 'is no block: it lacks ' + ', '.join(missing)}")
+    if not (name is None or (isinstance(name, str) and name)):
         raise ParameterError(f"a block needs a name, got {name!r} for {type(spec).__name__}")
     ensure_checked(spec)
     _check_timebase(spec, name, dt)
@@ -315,7 +315,7 @@ def _probe(made: Block) -> None:
             got = np.size(function(0.0, x, u, p))
             if got != wanted:
                 names = made.output_labels if what == "output" else made.state_labels
-                raise TypeError(
+                raise BlockError(
                     f"{who} returns {got} values from {what}, needs {wanted}: {', '.join(names)}"
                 )
         # With NaN for an input, an output that it reaches turns NaN as well.
@@ -324,6 +324,6 @@ def _probe(made: Block) -> None:
             after = np.asarray(spec.output(0.0, x, u * np.nan, p), dtype=float)
             if not np.array_equal(before, after, equal_nan=True):
                 label = made.output_labels[int(np.argmax(before != after))]
-                raise TypeError(
+                raise BlockError(
                     f"{who} declares feedthrough = False, but output '{label}' depends on the input"
                 )
