@@ -89,14 +89,15 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
         made = notes.attempt((), experiment, study, folder, signals, inputs or ())
     if made is None:
         _check_designs(study, _stand_in(study, quantities), notes)
-        _check_keywords(study, folder, notes)
+        _comparable(study, folder, notes)
     else:
         space = notes.attempt(("space",), resolved, made.space, diagrams[0])
         if space is not None:
             if refusal := notes.attempt(("space",), refusal_of, space, diagrams):
                 notes.add(("space",), f"boxes do not fit together: {refusal}")
             _check_designs(study, space, notes)
-        _check_comparisons(study, made, folder, notes)
+        for i, asked in _comparable(study, folder, notes):
+            notes.attempt(("analysis", i), _check_options, study, made, asked, folder)
     return made, _unique(notes.problems)
 
 
@@ -117,15 +118,18 @@ def _stand_in(study: Study, quantities: Mapping[str, Uncertain | None]) -> Space
     )
 
 
-def _check_keywords(study: Study, folder: Path, notes: _Notes) -> None:
-    """Hold what comparisons are about against the loop's function, where it is known."""
+def _comparable(study: Study, folder: Path, notes: _Notes) -> list[tuple[int, Compare]]:
+    """Return the comparisons whose keyword the loop's function takes; the others are noted."""
     try:
         function = loop_function(study.loop, folder)
-    except UsageError:
-        return
-    for i, asked in enumerate(study.analysis):
-        if isinstance(asked, Compare):
-            notes.attempt(("analysis", i, "keyword"), check_keyword, function, asked.keyword)
+    except UsageError:  # noted already
+        return []
+    asked = [(i, one) for i, one in enumerate(study.analysis) if isinstance(one, Compare)]
+    before = len(notes.problems)
+    for i, one in asked:
+        notes.attempt(("analysis", i, "keyword"), check_keyword, function, one.keyword)
+    lost = {problem.place[1] for problem in notes.problems[before:]}
+    return [(i, one) for i, one in asked if i not in lost]
 
 
 class _Empty:
@@ -225,12 +229,6 @@ def _check_designs(study: Study, space: Space, notes: _Notes) -> None:
             made = Design(space=space, kind=kind, size=1, is_iid=kind == "i.i.d.", entropy=0)
             notes.attempt(("analysis", i), check_iid, made)
         notes.attempt(("analysis", i), own_design, asked, space, study.study.seed)
-
-
-def _check_comparisons(study: Study, made: Experiment, folder: Path, notes: _Notes) -> None:
-    for i, asked in enumerate(study.analysis):
-        if isinstance(asked, Compare):
-            notes.attempt(("analysis", i), _check_options, study, made, asked, folder)
 
 
 def _quantities_of(asked: Any) -> list[tuple[str, str]]:
