@@ -26,9 +26,9 @@ from analysis.robustness.sweep import Sweep, load
 from nlctl._files import replace_file
 
 from .build import labels, main_design
-from .origin import loop_differences, origin_key, plain_study, version_differences
+from .origin import loop_differences, plain_study, version_differences
 from .parts import uncertain
-from .plain import ANEW, RunFolderError, file_digest, read_json, write_json
+from .plain import ANEW, RunFolderError, file_digest, origin_key, read_json, write_json
 from .result import Finding, Result
 from .schema import Study
 from .written import from_toml

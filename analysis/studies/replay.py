@@ -20,8 +20,7 @@ from nlctl._errors import ParameterError
 from .analyses import Compare
 from .comparison import alternatives, widened
 from .folder import load_finding, load_rows, load_run
-from .origin import origin_key
-from .plain import RunFolderError, as_json
+from .plain import RunFolderError, as_json, origin_key
 from .read import StudyFile
 from .run import reopened
 from .schema import keyed

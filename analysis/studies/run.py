@@ -27,11 +27,10 @@ from .ground import Ground
 from .origin import (
     compared_differences,
     loop_differences,
-    origin_key,
     origin_of,
     version_differences,
 )
-from .plain import RunFolderError, write_json
+from .plain import RunFolderError, origin_key, write_json
 from .read import StudyFile, read_study
 from .result import Finding, Result
 from .schema import Study, keyed
