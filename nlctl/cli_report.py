@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .cli_studies import INCOMPLETE, INTERRUPTED, exit_codes, run_folder
+from .cli_studies import ANSWERS, INCOMPLETE, INTERRUPTED, exit_codes, run_folder
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -187,7 +187,7 @@ def _study(
         study, out, threads=jobs or None, watch=sweep_bar, interactive=interactive
     )
     if result.complete:
-        return result.verdict, page, int(not result.holds)
+        return result.verdict, page, ANSWERS.get(result.answer, 0)
     if study.suffix == ".toml":
         print("nlctl: incomplete; the same command goes on", file=sys.stderr)
     return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE

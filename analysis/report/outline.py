@@ -41,9 +41,9 @@ SHORT = 24  # characters of a text that stays on one line
 LIGHTS = {
     "pass": ("pass", "passes", "hold", "holds", "ok", "reached", "confirmed"),
     "proved": ("proved", "computed"),
-    "checked": ("checked", "sampled"),
-    "caution": ("undecided", "open", "inconclusive", "not confirmed"),
-    "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
+    "checked": ("checked", "sampled", "shown"),
+    "caution": ("undecided", "open", "inconclusive", "not confirmed", "not shown yet"),
+    "fail": ("refuted", "fail", "fails", "failed", "violated", "missed", "diverged"),
 }
 MEANINGS = {  # of the statuses of claims, as the page explains them
     "holds": "what was measured is within the limit",
@@ -51,11 +51,15 @@ MEANINGS = {  # of the statuses of claims, as the page explains them
     "computed": "in closed form",
     "checked": "at every sample of one simulated run, which proves nothing of others",
     "sampled": "found by simulated runs, at most with a stated confidence, which is no proof",
+    "shown": "by simulated runs, at most with a stated confidence, which is no proof",
+    "refuted": "by a run that contradicts it, or by many with a stated confidence",
+    "not shown yet": "what was run neither shows nor refutes it",
     "undecided": "what was run does not tell",
     "not confirmed": "a violation was found, but not by other integrators",
     "violated": "there is a counterexample",
     "fails": "what was measured is beyond the limit",
 }
+ANSWERS = ("shown", "refuted", "not shown yet")  # to the claims of studies
 _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in statuses}
 
 
@@ -220,10 +224,17 @@ def summary(claims: Sequence[Claim]) -> tuple[str, str]:
     statuses = [claim_status(claim) for claim in claims]
     looks = [look for _, look in statuses]
     failed, open_ = looks.count("fail"), looks.count("caution")
+    words = {status for status, _ in statuses}
     if failed:
-        return "fail", f"{failed} of {len(claims)} claims {'fails' if failed == 1 else 'fail'}."
+        verb = "fails" if failed == 1 else "fail"
+        if words <= set(ANSWERS):
+            verb = "is refuted" if failed == 1 else "are refuted"
+            verb += f", {open_} not shown yet" if open_ else ""
+        return "fail", f"{failed} of {len(claims)} claims {verb}."
     if open_:
-        return "caution", f"{open_} of {len(claims)} claims {'is' if open_ == 1 else 'are'} open."
+        word = "not shown yet" if words <= set(ANSWERS) else "open"
+        verb = "is" if open_ == 1 else "are"
+        return "caution", f"{open_} of {len(claims)} claims {verb} {word}."
     if not claims:
         return "neutral", "No claims are made."
     kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))

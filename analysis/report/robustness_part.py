@@ -47,7 +47,12 @@ KINDS: dict[str, Items] = {  # in the order of the report
     "failure map": failure_map,
     "compare": compare,
 }
-OUTCOMES = {"pass": "sampled", "caution": "open", "neutral": "no claims"}  # by the light
+OUTCOMES = {  # by the light
+    "pass": "shown",
+    "caution": "not shown yet",
+    "fail": "refuted",
+    "neutral": "no claims",
+}
 
 
 def study_report(
