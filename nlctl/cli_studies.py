@@ -54,6 +54,7 @@ def run(
     out: Annotated[
         Path | None, typer.Option(help="Folder for the results; reports/NAME by default.")
     ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Use a folder with other files.")] = False,
     json: Json = False,
 ) -> None:
     """Run a study, print what it found, and keep everything in a folder.
@@ -79,6 +80,7 @@ def run(
                 file,
                 folder,
                 resume=resume,
+                force=force,
                 executor=pool,
                 threads=jobs or None if pool is None else None,
                 watch=sweep_bar,
