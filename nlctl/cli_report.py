@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .cli_studies import ANSWERS, INCOMPLETE, INTERRUPTED, exit_codes, run_folder
+from .cli_studies import ANSWERS, INCOMPLETE, INTERRUPTED, Trust, exit_codes, run_folder
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -62,8 +62,12 @@ def report(
         bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
     ] = False,
     force: Force = False,
+    trust: Trust = False,
 ) -> None:
-    """Write a report, one page that needs nothing else.  Exit 1 if a claim of it fails."""
+    """Write a report, one page that needs nothing else.  Exit 1 if a claim of it fails.
+
+    Rows of a study are drawn from its loop: the code that the study names is run.
+    """
     with exit_codes(json=False):
         made, page, code = (
             _paper(
@@ -75,7 +79,9 @@ def report(
                 force=force,
             )
             if study is None
-            else _study(study, out, jobs, pdf=pdf, interactive=interactive, force=force)
+            else _study(
+                study, out, jobs, pdf=pdf, interactive=interactive, force=force, trust=trust
+            )
         )
         print(made)
         finish_report(page, pdf=pdf, open_=open_)
@@ -191,7 +197,14 @@ def _compile_ahead() -> None:
 
 
 def _study(
-    study: Path, out: Path | None, jobs: int, *, pdf: bool, interactive: bool, force: bool
+    study: Path,
+    out: Path | None,
+    jobs: int,
+    *,
+    pdf: bool,
+    interactive: bool,
+    force: bool,
+    trust: bool,
 ) -> tuple[str, Path, int]:
     """Report a study; return the verdict, the page and the exit code."""
     from ._sweep_progress import sweep_bar
@@ -200,7 +213,13 @@ def _study(
     kept = run_folder(study) if study.suffix == ".toml" else study
     check_report_options(out or kept, pdf=pdf, force=force)
     page, result = report_study(
-        study, out, threads=jobs or None, watch=sweep_bar, interactive=interactive, force=force
+        study,
+        out,
+        threads=jobs or None,
+        watch=sweep_bar,
+        interactive=interactive,
+        force=force,
+        trust=trust,
     )
     if result.complete:
         return result.verdict, page, ANSWERS.get(result.answer, 0)

@@ -29,6 +29,7 @@ def report_study(
     watch: Watch | None = None,
     interactive: bool = False,
     force: bool = False,
+    trust: bool = False,
 ) -> tuple[Path, Result]:
     """Write the report of a study.
 
@@ -45,6 +46,8 @@ def report_study(
         As in `analysis.report.render_html`.
     force : bool, optional
         Whether files of others are replaced, see `analysis.report.write_report`.
+    trust : bool, optional
+        As in `analysis.studies.read_study`.
 
     Returns
     -------
@@ -60,9 +63,11 @@ def report_study(
     from analysis.report.robustness_part import study_report
     from analysis.studies import load_result
 
-    result = _run(path, threads, watch, force) if path.suffix == ".toml" else load_result(path)
+    result = (
+        _run(path, threads, watch, force, trust) if path.suffix == ".toml" else load_result(path)
+    )
     command = f"nlctl report {shlex.quote(path.as_posix())}" + " --interactive" * interactive
-    made = study_report(result, _histories(result, threads), command)
+    made = study_report(result, _histories(result, threads, trust), command)
     if out is not None:  # the data stay with the run
         data = Path(os.path.relpath(result.folder, out))
         made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})
@@ -126,18 +131,19 @@ def studies_part(folders: Sequence[Path], *, threads: int | None = None) -> list
     from analysis.studies import load_result
 
     results = [load_result(folder) for folder in folders]
-    return study_part([(result, _histories(result, threads)) for result in results])
+    return study_part([(result, _histories(result, threads, False)) for result in results])
 
 
-def _run(path: Path, threads: int | None, watch: Watch | None, force: bool) -> Result:
+def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trust: bool) -> Result:
     from analysis.studies import read_study, run
 
     how: dict[str, Any] = {} if watch is None else {"watch": watch}
     folder = run_folder(path)
-    return run(read_study(path), folder, resume=True, force=force, threads=threads, **how)
+    file = read_study(path, trust=trust)
+    return run(file, folder, resume=True, force=force, threads=threads, **how)
 
 
-def _histories(result: Result, threads: int | None) -> Histories | None:
+def _histories(result: Result, threads: int | None, trust: bool) -> Histories | None:
     """Simulate some rows of the main table again; None without rows, or if the loop has gone.
 
     Raises
@@ -152,7 +158,7 @@ def _histories(result: Result, threads: int | None) -> Histories | None:
     from ._errors import UsageError
 
     try:
-        run = reopened(result.folder)
+        run = reopened(result.folder, trust=trust)
     except RunFolderError:
         raise
     except UsageError as error:  # what was found is shown all the same

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -15,10 +16,10 @@ from analysis.robustness.guarantee import check_iid
 from analysis.robustness.largest_scale import refusal_of
 from analysis.robustness.resolve import check_keyword
 from analysis.robustness.space import combinations
-from nlctl._errors import UsageError
+from nlctl._errors import ParameterError, UsageError
 from nlctl._names import unknown
 
-from .analyses import Compare, Map
+from .analyses import Compare, Degradation, Map, Morris, Sobol
 from .build import (
     SIGNALS,
     choice,
@@ -39,6 +40,8 @@ from .schema import Study
 __all__ = ["bound"]
 
 T = TypeVar("T")
+MOST_ROWS = 10_000_000  # of a design or a search
+MOST_DIAGRAMS = 1000
 NEED_ROWS = ("probability", "sequential", "regional")
 
 
@@ -80,6 +83,7 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
     signals = frozenset.intersection(*(frozenset(d.output_labels) for d in diagrams or [_Empty]))
     for diagram in diagrams:
         _check_names(study, diagram, quantities, requirements, notes)
+    _check_sizes(study, notes)
     metrics = notes.attempt(("metrics",), metrics_of, study, folder, signals) if diagrams else None
     inputs = notes.attempt(("inputs",), inputs_of, study, diagrams) if diagrams else None
     _check_analyses(study, metrics, notes)
@@ -121,13 +125,33 @@ def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputS
     if len(notes.problems) > before:
         return []
     options = {c.name: c.options for c in made}
+    count = math.prod(len(c.options) for c in made)
+    if count > MOST_DIAGRAMS:
+        notes.add(
+            ("choices",), f"at most {MOST_DIAGRAMS:,} diagrams can be made, got {_count(count)}"
+        )
+        return []
     every = combinations(Space(choices=tuple(made))) if made else [{}]
     built = []
     for labels in every:
         chosen = {name: options[name][label] for name, label in labels.items()}
-        system = notes.attempt(("loop",), partial(build, **chosen))
+        system = notes.attempt(("loop",), _diagram, partial(build, **chosen), study.loop)
         built += [] if system is None else [system]
     return built
+
+
+def _diagram(build: Callable[[], Any], name: str) -> ct.InputOutputSystem:
+    """Return the diagram that a loop's function returns.
+
+    Raises
+    ------
+    ParameterError
+        If it returns something else.
+    """
+    made = build()
+    if not isinstance(made, ct.InputOutputSystem):
+        raise ParameterError(f"'{name}' returns {type(made).__name__}, and not a diagram")
+    return made
 
 
 def _check_names(
@@ -168,6 +192,41 @@ def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Note
         for key, name in _quantities_of(asked):
             if name not in study.space:
                 notes.add(("analysis", i, key), str(unknown("quantity", name, study.space)))
+
+
+def _check_sizes(study: Study, notes: _Notes) -> None:
+    """Refuse numbers of runs that no machine can make; nothing of that size is tried."""
+    wide, options = len(study.space), math.prod(len(c.options) for c in study.choices.values())
+    if study.runs is not None:
+        rows = study.runs.size or 1
+        if study.runs.design in ("grid", "corners"):
+            rows = (study.runs.levels or 2) ** wide * options
+        if rows > MOST_ROWS:
+            notes.add(("runs",), f"at most {MOST_ROWS:,} rows can be run, got {_count(rows)}")
+    for i, asked in enumerate(study.analysis):
+        rows = max(_sizes(asked, wide), default=0)
+        if rows > MOST_ROWS:
+            notes.add(
+                ("analysis", i), f"at most {MOST_ROWS:,} runs can be made, got {_count(rows)}"
+            )
+
+
+def _sizes(asked: Any, wide: int) -> list[int]:
+    """Return the numbers of runs that an analysis asks for."""
+    sizes = [getattr(asked, key, 0) for key in ("runs", "draws", "levels", "trajectories")]
+    if isinstance(asked, Map):
+        sizes.append((asked.cells + 1) ** 2)
+    if isinstance(asked, Degradation):
+        sizes.append(asked.runs * len(asked.factors))
+    if isinstance(asked, Morris | Sobol):
+        sizes.append((asked.trajectories if isinstance(asked, Morris) else asked.size) * (wide + 2))
+    if isinstance(asked, Compare):
+        sizes.append(asked.runs * len(asked.options))
+    return sizes
+
+
+def _count(rows: int) -> str:
+    return f"{rows:,}" if rows < 10**15 else f"about 10^{math.log10(rows):.0f}"
 
 
 def _check_designs(
