@@ -17,6 +17,7 @@ from nlctl._files import replace_file
 from .formula import mathml
 from .math_font import font_face
 from .outline import cells, claim_status, is_long, is_short, numeric
+from .own import generator
 
 __all__ = ["fill", "parts", "to_bytes", "write_files"]
 
@@ -37,7 +38,11 @@ def fill(template: str, *, interactive: bool = False, **content: object) -> str:
         script += licence + _own(f"{UPLOT}/uPlot.iife.min.js") + _own("templates/history.js")
     page = _environment().get_template(template)
     text = page.render(
-        style=Markup(style), script=Markup(script), policy=_policy(style, script), **content
+        style=Markup(style),
+        script=Markup(script),
+        policy=_policy(style, script),
+        generator=generator(template),
+        **content,
     )
     return text.translate(CONTROL)
 
