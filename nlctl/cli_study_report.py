@@ -16,6 +16,7 @@ from .cli_studies import run_folder
 if TYPE_CHECKING:
     from analysis.report.document import Section
     from analysis.report.robustness_histories import Histories
+    from analysis.robustness import Prepared
     from analysis.studies.result import Result
     from analysis.studies.run import Watch
 
@@ -56,11 +57,14 @@ def report_study(
     """
     from analysis.report.render import write_report
     from analysis.report.robustness_part import study_report
+    from analysis.report.study_loop import loop_of
     from analysis.studies import load_result
 
     result = _run(path, threads, watch) if path.suffix == ".toml" else load_result(path)
     command = f"nlctl report {shlex.quote(path.as_posix())}" + " --interactive" * interactive
-    made = study_report(result, _histories(result, threads), command)
+    prepared = _prepared(result)
+    loop = None if prepared is None else loop_of(prepared)
+    made = study_report(result, _histories(result, prepared, threads), command, loop)
     if out is not None:  # the data stay with the run
         data = Path(os.path.relpath(result.folder, out))
         made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})
@@ -111,7 +115,7 @@ def studies_part(folders: Sequence[Path], *, threads: int | None = None) -> list
     from analysis.studies import load_result
 
     results = [load_result(folder) for folder in folders]
-    return study_part([(result, _histories(result, threads)) for result in results])
+    return study_part([(r, _histories(r, _prepared(r), threads)) for r in results])
 
 
 def _run(path: Path, threads: int | None, watch: Watch | None) -> Result:
@@ -121,23 +125,28 @@ def _run(path: Path, threads: int | None, watch: Watch | None) -> Result:
     return run(read_study(path), run_folder(path), resume=True, threads=threads, **how)
 
 
-def _histories(result: Result, threads: int | None) -> Histories | None:
-    """Simulate some rows of the main table again; None without rows, or if the loop has gone."""
-    from analysis.report.robustness_histories import histories
+def _prepared(result: Result) -> Prepared | None:
+    """Return the loop of a run again; None, with a word on it, if the loop has gone."""
     from analysis.robustness import prepare
     from analysis.studies.run import rerun_file
 
     from ._errors import UsageError
 
-    if result.rows is None or not result.rows.done:
+    try:
+        return prepare(rerun_file(result.folder).experiment)
+    except UsageError as error:  # what was found is shown all the same
+        print(f"nlctl: the report has no fans and no diagram: {error}", file=sys.stderr)
+        return None
+
+
+def _histories(result: Result, prepared: Prepared | None, threads: int | None) -> Histories | None:
+    """Simulate some rows of the main table again; None without rows or loop."""
+    from analysis.report.robustness_histories import histories
+
+    if prepared is None or result.rows is None or not result.rows.done:
         return None
     searched = [f.numbers for f in result.findings if f.kind == "worst case" and f.is_answered]
     witness = min(
         ((n["witness"], n["margin"]) for n in searched), key=lambda pair: pair[1], default=None
     )
-    try:
-        prepared = prepare(rerun_file(result.folder).experiment)
-    except UsageError as error:  # what was found is shown all the same
-        print(f"nlctl: the report has no fans: {error}", file=sys.stderr)
-        return None
     return histories(prepared, result.rows.table, witness, threads=threads)

@@ -33,7 +33,9 @@ __all__ = [
     "summary",
 ]
 
-SHELL = frozenset(["claims", "contents", "provenance", "files"])  # anchors of the page itself
+SHELL = frozenset(
+    ["claims", "contents", "provenance", "files", "lead", "lead-title", "lead-desc"]
+)  # anchors of the page itself
 LONG = 32  # characters of a word that must be broken to fit a column
 SHORT = 24  # characters of a text that stays on one line
 
@@ -43,6 +45,7 @@ LIGHTS = {
     "proved": ("proved", "computed"),
     "checked": ("checked", "sampled"),
     "caution": ("undecided", "open", "inconclusive", "not confirmed"),
+    "refuted": ("refuted",),
     "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
 }
 MEANINGS = {  # of the statuses of claims, as the page explains them
@@ -54,6 +57,7 @@ MEANINGS = {  # of the statuses of claims, as the page explains them
     "undecided": "what was run does not tell",
     "not confirmed": "a violation was found, but not by other integrators",
     "violated": "there is a counterexample",
+    "refuted": "there is a counterexample to what others claim; nothing of this report failed",
     "fails": "what was measured is beyond the limit",
 }
 _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in statuses}
@@ -187,7 +191,7 @@ def sort_key(value: Any) -> str:
 
 
 def light(status: str) -> str:
-    """Return the look of a status: pass, proved, checked, caution, fail, or neutral."""
+    """Return the look of a status: pass, proved, checked, caution, refuted, fail, or neutral."""
     return _LIGHT_OF.get(status.strip().lower(), "neutral")
 
 
@@ -196,6 +200,8 @@ def claim_status(claim: Claim) -> tuple[str, str]:
     status = claim.status or ("holds" if claim.holds else "fails")
     look = light(status)
     if not claim.holds and look != "caution":
+        if claim.by or look == "refuted":
+            return "refuted", "refuted"
         return status if look == "fail" else "fails", "fail"
     return status, look
 
@@ -219,14 +225,28 @@ def summary(claims: Sequence[Claim]) -> tuple[str, str]:
     """
     statuses = [claim_status(claim) for claim in claims]
     looks = [look for _, look in statuses]
-    failed, open_ = looks.count("fail"), looks.count("caution")
+    failed, refuted, open_ = (looks.count(look) for look in ("fail", "refuted", "caution"))
+    total = len(claims)
     if failed:
-        return "fail", f"{failed} of {len(claims)} claims {'fails' if failed == 1 else 'fail'}."
+        return "fail", f"{failed} of {total} claims {'fails' if failed == 1 else 'fail'}."
+    kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
+    kept = ", ".join(f"{number} {status}" for status, number in kinds.items())
+    if refuted:
+        of = Counter(
+            c.by for c, look in zip(claims, looks, strict=True) if look == "refuted" and c.by
+        )
+        whose = f" of {next(iter(of))}" if of.total() == refuted and len(of) == 1 else ""
+        told = (
+            f"{refuted} claim{'s' if refuted > 1 else ''}{whose} {'are' if refuted > 1 else 'is'}"
+        )
+        left = total - refuted - open_
+        rest = f"; {left} {'others hold' if left > 1 else 'other holds'}" if left else ""
+        rest += f" ({kept})" if rest and kept else ""
+        waiting = f"; {open_} {'is' if open_ == 1 else 'are'} open" if open_ else ""
+        return "refuted", f"{told} refuted{rest}{waiting}."
     if open_:
-        return "caution", f"{open_} of {len(claims)} claims {'is' if open_ == 1 else 'are'} open."
+        return "caution", f"{open_} of {total} claims {'is' if open_ == 1 else 'are'} open."
     if not claims:
         return "neutral", "No claims are made."
-    kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
-    told = ", ".join(f"{number} {status}" for status, number in kinds.items())
-    hold = "The claim holds" if len(claims) == 1 else f"All {len(claims)} claims hold"
-    return "pass", f"{hold}: {told}." if told else f"{hold}."
+    hold = "The claim holds" if total == 1 else f"All {total} claims hold"
+    return "pass", f"{hold}: {kept}." if kept else f"{hold}."
