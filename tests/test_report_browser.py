@@ -125,12 +125,13 @@ def test_hostile_names_do_nothing_and_are_shown(visit, name):
 
 
 def column(page, place):
-    """Visible texts of one column of the long table."""
-    return page.evaluate(
+    """Visible texts of one column of the long table, as they were before they were set."""
+    texts = page.evaluate(
         "i => [...document.querySelector('table.many').tBodies[0].rows].filter(r => !r.hidden)"
         ".map(r => r.cells[i].textContent)",
         place,
     )
+    return [text.replace("−", "-").replace("\N{NO-BREAK SPACE}", " ") for text in texts]
 
 
 def test_a_click_or_a_key_sorts_by_number_and_again_downwards(visit):

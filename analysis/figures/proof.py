@@ -102,8 +102,10 @@ def _creeping(ax: Axes, run: LongRun) -> None:
     high = run.lobe.high
     ax.plot(run.time, zeta, "-", color=BLUE, linewidth=1.6, label="argument $\\zeta$ of the gain")
     ax.axhline(high, color=GREY, linewidth=1.0, linestyle="--")
-    place = {"textcoords": "offset points", "color": GREY}
-    ax.annotate(f"$\\zeta$ = {high:g}: the gain changes its sign", (0, high), (3, -11), **place)
+    ax.annotate(
+        f"$\\zeta$ = {high:g}: the gain changes its sign", (0, high), (3, -11),
+        textcoords="offset points", color=GREY,
+    )  # fmt: skip
     if np.isfinite(run.burst):
         ax.plot([run.burst], [high], "o", color=ORANGE, markersize=6, clip_on=False)
         ax.annotate(

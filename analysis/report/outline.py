@@ -45,7 +45,7 @@ LIGHTS = {
     "proved": ("proved", "computed"),
     "checked": ("checked", "sampled"),
     "caution": ("undecided", "open", "inconclusive", "not confirmed"),
-    "refuted": ("refuted",),
+    "refuted": ("refuted", "violated as printed"),
     "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
 }
 MEANINGS = {  # of the statuses of claims, as the page explains them

@@ -117,7 +117,8 @@ def study_sections(
     asked = [Section(key="study_asked", title="What was asked", items=[*setup_items(result)])]
     if result.study.loop in EXAMPLES:
         items = [*loop_items(EXAMPLES[result.study.loop])]
-        asked.append(Section(key="study_published", title="The loop as published", items=items))
+        title = "The loop as published"
+        asked.append(Section(key="study_published", title=title, items=items, folded=True))
     if loop is not None:
         asked += loop_sections(loop, result, "", 2)
     if kept is not None:

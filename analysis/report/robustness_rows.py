@@ -166,9 +166,15 @@ def _worst_rows(result: Result, table: pd.DataFrame) -> Iterator[Table]:
         "bit.",
         columns=("row", "margin", "least in", "status", "reached (s)", "again"),
         rows=ended,
+        folded=True,
     )
     values = worst[names].itertuples(name=None)
-    yield Table(caption="The values of these rows.", columns=("row", *names), rows=list(values))
+    yield Table(
+        caption="The values of these rows.",
+        columns=("row", *names),
+        rows=list(values),
+        folded=True,
+    )
 
 
 def _metrics(result: Result, table: pd.DataFrame) -> Table:
@@ -183,6 +189,7 @@ def _metrics(result: Result, table: pd.DataFrame) -> Table:
         caption=text.METRICS,
         columns=("metric", "meaning", "unit", *PARTS.values(), "missing"),
         rows=rows,
+        folded=True,
     )
 
 

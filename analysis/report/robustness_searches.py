@@ -159,7 +159,8 @@ def degradation(finding: Finding, result: Result, asked: Any, key: str) -> Itera
         figure=figures.degradation(curve, asked.at, asked.limit),
     )
     yield Table(
-        caption="The same in numbers.",
+        caption=f"{text.SAME}.",
+        folded=True,
         columns=("factor", "violations", "runs", "share", "from", "to", "least margin", "median"),
         rows=[
             (

@@ -92,6 +92,7 @@ PART = (
     "the paper's. nlctl report STUDY.toml makes a whole report on one, and on longer studies; the "
     "files reports/*.toml of nlctl are such studies."
 )
+SAME = "The same in numbers"
 DIAGRAM = "The loop as simulated, with nominal values, and the inside of its nested diagrams."
 PARAMETERS = (
     "All parameters of the loop, with their values; varied: by which law the study changed them."

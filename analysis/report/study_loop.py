@@ -82,19 +82,12 @@ def loop_of(prepared: Prepared) -> Loop:
 
 def loop_sections(loop: Loop, result: Result, prefix: str, level: int) -> Iterator[Section]:
     """Yield the loop as it was run, its parameters with what was varied, and its source."""
-    caption = text.DIAGRAM
-    figure = Figure(
-        key=f"{prefix}study_diagram",
-        caption=caption,
-        description=f"Block diagram of {loop.diagram.name} with the blocks {_blocks(loop)}.",
-        figure=draw(loop.diagram, expand=True),
-    )
     from_file = f" in {loop.file} (SHA-256 {loop.sha256})" if loop.file else ""
     made = Paragraph(text=f"The loop is made by {loop.maker}{from_file}.")
     yield Section(
         key=f"{prefix}study_loop",
         title="The loop",
-        items=[made, figure, *_parameters(loop, result)],
+        items=[made, *_picture(loop, prefix), *_parameters(loop, result)],
         level=level,
     )
     if loop.source:
@@ -107,9 +100,16 @@ def loop_sections(loop: Loop, result: Result, prefix: str, level: int) -> Iterat
         )
 
 
-def _blocks(loop: Loop) -> str:
-    parts = getattr(loop.diagram, "syslist", ()) or (loop.diagram,)
-    return ", ".join(str(system.name) for system in parts)
+def _picture(loop: Loop, prefix: str) -> Iterator[Figure]:
+    """Yield the diagram; a single system is none."""
+    if isinstance(loop.diagram, ct.InterconnectedSystem):
+        blocks = ", ".join(str(system.name) for system in loop.diagram.syslist)
+        yield Figure(
+            key=f"{prefix}study_diagram",
+            caption=text.DIAGRAM,
+            description=f"Block diagram of {loop.diagram.name} with the blocks {blocks}.",
+            figure=draw(loop.diagram, expand=True),
+        )
 
 
 def _parameters(loop: Loop, result: Result) -> Iterator[Item]:

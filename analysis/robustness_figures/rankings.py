@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
+from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from ..figures.axes import BLUE, GREY, ORANGE, legend_above
 from .labels import arms, number_axes
@@ -81,6 +81,7 @@ def paired_differences(table: pd.DataFrame, labels: Sequence[str], quantity: str
     ax.plot(middle[inside], at[inside], "o", color=BLUE, markersize=5)
     ax.axvline(0.0, color=GREY, linewidth=1.0, linestyle="--")
     ax.set_xlim(-1.05 * reach, 1.05 * reach)
+    ax.xaxis.set_major_locator(MaxNLocator(5))
     ax.set_xlabel(quantity, parse_math=False)
     return figure
 

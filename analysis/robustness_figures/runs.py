@@ -145,7 +145,7 @@ def fans(
     groups : sequence of str, optional
         The kind of each run.
     """
-    figure, axes = stacked_axes(rows=len(signals), height=1.9)
+    figure, axes = stacked_axes(rows=len(signals), height=1.9 if len(signals) > 1 else 2.6)
     nodes = np.unique(np.linspace(0, time.size - 1, STRETCHES + 1).astype(int))
     for ax, (name, samples) in zip(axes, signals.items(), strict=True):
         own = tuple(limits.get(name, ()))

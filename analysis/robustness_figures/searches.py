@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pandas as pd
-from matplotlib.colors import Normalize, TwoSlopeNorm
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
@@ -20,6 +21,7 @@ __all__ = ["degradation", "deviations", "failure_map", "radius_steps", "search"]
 
 SEARCHERS = {"corners": GREY, "uniform": BLUE, "CMA-ES": GREEN}
 INK = "#111111"  # on the map, which is light on dark pages as well
+COLOURS = ListedColormap(colormaps["PuOr"](np.linspace(0.15, 0.85, 256)))  # INK shows on all
 
 
 def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
@@ -136,7 +138,7 @@ def failure_map(
     plane = np.meshgrid(np.linspace(*span[:2], 240), np.linspace(*span[2:], 180))
     field = LinearTriInterpolator(net, margin)(*plane)
     image = ax.imshow(
-        field, extent=span, origin="lower", aspect="auto", cmap="PuOr", norm=_centred(margin)
+        field, extent=span, origin="lower", aspect="auto", cmap=COLOURS, norm=_centred(margin)
     )
     ax.plot(x, y, ".", color=INK, markersize=1.5, alpha=0.5, rasterized=True)
     if margin.min() <= 0 < margin.max():
