@@ -36,12 +36,14 @@ from .controllers import (
 from .drawing import draw
 from .native import (
     AlgebraicLoopError,
+    BlockEquations,
     CacheWarning,
     Compiled,
     CompileError,
     Ensemble,
     compile,  # noqa: A004
     ensemble_response,
+    typeset,
 )
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
@@ -55,6 +57,7 @@ __all__ = [
     "Backlash",
     "BandLimitedNoise",
     "Block",
+    "BlockEquations",
     "CacheWarning",
     "CompileError",
     "Compiled",
@@ -111,4 +114,5 @@ __all__ = [
     "replaced",
     "sliding_mode",
     "state_names",
+    "typeset",
 ]

@@ -24,7 +24,7 @@ _KEY = "nlctl"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Param:
-    """What `param` declares about one field: unit, meaning, bounds, number of axes."""
+    """What `param` declares about one field: unit, meaning, bounds, number of axes, symbol."""
 
     unit: str
     meaning: str
@@ -33,6 +33,7 @@ class Param:
     at_least: float | None
     at_most: float | None
     ndim: int
+    symbol: str | None
 
     def rules(self) -> Iterator[tuple[str, Callable[[float], bool]]]:
         """Yield each bound as ``("> 0", test)``."""
@@ -61,6 +62,7 @@ def param(
     below: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
+    symbol: str | None = None,
 ) -> Any:
     """Declare a parameter of a block record.
 
@@ -75,6 +77,8 @@ def param(
         Strict bounds of the value (of every element).
     at_least, at_most : float, optional
         Bounds that the value may attain.
+    symbol : str, optional
+        What formulas call it, where that is not its name: ``"mu"`` for centres.
 
     Returns
     -------
@@ -89,6 +93,7 @@ def param(
         at_least=at_least,
         at_most=at_most,
         ndim=np.ndim(default),
+        symbol=symbol,
     )
     return dataclasses.field(default=default, metadata={_KEY: declared})
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
+import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,13 +13,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .cli_studies import INCOMPLETE, INTERRUPTED, exit_codes, run_folder
+from .cli_studies import ANSWERS, INCOMPLETE, INTERRUPTED, exit_codes, run_folder
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
 
     from analysis.report.document import Report
     from analysis.report.svg import Drawn
+
+    from ._errors import UsageError
 
 QUICK = ("example-1-quick", "example-2-quick")  # the studies of the paper's report
 
@@ -125,10 +128,11 @@ def _reproduced(
 @contextmanager
 def _other_process() -> Iterator[Executor]:
     """Lend a process for the other core; it ends when the body fails, whatever it is doing."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import active_children, get_context
+    from multiprocessing import active_children
 
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    from ._workers import process_pool
+
+    with process_pool(1) as pool:
         try:
             yield pool
         except BaseException:
@@ -183,7 +187,7 @@ def _study(
         study, out, threads=jobs or None, watch=sweep_bar, interactive=interactive
     )
     if result.complete:
-        return result.verdict, page, int(not result.holds)
+        return result.verdict, page, ANSWERS.get(result.answer, 0)
     if study.suffix == ".toml":
         print("nlctl: incomplete; the same command goes on", file=sys.stderr)
     return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE
@@ -245,7 +249,7 @@ def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
 def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:
     """Print what differs, one thing a line; return whether nothing does.
 
-    Two folders without reports are compared by the results of their runs.
+    Two runs are compared by their results where one of them has no report.
 
     Raises
     ------
@@ -253,12 +257,19 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
         If a file is no report, or cannot be read.
     """
     from analysis.report.compare import compare
-    from analysis.studies import run_differences
+    from analysis.studies import origin_differences, run_differences
 
-    runs = [p.is_dir() and not (p / "report.json").exists() for p in (first, second)]
+    paths = (first, second)
+    without = [p for p in paths if p.is_dir() and not (p / "report.json").exists()]
+    as_runs = bool(without) and all((p / "results.json").exists() for p in paths)
+    if not as_runs:
+        for path in (p for p in paths if p in without or not p.exists()):
+            raise _no_report(path)
     found: list[Any] = (
-        run_differences(first, second) if all(runs) else compare(first, second, rtol=rtol)
+        run_differences(first, second) if as_runs else compare(first, second, rtol=rtol)
     )
+    if as_runs and (told := origin_differences(first, second)):
+        print(f"nlctl: the two runs were not computed from the same: {told}", file=sys.stderr)
     if as_json:
         told = [text if isinstance(text, str) else vars(text) for text in found]
         print(json_text.dumps(told, indent=1, ensure_ascii=False))
@@ -268,6 +279,22 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
     count = "no difference" if not found else f"{len(found)} differences"
     print("1 difference" if len(found) == 1 else count)
     return not found
+
+
+def _no_report(path: Path) -> UsageError:
+    """Return what is said of a path that cannot be compared, with the next step."""
+    from ._errors import UsageError
+
+    if not path.exists():
+        return UsageError(f"there is no '{path}': compare needs two reports, or two runs")
+    run = shlex.quote(str(path))
+    if (path / "results.json").exists():
+        return UsageError(f"'{path}' is a run without a report: make it with 'nlctl report {run}'")
+    if (path / "study.toml").exists():
+        return UsageError(
+            f"'{path}' is a run that is not done: finish it with 'nlctl run STUDY --resume'"
+        )
+    return UsageError(f"'{path}' holds neither a report nor a run of a study")
 
 
 def write_gallery_of(folder: Path, *, open_: bool) -> None:

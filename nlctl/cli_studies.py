@@ -1,7 +1,8 @@
 """The commands about study files.  Like `nlctl.cli` it only reads arguments and prints.
 
-Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or an invalid study, 3 an internal error or
-one of the user's own functions, 4 incomplete and resumable, 130 interrupted.
+Exit codes: 0 all claims are shown, 1 a claim is refuted, 2 usage or an invalid study, 3 an
+internal error or one of the user's own functions, 4 incomplete and resumable, 5 no claim is
+refuted, but not all are shown yet, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from typing import Annotated, Any
 
 import typer
 
-FAILS, INVALID, INTERNAL, INCOMPLETE, INTERRUPTED = 1, 2, 3, 4, 130
+FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
+ANSWERS = {"refuted": FAILS, "not shown yet": OPEN}  # exit code by the answer to a study's claims
 CONNECT = "5s"  # how long a scheduler may take to answer
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY", help="The study file, .toml.")]
@@ -54,7 +56,12 @@ def run(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Run a study, print what it found, and keep everything in a folder."""
+    """Run a study, print what it found, and keep everything in a folder.
+
+    Exit codes: 0 all claims are shown, 1 a claim is refuted, 5 none is refuted but not all are
+    shown yet, 2 an invalid study, 3 an error in a function of yours, 4 incomplete: go on with
+    --resume.
+    """
     options = [part for text in set_ or [] for part in ("--set", text)]
     options += [] if out is None else ["--out", str(out)]
     options += [] if executor == "threads" else ["--executor", executor]
@@ -79,8 +86,8 @@ def run(
         _show(result, json)
         if not result.complete:
             raise typer.Exit(INTERRUPTED if result.interrupted else INCOMPLETE)
-        if not result.holds:
-            raise typer.Exit(FAILS)
+        if result.answer in ANSWERS:
+            raise typer.Exit(ANSWERS[result.answer])
 
 
 def validate(study: StudyPath, set_: Settings = None, jobs: Jobs = 0, json: Json = False) -> None:
@@ -226,13 +233,10 @@ def _executor(text: str, jobs: int) -> Iterator[Any]:
     if text == "threads":
         yield None
     elif text == "processes":
-        import multiprocessing
-        from concurrent.futures import ProcessPoolExecutor
-
+        from ._workers import process_pool
         from .native._ensemble import cores
 
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(jobs or cores(), mp_context=context) as pool:
+        with process_pool(jobs or cores()) as pool:
             yield pool
     elif text.startswith("dask:"):
         with _dask_client(text.removeprefix("dask:")) as client:
@@ -271,7 +275,7 @@ def _show(result: Any, json: bool) -> None:
     for finding in result.findings:
         print(f"\n{finding.title}\n  {finding.sentence}")
         if finding.claim:
-            print(f"  Claim: {finding.claim}: {'holds' if finding.holds else 'FAILS'}.")
+            print(f"  Claim: {finding.claim}: {finding.told}.")
     print(f"\n{result.folder}")
 
 

@@ -126,17 +126,29 @@ def _run(path: Path, threads: int | None, watch: Watch | None) -> Result:
 
 
 def _prepared(result: Result) -> Prepared | None:
-    """Return the loop of a run again; None, with a word on it, if the loop has gone."""
-    from analysis.robustness import prepare
-    from analysis.studies.run import rerun_file
+    """Return the loop of a run again; None, with a word on it, if the loop has gone.
+
+    Raises
+    ------
+    RunFolderError
+        If the results were computed from another loop than today's: nothing is drawn from it.
+    """
+    from analysis.studies import RunFolderError
+    from analysis.studies.run import reopened
 
     from ._errors import UsageError
 
     try:
-        return prepare(rerun_file(result.folder).experiment)
+        run = reopened(result.folder)
+    except RunFolderError:
+        raise
     except UsageError as error:  # what was found is shown all the same
         print(f"nlctl: the report has no fans and no diagram: {error}", file=sys.stderr)
         return None
+    if run.versions:
+        told = f"computed with other versions ({run.versions}): fans are drawn with those of today"
+        print(f"nlctl: '{result.folder}' was {told}", file=sys.stderr)
+    return run.prepared
 
 
 def _histories(result: Result, prepared: Prepared | None, threads: int | None) -> Histories | None:

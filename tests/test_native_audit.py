@@ -6,9 +6,9 @@ import pytest
 
 import nlctl
 from nlctl._errors import ParameterError, UsageError
+from nlctl.expressions.graph import Graph
 from nlctl.native import AuditError, _lower_emit
 from nlctl.native._lower_blocks import _Reader
-from nlctl.native._trace_graph import Graph
 from nlctl.response import EngineWarning
 
 TIMES = np.linspace(0, 1, 11)

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.text import Text
 from scipy import stats
 from studies_example import LOOP
 
@@ -283,10 +284,10 @@ def test_json_holds_every_number(result, report):
 def test_planted_violations_make_the_page_red(result, report, page):
     """Failing claims are named in the verdict; what holds is sampled, never proved."""
     looks = {c.evidence: claim_status(c) for c in report.claims}
-    assert looks["worst-case"][1] == looks["sequential"][1] == "fail"
-    assert looks["probability"] == ("sampled", "checked")
+    assert looks["worst-case"][1] == looks["sequential"][1] == "refuted"
+    assert looks["probability"] == ("shown", "checked")
     assert not any(look == "proved" for _, look in looks.values())
-    assert 'class="verdict fail"' in page
+    assert 'class="verdict refuted"' in page
     assert result["worst-case"].claim in report.verdict
     told, _, assumed = result["probability"].sentence.partition(" Assumed: ")
     assert f"{told} Assumptions: see “What is assumed”." in report.verdict
@@ -305,13 +306,11 @@ def test_claims_point_to_sections(report):
 def test_a_violation_that_is_not_confirmed_is_open(result):
     """It neither holds nor fails; undecided tests as well."""
     worst = result["worst-case"]
-    doubted = replace(worst, numbers=dict(worst.numbers) | {"is_confirmed": False})
-    test = result["sequential"]
-    open_ = replace(test, numbers=dict(test.numbers) | {"decision": "undecided"}, holds=False)
+    doubted = replace(worst, answer="not shown yet")
+    open_ = replace(result["sequential"], answer="not shown yet", needs="9 more runs")
     findings = [{"worst-case": doubted, "sequential": open_}.get(f.key, f) for f in result.findings]
     found = {c.evidence: claim_status(c) for c in claims(replace(result, findings=tuple(findings)))}
-    assert found["worst-case"] == ("not confirmed", "caution")
-    assert found["sequential"] == ("undecided", "caution")
+    assert found["worst-case"] == found["sequential"] == ("not shown yet", "caution")
 
 
 @pytest.mark.parametrize("kind", ["Sobol'", "Latin hypercube", "corners"])
@@ -343,7 +342,7 @@ def test_an_analysis_without_an_answer_says_why(result):
             assert words.text == "Not answered: the rows do not admit it."
         told = {claim.evidence: claim for claim in made.claims if claim.evidence in gone}
         assert told.keys() == gone
-        assert all(claim_status(claim) == ("fails", "fail") for claim in told.values())
+        assert all(claim_status(claim) == ("refuted", "refuted") for claim in told.values())
         (found,) = tables_of(study_part([(part, None)])[1])
         said = dict(zip((f.key for f in findings), column(found, "found"), strict=True))
         assert all("do not admit it" in said[key] for key in gone)
@@ -454,6 +453,30 @@ def test_running_estimate_is_the_confidence_sequence():
             statement.lower,
             statement.upper,
         )
+
+
+def test_the_figure_of_the_estimate_says_what_decides(report):
+    """Exact bounds where the number of runs was fixed, the band in a sequential test."""
+    figures = {i.key: i for s in report.sections for i in s.items if isinstance(i, Figure)}
+    fixed, sequence = figures["probability-running"], figures["sequential-running"]
+    assert "rests on the exact bounds at the end alone" in fixed.caption
+    assert "rests on the band" in sequence.caption
+    for shown, label in ((fixed, "exact bounds: decide"), (sequence, "bounds at all n: decide")):
+        texts = [text.get_text() for text in shown.figure.findobj(Text)]
+        assert [t for t in texts if t.endswith("decide")] == [label]
+
+
+def test_nominal_values_that_violate_are_the_verdict(tmp_path):
+    """Before anything else, as a refuted claim, without an empty chart."""
+    asked = '[[analysis]]\nkind = "radius"\nruns = 20\nlimit = 0.5\n'
+    path = written(tmp_path, asked)
+    path.write_text(path.read_text().replace("|y| <= 0.5", "|y| <= 0.05"))
+    made = run(read_study(path), tmp_path / "run")
+    found = made["radius"]
+    assert found.sentence.startswith("The nominal values violate the spec (margin -")
+    assert (found.answer, found.numbers["upper"]) == ("refuted", 0.0)
+    (section,) = (s for s in study_report(made).sections if s.key == "radius")
+    assert not [item for item in section.items if isinstance(item, Figure)]
 
 
 @given(st.lists(st.floats(-2, 2), min_size=2, max_size=2))
@@ -610,7 +633,7 @@ def test_studies_stand_side_by_side_in_another_report(result, kept):
     keys = [i.key for s in made for i in s.items if isinstance(i, Figure)]
     assert len(keys) == len(set(keys)) == 5  # margins and map of both, fans of one
     (overview,) = (item for item in made[0].items if isinstance(item, Table))
-    assert column(overview, "outcome") == ["fail", "fail"]
+    assert column(overview, "outcome") == ["refuted", "refuted"]
     found = column(tables_of(made[1])[0], "found")
     for finding, words in zip(result.findings, found, strict=True):
         assert words.startswith(without_assumptions(finding.sentence))

@@ -22,13 +22,12 @@ from flint import arb
 
 from .ball import Ball, as_ball, common
 from .box import Box, Cell
-from .branches import Decisions, Undecided, take
+from .branches import Undecided, every_way
 
 __all__ = ["Ball", "Box", "Proof", "Range", "Undecided", "enclose", "prove", "upper"]
 
 Function = Callable[[tuple[Any, ...]], Any]
 HOPELESS = 5_000  # boxes after which a function still without bound somewhere is given up
-BRANCHES = 64  # ways through an equation on one box, beyond which the box is split first
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,21 +240,13 @@ def _bounds(function: Function, cell: Cell) -> tuple[arb, arb, tuple[arb, ...] |
 
 def _every_branch(function: Function, coordinates: Sequence[arb]) -> arb:
     """Return the hull over every way through the function; NaN if there is no end of them."""
-    balls, hull, count = tuple(map(Ball, coordinates)), None, 0
-    scripts: list[tuple[bool, ...]] = [()]
-    while scripts:
-        given = scripts.pop()
-        count += 1
-        try:
-            with take(Decisions(given=given)) as decisions:
-                value = as_ball(function(balls)).value
-        except Undecided:
-            return arb.nan()
-        hull = value if hull is None else hull.union(value)
-        taken = decisions.taken
-        scripts += [taken[:i] + (False,) for i in range(len(given), len(taken))]
-        if count + len(scripts) > BRANCHES:
-            return arb.nan()
+    balls, hull = tuple(map(Ball, coordinates)), None
+    try:
+        for result in every_way(lambda: function(balls)):
+            value = as_ball(result).value
+            hull = value if hull is None else hull.union(value)
+    except Undecided:
+        return arb.nan()
     assert hull is not None
     return hull
 

@@ -6,6 +6,7 @@ between the lines k_1 u and k_2 u, and eps_u the rest.  A small k_1 buys a small
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
@@ -17,9 +18,12 @@ from nlctl._param import equation_arguments
 from nlctl.actuators import Backlash, DeadZone, play_band
 from nlctl.functions import clip
 
-from .balls import Box, Range, enclose
+from .balls import Box, Range, Undecided, enclose
 
 __all__ = ["Decomposable", "Decomposition", "DecompositionError", "clipped_split", "decompose"]
+
+Edge = Callable[[Any, Any], Any]
+TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared splits are tried
 
 
 class DecompositionError(UsageError):
@@ -39,7 +43,8 @@ class Decomposition:
     part : callable
         ``part(u, v)`` is k u; floats and arrays.  `gain` and `eps_u` follow from it.
     provenance : {"computed", "proved", "given"}
-        "computed" in closed form, "proved" by branch and bound.
+        "computed" in closed form, "proved" by branch and bound, "given" by the record alone:
+        samples do not refute it, and nothing proves it.
     how, over : str
         How the bounds were obtained, and for which inputs they hold.
     """
@@ -121,6 +126,11 @@ def decompose(
     tol : float, optional
         eps_u* is at most this far from a value that is attained.
 
+    Notes
+    -----
+    The bounds hold for all t >= 0: time is a side of the boxes.  What a record declares itself is
+    "proved" where branch and bound confirms it, and "given" otherwise, whatever the record says.
+
     Returns
     -------
     Decomposition
@@ -132,12 +142,10 @@ def decompose(
         own one is refuted by a sample of its output.
     """
     if k is None and hasattr(actuator, "decomposition"):
-        split = actuator.decomposition(u_max)
-        _refute(actuator, split, u_max)
-        return split
-    if k is None and isinstance(actuator, DeadZone):
+        return _declared_split(actuator, u_max, tol)
+    if k is None and type(actuator) is DeadZone:
         return _textbook_dead_zone(actuator)
-    if k is None and isinstance(actuator, Backlash):
+    if k is None and type(actuator) is Backlash:
         if actuator.m_r == actuator.m_l:
             return _play(actuator)
         k = (min(actuator.m_r, actuator.m_l), max(actuator.m_r, actuator.m_l))
@@ -151,13 +159,32 @@ def decompose(
     return _proved_split(actuator, k, u_max, tol)
 
 
+def _declared_split(actuator: Any, u_max: float, tol: float) -> Decomposition:
+    """Return the split that a record declares, with what is known of it."""
+    split = actuator.decomposition(u_max)
+    _refute(actuator, split, u_max)
+    given = dataclasses.replace(
+        split, provenance="given", how=f"declared by {type(actuator).__name__}: {split.how}"
+    )
+    try:
+        proved = _proved_split(actuator, (split.k_1, split.k_2), u_max, tol)
+    except DecompositionError:
+        return given
+    if proved.eps_low < split.eps_low - tol or proved.eps_high > split.eps_high + tol:
+        return given
+    low, high = min(proved.eps_low, split.eps_low), max(proved.eps_high, split.eps_high)
+    return dataclasses.replace(proved, eps_low=low, eps_high=high)
+
+
 def _refute(actuator: Any, split: Decomposition, u_max: float) -> None:
-    """Look for an input at which a memoryless actuator breaks the split that it declares."""
+    """Look for an input and a time at which a memoryless actuator breaks what it declares."""
     if len(actuator.states):
         return
-    output, _ = _edges(actuator)
-    for u in np.linspace(-u_max, u_max, 2001):
-        v = output(u)
+    _, output = _edges(actuator)
+    points = [(u, 0.0) for u in np.linspace(-u_max, u_max, 2001)]
+    points += [(u, t) for t in TIMES for u in np.linspace(-u_max, u_max, 101)]
+    for u, t in points:
+        v = output(u, t)
         k, eps_u = split.gain(u, v), split.eps_u(u, v)
         room = 1e-9 * (1 + abs(v))
         if not (
@@ -166,8 +193,8 @@ def _refute(actuator: Any, split: Decomposition, u_max: float) -> None:
         ):
             raise DecompositionError(
                 f"{type(actuator).__name__} declares k in [{split.k_1:g}, {split.k_2:g}] and eps_u "
-                f"in [{split.eps_low:g}, {split.eps_high:g}], but at u = {u:g} k is {k:g} and "
-                f"eps_u is {eps_u:g}: correct its decomposition"
+                f"in [{split.eps_low:g}, {split.eps_high:g}], but at u = {u:g}, t = {t:g} s k is "
+                f"{k:g} and eps_u is {eps_u:g}: correct its decomposition"
             )
 
 
@@ -222,37 +249,48 @@ def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: floa
         part=part,
         provenance="proved",
         how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in reach[2.0])} boxes",
-        over=f"|u| <= {2 * u_max:g}",
+        over=f"|u| <= {2 * u_max:g}, all t",
     )
 
 
-def _edges(actuator: Any) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
-    """Return the least and the greatest output v that the actuator can have at input u."""
+def _edges(actuator: Any) -> tuple[Edge, Edge]:
+    """Return the least and the greatest output v that the actuator can have at input u, time t."""
     p = equation_arguments(actuator)
-    if isinstance(actuator, Backlash):
-        return (lambda u: play_band(u, p)[0]), (lambda u: play_band(u, p)[1])
+    if type(actuator) is Backlash:
+        return (lambda u, t: play_band(u, p)[0]), (lambda u, t: play_band(u, p)[1])
     if len(actuator.states) or len(actuator.inputs) != 1 or len(actuator.outputs) != 1:
         raise DecompositionError(
             f"{type(actuator).__name__} has memory or several signals: give the record a method "
             "decomposition(u_max)"
         )
 
-    def output(u: Any) -> Any:
-        return actuator.output(0.0, (), (u,), p)[0]
+    def output(u: Any, t: Any) -> Any:
+        try:
+            return actuator.output(t, (), (u,), p)[0]
+        except Undecided:
+            raise
+        except Exception as error:  # a user's function may raise whatever it likes
+            raise DecompositionError(
+                f"the output of {type(actuator).__name__} cannot be evaluated on intervals of u "
+                f"and t ({type(error).__name__}: {error}): write it with arithmetic and NumPy "
+                "functions of numbers"
+            ) from error
 
     return output, output
 
 
-def _eps_range(part: Any, edges: Any, u_max: float, tol: float) -> tuple[Range, Range]:
-    """Ranges of eps_u along both edges; it grows with v, so these are its ends."""
+def _eps_range(
+    part: Any, edges: tuple[Edge, Edge], u_max: float, tol: float
+) -> tuple[Range, Range]:
+    """Ranges of eps_u along both edges, for all t >= 0; it grows with v, so these are its ends."""
 
-    def along(edge: Callable[[Any], Any]) -> Range:
-        def eps_u(point: tuple[Any]) -> Any:
-            (u,) = point
-            v = edge(u)
+    def along(edge: Edge) -> Range:
+        def eps_u(point: tuple[Any, Any]) -> Any:
+            u, t = point
+            v = edge(u, t)
             return v - part(u, v)
 
-        return enclose(eps_u, Box.of(u=(-u_max, u_max)), tol=tol)
+        return enclose(eps_u, Box.of(u=(-u_max, u_max), t=(0.0, np.inf)), tol=tol)
 
     low = along(edges[0])
     return low, low if edges[1] is edges[0] else along(edges[1])

@@ -1,4 +1,4 @@
-"""A loop whose blocks also deliver what the proof speaks of: rates of the states, g, G and d.
+"""A loop whose blocks also output what the proof speaks of: rates of the states, g, G and d.
 
 The rates are the blocks' own update equations on the loop's own signals, so that V' is the
 gradient of V times the right-hand side of the diagram, and no difference of samples.
@@ -22,6 +22,7 @@ from nlctl.plants import PureFeedback
 from .decomposition import Decomposition
 from .integral import NussbaumIntegral
 from .parts import Parts
+from .roles import joined_again
 
 __all__ = ["input_gain", "observed"]
 
@@ -82,42 +83,24 @@ def observed(
     Raises
     ------
     DiagramError
-        If the law has no Nussbaum argument, or signals are not joined by their names.
+        If the law has no Nussbaum argument.
     """
     if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
         raise DiagramError(
             "(23), (24) need a law with the state zeta and a function N, got "
             f"{type(parts.law).__name__}: for a known sign see certify"
         )
-    roles = {path: part for part, path in parts.paths.items()}
     integral = NussbaumIntegral(alpha_1=alpha_1, part=split.part)
-    systems = [*_opened(loop, "", roles), block(integral, "integral")]
+    systems = [*joined_again(loop, parts.roles, _observed_block), block(integral, "integral")]
     return interconnect(systems, name=f"{loop.name}_observed")
 
 
-def _opened(diagram: Any, path: str, roles: dict[str, str]) -> list[Any]:
-    """Return copies of a diagram's blocks, nested diagrams with all signals as outputs."""
-    copies = []
-    for system in diagram.syslist:
-        here = f"{path}{system.name}"
-        if isinstance(system, ct.InterconnectedSystem):
-            inner = _opened(system, f"{here}.", roles)
-            inputs = list(system.input_labels)
-            copies.append(interconnect(inner, inputs=inputs, name=system.name))
-        elif isinstance(system, Block):
-            copies.append(_observed_block(system, roles.get(here)))
-        else:
-            copies.append(system.copy(name=system.name))
-    return copies
-
-
-def _observed_block(system: Block, part: str | None) -> Block:
-    spec = system.current_spec
+def _observed_block(part: str, spec: Any, name: str) -> Block:
     if part == "plant":
         spec = _with_outputs(spec, *_plant_terms(spec))
     elif part in ("weights", "robust", "law"):
         spec = _with_outputs(spec)
-    return block(spec, system.name)
+    return block(spec, name)
 
 
 def _plant_terms(plant: Any) -> tuple[tuple[str, ...], Callable]:

@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native
+from nlctl._diagram import initial_state
 from nlctl._diagram import state_names as all_states
 from nlctl._errors import ParameterError
 from nlctl.response import input_output_response
@@ -18,10 +19,12 @@ from .decomposition import Decomposition
 from .final_bound import Gains, alpha_1
 from .observed import observed
 from .parts import Parts, read_parts
+from .same_loop import check_same, points_around
 from .signals import Signals, signals_of
 
 __all__ = ["Member", "Run", "members_of", "observe", "observed_loop"]
 
+LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
 AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
 
 
@@ -163,11 +166,16 @@ def observe(
     ------
     ParameterError
         If a member does not reproduce the response that it stands for.
+    DiagramError
+        If the loop is not the one that the proof is about.
     """
     compiled = observed_loop(loop, split)
-    for member in members:
+    for number, member in enumerate(members):
         parts = read_parts(loop, member.start, member.params)
         params = {**member.params, "integral.alpha_1": alpha_1(parts.gains)}
+        x0 = initial_state(loop, member.start)
+        points = points_around(x0) if number == 0 else [(0.0, x0)]
+        check_same(loop, compiled.system, points, member.params, params)
         response: Any = input_output_response(
             compiled,
             member.times,
@@ -178,10 +186,20 @@ def observe(
             ignore_errors=True,
         )
         signals = signals_of(native.uninterrupted(response))
+        seen = _along(loop, response, LOOKS if number == 0 else 1)
+        check_same(loop, compiled.system, seen, member.params, params)
         _check_reproduced(member, signals)
         lost = None if response.success else float(response.statistics.time)
         message = str(response.message or "")
         yield Run(member=member, parts=parts, signals=signals, lost=lost, message=message)
+
+
+def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any]:
+    """Return times and states of the loop that a response of the observed loop has visited."""
+    states = np.asarray(response.states)[: loop.nstates or 0]
+    finite = np.flatnonzero(np.isfinite(states).all(axis=0))
+    places = np.unique(np.linspace(finite.size - 1, 0, count).astype(int)) if finite.size else []
+    return [(float(response.time[i]), states[:, i].copy()) for i in finite[places]]
 
 
 def observed_loop(loop: ct.InterconnectedSystem, split: Decomposition) -> native.Compiled:

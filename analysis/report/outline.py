@@ -43,8 +43,8 @@ SHORT = 24  # characters of a text that stays on one line
 LIGHTS = {
     "pass": ("pass", "passes", "hold", "holds", "ok", "reached", "confirmed"),
     "proved": ("proved", "computed"),
-    "checked": ("checked", "sampled"),
-    "caution": ("undecided", "open", "inconclusive", "not confirmed"),
+    "checked": ("checked", "sampled", "shown"),
+    "caution": ("undecided", "open", "inconclusive", "not confirmed", "not shown yet"),
     "refuted": ("refuted", "violated as printed"),
     "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
 }
@@ -54,12 +54,16 @@ MEANINGS = {  # of the statuses of claims, as the page explains them
     "computed": "in closed form",
     "checked": "at every sample of one simulated run, which proves nothing of others",
     "sampled": "found by simulated runs, at most with a stated confidence, which is no proof",
+    "shown": "by simulated runs, at most with a stated confidence, which is no proof",
+    "refuted": "there is a run that contradicts it, or many with a stated confidence; the claim "
+    "is wrong, and nothing of this report failed",
+    "not shown yet": "what was run neither shows nor refutes it",
     "undecided": "what was run does not tell",
     "not confirmed": "a violation was found, but not by other integrators",
     "violated": "there is a counterexample",
-    "refuted": "there is a counterexample to what others claim; nothing of this report failed",
     "fails": "what was measured is beyond the limit",
 }
+ANSWERS = ("shown", "refuted", "not shown yet")  # to the claims of studies
 _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in statuses}
 
 
@@ -231,22 +235,26 @@ def summary(claims: Sequence[Claim]) -> tuple[str, str]:
         return "fail", f"{failed} of {total} claims {'fails' if failed == 1 else 'fail'}."
     kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
     kept = ", ".join(f"{number} {status}" for status, number in kinds.items())
+    waiting = "not shown yet" if {status for status, _ in statuses} <= set(ANSWERS) else "open"
     if refuted:
-        of = Counter(
-            c.by for c, look in zip(claims, looks, strict=True) if look == "refuted" and c.by
-        )
-        whose = f" of {next(iter(of))}" if of.total() == refuted and len(of) == 1 else ""
-        told = (
-            f"{refuted} claim{'s' if refuted > 1 else ''}{whose} {'are' if refuted > 1 else 'is'}"
-        )
         left = total - refuted - open_
-        rest = f"; {left} {'others hold' if left > 1 else 'other holds'}" if left else ""
-        rest += f" ({kept})" if rest and kept else ""
-        waiting = f"; {open_} {'is' if open_ == 1 else 'are'} open" if open_ else ""
-        return "refuted", f"{told} refuted{rest}{waiting}."
+        told = [f"{_whose(claims)} refuted"]
+        told += [f"{open_} {'is' if open_ == 1 else 'are'} {waiting}"] * bool(open_)
+        holds = "other holds" if left == 1 else "others hold"
+        told += [f"{left} {holds}{f' ({kept})' if kept else ''}"] * bool(left)
+        return "refuted", f"{'; '.join(told)}."
     if open_:
-        return "caution", f"{open_} of {total} claims {'is' if open_ == 1 else 'are'} open."
+        return "caution", f"{open_} of {total} claims {'is' if open_ == 1 else 'are'} {waiting}."
     if not claims:
         return "neutral", "No claims are made."
     hold = "The claim holds" if total == 1 else f"All {total} claims hold"
     return "pass", f"{hold}: {kept}." if kept else f"{hold}."
+
+
+def _whose(claims: Sequence[Claim]) -> str:
+    """Return how many claims are refuted, and whose they are if all are somebody's: 1 claim is."""
+    of = [claim.by for claim in claims if claim_status(claim)[1] == "refuted"]
+    whose = f" of {of[0]}" if len(set(of)) == 1 and of[0] else f" of {len(claims)}" * (not any(of))
+    if whose.startswith(f" of {len(claims)}"):
+        return f"{len(of)}{whose} claims {'is' if len(of) == 1 else 'are'}"
+    return f"{len(of)} claim{'s' * (len(of) > 1)}{whose} {'is' if len(of) == 1 else 'are'}"

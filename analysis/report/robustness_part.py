@@ -49,7 +49,11 @@ KINDS: dict[str, Items] = {  # in the order of the report
     "failure map": failure_map,
     "compare": compare,
 }
-OUTCOMES = {"pass": "sampled", "caution": "open", "neutral": "no claims"}  # by the light
+OUTCOMES = {  # by the light
+    "pass": "shown",
+    "caution": "not shown yet",
+    "neutral": "no claims",
+}
 
 
 def study_report(

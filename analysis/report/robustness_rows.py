@@ -13,6 +13,7 @@ from nlctl.native import Status
 
 from .. import robustness_figures as figures
 from ..robustness.evaluation import margins_of
+from ..robustness.guarantee import rounded_down, rounded_up
 from ..robustness.sequential import sequence_bounds
 from ..robustness.spec import violates
 from . import robustness_text as text
@@ -267,12 +268,17 @@ def statement_items(
     curve = running(margins[: int(finding.numbers["runs"])], confidence)
     last = curve.iloc[-1]
     caption = text.RUNNING.format(confidence=100 * confidence)
+    fixed = None
+    if finding.kind == "probability":
+        fixed = (float(finding.numbers["singly"][0]), float(finding.numbers["singly"][1]))
+    caption += text.DECIDES_FIXED if fixed else text.DECIDES_SEQUENCE
+    ends = f", exact bounds {rounded_down(fixed[0])} and {rounded_up(fixed[1])}" if fixed else ""
     yield Figure(
         key=f"{key}-running",
         caption=caption,
-        description=f"{caption} After {curve.index[-1]} runs: {last['rate']:.4g}, between "
-        f"{last['low']:.4g} and {last['high']:.4g}.",
-        figure=figures.running_estimate(curve, limit),
+        description=f"{caption} After {curve.index[-1]} runs: {last['rate']:.4g}, band from "
+        f"{last['low']:.4g} to {last['high']:.4g}{ends}.",
+        figure=figures.running_estimate(curve, limit, fixed),
     )
 
 

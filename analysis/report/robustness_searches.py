@@ -85,7 +85,7 @@ def _rows(rows: Mapping[str, Row], quantities: pd.DataFrame, key: str) -> Iterat
             for name, unit, middle in known(quantities, "unit", "nominal")
         ],
     )
-    if len(table):
+    if np.any(table.to_numpy() != 0):
         told = "; ".join(
             f"{name}: " + ", ".join(f"{row} {value:.3g}" for row, value in line.items())
             for name, line in table.iterrows()
@@ -129,6 +129,9 @@ def deviations(rows: Mapping[str, Row], quantities: pd.DataFrame) -> pd.DataFram
 def radius(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
     """Yield which sizes were looked at, and the row at the edge of the smallest violation."""
     n, steps = finding.numbers, finding.tables["steps"]
+    if n["upper"] == 0:  # the nominal values violate: no other size was looked at
+        yield from _rows({"violating row": n["witness"]}, result.quantities, key)
+        return
     told = ", ".join(
         f"{step['size']:.4g}: {margin_text(float(step['margin']))}"
         for step in steps.to_dict("records")

@@ -33,10 +33,15 @@ CLIPPED = (
     f" Margins below −{CLIP:g}, and runs that did not reach their end, are drawn at −{CLIP:g}."
 )
 RUNNING = (
-    "Share of violations after n runs, in their order, and bounds that hold at all n at once with "
-    "confidence {confidence:g} % (a confidence sequence: wider than a bound for a fixed number of "
-    "runs)."
+    "Line: share of violations after n runs, in their order. Band: bounds that hold at all n at "
+    "once with confidence {confidence:g} % (a confidence sequence)."
 )
+DECIDES_FIXED = (
+    " The verdict rests on the exact bounds at the end alone, drawn as a bar: their number of runs "
+    "was fixed in advance. The band shows how the estimate settled; it is wider because it allows "
+    "for looking after every run, and decides nothing."
+)
+DECIDES_SEQUENCE = " The verdict rests on the band: it is reached where the limit leaves it."
 SEARCH = "Lowest margin after each run of the search; the background tells what chose the run."
 DEVIATIONS = "How far each quantity lies from nominal: ±1 is the end of its box on that side."
 RADIUS = "Sizes that were looked at, as factors of the box, with the lowest margin found there."

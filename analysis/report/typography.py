@@ -26,7 +26,9 @@ _POWER_OF_TEN = re.compile(r"(?<![\w.·])(\d+(?:\.\d+)?)e([+-]?)0*(\d{1,3})(?![\
 _POWER = re.compile(r"(?<=[A-Za-zα-ω)])\^(-?\d+)(?![\w.])")
 _MINUS = re.compile(r"(?:^|(?<=[\s(\[{=,;:|<>≤≥±…·]))-(?=[\d∞]|\.\d)")
 _SIGNS = ((" <= ", " ≤ "), (" >= ", " ≥ "), (")-(", ")–("))
-_UNIT = re.compile(rf"(?<=[\d∞⁰¹²³⁴⁵⁶⁷⁸⁹\]]) (?=(?:{UNITS}|1/[A-Za-z]+|/ [A-Za-z])(?![A-Za-z0-9_]))")
+_UNIT = re.compile(
+    rf"(?<=[\d∞⁰¹²³⁴⁵⁶⁷⁸⁹\]]) (?=(?:{UNITS}|1/[A-Za-z]+|/ [A-Za-z])(?![A-Za-z0-9_]))"
+)
 _NUMBERED = re.compile(r"\b(Example|Lemma|row|size) (?=\d)")
 _SLASH = re.compile(rf"(?<=\d{NO_BREAK}/) (?=[A-Za-z])")
 

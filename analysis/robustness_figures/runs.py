@@ -29,7 +29,7 @@ from ..figures.axes import (
     stacked_axes,
 )
 from ..robustness.spec import violates
-from .labels import plain
+from .labels import arms, plain
 
 __all__ = [
     "CLIP",
@@ -89,7 +89,11 @@ def margins(values: np.ndarray) -> Figure:
     return figure
 
 
-def running_estimate(curve: pd.DataFrame, limit: float | None = None) -> Figure:
+def running_estimate(
+    curve: pd.DataFrame,
+    limit: float | None = None,
+    fixed: tuple[float, float] | None = None,
+) -> Figure:
     """Share of violations after n runs, and bounds that hold at all n together.
 
     Parameters
@@ -98,13 +102,22 @@ def running_estimate(curve: pd.DataFrame, limit: float | None = None) -> Figure:
         Columns rate, low, high, indexed by the number of runs.
     limit : float, optional
         Of the claim.
+    fixed : tuple of 2 floats, optional
+        Exact bounds after the last run, which decide where the number of runs was fixed.
     """
     figure, (ax,) = stacked_axes()
     n = curve.index.to_numpy()
     ax.fill_between(
-        n, curve["low"], curve["high"], color=BLUE, alpha=0.2, linewidth=0, label="bounds"
-    )
+        n, curve["low"], curve["high"], color=BLUE, alpha=0.2, linewidth=0,
+        label="bounds at all n" if fixed else "bounds at all n: decide",
+    )  # fmt: skip
     ax.plot(n, curve["rate"], color=BLUE, linewidth=1.4, label="share so far")
+    if fixed is not None:
+        last = float(curve["rate"].iloc[-1])
+        ax.errorbar(
+            [n[-1]], [last], yerr=arms(np.array([last]), [fixed[0]], [fixed[1]]), color=BLUE,
+            marker="o", markersize=4, linewidth=2.2, capsize=5, label="exact bounds: decide",
+        )  # fmt: skip
     if limit is not None:
         ax.axhline(limit, color=ORANGE, linewidth=1.2, linestyle="--", label="limit")
     legend_above(ax)

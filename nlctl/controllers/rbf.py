@@ -64,9 +64,11 @@ class GaussianBasis:
     The number of columns of `centres` is the number of inputs x1, ..., xn.
     """
 
-    centres: Matrix = param(diagonal_centres(27, 2), unit="1", meaning="centres mu_i, one per row")
+    centres: Matrix = param(
+        diagonal_centres(27, 2), unit="1", meaning="centres mu_i, one per row", symbol="mu"
+    )
     widths: tuple[float, ...] = param(
-        (2.0,), unit="1", meaning="widths nu_i: one for all, or one each", above=0
+        (2.0,), unit="1", meaning="widths nu_i: one for all, or one each", above=0, symbol="nu"
     )
 
     states = ()

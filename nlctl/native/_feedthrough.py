@@ -8,9 +8,9 @@ import control as ct
 import numpy as np
 
 from .._block import Block
+from ..expressions.graph import Ambiguous
 from ._parameters import slots_of
 from ._trace_block import dependence
-from ._trace_graph import Ambiguous
 
 
 def feedthrough(system: Any) -> np.ndarray:

@@ -18,6 +18,7 @@ from numba.core import config
 from numba.core.errors import NumbaWarning
 
 from .._equation import equation
+from ..expressions.graph import Expr
 from . import _vector_math, _vector_memory, _vector_type
 from ._compile import TAUGHT, _jitted
 from ._emit import Program
@@ -26,7 +27,6 @@ from ._lower_emit import written
 from ._lower_plan import Store, needed, plan, split
 from ._parameters import length
 from ._schedule import Schedule
-from ._trace_graph import Expr
 from ._vector_math import FUNCTIONS
 from .codegen.fingerprint import module_key
 from .codegen.machine_code import Wanted, machine_code

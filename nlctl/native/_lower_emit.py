@@ -10,9 +10,9 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from ..expressions.graph import Expr
 from ._lower_blocks import Call
 from ._lower_plan import Loop, Plan, Store
-from ._trace_graph import Expr
 
 WIDE = 8
 INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "gt": ">",

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from .._block import Block
+from ..expressions.arrays import Tracer, number, vector
+from ..expressions.graph import Expr, Graph, Untraceable
+from ..expressions.operators import elementwise
+from ..expressions.trace import trace
 from ._parameters import Slot, current_values
-from ._trace import trace
-from ._trace_array import Tracer, number, vector
-from ._trace_graph import Expr, Graph, Untraceable
-from ._trace_operators import elementwise
 
 
 def time(graph: Graph) -> Tracer:

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ._trace_array import Tracer, boxed, concatenated, full, full_key, mapped, traced
-from ._trace_graph import Ambiguous, Expr, Graph, Untraceable
+from .arrays import Tracer, boxed, concatenated, full, full_key, mapped, traced
+from .graph import Ambiguous, Expr, Graph, Untraceable
 
 
 def elementwise(graph: Graph, name: str, *operands: Any) -> Tracer:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ._trace_array import Tracer, concatenated, number, traced
-from ._trace_graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, Undecided, Untraceable
-from ._trace_numpy import Stage
-from ._trace_operators import elementwise
+from .arrays import Tracer, concatenated, number, traced
+from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, Undecided, Untraceable
+from .operators import elementwise
+from .stage import Stage
 
 PATHS = 32  # ways through one function that are followed
 

@@ -17,16 +17,12 @@ from typing import Any
 import numpy as np
 from numba.core.registry import CPUDispatcher
 
-from ._trace_array import Tracer, concatenated, full, traced
-from ._trace_graph import NUMPY, Graph, Untraceable
-from ._trace_operators import elementwise, product, total
-from ._vector_math import FUNCTIONS
+from .arrays import Tracer, concatenated, full, traced
+from .functions import FUNCTIONS, MATH
+from .graph import NUMPY, Graph, Untraceable
+from .operators import elementwise, product, total
 
 _OPERATIONS = {name: op for op, name in NUMPY.items()} | {name: name for name in FUNCTIONS}
-_MATH = {
-    "fabs": "absolute", "pow": "power", "asin": "arcsin", "acos": "arccos", "atan": "arctan",
-    "atan2": "arctan2", "asinh": "arcsinh", "acosh": "arccosh", "atanh": "arctanh",
-}  # fmt: skip
 _LIBRARIES = ("numpy", "scipy", "numba")
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.ndarray, np.generic, range, slice)
 _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "int", "iter", "len",
@@ -153,10 +149,9 @@ class Stage:
         return _for_numbers(real)
 
     def _math_function(self, name: str, real: Any) -> Any:
-        operation = _MATH.get(name, name)
-        if operation not in FUNCTIONS or name == "remainder":  # NumPy's is another one
+        if name not in MATH:
             return _for_numbers(real)
-        known = self._ufunc(operation, real)
+        known = self._ufunc(MATH[name], real)
 
         def function(*arguments: Any) -> Any:
             result = known(*arguments)

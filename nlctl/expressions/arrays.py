@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ._trace_graph import SMALL, Expr, Graph, Untraceable
+from .graph import SMALL, Expr, Graph, Untraceable
 
 
 @dataclass(eq=False, repr=False)
@@ -181,6 +181,12 @@ class Tracer:
         if self.ndim == 1 and wanted in ((-1,), (self.length,)):
             return self
         raise Untraceable("reshaping a long array")
+
+    def pieces(self) -> list[tuple[Expr, int]]:
+        """Return the elements in order, each expression with its number of elements."""
+        if self.axis is not None:
+            return [(self.only, self.length)]
+        return [(self.graph.number(e), 1) for e in self.cells.flat]
 
     @property
     def only(self) -> Expr:

@@ -1,0 +1,1 @@
+"""Expressions: what plain Python functions compute, once read, for everyone who reads it."""

@@ -1,0 +1,139 @@
+"""The table of functions: all that readers of expressions know of each, a row per function.
+
+A row that is added here is traced, compiled, differentiated, enclosed and typeset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+__all__ = ["FUNCTIONS", "MATH", "Function"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Function:
+    """One function of real numbers.
+
+    Attributes
+    ----------
+    name : str
+        NumPy's name.
+    code : str
+        Its machine code: ``"own"`` for what the generator writes out, an intrinsic of LLVM
+        (``"llvm.fabs"``), or the name in the C library (``"log"``).
+    derivative : tuple of callable
+        Partial derivatives with respect to each argument, as functions of all of them.  Where a
+        function has a jump or a kink: that of one side, the one that its value belongs to.
+    enclosure : callable or None
+        The same function of python-flint's ``arb``; None where operators of the reader do it.
+    latex : str
+        Format string with ``{0}`` and ``{1}`` for the arguments.
+    math : tuple of str
+        Names in Python's `math` module.
+    """
+
+    name: str
+    code: str
+    derivative: tuple[Callable[..., Any], ...]
+    enclosure: Callable[..., Any] | None
+    latex: str
+    math: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Number of arguments."""
+        return len(self.derivative)
+
+
+def _zero(*x: Any) -> Any:
+    return 0.0 * x[0]  # NaN stays
+
+
+def _log_of(base: float, x: Any) -> Any:
+    return np.log(base + 0.0 * x)  # as exact as x: a ball encloses it
+
+
+def _row(
+    name: str,
+    code: str,
+    latex: str,
+    *derivative: Callable[..., Any],
+    ball: Callable[..., Any] | None = None,
+    math: str = "",
+) -> Function:
+    names = tuple((math or name).split()) if math != "-" else ()
+    return Function(
+        name=name, code=code, derivative=derivative, enclosure=ball, latex=latex, math=names
+    )
+
+
+_ROWS = (
+    _row("exp", "own", r"e^{{{0}}}", lambda x: np.exp(x), ball=lambda x: x.exp()),
+    _row("sin", "own", r"\sin {0}", lambda x: np.cos(x), ball=lambda x: x.sin()),
+    _row("cos", "own", r"\cos {0}", lambda x: -np.sin(x), ball=lambda x: x.cos()),
+    _row("tanh", "own", r"\tanh {0}", lambda x: 1.0 - np.tanh(x) ** 2, ball=lambda x: x.tanh()),
+    _row("sqrt", "llvm.sqrt", r"\sqrt{{{0}}}", lambda x: 0.5 / np.sqrt(x),
+         ball=lambda x: x.sqrt()),
+    _row("absolute", "llvm.fabs", r"\left|{0}\right|", lambda x: np.where(x < 0.0, -1.0, 1.0),
+         math="fabs"),
+    _row("floor", "llvm.floor", r"\left\lfloor {0} \right\rfloor", _zero,
+         ball=lambda x: x.floor(), math="-"),
+    _row("copysign", "llvm.copysign", r"\left|{0}\right| \operatorname{{sgn}} {1}",
+         lambda x, y: np.where(x < 0.0, -1.0, 1.0) * np.copysign(1.0, y), _zero),
+    _row("sign", "own", r"\operatorname{{sgn}} {0}", _zero, ball=lambda x: x.sgn(), math="-"),
+    _row("minimum", "own", r"\min\left({0}, {1}\right)",
+         lambda x, y: np.where(x < y, 1.0, 0.0), lambda x, y: np.where(x < y, 0.0, 1.0), math="-"),
+    _row("maximum", "own", r"\max\left({0}, {1}\right)",
+         lambda x, y: np.where(x > y, 1.0, 0.0), lambda x, y: np.where(x > y, 0.0, 1.0), math="-"),
+    _row("log", "log", r"\ln {0}", lambda x: 1.0 / x, ball=lambda x: x.log()),
+    _row("log2", "log2", r"\log_2 {0}", lambda x: 1.0 / (x * _log_of(2.0, x)),
+         ball=lambda x: x.log() / type(x)(2).log()),
+    _row("log10", "log10", r"\log_{{10}} {0}", lambda x: 1.0 / (x * _log_of(10.0, x)),
+         ball=lambda x: x.log() / type(x)(10).log()),
+    _row("log1p", "log1p", r"\ln\left(1 + {0}\right)", lambda x: 1.0 / (1.0 + x),
+         ball=lambda x: x.log1p()),
+    _row("expm1", "expm1", r"\left(e^{{{0}}} - 1\right)", lambda x: np.exp(x),
+         ball=lambda x: x.expm1()),
+    _row("exp2", "exp2", r"2^{{{0}}}", lambda x: _log_of(2.0, x) * np.exp2(x),
+         ball=lambda x: (x * type(x)(2).log()).exp()),
+    _row("tan", "tan", r"\tan {0}", lambda x: 1.0 + np.tan(x) ** 2, ball=lambda x: x.tan()),
+    _row("sinh", "sinh", r"\sinh {0}", lambda x: np.cosh(x), ball=lambda x: x.sinh()),
+    _row("cosh", "cosh", r"\cosh {0}", lambda x: np.sinh(x), ball=lambda x: x.cosh()),
+    _row("arcsin", "asin", r"\arcsin {0}", lambda x: 1.0 / np.sqrt((1.0 - x) * (1.0 + x)),
+         ball=lambda x: x.asin(), math="asin"),
+    _row("arccos", "acos", r"\arccos {0}", lambda x: -1.0 / np.sqrt((1.0 - x) * (1.0 + x)),
+         ball=lambda x: x.acos(), math="acos"),
+    _row("arctan", "atan", r"\arctan {0}", lambda x: 1.0 / (1.0 + x * x),
+         ball=lambda x: x.atan(), math="atan"),
+    _row("arcsinh", "asinh", r"\operatorname{{arsinh}} {0}", lambda x: 1.0 / np.sqrt(1.0 + x * x),
+         ball=lambda x: x.asinh(), math="asinh"),
+    _row("arccosh", "acosh", r"\operatorname{{arcosh}} {0}",
+         lambda x: 1.0 / np.sqrt((x - 1.0) * (x + 1.0)), ball=lambda x: x.acosh(), math="acosh"),
+    _row("arctanh", "atanh", r"\operatorname{{artanh}} {0}",
+         lambda x: 1.0 / ((1.0 - x) * (1.0 + x)), ball=lambda x: x.atanh(), math="atanh"),
+    _row("ceil", "llvm.ceil", r"\left\lceil {0} \right\rceil", _zero,
+         ball=lambda x: x.ceil(), math="-"),
+    _row("trunc", "llvm.trunc", r"\operatorname{{trunc}} {0}", _zero, math="-"),
+    _row("rint", "llvm.rint", r"\operatorname{{round}} {0}", _zero, math="-"),
+    _row("cbrt", "cbrt", r"\sqrt[3]{{{0}}}", lambda x: 1.0 / (3.0 * np.cbrt(x) ** 2)),
+    _row("arctan2", "atan2", r"\operatorname{{atan2}}\left({0}, {1}\right)",
+         lambda y, x: x / (x * x + y * y), lambda y, x: -y / (x * x + y * y), math="atan2"),
+    _row("hypot", "hypot", r"\sqrt{{{0}^2 + {1}^2}}",
+         lambda x, y: x / np.hypot(x, y), lambda x, y: y / np.hypot(x, y)),
+    _row("power", "pow", r"{0}^{{{1}}}",
+         lambda x, y: y * np.power(x, y - 1.0), lambda x, y: np.log(x) * np.power(x, y),
+         math="pow"),
+    _row("remainder", "own", r"{0} \bmod {1}",
+         lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.floor(x / y), math="-"),
+    _row("fmod", "fmod", r"\operatorname{{fmod}}\left({0}, {1}\right)",
+         lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.trunc(x / y)),
+)  # fmt: skip
+
+FUNCTIONS = {row.name: row for row in _ROWS}
+"""Every function that expressions know, by NumPy's name."""
+MATH = {name: row.name for row in _ROWS for name in row.math}
+"""NumPy's names of the functions of Python's `math`."""
