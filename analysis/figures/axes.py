@@ -15,6 +15,7 @@ __all__ = [
     "GREY",
     "ORANGE",
     "PURPLE",
+    "SHORT_LINE",
     "STYLES",
     "TIME",
     "WIDTH",
@@ -29,7 +30,7 @@ BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", 
 STYLES = ((BLUE, "-"), (ORANGE, "--"), (GREEN, "-."), (PURPLE, ":"))
 TIME = "time t (s)"
 WIDTH = 6.2  # in, with letters that can still be read on a phone
-LINE = 62  # characters that a legend above the axes has room for
+LINE, SHORT_LINE = 62, 42  # characters that a legend above the axes has room for
 
 
 def stacked_axes(rows: int = 1, height: float = 2.4) -> tuple[Figure, list[Axes]]:
@@ -57,7 +58,7 @@ def draw_lines(ax: Axes, t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Non
         legend_above(ax)
 
 
-def legend_above(ax: Axes, shown: Mapping[str, Any] | None = None) -> None:
+def legend_above(ax: Axes, shown: Mapping[str, Any] | None = None, line: int = LINE) -> None:
     """Put the legend above axes, where it hides nothing and takes no width.
 
     Parameters
@@ -65,6 +66,8 @@ def legend_above(ax: Axes, shown: Mapping[str, Any] | None = None) -> None:
     ax : Axes
     shown : mapping of str to artist, optional
         What it shows; by default what the axes have labels for.
+    line : int, optional
+        Characters that the axes have room for; those with long names at the left have less.
     """
     if shown is None:
         handles, labels = ax.get_legend_handles_labels()
@@ -78,7 +81,7 @@ def legend_above(ax: Axes, shown: Mapping[str, Any] | None = None) -> None:
         labels,
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
-        ncols=max(1, min(len(labels), LINE // widest)),
+        ncols=max(1, min(len(labels), line // widest)),
         frameon=False,
         borderaxespad=0.2,
         columnspacing=1.4,

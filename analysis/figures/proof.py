@@ -16,6 +16,7 @@ from .axes import (
     GREEN,
     GREY,
     ORANGE,
+    SHORT_LINE,
     STYLES,
     TIME,
     WIDTH,
@@ -221,5 +222,5 @@ def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
     ax.set_yticks(range(len(shown)), list(shown))
     ax.set(xscale="log", xlim=(0.5 * min(numbers), 3 * max(numbers)), xlabel="$|r|$")
     ax.invert_yaxis()
-    legend_above(ax)
+    legend_above(ax, line=SHORT_LINE)
     return figure

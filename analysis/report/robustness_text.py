@@ -102,6 +102,10 @@ DIAGRAM = "The loop as simulated, with nominal values, and the inside of its nes
 PARAMETERS = (
     "All parameters of the loop, with their values; varied: by which law the study changed them."
 )
+EQUATIONS = (
+    "Read from the functions that are run, block by block; letters are the names of signals, "
+    "parameters and local variables."
+)
 SOURCE = "As it was when this page was made:"
 ASSUMED = "What is assumed"
 WITH_ASSUMPTIONS = f" Assumptions: see “{ASSUMED}”."

@@ -1,4 +1,4 @@
-"""The loop that a study is about, as its page shows it: diagram, parameters, source."""
+"""The loop that a study is about, as its page shows it: diagram, parameters, equations, source."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ import numpy as np
 import pandas as pd
 
 from nlctl._diagram import parameters
+from nlctl._errors import UsageError
 from nlctl.drawing import draw
+from nlctl.native import typeset
 
 from ..robustness.experiment import Prepared
 from . import robustness_text as text
-from .document import Figure, Item, Paragraph, Section, Table
+from .document import Equation, Figure, Item, Paragraph, Section, Table
 
 if TYPE_CHECKING:
     from analysis.studies.result import Result
@@ -90,6 +92,13 @@ def loop_sections(loop: Loop, result: Result, prefix: str, level: int) -> Iterat
         items=[made, *_picture(loop, prefix), *_parameters(loop, result)],
         level=level,
     )
+    yield Section(
+        key=f"{prefix}study_equations",
+        title="The equations of the loop",
+        items=[*_equations(loop)],
+        level=level + 1,
+        folded=True,
+    )
     if loop.source:
         yield Section(
             key=f"{prefix}study_source",
@@ -128,6 +137,22 @@ def _parameters(loop: Loop, result: Result) -> Iterator[Item]:
         ],
         folded=True,
     )  # fmt: skip
+
+
+def _equations(loop: Loop) -> Iterator[Item]:
+    """Yield the equations of every block, read from the functions that are run."""
+    try:
+        blocks = typeset(loop.diagram)
+    except UsageError as refused:  # it was run all the same, by calling a function as it stands
+        yield Paragraph(text=f"There are no formulas of this loop: {refused}")
+        return
+    yield Paragraph(text=text.EQUATIONS)
+    for block in blocks:
+        yield Paragraph(text=f"Block {block.block}:")
+        yield from (Equation(latex=line) for line in (*block.inputs, *block.equations))
+        if block.where:
+            yield Paragraph(text="where")
+            yield from (Equation(latex=line) for line in block.where)
 
 
 def _value(value: Any) -> Any:

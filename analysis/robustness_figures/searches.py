@@ -12,7 +12,17 @@ from matplotlib.colors import ListedColormap, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from ..figures.axes import BLUE, GREEN, GREY, ORANGE, PURPLE, WIDTH, legend_above, stacked_axes
+from ..figures.axes import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SHORT_LINE,
+    WIDTH,
+    legend_above,
+    stacked_axes,
+)
 from ..robustness.spec import violates
 from .labels import arms, number_axes, plain
 from .runs import shown
@@ -62,7 +72,7 @@ def deviations(table: pd.DataFrame) -> Figure:
         ax.barh(at, values, height, color=colour, hatch=hatch, edgecolor="white", label=str(name))
     for end in (-1.0, 0.0, 1.0):
         ax.axvline(end, color=GREY, linewidth=0.8, linestyle="--" if end else "-")
-    legend_above(ax)
+    legend_above(ax, line=SHORT_LINE)
     ax.set_xlabel("deviation from nominal, in sides of the box (1)")
     return figure
 
