@@ -1,9 +1,10 @@
 from . import actuators, controllers, functions, native, paper, plants, references
-from ._block import Block, block
+from ._block import Block, Spec, block
 from ._diagram import initial_state, interconnect, parameters, state_names
 from ._equation import equation
 from ._errors import (
     AmbiguousNameError,
+    BlockError,
     DiagramError,
     DivergedError,
     ParameterError,
@@ -58,6 +59,7 @@ __all__ = [
     "BandLimitedNoise",
     "Block",
     "BlockEquations",
+    "BlockError",
     "CacheWarning",
     "CompileError",
     "Compiled",
@@ -84,6 +86,7 @@ __all__ = [
     "RobustTerm",
     "Saturation",
     "SlidingModeLaw",
+    "Spec",
     "SumOfSines",
     "UnknownNameError",
     "Zero",

@@ -14,7 +14,18 @@ import numpy as np
 from ._errors import ParameterError
 from ._param import as_numbers, whole_number
 
-__all__ = ["flag", "fraction", "known", "number", "one_of", "vector", "whole_number"]
+__all__ = [
+    "a_function",
+    "flag",
+    "fraction",
+    "number",
+    "of_type",
+    "one_of",
+    "text",
+    "tuple_of",
+    "vector",
+    "whole_number",
+]
 
 T = TypeVar("T")
 
@@ -120,7 +131,7 @@ def flag(who: str, name: str, value: Any) -> bool:
     return bool(value)
 
 
-def known(who: str, name: str, value: Any, kind: type[T], how: str = "") -> T:
+def of_type(who: str, name: str, value: Any, kind: type[T], how: str = "") -> T:
     """Return a value of the kind that a function works on.
 
     Parameters
@@ -138,4 +149,47 @@ def known(who: str, name: str, value: Any, kind: type[T], how: str = "") -> T:
         raise ParameterError(
             f"{who} needs {name} to be of type {kind.__name__}{made}, got {type(value).__name__}"
         )
+    return value
+
+
+def tuple_of(who: str, name: str, values: Any, kind: type[T]) -> tuple[T, ...]:
+    """Return a sequence of values of one kind as a tuple.
+
+    Raises
+    ------
+    ParameterError
+        If it is no list or tuple, or an entry is of another type.
+    """
+    if not isinstance(values, list | tuple):
+        raise ParameterError(
+            f"{who} needs {name} to be a tuple of {kind.__name__}, got {type(values).__name__}"
+        )
+    for place, value in enumerate(values):
+        of_type(who, f"{name}[{place}]", value, kind)
+    return tuple(values)
+
+
+def text(who: str, name: str, value: Any) -> str:
+    """Return a text that is not empty.
+
+    Raises
+    ------
+    ParameterError
+        If it is empty, or no text.
+    """
+    if not (isinstance(value, str) and value):
+        raise ParameterError(f"{who} needs a name for {name}, got {value!r}")
+    return value
+
+
+def a_function(who: str, name: str, value: Any) -> Any:
+    """Return what can be called.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot.
+    """
+    if not callable(value):
+        raise ParameterError(f"{who} needs a function for {name}, got {type(value).__name__}")
     return value

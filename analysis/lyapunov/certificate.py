@@ -27,9 +27,9 @@ from nlctl._param import whole_number
 
 from .ball import Ball
 from .balls import upper
-from .decomposition import Decomposition, decompose
+from .decomposition import Decomposition, check_gain, decompose
 from .demand import Demand, demand
-from .final_bound import KAPPA, alpha_0, alpha_1, initial_V
+from .final_bound import alpha_0, alpha_1, initial_V
 from .known_sign_loop import KnownSignLoop, read_loop
 from .record import Constant, per_second
 from .tracking import reference_bounds
@@ -127,10 +127,10 @@ class Certificate:
 
 
 def bound_of_r(loop: KnownSignLoop, delta_star: float) -> tuple[arb, arb, float, arb]:
-    """Return C_0, alpha_0 (with 0.2785 b), alpha_1 and V(0) for W = 0 and a bound delta*."""
+    """Return C_0, alpha_0, alpha_1 and V(0) for W = 0 and a bound delta*."""
     gains, delta = loop.parts.gains, Ball(arb(delta_star))
     rate = alpha_1(gains)
-    drive = (alpha_0(gains, delta, 0.0) + KAPPA * loop.law.b).value * OUTWARD
+    drive = alpha_0(gains, delta, 0.0).value * OUTWARD
     V_0 = initial_V(gains, delta, sum(w * w for w in gains.W_hat_0)).value * OUTWARD
     return (2 * V_0.max(drive / rate * OUTWARD)).sqrt(), drive, rate, V_0
 
@@ -188,6 +188,7 @@ def certify(
     for name, value in (("u_max", u_max), ("tol", tol)):
         if not 0 < value < np.inf:
             raise ParameterError(f"certify needs a finite {name} > 0, got {value}")
+    check_gain("certify", k)
     read = read_loop(loop, params, inputs)
     split = _disturbed(decompose(read.parts.actuator, k=k, u_max=u_max, tol=tol), read)
     C = abs(read.parts.gains.r_0)

@@ -12,16 +12,22 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
+from flint import arb
 
+from nlctl._arguments import number, vector
 from nlctl._errors import ParameterError, UsageError
 from nlctl._param import equation_arguments
 from nlctl.actuators import Backlash, DeadZone, play_band
 from nlctl.functions import clip
 
+from .ball import Ball, as_ball, common
 from .balls import Box, Range, Undecided, enclose
+from .slope import slope_in
+from .time_dependence import UNREAD, reads_time
 
 __all__ = ["Decomposable", "Decomposition", "DecompositionError", "clipped_split", "decompose"]
 
+UNTIMED, TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
 Edge = Callable[[Any, Any], Any]
 TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared splits are tried
 
@@ -93,13 +99,32 @@ def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
 
     It serves numbers, arrays and balls, and leaves the smallest |eps_u| that any split with
     k_1 <= k <= k_2 leaves at (u, v).
+
+    Raises
+    ------
+    ParameterError
+        If not 0 < k_1 <= k_2, both finite.
     """
+    number("clipped_split", "k_1", k_1, above=0)
+    number("clipped_split", "k_2", k_2, at_least=k_1)
 
     def part(u: Any, v: Any) -> Any:
         one, other = k_1 * u, k_2 * u
         return clip(v, np.minimum(one, other), np.maximum(one, other))
 
     return part
+
+
+def check_gain(who: str, k: Any) -> None:
+    """Refuse bounds of k that are no pair with 0 < k_1 <= k_2; None is none.
+
+    Raises
+    ------
+    ParameterError
+    """
+    bounds = None if k is None else vector(who, "k = (k_1, k_2)", k)
+    if bounds is not None and (bounds.size != 2 or not 0 < bounds[0] <= bounds[1]):
+        raise ParameterError(f"{who} needs k = (k_1, k_2) with 0 < k_1 <= k_2, got {k}")
 
 
 def decompose(
@@ -140,7 +165,12 @@ def decompose(
     DecompositionError
         If eps_u is not bounded for all u, as with saturation, no split is known, or the record's
         own one is refuted by a sample of its output.
+    ParameterError
+        If `k` is no pair with 0 < k_1 <= k_2, or `u_max` or `tol` is not positive.
     """
+    u_max = number("decompose", "u_max", u_max, above=0)
+    tol = number("decompose", "tol", tol, above=0)
+    check_gain("decompose", k)
     if k is None and hasattr(actuator, "decomposition"):
         return _declared_split(actuator, u_max, tol)
     if k is None and type(actuator) is DeadZone:
@@ -154,8 +184,6 @@ def decompose(
             f"{type(actuator).__name__} has no known split (2): give the bounds k=(k_1, k_2), or "
             "the record a method decomposition(u_max)"
         )
-    if not (np.isfinite(u_max) and u_max > 0 and 0 < k[0] <= k[1] < np.inf):
-        raise ParameterError(f"decompose needs u_max > 0 and 0 < k_1 <= k_2, got {u_max} and {k}")
     return _proved_split(actuator, k, u_max, tol)
 
 
@@ -238,17 +266,23 @@ def _play(play: Backlash) -> Decomposition:
 
 
 def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: float) -> Decomposition:
-    part, edges = clipped_split(*k), _edges(actuator)
-    reach = {factor: _eps_range(part, edges, factor * u_max, tol) for factor in (1.0, 2.0)}
-    _refuse_growth(actuator, k, u_max, reach)
+    edges = _edges(actuator)
+    wide = _eps_range(k, edges, 2 * u_max, tol)
+    undecided = sum(end.undecided for end in wide)
+    if undecided:
+        raise DecompositionError(
+            f"eps_u of {type(actuator).__name__} could not be bounded for |u| <= {2 * u_max:g}: "
+            f"{undecided} boxes are undecided"
+        )
+    _refuse_growth(actuator, k, u_max, (_eps_range(k, edges, u_max, tol), wide))
     return Decomposition(
         k_1=k[0],
         k_2=k[1],
-        eps_low=reach[2.0][0].low,
-        eps_high=reach[2.0][1].high,
-        part=part,
+        eps_low=wide[0].low,
+        eps_high=wide[1].high,
+        part=clipped_split(*k),
         provenance="proved",
-        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in reach[2.0])} boxes",
+        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in wide)} boxes",
         over=f"|u| <= {2 * u_max:g}, all t",
     )
 
@@ -280,34 +314,59 @@ def _edges(actuator: Any) -> tuple[Edge, Edge]:
 
 
 def _eps_range(
-    part: Any, edges: tuple[Edge, Edge], u_max: float, tol: float
+    k: tuple[float, float], edges: tuple[Edge, Edge], u_max: float, tol: float
 ) -> tuple[Range, Range]:
     """Ranges of eps_u along both edges, for all t >= 0; it grows with v, so these are its ends."""
+    part = clipped_split(*k)
 
     def along(edge: Edge) -> Range:
-        def eps_u(point: tuple[Any, Any]) -> Any:
-            u, t = point
+        def eps_u(point: tuple[Any, ...]) -> Any:
+            u, t = (*point, UNREAD)[:2]
             v = edge(u, t)
-            return v - part(u, v)
+            rest = as_ball(v - part(u, v))
+            return rest if t is UNREAD else _sharpened(rest, edge, k, u, t)
 
-        return enclose(eps_u, Box.of(u=(-u_max, u_max), t=(0.0, np.inf)), tol=tol)
+        if reads_time(edge):
+            box, limit = Box.of(u=(-u_max, u_max), t=(0.0, np.inf)), TIMED
+        else:
+            box, limit = Box.of(u=(-u_max, u_max)), UNTIMED
+        return enclose(eps_u, box, tol=tol, max_boxes=limit)
 
     low = along(edges[0])
     return low, low if edges[1] is edges[0] else along(edges[1])
 
 
+def _sharpened(rest: Any, edge: Edge, k: tuple[float, float], u: Any, t: Any) -> Any:
+    """Return eps_u from the difference quotient q of v in u as well, v = q u + v(0, t).
+
+    v - clip(v, k_1 u, k_2 u) grows with v, and no faster: it is u (q - clip(q, k_1, k_2)) and what
+    lies between 0 and v(0, t).  Between v and its clipped self intervals forget that t is one time.
+    """
+    try:
+        q, start = slope_in(lambda w: edge(w, t), u).value, as_ball(edge(0.0, t)).value
+    except Undecided:
+        return rest
+    low, high = (_excess(end, k) for end in (q.lower(), q.upper()))
+    sharper = as_ball(u).value * low.union(high) + arb(0).union(start)
+    if not rest.value.overlaps(sharper):  # answers that contradict each other: nobody goes this way
+        return rest
+    value = common(rest.value, sharper)
+    return Ball(value, (arb(0, "inf"),) * len(as_ball(u).gradient))
+
+
+def _excess(q: arb, k: tuple[float, float]) -> arb:
+    return (q - k[1]).max(arb(0)) + (q - k[0]).min(arb(0))
+
+
 def _refuse_growth(
-    actuator: Any, k: tuple[float, float], u_max: float, reach: dict[float, tuple[Range, Range]]
+    actuator: Any,
+    k: tuple[float, float],
+    u_max: float,
+    reach: tuple[tuple[Range, Range], tuple[Range, Range]],
 ) -> None:
     """(2) wants one eps_u* for all u; where eps_u grows with the range of u, there is none."""
-    name, (low, high) = type(actuator).__name__, reach[2.0]
-    undecided = low.undecided + high.undecided
-    if undecided:
-        raise DecompositionError(
-            f"eps_u of {name} could not be bounded for |u| <= {2 * u_max:g}: {undecided} boxes "
-            "are undecided"
-        )
-    bound = max(-reach[1.0][0].low, reach[1.0][1].high)
+    name, near, (low, high) = type(actuator).__name__, *reach
+    bound = max(-near[0].low, near[1].high)
     attained = max(high.greatest, -low.least)
     if attained > bound:
         raise DecompositionError(

@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native
+from nlctl._arguments import number
 from nlctl._diagram import initial_state
 from nlctl._diagram import state_names as all_states
 from nlctl._errors import ParameterError
@@ -19,8 +20,9 @@ from .decomposition import Decomposition
 from .final_bound import Gains, alpha_1
 from .observed import observed
 from .parts import Parts, read_parts
+from .reference_rates import reference_margin
 from .same_loop import check_same, points_around
-from .signals import Signals, signals_of
+from .signals import Margin, Signals, signals_of
 
 __all__ = ["Member", "Run", "members_of", "observe", "observed_loop"]
 
@@ -67,6 +69,8 @@ class Run:
         Time (s) at which the run ended early, diverged or too stiff.
     message : str
         Why it ended early.
+    reference : Margin or None
+        Of the reference's derivatives, see `analysis.lyapunov.reference_rates`.
     """
 
     member: Member
@@ -74,6 +78,7 @@ class Run:
     signals: Signals
     lost: float | None
     message: str = ""
+    reference: Margin | None = None
 
     @property
     def gains(self) -> Gains:
@@ -110,7 +115,7 @@ def members_of(
             raise ParameterError("ledger takes start and params of the responses: leave them out")
         responses = list(run) if isinstance(run, Sequence) else [run]
         return [_of_response(loop, response) for response in responses]
-    horizon = float(run)  # type: ignore[arg-type]
+    horizon, step = number("ledger", "horizon", run), number("ledger", "step", step)
     if not (0 < step < horizon < np.inf):
         raise ParameterError(f"ledger needs 0 < step < horizon, got {step:g} and {horizon:g}")
     times = np.linspace(0.0, horizon, round(horizon / step) + 1)
@@ -170,11 +175,11 @@ def observe(
         If the loop is not the one that the proof is about.
     """
     compiled = observed_loop(loop, split)
-    for number, member in enumerate(members):
+    for place, member in enumerate(members):
         parts = read_parts(loop, member.start, member.params)
         params = {**member.params, "integral.alpha_1": alpha_1(parts.gains)}
         x0 = initial_state(loop, member.start)
-        points = points_around(x0) if number == 0 else [(0.0, x0)]
+        points = points_around(x0) if place == 0 else [(0.0, x0)]
         check_same(loop, compiled.system, points, member.params, params)
         response: Any = input_output_response(
             compiled,
@@ -186,12 +191,19 @@ def observe(
             ignore_errors=True,
         )
         signals = signals_of(native.uninterrupted(response))
-        seen = _along(loop, response, LOOKS if number == 0 else 1)
+        seen = _along(loop, response, LOOKS if place == 0 else 1)
         check_same(loop, compiled.system, seen, member.params, params)
         _check_reproduced(member, signals)
         lost = None if response.success else float(response.statistics.time)
         message = str(response.message or "")
-        yield Run(member=member, parts=parts, signals=signals, lost=lost, message=message)
+        yield Run(
+            member=member,
+            parts=parts,
+            signals=signals,
+            lost=lost,
+            message=message,
+            reference=_reference(loop, parts, response, signals, member.params),
+        )
 
 
 def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any]:
@@ -200,6 +212,21 @@ def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any
     finite = np.flatnonzero(np.isfinite(states).all(axis=0))
     places = np.unique(np.linspace(finite.size - 1, 0, count).astype(int)) if finite.size else []
     return [(float(response.time[i]), states[:, i].copy()) for i in finite[places]]
+
+
+def _reference(
+    loop: ct.InterconnectedSystem,
+    parts: Parts,
+    response: Any,
+    signals: Signals,
+    params: Mapping[str, Any],
+) -> Margin | None:
+    """Compare the reference's derivatives with those of its own outputs."""
+    loop._update_params(dict(params))
+    states = np.asarray(response.states)[: loop.nstates or 0]
+    whole = np.isfinite(states).all(axis=0)
+    place = parts.roles.places["reference"]
+    return reference_margin(place, signals.t[whole], states[:, whole]) if whole.sum() > 1 else None
 
 
 def observed_loop(loop: ct.InterconnectedSystem, split: Decomposition) -> native.Compiled:

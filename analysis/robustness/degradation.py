@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from nlctl._arguments import flag, known, vector, whole_number
+from nlctl._arguments import flag, of_type, vector, whole_number
 from nlctl._errors import ParameterError
 
 from .design import checked_entropy, independent
@@ -113,7 +113,7 @@ def degradation_curve(
     if not sizes:
         raise ParameterError("a degradation curve needs at least one factor, got none")
     runs = whole_number("a degradation curve", "runs", runs, at_least=1)
-    known("a degradation curve", "space", space, Space)
+    of_type("a degradation curve", "space", space, Space)
     entropy = checked_entropy(entropy)
     each = 1 - (1 - confidence) / len(sizes) if simultaneous else confidence
     statements, margins = [], []

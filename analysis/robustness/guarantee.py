@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nlctl._arguments import fraction, known, one_of, whole_number
+from nlctl._arguments import fraction, of_type, one_of, whole_number
 from nlctl._errors import ParameterError, UsageError
 
 from .design import Design
@@ -314,7 +314,7 @@ def check_iid(design: Design) -> None:
     NoGuaranteeError
         The message says why, and what to run instead.
     """
-    known("a statement", "design", design, Design, "independent(space, size)")
+    of_type("a statement", "design", design, Design, "independent(space, size)")
     if design.is_iid:
         return
     if design.kind == "user's table":

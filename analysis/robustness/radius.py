@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl._arguments import fraction, known, number, whole_number
+from nlctl._arguments import fraction, number, of_type, whole_number
 from nlctl._errors import UsageError
 
 from .design import checked_entropy, independent
@@ -168,7 +168,7 @@ def robustness_radius(
         If Ctrl-C kept rows from finishing.
     """
     who = "a robustness radius"
-    known(who, "space", space, Space)
+    of_type(who, "space", space, Space)
     runs = whole_number(who, "runs", runs, at_least=1)
     draws = whole_number(who, "draws", draws, at_least=0)
     fraction(who, "tolerance", tolerance)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -14,7 +14,15 @@ from nlctl._names import unknown
 
 from .toml import statements
 
-__all__ = ["Place", "Problem", "StudyError", "line_numbers", "place_text", "schema_problems"]
+__all__ = [
+    "Place",
+    "Problem",
+    "StudyError",
+    "line_numbers",
+    "located",
+    "place_text",
+    "schema_problems",
+]
 
 Place = tuple[str | int, ...]
 LONGEST = 600  # characters of a mistake
@@ -32,22 +40,30 @@ class Problem:
     message : str
     line : int, optional
         Line of the file, from 1; None for what is not in the file.
+    settings : tuple of str
+        Of the command line, ``key=value``, that are mistaken or have a part in it.
     """
 
     place: Place
     message: str
     line: int | None = None
+    settings: tuple[str, ...] = ()
 
     def plain(self) -> dict[str, Any]:
         """Return it as JSON can hold it."""
         place = list(self.place)
         return {"place": place, "text": place_text(self.place), "line": self.line} | {
-            "message": self.message
+            "message": self.message,
+            "settings": list(self.settings),
         }
 
     def __str__(self) -> str:
+        given = " ".join(f"--set {setting}" for setting in self.settings)
+        if self.line is None and given:
+            return f"{_short(given)}: {_short(self.message)}"
         line = "" if self.line is None else f"line {self.line}, "
-        return f"{line}{_short(place_text(self.place))}: {_short(self.message)}"
+        given = f" (with {_short(given)})" if given else ""
+        return f"{line}{_short(place_text(self.place))}: {_short(self.message)}{given}"
 
 
 def _short(text: str) -> str:
@@ -199,6 +215,25 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
         yield annotation
     for part in get_args(annotation):
         yield from _models(part)
+
+
+def located(problem: Problem, lines: Mapping[Place, int], settings: Mapping[Place, str]) -> Problem:
+    """Return a mistake with its line, or with the settings of the command line that made it.
+
+    Parameters
+    ----------
+    problem : Problem
+    lines : mapping
+        See `line_numbers`.
+    settings : mapping
+        Place and text of each setting.
+    """
+    place = problem.place
+    own = tuple(text for at, text in settings.items() if place[: len(at)] == at)
+    if own:
+        return replace(problem, settings=own)
+    inside = tuple(text for at, text in settings.items() if at[: len(place)] == place)
+    return replace(problem, line=nearest_line(lines, place), settings=inside if place else ())
 
 
 def nearest_line(lines: Mapping[Place, int], place: Place) -> int | None:

@@ -21,7 +21,7 @@ from .problems import (
     Problem,
     StudyError,
     line_numbers,
-    nearest_line,
+    located,
     place_text,
     schema_problems,
 )
@@ -94,9 +94,7 @@ def read_study(
     try:
         data = read_toml(text)
         lines = line_numbers(text)
-        for setting in settings:
-            place = _set(data, setting)
-            lines = {key: line for key, line in lines.items() if key[: len(place)] != place}
+        given = {_set(data, setting): setting for setting in settings}
         check_depth(data)
     except ParameterError:
         raise
@@ -108,9 +106,10 @@ def read_study(
         more = [] if trust else untrusted(study, folder)
         if not more:
             experiment, more = bound(study, folder)
-        problems += [replace(p, place=_original(p.place, entries)) for p in more]
+        more = [replace(p, place=_original(p.place, entries)) for p in more]
+        problems += [p for p in more if not follows(p, problems)]
     if problems or study is None or experiment is None:
-        placed = [replace(p, line=nearest_line(lines, p.place)) for p in problems]
+        placed = [located(p, lines, given) for p in problems]
         raise StudyError(str(path), sorted(placed, key=lambda p: p.line or 0))
     return StudyFile(path=folder / path.name, study=study, experiment=experiment)
 
@@ -133,12 +132,19 @@ def _validated(data: dict[str, Any]) -> tuple[Study | None, list[Problem], list[
         except ValidationError as error:
             found = schema_problems(error, Study, whole)
         found = [replace(p, place=_original(p.place, entries)) for p in found]
-        problems = found if problems is None else problems
+        told = problems or []  # what takes out a mistaken part lets others come to light
+        problems = told + [p for p in found if not follows(p, told)]
         for problem in reversed(found):
             _remove(rest, problem.place)
         if any(problem.place[:1] == ("study",) for problem in found):
             rest["study"] = NAMELESS
     return None, problems or [], entries
+
+
+def follows(problem: Problem, told: Sequence[Problem]) -> bool:
+    """Whether a mistake may follow from parts that were taken out because of others."""
+    place = problem.place
+    return any(place and one.place[: len(place)] == place for one in told)
 
 
 def _original(place: Place, entries: Sequence[int]) -> Place:

@@ -21,6 +21,7 @@ from numba.core.registry import CPUDispatcher
 
 from .._errors import CompileError, ParameterError, UsageError
 from .._names import unknown
+from .._run_arguments import checked_params
 from . import _numpy, _values
 from ._describe import described
 from ._emit import Program, emit
@@ -56,6 +57,12 @@ class Compiled:
         What was read from the diagram.
     program : Program
         What was written for it.
+
+    Notes
+    -----
+    It is no python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
+    run it, ``compiled.linearize(x0)`` linearizes it with exact derivatives, and for every other
+    function of python-control there is ``compiled.system``.
     """
 
     schedule: Schedule
@@ -272,7 +279,12 @@ def compile(  # noqa: A001 (what it does)
     """
     if isinstance(system, ct.TransferFunction):
         system = ct.ss(system)
-    system._update_params(params)
+    if not isinstance(system, ct.InputOutputSystem):
+        raise CompileError(
+            f"compile needs a diagram or a block, got {type(system).__name__}: nlctl.block makes "
+            "a block of a record"
+        )
+    system._update_params(checked_params(params))  # type: ignore[attr-defined]
     if algebraic_loops not in LOOPS:
         raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
     read = schedule(system, solve_loops=algebraic_loops == "solve")
