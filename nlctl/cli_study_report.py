@@ -15,6 +15,7 @@ from .cli_studies import run_folder
 if TYPE_CHECKING:
     from analysis.report.document import Section
     from analysis.report.robustness_histories import Histories
+    from analysis.robustness import Prepared
     from analysis.studies.result import Result
     from analysis.studies.run import Watch
 
@@ -61,13 +62,16 @@ def report_study(
     """
     from analysis.report.render import write_report
     from analysis.report.robustness_part import study_report
+    from analysis.report.study_loop import loop_of
     from analysis.studies import load_result
 
     result = (
         _run(path, threads, watch, force, trust) if path.suffix == ".toml" else load_result(path)
     )
     command = f"nlctl report {shlex.quote(path.as_posix())}" + " --interactive" * interactive
-    made = study_report(result, _histories(result, threads, trust), command)
+    prepared = _prepared(result, trust)
+    loop = None if prepared is None else loop_of(prepared)
+    made = study_report(result, _histories(result, prepared, threads), command, loop)
     if out is not None:  # the data stay with the run
         data = Path(os.path.relpath(result.folder, out))
         made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})
@@ -131,7 +135,7 @@ def studies_part(folders: Sequence[Path], *, threads: int | None = None) -> list
     from analysis.studies import load_result
 
     results = [load_result(folder) for folder in folders]
-    return study_part([(result, _histories(result, threads, False)) for result in results])
+    return study_part([(r, _histories(r, _prepared(r, False), threads)) for r in results])
 
 
 def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trust: bool) -> Result:
@@ -143,15 +147,14 @@ def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trus
     return run(file, folder, resume=True, force=force, threads=threads, **how)
 
 
-def _histories(result: Result, threads: int | None, trust: bool) -> Histories | None:
-    """Simulate some rows of the main table again; None without rows, or if the loop has gone.
+def _prepared(result: Result, trust: bool) -> Prepared | None:
+    """Return the loop of a run again; None, with a word on it, if the loop has gone.
 
     Raises
     ------
     RunFolderError
         If the results were computed from another loop than today's: nothing is drawn from it.
     """
-    from analysis.report.robustness_histories import histories
     from analysis.studies import RunFolderError
     from analysis.studies.run import reopened
 
@@ -162,15 +165,22 @@ def _histories(result: Result, threads: int | None, trust: bool) -> Histories | 
     except RunFolderError:
         raise
     except UsageError as error:  # what was found is shown all the same
-        print(f"nlctl: the report has no fans: {error}", file=sys.stderr)
+        print(f"nlctl: the report has no fans and no diagram: {error}", file=sys.stderr)
         return None
     if run.versions:
         told = f"computed with other versions ({run.versions}): fans are drawn with those of today"
         print(f"nlctl: '{result.folder}' was {told}", file=sys.stderr)
-    if result.rows is None or not result.rows.done:
+    return run.prepared
+
+
+def _histories(result: Result, prepared: Prepared | None, threads: int | None) -> Histories | None:
+    """Simulate some rows of the main table again; None without rows or loop."""
+    from analysis.report.robustness_histories import histories
+
+    if prepared is None or result.rows is None or not result.rows.done:
         return None
     searched = [f.numbers for f in result.findings if f.kind == "worst case" and f.is_answered]
     witness = min(
         ((n["witness"], n["margin"]) for n in searched), key=lambda pair: pair[1], default=None
     )
-    return histories(run.prepared, result.rows.table, witness, threads=threads)
+    return histories(prepared, result.rows.table, witness, threads=threads)

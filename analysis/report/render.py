@@ -59,7 +59,8 @@ def render_html(
     placed = place(report)
     light, told = summary(report.claims)
     items = {anchor: item for part in placed for anchor, _, item in part.items}
-    figures = {anchor: item for anchor, item in items.items() if isinstance(item, Figure)}
+    figures = {} if report.lead is None else {"lead": report.lead}
+    figures |= {anchor: item for anchor, item in items.items() if isinstance(item, Figure)}
     files = svg_files([figure.figure for figure in figures.values()], pool, drawn)
     shapes: dict[str, str] = {}
     drawings = {
@@ -103,7 +104,9 @@ def render_json(report: Report) -> str:
     """Return every number and table of the report as JSON."""
     content = {
         "title": report.title,
+        "question": report.question,
         "verdict": report.verdict,
+        "lead": None if report.lead is None else _plain(report.lead),
         "claims": [vars(claim) for claim in report.claims],
         "sections": {
             part.anchor: {

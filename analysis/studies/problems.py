@@ -58,11 +58,11 @@ class Problem:
         }
 
     def __str__(self) -> str:
-        given = " ".join(f"--set {setting}" for setting in self.settings)
+        given = " ".join(f"--set {_short(setting)}" for setting in self.settings)
         if self.line is None and given:
-            return f"{_short(given)}: {_short(self.message)}"
+            return f"{given}: {_short(self.message)}"
         line = "" if self.line is None else f"line {self.line}, "
-        given = f" (with {_short(given)})" if given else ""
+        given = f" (with {given})" if given else ""
         return f"{line}{_short(place_text(self.place))}: {_short(self.message)}{given}"
 
 
