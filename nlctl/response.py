@@ -215,10 +215,12 @@ def _native(run: Run) -> ct.TimeResponseData:
     from .native import compile as compile_diagram
     from .native._response import respond
     from .native._solver_arguments import solver_settings
+    from .native.thirdparty.sizes import sized
 
     settings = solver_settings(**run.solver)
     compiled = run.system
     if isinstance(compiled, ct.InputOutputSystem):
+        compiled = sized(compiled, run.inputs, run.initial_state)
         compiled = compile_diagram(compiled, params=run.params)
     return respond(
         compiled,

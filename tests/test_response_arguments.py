@@ -64,7 +64,7 @@ def agree(ours, theirs, atol=1e-6):
     for name in ("outputs", "states", "inputs"):
         one, other = getattr(ours, name), getattr(theirs, name)
         assert one.shape == other.shape
-        np.testing.assert_allclose(one, other, atol=atol)
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=atol)
 
 
 class TestAsInPythonControl:

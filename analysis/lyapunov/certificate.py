@@ -29,7 +29,7 @@ from .ball import Ball
 from .balls import upper
 from .decomposition import Decomposition, check_gain, decompose
 from .demand import Demand, demand
-from .final_bound import KAPPA, alpha_0, alpha_1, initial_V
+from .final_bound import alpha_0, alpha_1, initial_V
 from .known_sign_loop import KnownSignLoop, read_loop
 from .record import Constant, per_second
 from .tracking import reference_bounds
@@ -127,10 +127,10 @@ class Certificate:
 
 
 def bound_of_r(loop: KnownSignLoop, delta_star: float) -> tuple[arb, arb, float, arb]:
-    """Return C_0, alpha_0 (with 0.2785 b), alpha_1 and V(0) for W = 0 and a bound delta*."""
+    """Return C_0, alpha_0, alpha_1 and V(0) for W = 0 and a bound delta*."""
     gains, delta = loop.parts.gains, Ball(arb(delta_star))
     rate = alpha_1(gains)
-    drive = (alpha_0(gains, delta, 0.0) + KAPPA * loop.law.b).value * OUTWARD
+    drive = alpha_0(gains, delta, 0.0).value * OUTWARD
     V_0 = initial_V(gains, delta, sum(w * w for w in gains.W_hat_0)).value * OUTWARD
     return (2 * V_0.max(drive / rate * OUTWARD)).sqrt(), drive, rate, V_0
 

@@ -181,7 +181,7 @@ def _with_gains(
     changed = dataclasses.replace(
         parts,
         law=dataclasses.replace(parts.law, **law),
-        gains=dataclasses.replace(parts.gains, beta=beta, **robust, **weights),
+        gains=dataclasses.replace(parts.gains, beta=beta, b=b, **robust, **weights),
     )
     pieces = {"law": law, "robust": robust, "weights": weights}
     gains = {f"{paths[n]}.{key}": v for n, values in pieces.items() for key, v in values.items()}

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
+from flint import arb
 
 from nlctl._arguments import number, vector
 from nlctl._errors import ParameterError, UsageError
@@ -19,10 +20,14 @@ from nlctl._param import equation_arguments
 from nlctl.actuators import Backlash, DeadZone, play_band
 from nlctl.functions import clip
 
+from .ball import Ball, as_ball, common
 from .balls import Box, Range, Undecided, enclose
+from .slope import slope_in
+from .time_dependence import UNREAD, reads_time
 
 __all__ = ["Decomposable", "Decomposition", "DecompositionError", "clipped_split", "decompose"]
 
+UNTIMED, TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
 Edge = Callable[[Any, Any], Any]
 TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared splits are tried
 
@@ -261,17 +266,23 @@ def _play(play: Backlash) -> Decomposition:
 
 
 def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: float) -> Decomposition:
-    part, edges = clipped_split(*k), _edges(actuator)
-    reach = {factor: _eps_range(part, edges, factor * u_max, tol) for factor in (1.0, 2.0)}
-    _refuse_growth(actuator, k, u_max, reach)
+    edges = _edges(actuator)
+    wide = _eps_range(k, edges, 2 * u_max, tol)
+    undecided = sum(end.undecided for end in wide)
+    if undecided:
+        raise DecompositionError(
+            f"eps_u of {type(actuator).__name__} could not be bounded for |u| <= {2 * u_max:g}: "
+            f"{undecided} boxes are undecided"
+        )
+    _refuse_growth(actuator, k, u_max, (_eps_range(k, edges, u_max, tol), wide))
     return Decomposition(
         k_1=k[0],
         k_2=k[1],
-        eps_low=reach[2.0][0].low,
-        eps_high=reach[2.0][1].high,
-        part=part,
+        eps_low=wide[0].low,
+        eps_high=wide[1].high,
+        part=clipped_split(*k),
         provenance="proved",
-        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in reach[2.0])} boxes",
+        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in wide)} boxes",
         over=f"|u| <= {2 * u_max:g}, all t",
     )
 
@@ -303,34 +314,59 @@ def _edges(actuator: Any) -> tuple[Edge, Edge]:
 
 
 def _eps_range(
-    part: Any, edges: tuple[Edge, Edge], u_max: float, tol: float
+    k: tuple[float, float], edges: tuple[Edge, Edge], u_max: float, tol: float
 ) -> tuple[Range, Range]:
     """Ranges of eps_u along both edges, for all t >= 0; it grows with v, so these are its ends."""
+    part = clipped_split(*k)
 
     def along(edge: Edge) -> Range:
-        def eps_u(point: tuple[Any, Any]) -> Any:
-            u, t = point
+        def eps_u(point: tuple[Any, ...]) -> Any:
+            u, t = (*point, UNREAD)[:2]
             v = edge(u, t)
-            return v - part(u, v)
+            rest = as_ball(v - part(u, v))
+            return rest if t is UNREAD else _sharpened(rest, edge, k, u, t)
 
-        return enclose(eps_u, Box.of(u=(-u_max, u_max), t=(0.0, np.inf)), tol=tol)
+        if reads_time(edge):
+            box, limit = Box.of(u=(-u_max, u_max), t=(0.0, np.inf)), TIMED
+        else:
+            box, limit = Box.of(u=(-u_max, u_max)), UNTIMED
+        return enclose(eps_u, box, tol=tol, max_boxes=limit)
 
     low = along(edges[0])
     return low, low if edges[1] is edges[0] else along(edges[1])
 
 
+def _sharpened(rest: Any, edge: Edge, k: tuple[float, float], u: Any, t: Any) -> Any:
+    """Return eps_u from the difference quotient q of v in u as well, v = q u + v(0, t).
+
+    v - clip(v, k_1 u, k_2 u) grows with v, and no faster: it is u (q - clip(q, k_1, k_2)) and what
+    lies between 0 and v(0, t).  Between v and its clipped self intervals forget that t is one time.
+    """
+    try:
+        q, start = slope_in(lambda w: edge(w, t), u).value, as_ball(edge(0.0, t)).value
+    except Undecided:
+        return rest
+    low, high = (_excess(end, k) for end in (q.lower(), q.upper()))
+    sharper = as_ball(u).value * low.union(high) + arb(0).union(start)
+    if not rest.value.overlaps(sharper):  # answers that contradict each other: nobody goes this way
+        return rest
+    value = common(rest.value, sharper)
+    return Ball(value, (arb(0, "inf"),) * len(as_ball(u).gradient))
+
+
+def _excess(q: arb, k: tuple[float, float]) -> arb:
+    return (q - k[1]).max(arb(0)) + (q - k[0]).min(arb(0))
+
+
 def _refuse_growth(
-    actuator: Any, k: tuple[float, float], u_max: float, reach: dict[float, tuple[Range, Range]]
+    actuator: Any,
+    k: tuple[float, float],
+    u_max: float,
+    reach: tuple[tuple[Range, Range], tuple[Range, Range]],
 ) -> None:
     """(2) wants one eps_u* for all u; where eps_u grows with the range of u, there is none."""
-    name, (low, high) = type(actuator).__name__, reach[2.0]
-    undecided = low.undecided + high.undecided
-    if undecided:
-        raise DecompositionError(
-            f"eps_u of {name} could not be bounded for |u| <= {2 * u_max:g}: {undecided} boxes "
-            "are undecided"
-        )
-    bound = max(-reach[1.0][0].low, reach[1.0][1].high)
+    name, near, (low, high) = type(actuator).__name__, *reach
+    bound = max(-near[0].low, near[1].high)
     attained = max(high.greatest, -low.least)
     if attained > bound:
         raise DecompositionError(

@@ -17,8 +17,8 @@ from nlctl._block import Block, block
 from nlctl._diagram import interconnect
 from nlctl._equation import equation
 from nlctl._errors import DiagramError
-from nlctl.plants import PureFeedback
 
+from .declared_terms import terms_with_parameters
 from .decomposition import Decomposition
 from .integral import NussbaumIntegral
 from .parts import Parts
@@ -63,7 +63,8 @@ def observed(
     """Return the loop with all its signals as outputs, and with the integrals of (32), (33).
 
     Added are ``rate_<state>`` for every state of plant, weights, robust term and law, the
-    estimates ``W_hat[i]``, ``g``, ``G`` and ``d`` of the plant, and `NussbaumIntegral`.
+    estimates ``W_hat[i]``, ``g``, ``G``, ``d`` and ``state_<state>`` of the plant, and
+    `NussbaumIntegral`.
 
     Parameters
     ----------
@@ -104,34 +105,17 @@ def _observed_block(part: str, spec: Any, name: str) -> Block:
 
 
 def _plant_terms(plant: Any) -> tuple[tuple[str, ...], Callable]:
-    """Return the outputs g, G, d of a plant, and the equation that delivers them."""
-    f, d = _with_parameters(plant)
+    """Return the outputs g, G, d and the states of a plant, and the equation of them."""
+    f, d = terms_with_parameters(plant)
     G = input_gain(f)
 
     @equation
     def terms(t, x, u, p):
         (v,) = u
         state = tuple(x)
-        return f(state, 0.0, p), G(state, v, p), d(state, t, p)
+        return (f(state, 0.0, p), G(state, v, p), d(state, t, p)) + state
 
-    return ("g", "G", "d"), terms
-
-
-def _with_parameters(plant: Any) -> tuple[Callable, Callable]:
-    """Return ``f(x, v, p)`` and ``d(x, t, p)`` as equations that machine code can call."""
-    if not isinstance(plant, PureFeedback):
-        return plant.f, plant.d
-    own_f, own_d = equation(plant.f), equation(plant.d)  # the user's functions, without parameters
-
-    @equation
-    def f(x, v, p):
-        return own_f(x, v)
-
-    @equation
-    def d(x, t, p):
-        return own_d(x, t)
-
-    return f, d
+    return ("g", "G", "d", *(f"state_{name}" for name in plant.states)), terms
 
 
 def _with_outputs(spec: Any, names: tuple[str, ...] = (), terms: Callable | None = None) -> Any:

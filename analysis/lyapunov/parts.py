@@ -11,12 +11,14 @@ import numpy as np
 
 from nlctl._diagram import initial_state
 from nlctl._errors import DiagramError
-from nlctl.controllers import AdaptiveWeights
+from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
 
 from .final_bound import Gains
 from .roles import Roles, read_roles
 
 __all__ = ["Parts", "read_parts"]
+
+DAMPED = (KnownSignLaw, MonotoneNussbaumLaw)  # laws with eta = beta r + s tanh(r s / b)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,6 +105,7 @@ def read_parts(
         r_0=float(outputs[loop.output_labels.index("r")]),
         delta_hat_0=float(own["robust"][0]),
         W_hat_0=tuple(map(float, own["weights"])) if weights else (),
+        b=specs["law"].b if isinstance(specs["law"], DAMPED) else 0.0,
     )
     return Parts(
         plant=specs["plant"],

@@ -19,6 +19,7 @@ from nlctl._errors import CompileError, DiagramError
 from nlctl.controllers import AdaptiveWeights
 from nlctl.native._wiring import Combination, Signal, Wiring
 from nlctl.native.thirdparty.checks import check_functions, check_sizes
+from nlctl.plants import coordinate_names
 
 __all__ = ["Roles", "joined_again", "read_roles"]
 
@@ -182,11 +183,24 @@ def _check_record(place: Place, part: str, needed: tuple[str, ...]) -> None:
         raise DiagramError(
             f"the proof reads the record of '{place.path}', which is not an nlctl block"
         )
+    if part == "plant":
+        _check_coordinates(place, spec)
     missing = [name for name in needed if not hasattr(spec, name)]
     if missing:
         raise DiagramError(
             f"the proof needs {', '.join(missing)} of block '{place.path}', and "
             f"{type(spec).__name__} has no such thing"
+        )
+
+
+def _check_coordinates(place: Place, spec: Any) -> None:
+    states = coordinate_names(len(spec.states))
+    missing = [name for name in states if name not in spec.outputs]
+    if tuple(spec.states) != states or missing:
+        raise DiagramError(
+            f"the proof needs the states {', '.join(states)} of block '{place.path}' in this order "
+            f"and as outputs, got the states {', '.join(spec.states)} and the outputs "
+            f"{', '.join(spec.outputs)}"
         )
 
 

@@ -20,8 +20,9 @@ from .decomposition import Decomposition
 from .final_bound import Gains, alpha_1
 from .observed import observed
 from .parts import Parts, read_parts
+from .reference_rates import reference_margin
 from .same_loop import check_same, points_around
-from .signals import Signals, signals_of
+from .signals import Margin, Signals, signals_of
 
 __all__ = ["Member", "Run", "members_of", "observe", "observed_loop"]
 
@@ -68,6 +69,8 @@ class Run:
         Time (s) at which the run ended early, diverged or too stiff.
     message : str
         Why it ended early.
+    reference : Margin or None
+        Of the reference's derivatives, see `analysis.lyapunov.reference_rates`.
     """
 
     member: Member
@@ -75,6 +78,7 @@ class Run:
     signals: Signals
     lost: float | None
     message: str = ""
+    reference: Margin | None = None
 
     @property
     def gains(self) -> Gains:
@@ -192,7 +196,14 @@ def observe(
         _check_reproduced(member, signals)
         lost = None if response.success else float(response.statistics.time)
         message = str(response.message or "")
-        yield Run(member=member, parts=parts, signals=signals, lost=lost, message=message)
+        yield Run(
+            member=member,
+            parts=parts,
+            signals=signals,
+            lost=lost,
+            message=message,
+            reference=_reference(loop, parts, response, signals, member.params),
+        )
 
 
 def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any]:
@@ -201,6 +212,21 @@ def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any
     finite = np.flatnonzero(np.isfinite(states).all(axis=0))
     places = np.unique(np.linspace(finite.size - 1, 0, count).astype(int)) if finite.size else []
     return [(float(response.time[i]), states[:, i].copy()) for i in finite[places]]
+
+
+def _reference(
+    loop: ct.InterconnectedSystem,
+    parts: Parts,
+    response: Any,
+    signals: Signals,
+    params: Mapping[str, Any],
+) -> Margin | None:
+    """Compare the reference's derivatives with those of its own outputs."""
+    loop._update_params(dict(params))
+    states = np.asarray(response.states)[: loop.nstates or 0]
+    whole = np.isfinite(states).all(axis=0)
+    place = parts.roles.places["reference"]
+    return reference_margin(place, signals.t[whole], states[:, whole]) if whole.sum() > 1 else None
 
 
 def observed_loop(loop: ct.InterconnectedSystem, split: Decomposition) -> native.Compiled:

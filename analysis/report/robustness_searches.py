@@ -162,7 +162,8 @@ def degradation(finding: Finding, result: Result, asked: Any, key: str) -> Itera
         figure=figures.degradation(curve, asked.at, asked.limit),
     )
     yield Table(
-        caption="The same in numbers.",
+        caption=f"{text.SAME}.",
+        folded=True,
         columns=("factor", "violations", "runs", "share", "from", "to", "least margin", "median"),
         rows=[
             (
@@ -186,7 +187,8 @@ def failure_map(finding: Finding, result: Result, asked: Any, key: str) -> Itera
     labels = tuple(f"{name} ({unit or '1'})" for name, unit in known(about, "unit"))
     edge, is_nominal = finding.tables["boundary"], bool(np.all(np.isfinite(nominal)))
     caption = text.MAP + text.VIOLATED * bool(np.any(violates(points["spec"])))
-    caption += text.BOUNDARY * bool(len(edge)) + text.STAR * is_nominal
+    caption += text.BOUNDARY * bool(len(edge)) + text.STAR * is_nominal + text.BOX
+    box = tuple((float(row["low"]), float(row["high"])) for _, row in about.iterrows())
     yield Figure(
         key=f"{key}-map",
         caption=caption,
@@ -197,6 +199,7 @@ def failure_map(finding: Finding, result: Result, asked: Any, key: str) -> Itera
             names,
             labels=labels,  # type: ignore[arg-type]
             nominal=nominal if is_nominal else None,  # type: ignore[arg-type]
+            box=box,  # type: ignore[arg-type]
         ),
     )
     if len(edge):
