@@ -118,10 +118,11 @@ class TestOfWhichLoop:
         assert creep(response, loop=loop, window=4 * np.pi) == creep(response, window=4 * np.pi)
 
     def test_a_response_of_another_loop_is_refused(self):
-        """Of the same equations with another gain, and of other signals."""
+        """Of the same blocks with another Nussbaum function, and of another number of states."""
         _, response = example_2()
-        other = nlctl.paper.example_2()
-        other.params["law.beta"] = 4.0
+        controller = nlctl.paper.example_2().syslist[2]
+        law = nlctl.NussbaumLaw(beta=5.0, N=lambda zeta: -np.exp(zeta))
+        other = nlctl.paper.example_2(controller=nlctl.controllers.replaced(controller, law=law))
         with pytest.raises(ParameterError, match="u of the response and of 'example_2' differ"):
             creep(response, loop=other)
         with pytest.raises(ParameterError, match="states"):

@@ -45,17 +45,17 @@ def law_of_response(loop: Any, response: Any) -> Function:
         If the response is not one of the loop.
     """
     loop = getattr(loop, "system", loop)
-    params = own_parameters(loop, response)
-    parts = read_parts(loop, params=params)
-    if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
-        raise DiagramError(
-            f"creep is about laws with a Nussbaum argument, got {type(parts.law).__name__}"
-        )
     states = np.atleast_2d(np.asarray(response.states))
     if states.shape[0] != loop.nstates:
         raise ParameterError(
             f"the response has {states.shape[0]} states, '{loop.name}' has {loop.nstates}: give "
             "the loop that it is of"
+        )
+    params = own_parameters(loop, response)
+    parts = read_parts(loop, params=params)
+    if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
+        raise DiagramError(
+            f"creep is about laws with a Nussbaum argument, got {type(parts.law).__name__}"
         )
     place = state_names(loop).index(f"{parts.paths['law']}.zeta")
     for i in np.unique(np.linspace(0, states.shape[1] - 1, LOOKS).astype(int)):
