@@ -244,7 +244,7 @@ def test_a_long_run_foretells_from_its_beginning_alone():
     wanted = found()[2].creep
     assert told.time == 200.0
     assert told.verdict == "creeps"
-    assert told.burst_by_balance == pytest.approx(wanted.burst_by_balance, rel=1e-3)
+    assert told.burst == pytest.approx(wanted.burst, rel=1e-3)
     assert run.calm < 0.06
 
 
@@ -255,11 +255,11 @@ def test_the_burst_is_at_the_top_of_the_part():
     words, figure, *_ = first.items
     assert isinstance(words, Paragraph)
     assert f"t = {run.burst:.1f} s" in words.text
-    assert f"foretold for {run.predictions[0].burst_by_balance:.0f} s" in words.text
+    assert f"foretold for {run.predictions[0].burst:.0f} s" in words.text
     assert isinstance(figure, Figure)
     lines = [line.get_xdata() for line in figure.figure.axes[0].lines]
     marks = {float(x[0]) for x in lines if len(x) == 2 and x[0] == x[1]}
-    assert marks == {run.burst, run.predictions[0].burst_by_balance}
+    assert marks == {run.burst, run.predictions[0].burst}
 
 
 def test_without_a_burst_none_is_claimed():
@@ -316,7 +316,7 @@ def test_the_kept_record_goes_on_where_a_run_of_today_ends():
     assert np.all(np.diff(whole.time) > 0)
     assert 9.1e3 < whole.burst < 9.5e3
     assert whole.calm < 0.06
-    early, late = (p.burst_by_balance for p in whole.predictions)
+    early, late = (p.burst for p in whole.predictions)
     assert early == pytest.approx(whole.burst, rel=0.05)
     assert late == pytest.approx(whole.burst, rel=0.05)
     other = dataclasses.replace(today, signals={k: v + 0.01 for k, v in today.signals.items()})

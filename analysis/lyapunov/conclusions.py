@@ -192,8 +192,7 @@ def _creep(run: Run) -> Line:
     if isinstance(found, str):
         return Line(key="creep", statement=statement, status="undecided", evidence=found)
     calm = found.verdict in ("settles", "turned round")
-    burst = np.min([found.burst, found.burst_by_balance])
-    soon = f"; budget spent by {burst:.4g} s at the latest rate, then max |r| = {found.peak:.4g}"
+    soon = f"; budget spent by {found.burst:.4g} s or so, then max |r| = {found.peak:.4g}"
     return Line(
         key="creep",
         statement=statement,

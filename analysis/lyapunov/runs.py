@@ -21,6 +21,7 @@ from .final_bound import Gains, alpha_1
 from .observed import observed
 from .parts import Parts, read_parts
 from .reference_rates import reference_margin
+from .response_of_loop import own_parameters
 from .same_loop import check_same, points_around
 from .signals import Margin, Signals, signals_of
 
@@ -142,9 +143,7 @@ def _of_response(loop: ct.InterconnectedSystem, response: Any) -> Member:
             f"{states.shape[0]}"
         )
     start = dict(zip(all_states(loop), map(float, states[:, 0]), strict=True))
-    usual = dict(loop.params)
-    given = (response.params or {}).items()
-    own = {k: v for k, v in given if "." in k and not np.array_equal(usual.get(k, np.nan), v)}
+    own = own_parameters(loop, response)
     return Member(
         start=start, params=own, times=np.asarray(response.time, dtype=float), expected=response
     )

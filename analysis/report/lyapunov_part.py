@@ -99,7 +99,7 @@ def _creep_table(found: Mapping[int, Evidence]) -> Table:
     rows = []
     for number, one in found.items():
         c = one.creep
-        burst = f"{c.burst_by_balance:.4g} s" if np.isfinite(c.burst_by_balance) else "none"
+        burst = f"{c.burst:.4g} s" if np.isfinite(c.burst) else "none"
         rest = "none" if c.rest is None else f"{c.rest:.4g}"
         if c.rest_range is not None:
             rest = f"{rest}, by parts of the data {c.rest_range[0]:.4g} to {c.rest_range[1]:.4g}"

@@ -122,8 +122,8 @@ def burst(run: LongRun) -> str:
         "other tolerances the burst comes at other times, since errors add up over hours; the "
         "command below prints one. The drift told so long "
         f"before: from the first {early.time:g} s the burst is foretold for "
-        f"{early.burst_by_balance:.0f} s, from the first {late.time:g} s for "
-        f"{late.burst_by_balance:.0f} s."
+        f"{early.burst:.0f} s, from the first {late.time:g} s for "
+        f"{late.burst:.0f} s."
     )
 
 
@@ -137,8 +137,8 @@ def told(run: LongRun) -> tuple[str, str]:
     before = [
         f"at rest at ζ = {p.rest:.3f}"
         if p.rest is not None
-        else f"burst at {p.burst_by_balance:.0f} s"
-        if np.isfinite(p.burst_by_balance)
+        else f"burst at {p.burst:.0f} s"
+        if np.isfinite(p.burst)
         else p.verdict
         for p in run.predictions
     ]
