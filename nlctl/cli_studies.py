@@ -33,6 +33,12 @@ Settings = Annotated[
         'space."actuator.b_r".uniform=[0.3,0.6], analysis.0.confidence=0.9.',
     ),
 ]
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust", help="Run code from outside of the study's folder and of installed packages."
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 Jobs = Annotated[int, typer.Option(min=0, help="Threads or processes; 0: one per core.")]
 
@@ -54,9 +60,13 @@ def run(
     out: Annotated[
         Path | None, typer.Option(help="Folder for the results; reports/NAME by default.")
     ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Use a folder with other files.")] = False,
+    trust: Trust = False,
     json: Json = False,
 ) -> None:
     """Run a study, print what it found, and keep everything in a folder.
+
+    A study file names code, which is run: run the studies of those whose programs you would run.
 
     Exit codes: 0 all claims are shown, 1 a claim is refuted, 5 none is refuted but not all are
     shown yet, 2 an invalid study, 3 an error in a function of yours, 4 incomplete: go on with
@@ -66,6 +76,7 @@ def run(
     options += [] if out is None else ["--out", str(out)]
     options += [] if executor == "threads" else ["--executor", executor]
     options += ["--jobs", str(jobs)] if jobs else []
+    options += ["--force"] * force + ["--trust"] * trust
     folder = run_folder(study) if out is None else out
     with exit_codes(json), _told_how_to_go_on(study, options, folder, resume, json):
         from analysis.studies import read_study
@@ -73,12 +84,13 @@ def run(
 
         from ._sweep_progress import sweep_bar
 
-        file = read_study(study, set_ or [])
+        file = read_study(study, set_ or [], trust=trust)
         with _executor(executor, jobs) as pool:
             result = run_study(
                 file,
                 folder,
                 resume=resume,
+                force=force,
                 executor=pool,
                 threads=jobs or None if pool is None else None,
                 watch=sweep_bar,
@@ -90,12 +102,21 @@ def run(
             raise typer.Exit(ANSWERS[result.answer])
 
 
-def validate(study: StudyPath, set_: Settings = None, jobs: Jobs = 0, json: Json = False) -> None:
-    """Check a study file, and say how many runs, how much time and disk it will take."""
+def validate(
+    study: StudyPath,
+    set_: Settings = None,
+    jobs: Jobs = 0,
+    trust: Trust = False,
+    json: Json = False,
+) -> None:
+    """Check a study file, and say how many runs, how much time and disk it will take.
+
+    To know, it makes the loop and runs a few rows: the code that the file names is run.
+    """
     with exit_codes(json):
         from analysis.studies import plan, read_study
 
-        found = plan(read_study(study, set_ or []), jobs or None)
+        found = plan(read_study(study, set_ or [], trust=trust), jobs or None)
         if json:
             content = {"valid": True, **vars(found), "total": found.total}
             print(json_text.dumps(content, indent=1))
@@ -116,9 +137,13 @@ def replay(
         str, typer.Option(help="An analysis that keeps rows of its own, such as worst-case.")
     ] = "",
     plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
+    trust: Trust = False,
     json: Json = False,
 ) -> None:
-    """Run one row again, compare it with the stored one bit for bit, and plot its signals."""
+    """Run one row again, compare it with the stored one bit for bit, and plot its signals.
+
+    The loop is made anew: the code that the study names is run.
+    """
     with exit_codes(json):
         from analysis.studies import replay as replay_row
         from analysis.studies import replay_figure
@@ -127,7 +152,7 @@ def replay(
 
         if plot is not None:
             check_figure(plot)
-        made = replay_row(folder, row, part)
+        made = replay_row(folder, row, part, trust=trust)
         if plot is not None:
             write_figure(plot, replay_figure(made))
         if json:

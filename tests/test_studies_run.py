@@ -32,7 +32,7 @@ from analysis.studies import (
 )
 from analysis.studies.build import own_design
 from analysis.studies.folder import load_finding, load_run, save_finding
-from analysis.studies.origin import origin_key
+from analysis.studies.plain import origin_key
 from analysis.studies.schema import keyed
 from nlctl import ParameterError, UnknownNameError
 

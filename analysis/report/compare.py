@@ -15,12 +15,12 @@ from typing import Any
 from nlctl._errors import ParameterError, UsageError
 
 from .outline import sort_key
+from .own import PARTS
 
 __all__ = ["Difference", "compare", "read_report"]
 
 ABSENT = "absent"
 FOLDER = re.compile(r"\b(nlctl (?:replay|report|run)) (?:'[^']*'|\"[^\"]*\"|[^\s'\"])+")
-PARTS = ("title", "verdict", "claims", "numbers", "sections")
 
 
 @dataclass(frozen=True, kw_only=True)

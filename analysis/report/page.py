@@ -16,6 +16,7 @@ from nlctl._files import replace_file
 from .formula import inline, mathml
 from .math_font import font_face
 from .outline import cells, claim_status, is_long, is_short, numeric
+from .own import generator
 from .typography import pieces, plain
 
 __all__ = ["fill", "to_bytes", "write_files"]
@@ -36,7 +37,11 @@ def fill(template: str, *, interactive: bool = False, **content: object) -> str:
         script += licence + _own(f"{UPLOT}/uPlot.iife.min.js") + _own("templates/history.js")
     page = _environment().get_template(template)
     text = page.render(
-        style=Markup(style), script=Markup(script), policy=_policy(style, script), **content
+        style=Markup(style),
+        script=Markup(script),
+        policy=_policy(style, script),
+        generator=generator(template),
+        **content,
     )
     return text.translate(CONTROL)
 

@@ -85,7 +85,7 @@ def study_report(
         claims=claims(result),
         sections=study_sections(result, kept, loop, limits=False),
         command=command,
-        provenance=versions("cma") | {"seed": str(result.study.study.seed)} | _table_hash(result),
+        provenance=_provenance(result),
         numbers=numbers(result),
         methods=paragraphs,
         limits=[*how.limits(result), *result.notes],
@@ -93,6 +93,13 @@ def study_report(
         inputs=_study_file(result.folder),
         files=data_files(result.folder),
     )
+
+
+def _provenance(result: Result) -> dict[str, str]:
+    """Return what made the numbers: the versions of the run, not those that draw the page."""
+    then = {"Python" if k == "python" else k: v for k, v in result.made_with.items()}
+    seed = {"seed": str(result.study.study.seed)}
+    return versions("cma") | then | seed | _table_hash(result)
 
 
 def study_sections(

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from nlctl import _errors
-from nlctl.native.codegen.fingerprint import program_key
+from nlctl.native import Compiled
 
 from ..metrics import Metric
 from .design import Design
@@ -89,11 +89,17 @@ def experiment_facts(prepared: Prepared, space: Space | None = None) -> dict[str
             **{k: getattr(experiment, k) for k in ("rtol", "atol", "max_steps", "method")},
         },
         "diagrams": {
-            labels_text(labels): {"program": program_key(loop.program), **loop_facts(loop.system)}
+            labels_text(labels): {"program": _program(loop), **loop_facts(loop.system)}
             for labels, loop in prepared.loops
         },
         "versions": versions(),
     }
+
+
+def _program(loop: Compiled) -> str:
+    """Return a key of the program that was written for a diagram."""
+    parts = loop.program.namespace(native=True)
+    return short_key(loop.source, *((name, parts[name]) for name in sorted(parts)))
 
 
 def labels_text(labels: Mapping[str, str]) -> str:
@@ -144,7 +150,7 @@ def _function(function: Any) -> str:
     while isinstance(plain, functools.partial):
         plain = plain.func
     plain = getattr(plain, "py_func", plain)
-    name = f"{getattr(plain, '__module__', '')}.{getattr(plain, '__qualname__', type(plain))}"
+    name = getattr(plain, "__qualname__", type(plain).__qualname__)
     return f"{name} {short_key(function)}"
 
 

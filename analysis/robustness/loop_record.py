@@ -21,7 +21,7 @@ import numpy as np
 from nlctl._block import Block
 from nlctl._diagram import all_parameter_rows, initial_state, leaves, places, state_names
 from nlctl._param import declared_params
-from nlctl.native.codegen.fingerprint import function_key
+from nlctl.native.codegen.fingerprint import content_key
 
 __all__ = ["array_text", "loop_facts", "loop_values", "short_key", "values_differ"]
 
@@ -71,7 +71,7 @@ def _steady(system: ct.InputOutputSystem, content: Mapping[str, T]) -> dict[str,
 
 def short_key(*things: Any) -> str:
     """Return a key of functions, and of all that they reach, short enough to be read."""
-    return function_key(*things)[:16]
+    return content_key(*things)[:16]
 
 
 def _block(system: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,10 +17,10 @@ from analysis.robustness.guarantee import check_iid
 from analysis.robustness.largest_scale import refusal_of
 from analysis.robustness.resolve import check_keyword
 from analysis.robustness.space import combinations
-from nlctl._errors import UsageError
+from nlctl._errors import ParameterError, UsageError
 from nlctl._names import unknown
 
-from .analyses import Compare, Map
+from .analyses import Compare, Degradation, Map, Morris, Sobol
 from .build import (
     SIGNALS,
     choice,
@@ -40,6 +41,8 @@ from .schema import Study
 __all__ = ["bound"]
 
 T = TypeVar("T")
+MOST_ROWS = 10_000_000  # of a design or a search
+MOST_DIAGRAMS = 1000
 NEED_ROWS = ("probability", "sequential", "regional")
 
 
@@ -81,6 +84,7 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
     signals = frozenset.intersection(*(frozenset(d.output_labels) for d in diagrams or [_Empty]))
     for diagram in diagrams:
         _check_names(study, diagram, quantities, requirements, notes)
+    small = _check_sizes(study, notes)
     metrics = notes.attempt(("metrics",), metrics_of, study, folder, signals) if diagrams else None
     inputs = notes.attempt(("inputs",), inputs_of, study, diagrams) if diagrams else None
     _check_analyses(study, metrics, notes)
@@ -88,7 +92,8 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
     if diagrams and not notes.problems:
         made = notes.attempt((), experiment, study, folder, signals, inputs or ())
     if made is None:
-        _check_designs(study, _stand_in(study, quantities), notes)
+        if small:
+            _check_designs(study, _stand_in(study, quantities), notes)
         _comparable(study, folder, notes)
     else:
         space = notes.attempt(("space",), resolved, made.space, diagrams[0])
@@ -162,11 +167,17 @@ def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputS
     if len(notes.problems) > before:
         return _as_it_comes(function)
     options = {c.name: c.options for c in made}
+    count = math.prod(len(c.options) for c in made)
+    if count > MOST_DIAGRAMS:
+        notes.add(
+            ("choices",), f"at most {MOST_DIAGRAMS:,} diagrams can be made, got {_count(count)}"
+        )
+        return []
     every = combinations(Space(choices=tuple(made))) if made else [{}]
     built = []
     for labels in every:
         chosen = {name: options[name][label] for name, label in labels.items()}
-        system = notes.attempt(("loop",), partial(build, **chosen))
+        system = notes.attempt(("loop",), _diagram, partial(build, **chosen), study.loop)
         built += [] if system is None else [system]
     return built or _as_it_comes(function)
 
@@ -174,9 +185,24 @@ def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputS
 def _as_it_comes(function: Callable[..., Any] | None) -> list[ct.InputOutputSystem]:
     """Return the loop without the study's options, so that names can be held against it."""
     try:
-        return [] if function is None else [function()]
+        made = None if function is None else function()
+        return [made] if isinstance(made, ct.InputOutputSystem) else []
     except Exception:  # whatever a function of the user's does without what it was to be given
         return []
+
+
+def _diagram(build: Callable[[], Any], name: str) -> ct.InputOutputSystem:
+    """Return the diagram that a loop's function returns.
+
+    Raises
+    ------
+    ParameterError
+        If it returns something else.
+    """
+    made = build()
+    if not isinstance(made, ct.InputOutputSystem):
+        raise ParameterError(f"'{name}' returns {type(made).__name__}, and not a diagram")
+    return made
 
 
 def _check_names(
@@ -217,6 +243,43 @@ def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Note
         for key, name in _quantities_of(asked):
             if name not in study.space:
                 notes.add(("analysis", i, key), str(unknown("quantity", name, study.space)))
+
+
+def _check_sizes(study: Study, notes: _Notes) -> bool:
+    """Refuse numbers of runs that no machine can make, and return whether there were none."""
+    before = len(notes.problems)
+    wide, options = len(study.space), math.prod(len(c.options) for c in study.choices.values())
+    if study.runs is not None:
+        rows = study.runs.size or 1
+        if study.runs.design in ("grid", "corners"):
+            rows = (study.runs.levels or 2) ** wide * options
+        if rows > MOST_ROWS:
+            notes.add(("runs",), f"at most {MOST_ROWS:,} rows can be run, got {_count(rows)}")
+    for i, asked in enumerate(study.analysis):
+        rows = max(_sizes(asked, wide), default=0)
+        if rows > MOST_ROWS:
+            notes.add(
+                ("analysis", i), f"at most {MOST_ROWS:,} runs can be made, got {_count(rows)}"
+            )
+    return len(notes.problems) == before
+
+
+def _sizes(asked: Any, wide: int) -> list[int]:
+    """Return the numbers of runs that an analysis asks for."""
+    sizes = [getattr(asked, key, 0) for key in ("runs", "draws", "levels", "trajectories")]
+    if isinstance(asked, Map):
+        sizes.append((asked.cells + 1) ** 2)
+    if isinstance(asked, Degradation):
+        sizes.append(asked.runs * len(asked.factors))
+    if isinstance(asked, Morris | Sobol):
+        sizes.append((asked.trajectories if isinstance(asked, Morris) else asked.size) * (wide + 2))
+    if isinstance(asked, Compare):
+        sizes.append(asked.runs * len(asked.options))
+    return sizes
+
+
+def _count(rows: int) -> str:
+    return f"{rows:,}" if rows < 10**15 else f"about 10^{math.log10(rows):.0f}"
 
 
 def _check_designs(study: Study, space: Space, notes: _Notes) -> None:

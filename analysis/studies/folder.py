@@ -13,6 +13,7 @@ was edited or belongs to another loop is refused, not shown.
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,11 +27,11 @@ from analysis.robustness.sweep import Sweep, load
 from nlctl._files import replace_file
 
 from .build import labels, main_design
-from .origin import loop_differences, origin_key, plain_study, version_differences
+from .origin import loop_differences, plain_study, version_differences
 from .parts import uncertain
-from .plain import ANEW, RunFolderError, file_digest, read_json, write_json
+from .plain import ANEW, RunFolderError, file_digest, origin_key, read_json, write_json
 from .result import Finding, Result
-from .schema import Study
+from .schema import Study, keyed
 from .written import from_toml
 
 __all__ = [
@@ -41,10 +42,13 @@ __all__ = [
     "load_run",
     "load_study",
     "origin_differences",
+    "remove_run",
     "run_differences",
     "save_finding",
 ]
 
+OWN = ("study.toml", "run.json", "results.json", "rows", ".lock", ".owner")
+OWN += ("index.html", "report.json", "report.pdf")
 METRIC_COLUMNS = ("key", "signal", "unit", "meaning")
 
 
@@ -103,6 +107,25 @@ def load_run(folder: Path) -> dict[str, Any]:
         If the folder holds no run, or the file is damaged.
     """
     return read_json(folder / "run.json")
+
+
+def remove_run(folder: Path, *, force: bool = False) -> None:
+    """Remove the folder of a run, with its page.
+
+    Raises
+    ------
+    RunFolderError
+        If it holds something else, and `force` is False.
+    """
+    if not force:
+        known = {*OWN, *keyed(load_study(folder))} if (folder / "study.toml").exists() else set()
+        others = sorted(p.name for p in folder.iterdir() if p.name not in known)
+        if others:
+            raise RunFolderError(
+                f"'{folder}' would be replaced, and holds what no run has made ({others[0]}): take "
+                "another folder with --out, or replace it with --force"
+            )
+    shutil.rmtree(folder)
 
 
 def load_study(folder: Path) -> Study:

@@ -17,14 +17,12 @@ from analysis.robustness.loop_record import loop_facts, loop_values, values_diff
 
 from .analyses import Compare
 from .comparison import compared
-from .plain import digest_of
 from .read import StudyFile
 from .schema import Study, keyed
 
 __all__ = [
     "compared_differences",
     "loop_differences",
-    "origin_key",
     "origin_of",
     "plain_study",
     "version_differences",
@@ -82,11 +80,6 @@ def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared
 def plain_study(study: Study) -> dict[str, Any]:
     """Return a study as it stands in a record."""
     return from_json(as_json(study.model_dump(mode="json", exclude_unset=True, exclude_none=True)))
-
-
-def origin_key(origin: Mapping[str, Any]) -> str:
-    """Return a key of a record; values are no part of it, they differ by rounding elsewhere."""
-    return digest_of(as_json({key: part for key, part in origin.items() if key != "values"}))
 
 
 def version_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:

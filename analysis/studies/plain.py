@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ __all__ = [
     "as_json",
     "digest_of",
     "file_digest",
+    "origin_key",
     "read_json",
     "write_json",
 ]
@@ -82,3 +84,8 @@ def file_digest(path: Path) -> str:
     """
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def origin_key(origin: Mapping[str, Any]) -> str:
+    """Return a key of what `origin.origin_of` returns, without values, which rounding changes."""
+    return digest_of(as_json({key: part for key, part in origin.items() if key != "values"}))

@@ -12,6 +12,8 @@ from pydantic import BaseModel, ValidationError
 from nlctl._errors import UsageError
 from nlctl._names import unknown
 
+from .toml import statements
+
 __all__ = [
     "Place",
     "Problem",
@@ -23,6 +25,8 @@ __all__ = [
 ]
 
 Place = tuple[str | int, ...]
+LONGEST = 600  # characters of a mistake
+LARGEST = 10**40  # integers beyond are not printed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,12 +58,17 @@ class Problem:
         }
 
     def __str__(self) -> str:
-        given = " ".join(f"--set {setting}" for setting in self.settings)
+        given = " ".join(f"--set {_short(setting)}" for setting in self.settings)
         if self.line is None and given:
-            return f"{given}: {self.message}"
+            return f"{given}: {_short(self.message)}"
         line = "" if self.line is None else f"line {self.line}, "
         given = f" (with {given})" if given else ""
-        return f"{line}{place_text(self.place)}: {self.message}{given}"
+        return f"{line}{_short(place_text(self.place))}: {_short(self.message)}{given}"
+
+
+def _short(text: str) -> str:
+    """Leave out the middle of a text that quotes too much of a file."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
 
 class StudyError(UsageError):
@@ -90,28 +99,20 @@ def place_text(place: Place) -> str:
 
 
 def line_numbers(text: str) -> dict[Place, int]:
-    """Return the line of every key that a line of a TOML file begins with.
-
-    A statement is the least number of lines that TOML can read by themselves: a header, or a key
-    with its value.
-    """
-    lines = text.splitlines()
+    """Return the line of every key that a statement of a TOML file begins with."""
     found: dict[Place, int] = {}
     counts: dict[Place, int] = {}
     table: Place = ()
-    i = 0
-    while i < len(lines):
-        end, statement = _statement(lines, i)
-        path = _path(statement)
-        if lines[i].lstrip().startswith("["):
-            if lines[i].lstrip().startswith("[["):
+    for line, statement in statements(text):
+        path = _path(_parsed(statement))
+        if statement.startswith("["):
+            if statement.startswith("[["):
                 counts[path] = counts.get(path, -1) + 1
             path = table = _indexed(path, counts)
         else:
             path = (*table, *path)
         for depth in range(1, len(path) + 1):
-            found.setdefault(path[:depth], i + 1)
-        i = end
+            found.setdefault(path[:depth], line + 1)
     return found
 
 
@@ -125,13 +126,11 @@ def _indexed(path: Place, counts: Mapping[Place, int]) -> Place:
     return tuple(place)
 
 
-def _statement(lines: Sequence[str], start: int) -> tuple[int, dict[str, Any]]:
-    for end in range(start + 1, len(lines) + 1):
-        try:
-            return end, tomllib.loads("\n".join(lines[start:end]))
-        except tomllib.TOMLDecodeError:
-            continue
-    return start + 1, {}
+def _parsed(statement: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(statement)
+    except tomllib.TOMLDecodeError:  # a comment
+        return {}
 
 
 def _path(statement: Any) -> Place:
@@ -165,9 +164,16 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
             tags = context["expected_tags"].replace("'", "").split(", ")
             place, message = (*place, "kind"), str(unknown("kind", str(context["tag"]), tags))
         elif "input" in one and not isinstance(one["input"], dict | list):
-            message = f"{message}, got {one['input']!r}"
+            message = f"{message}, got {_text(one['input'])}"
         found.append(Problem(place=place, message=message))
     return found
+
+
+def _text(value: Any) -> str:
+    """Return a value as it stands in the file; not an integer of thousands of digits."""
+    if isinstance(value, int) and abs(value) > LARGEST:
+        return f"an integer of {value.bit_length()} bits"
+    return repr(value)
 
 
 def _in_file(loc: Place, data: Any, absent: bool) -> Place:

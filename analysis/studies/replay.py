@@ -20,8 +20,7 @@ from nlctl._errors import ParameterError
 from .analyses import Compare
 from .comparison import alternatives, widened
 from .folder import load_finding, load_rows, load_run
-from .origin import origin_key
-from .plain import RunFolderError, as_json
+from .plain import RunFolderError, as_json, origin_key
 from .read import StudyFile
 from .run import reopened
 from .schema import keyed
@@ -80,7 +79,7 @@ class Replay:
         )
 
 
-def replay(folder: Path, row: int, part: str = "") -> Replay:
+def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Replay:
     """Run one row of a run folder again.
 
     Parameters
@@ -89,6 +88,8 @@ def replay(folder: Path, row: int, part: str = "") -> Replay:
     row : int
     part : str, optional
         Key of an analysis that keeps rows of its own; by default the main table.
+    trust : bool, optional
+        As in `read_study`.
 
     Raises
     ------
@@ -97,7 +98,7 @@ def replay(folder: Path, row: int, part: str = "") -> Replay:
     ParameterError
         If the row is not there.
     """
-    run = reopened(folder)
+    run = reopened(folder, trust=trust)
     table = _table(folder, part)
     if row not in table.index:
         where = f"of '{part}'" if part else "of the main table"

@@ -12,7 +12,7 @@ import pandas as pd
 from analysis.robustness.sweep import Sweep
 from nlctl._names import unknown
 
-from .plain import as_json
+from .plain import as_json, origin_key
 from .schema import Study, keyed
 
 __all__ = ["Finding", "Result"]
@@ -113,6 +113,13 @@ class Result:
     interrupted: bool = False
     notes: tuple[str, ...] = ()
     origin: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def made_with(self) -> dict[str, str]:
+        """Versions that the numbers were computed with, and a key of all they follow from."""
+        if not self.origin:
+            return {}
+        return {**self.origin["versions"], "computed from": origin_key(self.origin)}
 
     @property
     def asked(self) -> dict[str, Any]:

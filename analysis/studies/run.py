@@ -27,11 +27,10 @@ from .ground import Ground
 from .origin import (
     compared_differences,
     loop_differences,
-    origin_key,
     origin_of,
     version_differences,
 )
-from .plain import RunFolderError, write_json
+from .plain import RunFolderError, origin_key, write_json
 from .read import StudyFile, read_study
 from .result import Finding, Result
 from .schema import Study, keyed
@@ -288,7 +287,7 @@ def _refuse_another_loop(folder: Path, before: Mapping[str, Any], now: Mapping[s
         )
 
 
-def rerun_file(folder: Path) -> StudyFile:
+def rerun_file(folder: Path, *, trust: bool = False) -> StudyFile:
     """Return the study of a run folder, held against the loop of today; see `reopened`.
 
     Raises
@@ -300,7 +299,7 @@ def rerun_file(folder: Path) -> StudyFile:
     """
     place = load_run(folder)["study_folder"]
     load_study(folder)
-    return read_study(folder / "study.toml", folder=folder / place)
+    return read_study(folder / "study.toml", folder=folder / place, trust=trust)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -321,8 +320,14 @@ class Reopened:
     versions: str
 
 
-def reopened(folder: Path) -> Reopened:
+def reopened(folder: Path, *, trust: bool = False) -> Reopened:
     """Return the study of a run with its loop, to draw from it.
+
+    Parameters
+    ----------
+    folder : Path
+    trust : bool, optional
+        As in `read_study`.
 
     Raises
     ------
@@ -331,7 +336,7 @@ def reopened(folder: Path) -> Reopened:
     RunFolderError
         If the folder holds no run, or one that was computed from another loop.
     """
-    file, before = rerun_file(folder), load_run(folder)["origin"]
+    file, before = rerun_file(folder, trust=trust), load_run(folder)["origin"]
     prepared = prepare(file.experiment)
     now = origin_of(file, prepared)
     _refuse_another_loop(folder, before, now)

@@ -23,6 +23,7 @@ import numba
 import numpy as np
 
 LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"}  # their versions stand for them
+MODULE = "\1of "  # begins a text that names a module and nothing of its content
 HEAP_TYPE = 1 << 9  # Py_TPFLAGS_HEAPTYPE: made by a class statement
 CONSTANTS = (int, float, complex, str, bytes, tuple, list, dict, np.ndarray, np.generic)
 STANDARD = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
@@ -46,6 +47,16 @@ def program_key(program: Sourced) -> str:
 def function_key(*things: Any) -> str:
     """Return a key of functions, and of other things that their machine code depends on."""
     return _digest(*things)
+
+
+def content_key(*things: Any) -> str:
+    """Return a key of what functions compute: the same wherever their files are.
+
+    Unlike `function_key` it does not tell functions of the same content in different modules.
+    """
+    seen: set[int] = set()
+    texts = (text for thing in things for text in _fingerprint(thing, seen))
+    return _digest_of(text for text in texts if not text.startswith(MODULE))
 
 
 def module_key(*modules: types.ModuleType) -> str:
@@ -116,7 +127,7 @@ def _of_function(function: types.FunctionType, seen: set[int]) -> Iterator[str]:
     if id(function) in seen:
         return
     seen.add(id(function))
-    yield f"of {function.__module__}"  # what is on disk refers to it by this name
+    yield f"{MODULE}{function.__module__}"  # what is on disk refers to it by this name
     yield from _code_text(function.__code__)
     for given in (function.__defaults__, function.__kwdefaults__):
         yield from _fingerprint(given, seen)
