@@ -16,6 +16,7 @@ from ..lyapunov.long_run import LongRun
 from ..reproduction import CASES, HORIZON, TAIL, Check, Run, checks
 from . import paper_text as text
 from .document import Figure, History, Item, Paragraph, Report, Section, Table
+from .equations import equations_of
 from .lyapunov_part import Evidence, lyapunov_sections
 from .paper_claims import claims, proof_claims, verdict
 from .paper_closing import closing_sections, metric_table
@@ -131,7 +132,8 @@ def _example(number: int, runs: Runs, compared: Sequence[Check]) -> list[Section
         description=f"Block diagram of {diagram.name} with the blocks {blocks}.",
         figure=draw(diagram, expand=True),
     )
-    shown = [*text.PLANTS[number], picture, tracking, control, _interactive(number, run)]
+    equations = equations_of(diagram, ("plant", "actuator"), f"Ex. {number}")
+    shown = [*equations, picture, tracking, control, _interactive(number, run)]
     folded: tuple[tuple[str, str, list[Item]], ...] = (
         ("signals", "The other signals over time, and the actuator's characteristic", [*others]),
         ("parameters", "Parameters as printed and as used", [_parameter_table(number, diagram)]),

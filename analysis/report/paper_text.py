@@ -97,33 +97,6 @@ CONTROLLER_PART = (
     Paragraph(text=SYMBOLS),
 )
 
-PLANTS = {
-    1: (
-        Equation(
-            latex=r"\dot x_2 = -p_1 x_1 - p\,x_2 - x_1^3 + q\cos(w t)"
-            r" + (1 + 0.1\cos(x_1))(1 + 0.2\cos(v))\,v + 0.1\,(x_1^2 + x_2^2)\sin(t)",
-            number="Ex. 1",
-        ),
-        Equation(
-            latex=r"v(u) = \begin{cases} (1 + 0.3\sin(u))(u - 0.5) & u \ge 0.5 \\"
-            r" 0 & -0.3 < u < 0.5 \\ (0.8 + 0.2\cos(u))(u + 0.3) & u \le -0.3 \end{cases}",
-            number="Ex. 1",
-        ),
-    ),
-    2: (
-        Equation(
-            latex=r"\dot x_3 = -c x_1 - b x_2 - a x_3 + x_1^2"
-            r" + (2 + \cos(x_1))(1 + 0.2\sin^2(v))\,v + \sin(0.1 t)",
-            number="Ex. 2",
-        ),
-        Equation(
-            latex=r"v(t) = \min\left(\max\left(v(t^-),\ 1.2\,(u - 0.5)\right),"
-            r"\ 1.2\,(u + 0.6)\right)",
-            number="Ex. 2",
-        ),
-    ),
-}
-
 EXAMPLES = {"example-1": 1, "example-2": 2}  # number by the name that studies call it
 
 TITLES = {

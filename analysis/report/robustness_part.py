@@ -127,7 +127,7 @@ def study_sections(
     table = None if result.rows is None or not result.rows.done else result.rows.table
     asked = [Section(key="study_asked", title="What was asked", items=[*setup_items(result)])]
     if result.study.loop in EXAMPLES:
-        items = [*loop_items(EXAMPLES[result.study.loop])]
+        items = [*loop_items()]
         title = "The loop as published"
         asked.append(Section(key="study_published", title=title, items=items, folded=True))
     if loop is not None:

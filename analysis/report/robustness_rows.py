@@ -18,7 +18,7 @@ from ..robustness.sequential import sequence_bounds
 from ..robustness.spec import violates
 from . import robustness_text as text
 from .document import Figure, History, Item, Paragraph, Table
-from .paper_text import CONTROLLER_PART, EXAMPLES, PLANT_CLASS, PLANTS, TITLES
+from .paper_text import CONTROLLER_PART, EXAMPLES, PLANT_CLASS, TITLES
 from .robustness_claims import refusal
 from .robustness_histories import Histories
 from .robustness_text import margin_text
@@ -71,10 +71,10 @@ def setup_items(result: Result) -> Iterator[Item]:
     )
 
 
-def loop_items(number: int) -> Iterator[Item]:
-    """Yield the equations of one of the paper's examples."""
-    yield Paragraph(text="The class of plants, the last equation of this one, and its actuator:")
-    yield from (PLANT_CLASS, *PLANTS[number], *CONTROLLER_PART)
+def loop_items() -> Iterator[Item]:
+    """Yield the class of plants and the controller of the paper's examples, as it prints them."""
+    yield Paragraph(text="The class of plants:")
+    yield from (PLANT_CLASS, *CONTROLLER_PART)
 
 
 def known(quantities: pd.DataFrame, *columns: str) -> Iterable[tuple[Any, ...]]:
