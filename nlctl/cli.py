@@ -65,9 +65,9 @@ def simulate(
         typer.Option("--input", metavar="NAME=VALUE", help="A constant input; 0 by default."),
     ] = None,
     engine: Annotated[
-        str | None,
+        str,
         typer.Option(help="native, python-control, or auto: native if it can be compiled."),
-    ] = None,
+    ] = "auto",
     until: Annotated[float, typer.Option(help="Horizon in s.")] = 20.0,
     step: Annotated[float, typer.Option(help="Sampling interval of the output in s.")] = 0.01,
     plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,

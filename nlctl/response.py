@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["EngineWarning", "input_output_response"]
 
 ENGINES = ("python-control", "native", "auto")
+SCIPY_METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 NATIVE_ONLY = ("max_steps", "step")  # settings that python-control does not know
 
 
@@ -37,7 +38,7 @@ def input_output_response(
     initial_state: Mapping[str, float] | Any = None,
     *,
     params: Mapping[str, Any] | None = None,
-    engine: str | None = None,
+    engine: str = "auto",
     method: str | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
@@ -54,12 +55,12 @@ def input_output_response(
     progress: Callable[[float], object] | None = None,
     **aliases: Any,
 ) -> ct.TimeResponseData:
-    """Simulate a block or diagram, in python-control or as machine code.
+    """Simulate a block or diagram, as machine code or in python-control.
 
-    A diagram is integrated by `control.input_output_response`, a compiled one by nlctl's own
-    integrator, with the same arguments.  What is added to python-control: blocks start from
-    their own initial states, tolerances are tighter, a run that leaves the finite numbers ends
-    with the time at which it did, and progress can be watched.
+    A diagram that can be compiled is integrated by nlctl's own integrator, any other by
+    `control.input_output_response`, with the same arguments.  What is added to python-control:
+    blocks start from their own initial states, tolerances are tighter, a run that leaves the
+    finite numbers ends with the time at which it did, and progress can be watched.
 
     Parameters
     ----------
@@ -78,11 +79,13 @@ def input_output_response(
         and the others start at 0.  Also ``X0``.
     params : mapping, optional
         Qualified parameters, ``{"actuator.b_r": 0.6}``.
-    engine : {"python-control", "native", "auto"}, optional
-        What computes the run of a diagram: python-control, the default; machine code, compiled
-        for this run (for many runs compile once, with `nlctl.compile`); or machine code where the
-        diagram can be compiled and python-control, with an `EngineWarning` that says why, where
-        it cannot.  A `Compiled` always runs as machine code.
+    engine : {"auto", "native", "python-control"}, optional
+        What computes the run of a diagram.  By default machine code, compiled for this run (for
+        many runs compile once, with `nlctl.compile`), where the diagram can be compiled; where
+        it cannot, python-control with an `EngineWarning` that says why.  With "native" that is
+        an error, and "python-control" is the reference.  What only python-control knows (a
+        method of SciPy, keywords of its integrator, the integrator's own times) it computes.  A
+        `Compiled` always runs as machine code.
     method : str, optional
         Method of `scipy.integrate.solve_ivp` in python-control, "LSODA" by default.  Machine code
         has "tsit5", an explicit Runge-Kutta pair of orders 5(4), "rodas5p", a stiff method of
@@ -175,9 +178,9 @@ def input_output_response(
     return _computed(unified(run), engine)
 
 
-def _computed(run: Run, engine: str | None) -> ct.TimeResponseData:
+def _computed(run: Run, engine: str) -> ct.TimeResponseData:
     interpretable = isinstance(run.system, ct.InputOutputSystem)
-    if not _takes_machine_code(engine, interpretable):
+    if not _takes_machine_code(run, engine, interpretable):
         for name in NATIVE_ONLY:
             if run.solver[name] is not None:
                 raise ParameterError(
@@ -200,14 +203,23 @@ def _computed(run: Run, engine: str | None) -> ct.TimeResponseData:
     return interpreted(replace(run, solver=dict(run.solver) | {"method": None}))
 
 
-def _takes_machine_code(engine: str | None, interpretable: bool) -> bool:
-    if engine is not None and engine not in ENGINES:
+def _takes_machine_code(run: Run, engine: str, interpretable: bool) -> bool:
+    if engine not in ENGINES:
         raise unknown("engine", str(engine), ENGINES)
     if not interpretable and engine == "python-control":
         raise ParameterError(
             "engine='python-control' needs a diagram, got a compiled one: give compiled.system"
         )
-    return not interpretable or engine in ("native", "auto")
+    if not interpretable or engine == "native":
+        return True
+    return engine == "auto" and not _asks_for_scipy(run)
+
+
+def _asks_for_scipy(run: Run) -> bool:
+    """Whether a run is given what only python-control's integrator knows."""
+    method, keywords = run.solver["method"], run.solver["solve_ivp_kwargs"] or {}
+    named = run.solver["solve_ivp_method"] is not None or method in SCIPY_METHODS
+    return named or run.evaluation_times is None or bool(set(keywords) - {"rtol", "atol"})
 
 
 def _native(run: Run) -> ct.TimeResponseData:
