@@ -9,7 +9,14 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
     ["nlctl._errors", "nlctl._files", "nlctl._equation", "nlctl._param", "nlctl._names"]
-    + ["nlctl._block", "nlctl._diagram", "nlctl._run_arguments", "nlctl.functions"]
+    + ["nlctl._arguments", "nlctl._workers"]
+    + [
+        "nlctl._block",
+        "nlctl._diagram",
+        "nlctl._run_arguments",
+        "nlctl._time_response",
+        "nlctl.functions",
+    ]
     + ["nlctl._layout", "nlctl.drawing"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers"],
     ["nlctl._catalogue", "nlctl.paper"],

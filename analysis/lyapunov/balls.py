@@ -20,6 +20,9 @@ from typing import Any
 import numpy as np
 from flint import arb
 
+from nlctl._arguments import a_function, number, of_type, whole_number
+from nlctl._errors import ParameterError
+
 from .ball import Ball, as_ball, common
 from .box import Box, Cell
 from .branches import Undecided, every_way
@@ -102,7 +105,16 @@ def enclose(function: Function, box: Box, *, tol: float = 1e-3, max_boxes: int =
     Returns
     -------
     Range
+
+    Raises
+    ------
+    ParameterError
+        If it is no function or no box, `tol` is not positive, or `max_boxes` is below 1.
     """
+    a_function("enclose", "function", function)
+    of_type("enclose", "box", box, Box, "Box.of(x1=(-1, 1))")
+    number("enclose", "tol", tol, above=0)
+    whole_number("enclose", "max_boxes", max_boxes, at_least=1)
     start = time.perf_counter()
     high, greatest, n, lost = _supremum(function, box, tol, max_boxes)
     low, least, m, missed = _supremum(lambda x: -as_ball(function(x)), box, tol, max_boxes)
@@ -138,7 +150,17 @@ def prove(
         The claim.
     max_boxes : int, optional
         Number of boxes after which the rest counts as undecided.
+
+    Raises
+    ------
+    ParameterError
+        If it is no function or no box, the claim is not low <= high, or `max_boxes` is below 1.
     """
+    a_function("prove", "function", function)
+    of_type("prove", "box", box, Box, "Box.of(x1=(-1, 1))")
+    whole_number("prove", "max_boxes", max_boxes, at_least=1)
+    if not low <= high:  # refuses NaN, too
+        raise ParameterError(f"prove needs low <= high, got {low} and {high}")
     start, queue, boxes = time.perf_counter(), [box.cell], 0
     undecided, where, value, holds = 0, None, np.nan, True
     while queue and boxes < max_boxes:

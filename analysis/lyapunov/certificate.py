@@ -27,7 +27,7 @@ from nlctl._param import whole_number
 
 from .ball import Ball
 from .balls import upper
-from .decomposition import Decomposition, decompose
+from .decomposition import Decomposition, check_gain, decompose
 from .demand import Demand, demand
 from .final_bound import alpha_0, alpha_1, initial_V
 from .known_sign_loop import KnownSignLoop, read_loop
@@ -188,6 +188,7 @@ def certify(
     for name, value in (("u_max", u_max), ("tol", tol)):
         if not 0 < value < np.inf:
             raise ParameterError(f"certify needs a finite {name} > 0, got {value}")
+    check_gain("certify", k)
     read = read_loop(loop, params, inputs)
     split = _disturbed(decompose(read.parts.actuator, k=k, u_max=u_max, tol=tol), read)
     C = abs(read.parts.gains.r_0)

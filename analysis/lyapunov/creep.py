@@ -26,6 +26,7 @@ import numpy as np
 from scipy.integrate import quad, trapezoid
 
 from nlctl import functions
+from nlctl._arguments import number, of_type, whole_number
 from nlctl._errors import ParameterError
 
 from .drift import Drift, drift
@@ -163,7 +164,14 @@ def burst_peak(lobe: Lobe, kG: float) -> float:
     """Return max |r| = sqrt(2 k G |int N|) of a burst through a lobe of the wrong sign.
 
     r^2/2 grows by int k G N dzeta, against which disturbances and beta r are small.
+
+    Raises
+    ------
+    ParameterError
+        If it is no lobe, or `kG` is not positive.
     """
+    of_type("burst_peak", "lobe", lobe, Lobe, "lobe_around(zeta)")
+    number("burst_peak", "kG", kG, above=0)
     return float(np.sqrt(2 * kG * lobe.budget))
 
 
@@ -212,6 +220,8 @@ def creep(
     """
     N = N if loop is None else law_of_response(loop, response)
     run = drift(response, N)
+    number("creep", "window", window, above=0)
+    whole_number("creep", "skip", skip, at_least=0)
     lobe = lobe_around(float(run.zeta[-1]), N)
     rates, inverse = _windows(run, N, lobe, window, skip)
     balance = _fitted(rates, inverse)

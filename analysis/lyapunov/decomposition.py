@@ -14,6 +14,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from flint import arb
 
+from nlctl._arguments import number, vector
 from nlctl._errors import ParameterError, UsageError
 from nlctl._param import equation_arguments
 from nlctl.actuators import Backlash, DeadZone, play_band
@@ -98,13 +99,32 @@ def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
 
     It serves numbers, arrays and balls, and leaves the smallest |eps_u| that any split with
     k_1 <= k <= k_2 leaves at (u, v).
+
+    Raises
+    ------
+    ParameterError
+        If not 0 < k_1 <= k_2, both finite.
     """
+    number("clipped_split", "k_1", k_1, above=0)
+    number("clipped_split", "k_2", k_2, at_least=k_1)
 
     def part(u: Any, v: Any) -> Any:
         one, other = k_1 * u, k_2 * u
         return clip(v, np.minimum(one, other), np.maximum(one, other))
 
     return part
+
+
+def check_gain(who: str, k: Any) -> None:
+    """Refuse bounds of k that are no pair with 0 < k_1 <= k_2; None is none.
+
+    Raises
+    ------
+    ParameterError
+    """
+    bounds = None if k is None else vector(who, "k = (k_1, k_2)", k)
+    if bounds is not None and (bounds.size != 2 or not 0 < bounds[0] <= bounds[1]):
+        raise ParameterError(f"{who} needs k = (k_1, k_2) with 0 < k_1 <= k_2, got {k}")
 
 
 def decompose(
@@ -145,7 +165,12 @@ def decompose(
     DecompositionError
         If eps_u is not bounded for all u, as with saturation, no split is known, or the record's
         own one is refuted by a sample of its output.
+    ParameterError
+        If `k` is no pair with 0 < k_1 <= k_2, or `u_max` or `tol` is not positive.
     """
+    u_max = number("decompose", "u_max", u_max, above=0)
+    tol = number("decompose", "tol", tol, above=0)
+    check_gain("decompose", k)
     if k is None and hasattr(actuator, "decomposition"):
         return _declared_split(actuator, u_max, tol)
     if k is None and type(actuator) is DeadZone:
@@ -159,8 +184,6 @@ def decompose(
             f"{type(actuator).__name__} has no known split (2): give the bounds k=(k_1, k_2), or "
             "the record a method decomposition(u_max)"
         )
-    if not (np.isfinite(u_max) and u_max > 0 and 0 < k[0] <= k[1] < np.inf):
-        raise ParameterError(f"decompose needs u_max > 0 and 0 < k_1 <= k_2, got {u_max} and {k}")
     return _proved_split(actuator, k, u_max, tol)
 
 

@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native
+from nlctl._arguments import one_of, whole_number
 
 from .box import Box, visited_box
 from .constants import constants
@@ -119,6 +120,9 @@ def examine(
     ParameterError, UnknownNameError
         If a run, a box or a name is refused.
     """
+    max_steps = whole_number("examine", "max_steps", max_steps, at_least=1)
+    if isinstance(W, str):
+        one_of("examine", "W", W, ["tightest"])
     members = members_of(loop, run, step, start, params)
     fixed = _numbers(start), _numbers(params)
     if len(members) == 1:

@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native
+from nlctl._arguments import number
 from nlctl._diagram import initial_state
 from nlctl._diagram import state_names as all_states
 from nlctl._errors import ParameterError
@@ -115,7 +116,7 @@ def members_of(
             raise ParameterError("ledger takes start and params of the responses: leave them out")
         responses = list(run) if isinstance(run, Sequence) else [run]
         return [_of_response(loop, response) for response in responses]
-    horizon = float(run)  # type: ignore[arg-type]
+    horizon, step = number("ledger", "horizon", run), number("ledger", "step", step)
     if not (0 < step < horizon < np.inf):
         raise ParameterError(f"ledger needs 0 < step < horizon, got {step:g} and {horizon:g}")
     times = np.linspace(0.0, horizon, round(horizon / step) + 1)
@@ -173,11 +174,11 @@ def observe(
         If the loop is not the one that the proof is about.
     """
     compiled = observed_loop(loop, split)
-    for number, member in enumerate(members):
+    for place, member in enumerate(members):
         parts = read_parts(loop, member.start, member.params)
         params = {**member.params, "integral.alpha_1": alpha_1(parts.gains)}
         x0 = initial_state(loop, member.start)
-        points = points_around(x0) if number == 0 else [(0.0, x0)]
+        points = points_around(x0) if place == 0 else [(0.0, x0)]
         check_same(loop, compiled.system, points, member.params, params)
         response: Any = input_output_response(
             compiled,
@@ -189,7 +190,7 @@ def observe(
             ignore_errors=True,
         )
         signals = signals_of(native.uninterrupted(response))
-        seen = _along(loop, response, LOOKS if number == 0 else 1)
+        seen = _along(loop, response, LOOKS if place == 0 else 1)
         check_same(loop, compiled.system, seen, member.params, params)
         _check_reproduced(member, signals)
         lost = None if response.success else float(response.statistics.time)

@@ -21,12 +21,14 @@ from ._machine import compile_ahead
 from ._response import Response, uninterrupted
 from ._schedule import AlgebraicLoopError
 from ._simulate import Settings, Statistics
+from ._typeset import BlockEquations, typeset
 from .audit import AuditError
 from .codegen.store import CacheWarning
 
 __all__ = [
     "AlgebraicLoopError",
     "AuditError",
+    "BlockEquations",
     "CacheWarning",
     "CompileError",
     "Compiled",
@@ -38,5 +40,6 @@ __all__ = [
     "compile",
     "compile_ahead",
     "ensemble_response",
+    "typeset",
     "uninterrupted",
 ]

@@ -7,10 +7,10 @@ in one loop; one that is used in several, or element by element, lies in memory.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from ..expressions.graph import Expr
+from ..expressions.graph import Expr, needed
 
 Loop = tuple[int, int]  # level and length
 STORED = ("concat", "call")  # vectors that are made in memory
@@ -53,18 +53,6 @@ class Plan:
     loops: dict[Loop, list[Expr]]
     stores: tuple[Store, ...]
     rows: int
-
-
-def needed(exprs: Iterable[Expr], known: Collection[Expr]) -> tuple[Expr, ...]:
-    """Return all that expressions are made of, parts first; nothing behind what is known."""
-    found: dict[Expr, None] = {}
-    waiting = list(exprs)
-    while waiting:
-        expr = waiting.pop()
-        if expr not in found:
-            found[expr] = None
-            waiting.extend(expr.args if expr not in known else ())
-    return tuple(sorted(found, key=lambda e: e.index))
 
 
 def split(store: Store, known: Collection[Expr] = ()) -> list[Store]:
