@@ -11,6 +11,7 @@ from ._errors import (
     UnknownNameError,
 )
 from ._param import param, record
+from ._version import __version__ as __version__
 from .actuators import Backlash, DeadZone, Gain, Saturation, cascade
 from .controllers import (
     PID,

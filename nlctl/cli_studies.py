@@ -11,7 +11,6 @@ import errno
 import json as json_text
 import shlex
 import sys
-import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -223,7 +222,9 @@ def exit_codes(json: bool) -> Iterator[None]:
     except (typer.Exit, typer.Abort):
         raise
     except Exception as error:
-        traceback.print_exc()
+        from ._terminal import trace_of
+
+        print(trace_of(error), file=sys.stderr)
         if json:
             print(json_text.dumps({"error": f"{type(error).__name__}: {error}"}))
         raise typer.Exit(INTERNAL) from None

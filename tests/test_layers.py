@@ -8,7 +8,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
-    ["nlctl._errors", "nlctl._files", "nlctl._equation", "nlctl._param", "nlctl._names"]
+    [
+        "nlctl._errors",
+        "nlctl._version",
+        "nlctl._files",
+        "nlctl._equation",
+        "nlctl._param",
+        "nlctl._names",
+    ]
     + ["nlctl._arguments", "nlctl._workers"]
     + [
         "nlctl._block",
@@ -26,8 +33,15 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     + ["analysis.json_values"],
     ["analysis.figures", "analysis.robustness_figures", "analysis.report"],
     ["analysis.studies"],
-    ["nlctl._terminal", "nlctl._check", "nlctl._sweep_progress", "nlctl.cli"]
-    + ["nlctl.cli_report", "nlctl.cli_studies", "nlctl.cli_study_report"],
+    [
+        "nlctl._terminal",
+        "nlctl._loops",
+        "nlctl._beside",
+        "nlctl._check",
+        "nlctl._sweep_progress",
+        "nlctl.cli",
+    ]
+    + ["nlctl.cli_report", "nlctl.cli_studies", "nlctl.cli_study_report", "nlctl.__main__"],
 ]
 COMMAND_LINE = LAYERS[-1]
 BLOCK_MODULES = LAYERS[1]

@@ -24,13 +24,15 @@ def rows(text):
 
 
 BOMBS = {
-    "nested lists": (HEAD + "x = " + "[" * 5000 + "]" * 5000, "inside of each other"),
+    "nested lists": (HEAD + "x = " + "[" * 3000 + "]" * 3000, "inside of each other"),
+    "more lists": (HEAD + "x = " + "[" * 5000 + "]" * 5000, "characters in line"),
+    "lists over lines": (HEAD + "x = " + "[\n" * 5000 + "]\n" * 5000, "inside of each other"),
     "nested lists that do not end": (HEAD + "x = " + "[" * 5000, "TOML|inside of each other"),
-    "nested tables": (HEAD + "x = " + "{ a = " * 2000 + "1" + "}" * 2000, "inside of each other"),
+    "nested tables": (HEAD + "x = " + "{ a = " * 1000 + "1" + "}" * 1000, "inside of each other"),
     "dotted keys": (HEAD + f"{DOTS} = 1\n", "deeper than 20, in 'time'|deeper than 20"),
     "a dotted header": (f"{HEAD}[{DOTS}]\nx = 1\n", "deeper than 20"),
     "a dotted list header": (f"{HEAD}[[{DOTS}]]\nx = 1\n", "deeper than 20"),
-    "the most dots": (HEAD + ".".join(["a"] * 9_900) + " = 1\n", "deeper than 20"),
+    "the most dots": (HEAD + ".".join(["a"] * 3_800) + " = 1\n", "deeper than 20"),
     "more dots": (HEAD + ".".join(["a"] * 60_000) + " = 1\n", "characters in line"),
     "a long integer": (HEAD.replace("seed = 3", "seed = " + "1" * 5000), "thousands of digits"),
     "an integer of 4000 digits": (

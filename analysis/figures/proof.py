@@ -50,7 +50,7 @@ def burst(run: LongRun) -> Figure:
     for p, (colour, style) in zip(run.predictions, STYLES[2:], strict=False):
         for ax in (whole, error):
             ax.axvline(p.burst, color=colour, linestyle=style, linewidth=1.6)
-        label = f"foretold from {p.time:g} s"
+        label = f"predicted after {p.time:g} s, {100 * p.share:.2g} % of the lobe spent"
         whole.plot(p.time, p.zeta, "o", linestyle=style, color=colour, markersize=5, label=label)
     for ax in (whole, error):
         ax.axvline(run.burst, color=ORANGE, linewidth=1.6, label="happened")

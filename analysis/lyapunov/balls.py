@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from nlctl._arguments import a_function, number, of_type, whole_number
+from nlctl._arguments import a_function, of_type, whole_number
 from nlctl._errors import ParameterError
 
 from .ball import Ball, as_ball, common
@@ -113,7 +113,8 @@ def enclose(function: Function, box: Box, *, tol: float = 1e-3, max_boxes: int =
     """
     a_function("enclose", "function", function)
     of_type("enclose", "box", box, Box, "Box.of(x1=(-1, 1))")
-    number("enclose", "tol", tol, above=0)
+    if not tol > 0:  # infinite: the first box will do
+        raise ParameterError(f"enclose needs tol > 0, got {tol}")
     whole_number("enclose", "max_boxes", max_boxes, at_least=1)
     start = time.perf_counter()
     high, greatest, n, lost = _supremum(function, box, tol, max_boxes)

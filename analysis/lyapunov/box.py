@@ -9,7 +9,6 @@ from typing import Literal
 import control as ct
 import numpy as np
 
-from nlctl._arguments import of_type
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
 
@@ -107,7 +106,10 @@ def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
             f"visited_box needs a response and margin >= 0, got {len(responses)} and {margin}"
         )
     for response in responses:
-        of_type("visited_box", "a response", response, ct.TimeResponseData)
+        if not hasattr(response, "output_labels"):
+            raise ParameterError(
+                f"visited_box needs responses with named outputs, got {type(response).__name__}"
+            )
     labels = [list(r.output_labels or ()) for r in responses]
     wanted = [n for n in labels[0] if n in ("u", "v") or _is_state(n)]
     if not any(map(_is_state, wanted)):

@@ -154,19 +154,11 @@ def _numbers(values: Mapping[str, Any] | None) -> dict[str, Any]:
     return {k: v for k, v in (values or {}).items() if np.ndim(v) == 0 or isinstance(v, tuple)}
 
 
-@dataclass(frozen=True)
-class _Extremes:
-    """What `visited_box` reads of a run."""
-
-    time: np.ndarray
-    output_labels: list[str]
-    y: list[np.ndarray]
-
-
 def _visited(runs: Runs) -> Box:
     reached = []
     for run in runs:
         names = [n for n in run.signals.values if n == "v" or (n[:1] == "x" and n[1:].isdigit())]
         y = [np.array([np.min(run.signals[n]), np.max(run.signals[n])]) for n in names]
-        reached.append(_Extremes(run.signals.t[[0, -1]], names, y))
+        ends = run.signals.t[[0, -1]]  # whatever lies in between does not count
+        reached.append(ct.TimeResponseData(ends, np.array(y), output_labels=names, issiso=False))
     return visited_box(*reached)

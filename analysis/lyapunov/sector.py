@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._arguments import number, of_type
-from nlctl._errors import DiagramError
+from nlctl._arguments import of_type
+from nlctl._errors import DiagramError, ParameterError
 from nlctl._param import equation_arguments
 from nlctl.plants import PureFeedback, coordinate_names
 
@@ -121,7 +121,8 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     """
     f, _ = plant_terms(plant)
     box = of_type("sector", "box", box, Box, "Box.of(x1=(-1, 1), v=(-5, 5))")
-    number("sector", "tol", tol, above=0)
+    if not tol > 0:
+        raise ParameterError(f"sector needs tol > 0, got {tol}")
     box = box.only(*coordinate_names(len(plant.states)), "v")
     return quotient_range(lambda x, v: f(tuple(x), v), box, tol=tol, max_boxes=max_boxes)
 

@@ -84,7 +84,7 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
     signals = frozenset.intersection(*(frozenset(d.output_labels) for d in diagrams or [_Empty]))
     for diagram in diagrams:
         _check_names(study, diagram, quantities, requirements, notes)
-    small = _check_sizes(study, notes)
+    large = _too_large(study, notes)
     metrics = notes.attempt(("metrics",), metrics_of, study, folder, signals) if diagrams else None
     inputs = notes.attempt(("inputs",), inputs_of, study, diagrams) if diagrams else None
     _check_analyses(study, metrics, notes)
@@ -92,15 +92,14 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
     if diagrams and not notes.problems:
         made = notes.attempt((), experiment, study, folder, signals, inputs or ())
     if made is None:
-        if small:
-            _check_designs(study, _stand_in(study, quantities), notes)
+        _check_designs(study, _stand_in(study, quantities), large, notes)
         _comparable(study, folder, notes)
     else:
         space = notes.attempt(("space",), resolved, made.space, diagrams[0])
         if space is not None:
             if refusal := notes.attempt(("space",), refusal_of, space, diagrams):
                 notes.add(("space",), f"boxes do not fit together: {refusal}")
-            _check_designs(study, space, notes)
+            _check_designs(study, space, large, notes)
         for i, asked in _comparable(study, folder, notes):
             notes.attempt(("analysis", i), _check_options, study, made, asked, folder)
     return made, _unique(notes.problems)
@@ -185,8 +184,7 @@ def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputS
 def _as_it_comes(function: Callable[..., Any] | None) -> list[ct.InputOutputSystem]:
     """Return the loop without the study's options, so that names can be held against it."""
     try:
-        made = None if function is None else function()
-        return [made] if isinstance(made, ct.InputOutputSystem) else []
+        return [] if function is None else [_diagram(function, "")]
     except Exception:  # whatever a function of the user's does without what it was to be given
         return []
 
@@ -245,23 +243,21 @@ def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Note
                 notes.add(("analysis", i, key), str(unknown("quantity", name, study.space)))
 
 
-def _check_sizes(study: Study, notes: _Notes) -> bool:
-    """Refuse numbers of runs that no machine can make, and return whether there were none."""
-    before = len(notes.problems)
+def _too_large(study: Study, notes: _Notes) -> set[Place]:
+    """Refuse numbers of runs that no machine can make; return where they are asked for."""
     wide, options = len(study.space), math.prod(len(c.options) for c in study.choices.values())
+    counts: dict[Place, int] = {
+        ("analysis", i): max(_sizes(asked, wide)) for i, asked in enumerate(study.analysis)
+    }
     if study.runs is not None:
-        rows = study.runs.size or 1
+        counts["runs",] = study.runs.size or 1
         if study.runs.design in ("grid", "corners"):
-            rows = (study.runs.levels or 2) ** wide * options
-        if rows > MOST_ROWS:
-            notes.add(("runs",), f"at most {MOST_ROWS:,} rows can be run, got {_count(rows)}")
-    for i, asked in enumerate(study.analysis):
-        rows = max(_sizes(asked, wide), default=0)
-        if rows > MOST_ROWS:
-            notes.add(
-                ("analysis", i), f"at most {MOST_ROWS:,} runs can be made, got {_count(rows)}"
-            )
-    return len(notes.problems) == before
+            counts["runs",] = (study.runs.levels or 2) ** wide * options
+    large = {place: count for place, count in counts.items() if count > MOST_ROWS}
+    for place, count in large.items():
+        what = "rows can be run" if place == ("runs",) else "runs can be made"
+        notes.add(place, f"at most {MOST_ROWS:,} {what}, got {_count(count)}")
+    return set(large)
 
 
 def _sizes(asked: Any, wide: int) -> list[int]:
@@ -282,16 +278,17 @@ def _count(rows: int) -> str:
     return f"{rows:,}" if rows < 10**15 else f"about 10^{math.log10(rows):.0f}"
 
 
-def _check_designs(study: Study, space: Space, notes: _Notes) -> None:
-    """Make every design that is known in advance, and hold the analyses against it."""
-    if study.runs is not None:
+def _check_designs(study: Study, space: Space, large: set[Place], notes: _Notes) -> None:
+    """Make designs that are known in advance, unless too large; hold the analyses against them."""
+    if study.runs is not None and ("runs",) not in large:
         notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
     for i, asked in enumerate(study.analysis):
         if asked.kind in ("probability", "sequential") and study.runs is not None:
             kind = study.runs.design
             made = Design(space=space, kind=kind, size=1, is_iid=kind == "i.i.d.", entropy=0)
             notes.attempt(("analysis", i), check_iid, made)
-        notes.attempt(("analysis", i), own_design, asked, space, study.study.seed)
+        if ("analysis", i) not in large:
+            notes.attempt(("analysis", i), own_design, asked, space, study.study.seed)
 
 
 def _quantities_of(asked: Any) -> list[tuple[str, str]]:

@@ -10,7 +10,7 @@ from typing import Any
 __all__ = ["check_depth", "read_toml", "statements"]
 
 LARGEST = 200_000  # characters of a file
-LONGEST = 20_000  # characters of a line
+LONGEST = 8_000  # characters of a line; a key takes the square of its dots to be read
 DEEPEST = 20  # tables and lists inside of each other
 TOKEN = re.compile(
     r'"""(?:[^\\]|\\.)*?"""|\'\'\'.*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*|[\[\]{}\n]',
