@@ -1,5 +1,7 @@
 """Loops that differ from the certified one in one planted thing, by what was changed."""
 
+import dataclasses
+
 import control as ct
 
 import nlctl
@@ -155,3 +157,10 @@ def patched(part, **functions):
     for name, function in functions.items():
         setattr(block, name, function)
     return {part: block}
+
+
+def sampled(record):
+    """A record whose update returns x[k+1], as a block with a sampling interval."""
+    kind = type(type(record).__name__, (type(record),), {"discrete": True})
+    values = {f.name: getattr(record, f.name) for f in dataclasses.fields(record) if f.init}
+    return kind(**values)

@@ -57,5 +57,5 @@ def test_impossible_wishes_are_refused():
         tighten(loop(), u_limit=0.01, horizon=1.0, evaluations=2)
     with pytest.raises(UnknownNameError, match="C_0"):
         tighten(loop(), u_limit=1.0, bound="C0")
-    with pytest.raises(ParameterError, match="evaluations > 0"):
+    with pytest.raises(ParameterError, match="evaluations >= 1"):
         tighten(loop(), u_limit=1.0, evaluations=0)

@@ -7,7 +7,18 @@ function of time, an equation, a parameter.
 import control as ct
 import numpy as np
 import pytest
-from planted_loops import PARTS, UPDATE, actuator, again, nested, patched, plant, system, wired
+from planted_loops import (
+    PARTS,
+    UPDATE,
+    actuator,
+    again,
+    nested,
+    patched,
+    plant,
+    sampled,
+    system,
+    wired,
+)
 
 import nlctl
 from analysis.lyapunov.certificate import certify
@@ -249,7 +260,7 @@ EQUATIONS = {
         "'law' has another output function than KnownSignLaw",
     ),
     "a sampled loop": (
-        lambda: {k: nlctl.block(make(), k, dt=0.1) for k, make in PARTS.items()},
+        lambda: {k: nlctl.block(sampled(make()), k, dt=0.1) for k, make in PARTS.items()},
         r"continuous time, and 'planted' is sampled with dt = 0.1",
     ),
     "a plant that cannot be read on intervals": (

@@ -89,7 +89,8 @@ def demand(loop: KnownSignLoop, split: Decomposition, C: float, *, tol: float = 
         return loop.acceleration(t, x, 0.0)
 
     rough = enclose(matched, over_all("t"), max_boxes=1).magnitude
-    fine = enclose(matched, over_all("t"), tol=tol * rough, max_boxes=20_000)
+    fineness = tol * rough if 0 < rough < np.inf else tol
+    fine = enclose(matched, over_all("t"), tol=fineness, max_boxes=20_000)
     gain = quotient_range(
         lambda x, v: loop.acceleration(x[-1], x[:-1], v),
         over_all("t", "v"),
