@@ -38,7 +38,7 @@ def input_output_response(
     initial_state: Mapping[str, float] | Any = None,
     *,
     params: Mapping[str, Any] | None = None,
-    engine: str = "auto",
+    engine: str | None = "auto",
     method: str | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
@@ -175,7 +175,7 @@ def input_output_response(
             **{"solve_ivp_method": solve_ivp_method, "solve_ivp_kwargs": solve_ivp_kwargs},
         },
     )
-    return _computed(unified(run), engine)
+    return _computed(unified(run), engine or "auto")
 
 
 def _computed(run: Run, engine: str) -> ct.TimeResponseData:

@@ -12,7 +12,6 @@ from hypothesis.extra.numpy import arrays
 
 import nlctl
 
-simulate: Any = nlctl.input_output_response
 reference: Any = ct.input_output_response
 PRECISE = {"rtol": 1e-9, "atol": 1e-11, "max_step": 0.1}
 T = np.linspace(0, 1, 6)
@@ -28,6 +27,13 @@ COMPILED = {name: nlctl.compile(system) for name, system in SYSTEMS.items()}
 ENGINES = ["compiled", "python-control"]
 
 numbers = st.floats(-3, 3)
+
+
+def simulate(system, *arguments: Any, **how: Any) -> Any:
+    """Run a compiled diagram as it is, any other in python-control by default."""
+    if isinstance(system, ct.InputOutputSystem):
+        how = {"engine": "python-control"} | how
+    return nlctl.input_output_response(system, *arguments, **how)
 
 
 def system_for(name, engine):
@@ -241,8 +247,8 @@ class TestRefused:
 
     @pytest.mark.parametrize(("how", "told"), REFUSED)
     def test_in_machine_code(self, how, told):
-        """Also where python-control could take over."""
-        for system, engine in ((COMPILED["three"], None), (THREE, "auto")):
+        """Of a compiled diagram, and of one that is to run as machine code."""
+        for system, engine in ((COMPILED["three"], None), (THREE, "native")):
             with pytest.raises(nlctl.ParameterError, match=told):
                 simulate(system, T, engine=engine, **how)
 
