@@ -28,9 +28,9 @@ def named_loop(name: str) -> Any:
     import control as ct
 
     if ":" in name:
-        from analysis.studies.parts import loop_function  # takes a second
+        from analysis.studies.parts import named_function  # takes a second
 
-        made = loop_function(name, Path.cwd())()
+        made = named_function(name, Path.cwd())()  # who types its name wants it called
     else:
         from .paper import named_example
 
