@@ -87,7 +87,7 @@ def test_the_table_of_figures_is_the_table_that_is_checked():
         keys = [(example, "tail_max_e"), (example, "max_u"), (other, "tail_max_e")]
         for text, key in zip(row.groups(), keys, strict=True):
             assert float(text) == round(wanted[key], len(text.partition(".")[2]))
-    assert f"compares {len(wanted)} figures" in README
+    assert f"compares {len(wanted)} numbers" in README
 
 
 def test_commands_and_names_in_the_readme_exist():
