@@ -96,7 +96,7 @@ class Compiled:
         """
         if getattr(config, "DISABLE_JIT", False):
             return self.interpreted
-        ready = {name: _jitted(f) for name, f in self.program.functions.items()}
+        ready = {name: jitted(f) for name, f in self.program.functions.items()}
         module = loaded(self.program, ready)
         options = {"error_model": "numpy", "nogil": True}
         wanted = [
@@ -225,7 +225,7 @@ def _restored(content: bytes) -> Compiled:
     return Compiled(schedule=read, program=program)
 
 
-def _jitted(function: Any) -> Any:
+def jitted(function: Any) -> Any:
     """Make a block's function callable from machine code; equations already are."""
     if isinstance(function, CPUDispatcher):
         return function

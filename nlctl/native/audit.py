@@ -19,8 +19,9 @@ import numpy as np
 from .._errors import ParameterError, UsageError
 from ._compile import Compiled
 from ._emit import emit
-from ._lower import lower, lowered_code
+from ._lower import lower
 from ._machine import Machine, machine
+from ._routine import lowered_code
 from ._schedule import Signal
 from .thirdparty.python_control import block_inputs, block_outputs, block_rates
 
