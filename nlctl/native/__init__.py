@@ -14,10 +14,10 @@ sampled systems.
 """
 
 from .._errors import CompileError
+from ._ahead import compile_ahead
 from ._compile import Compiled, compile  # noqa: A004 (what it does)
 from ._ensemble import Ensemble, ensemble_response
 from ._lane import Status
-from ._machine import compile_ahead
 from ._response import Response, uninterrupted
 from ._schedule import AlgebraicLoopError
 from ._simulate import Settings, Statistics

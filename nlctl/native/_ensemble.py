@@ -15,9 +15,10 @@ import numpy as np
 from .._names import unknown
 from .._param import checked_times
 from .._run_arguments import input_array
+from ._ahead import compile_for
 from ._compile import Compiled
 from ._lane import RUNNING, STIFF, Status
-from ._machine import WIDTH, compile_for
+from ._machine import WIDTH
 from ._members import Members, members
 from ._simulate import Settings, Trajectory, begin, finish, go_on, made, prepared, trajectory
 from .audit import Audit, Trial

@@ -120,7 +120,7 @@ def lower(
     rows = {
         "p": parameters, "t": 1, "x": system.nstates or 0, "u": system.ninputs or 0,
         "c": max(size, 1), "dx": system.nstates or 0, "g": program.events,
-        "y": system.noutputs or 0,
+        "y": len(schedule.outputs),
     }  # fmt: skip
     calls = Calls(
         calls=found.calls, lanes=lanes, before=found.before, functions=program.functions,
@@ -132,9 +132,7 @@ def lower(
     )  # fmt: skip
 
 
-def _planned(
-    stores: Mapping[str, list[Store]], parameters: int
-) -> tuple[dict[str, Function], int]:
+def _planned(stores: Mapping[str, list[Store]], parameters: int) -> tuple[dict[str, Function], int]:
     """Return the plans of all functions, and how many rows of `c` they need."""
     known = _parameters_alone([s.expr for part in stores.values() for s in part], parameters)
     prepared = [

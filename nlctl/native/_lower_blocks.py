@@ -90,7 +90,7 @@ def whole(schedule: Schedule, program: Program) -> Equations:
     found = []
     for name, count, line in (
         ("rhs", n + program.events, f"program_rhs(t, x, u, p, y[:{n}], y[{n}:])"),
-        ("out", system.noutputs or 0, "program_out(t, x, u, p, y)"),
+        ("out", len(schedule.outputs), "program_out(t, x, u, p, y)"),
     ):
         lengths = (*(g.size for g in given), count)
         call = Call(name=f"{name}_of_one", lines=(line,), lengths=lengths, reason=why)

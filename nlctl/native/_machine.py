@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import control as ct
 import numpy as np
 
-from ._compile import Compiled
-from ._discrete import compile_discrete
 from ._lower import Lowered, lower
 from ._lower_blocks import Equations, whole
 from ._routine import check, entry, lowered_code
 from .thirdparty.errors import explained
+
+if TYPE_CHECKING:
+    from ._compile import Compiled
 
 WIDTH = 8  # members side by side in ensembles: one AVX-512 register
 
@@ -77,29 +77,30 @@ def _made(compiled: Compiled, width: int, found: Equations | None) -> tuple[Lowe
     return lowered, Machine(width=width, rows=lowered.size, prepare=prepare, rhs=rhs, out=out)
 
 
-def compile_ahead(compiled: Compiled, *, ensemble: bool = False) -> None:
-    """Make a diagram's machine code now, instead of with its first run; it stays in the cache.
+def evaluations(compiled: Compiled) -> tuple[Callable[..., None], Callable[..., None]]:
+    """Return ``rhs(t, x, u, p, dx, g)`` and ``out(t, x, u, p, y)`` of numbers and flat vectors."""
 
-    The integrators, which all diagrams share, are not included.
+    def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: np.ndarray, g: np.ndarray) -> None:
+        code, c = prepared_parameters(compiled, p)
+        code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], g[:, None])
 
-    Parameters
-    ----------
-    compiled : Compiled
-    ensemble : bool, optional
-        Make that of `nlctl.ensemble_response`, instead of that of single runs.
+    def out(t: float, x: Any, u: Any, p: np.ndarray, y: np.ndarray) -> None:
+        code, c = prepared_parameters(compiled, p)
+        code.out(np.array([t]), _column(x), _column(u), c, y[:, None])
 
-    Raises
-    ------
-    CompileError
-        If a block's function cannot be machine code.
-    """
-    width = WIDTH if ensemble else 1
-    compile_for(compiled, np.repeat(compiled.parameter_vector()[:, None], width, axis=1), width)
+    return rhs, out
 
 
-def compile_for(compiled: Compiled, p: np.ndarray, width: int) -> None:
-    """Make the machine code that runs with parameters `p` need, as `machine` takes them."""
-    if ct.isctime(compiled.system):
-        machine(compiled, p, width)
-    else:
-        compile_discrete(compiled)
+def prepared_parameters(
+    compiled: Compiled, p: np.ndarray, width: int = 1
+) -> tuple[Machine, np.ndarray]:
+    """Return machine code for a parameter vector, and what its functions take of that."""
+    each = np.repeat(p[:, None], width, axis=1)
+    code = machine(compiled, each, width)
+    c = np.zeros((code.rows, width))
+    code.prepare(each, c)
+    return code, c
+
+
+def _column(values: Any) -> np.ndarray:
+    return np.ascontiguousarray(values, dtype=float).reshape(-1, 1)

@@ -11,7 +11,7 @@ import numpy as np
 from numba.core import config
 
 from .._errors import UsageError
-from ._compile import TAUGHT, jitted
+from ._jitted import TAUGHT, jitted
 from ._lower import Lowered
 from .codegen.calls import FAILED, Call, Native
 from .codegen.finish import Loaded, finished
@@ -123,7 +123,9 @@ def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Rou
     ]
     return Routine(
         address=loaded.addresses[name],
-        shapes=tuple((lanes,) if a == "t" else (lowered.rows[a], lanes) for a in function.arguments),
+        shapes=tuple(
+            (lanes,) if a == "t" else (lowered.rows[a], lanes) for a in function.arguments
+        ),
         loaded=loaded,
         opaque=tuple(opaque),
     )

@@ -20,7 +20,7 @@ from .._errors import ParameterError, UsageError
 from ._compile import Compiled
 from ._emit import emit
 from ._lower import lower
-from ._machine import Machine, machine
+from ._machine import Machine, prepared_parameters
 from ._routine import lowered_code
 from ._schedule import Signal
 from .thirdparty.python_control import block_inputs, block_outputs, block_rates
@@ -86,7 +86,8 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
     if not wanted:
         return
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
-        code = _code(compiled, trial)
+        width = trial.width if ct.isctime(compiled.system) else 1
+        code, _ = prepared_parameters(compiled, trial.p, width)
         done = compiled.__dict__.setdefault("_audited", [])
         if wanted is True and any(known is code for known in done):
             return
@@ -102,28 +103,10 @@ def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
         yield float(trial.time[m]), trial.states[:, m].copy(), trial.inputs[:, m].copy()
 
 
-def _code(compiled: Compiled, trial: Trial) -> Any:
-    """Return the machine code of a run."""
-    if not ct.isctime(compiled.system):
-        return compiled.native
-    return machine(compiled, np.repeat(trial.p[:, None], trial.width, axis=1), trial.width)
-
-
-def _evaluated(compiled: Compiled, trial: Trial, code: Any) -> Evaluated:
+def _evaluated(compiled: Compiled, trial: Trial, code: Machine) -> Evaluated:
     """Return what machine code computes at a point."""
     system, events = compiled.system, compiled.program.events
-    if not isinstance(code, Machine):
-        rhs, out = code
-
-        def one(t: float, x: np.ndarray, u: np.ndarray) -> Values:
-            dx, y = np.empty(x.size), np.empty(system.noutputs or 0)
-            rhs(t, x, u, trial.p, dx, np.empty(events))
-            out(t, x, u, trial.p, y)
-            return dx, y
-
-        return one
-    c = np.zeros((code.rows, code.width))
-    code.prepare(np.repeat(trial.p[:, None], code.width, axis=1), c)
+    _, c = prepared_parameters(compiled, trial.p, code.width)
 
     def several(t: float, x: np.ndarray, u: np.ndarray) -> Values:
         tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), code.width, axis=1) for v in (t, x, u))
@@ -229,7 +212,7 @@ def _signals(compiled: Compiled, trial: Trial, point: Any) -> np.ndarray:
     schedule = replace(compiled.schedule, outputs=every)
     t, x, u = point
     y = np.empty((len(every), 1))
-    if schedule.loops or not ct.isctime(compiled.system):
+    if schedule.loops:
         _, out = Compiled(schedule=schedule, program=emit(schedule)).interpreted
         out(t, x, u, trial.p, y[:, 0])
         return y[:, 0]

@@ -81,8 +81,7 @@ class Calls:
 
     @property
     def source(self) -> str:
-        """Source of all of them: ``name(given, y)``, and ``at_name(c, at, lane)`` for machine code.
-        """
+        """Source of all of them: ``name(given, y)``, and ``at_name(c, at, lane)`` for machine code."""
         lines = [*self.before.splitlines()]
         for call in self.calls.values():
             lines += ["", "", "@equation", f"def {call.name}(given, y):  # {call.reason}"]

@@ -18,9 +18,7 @@ from .plan import Function, LoopOfLevel, Plan
 Opaque = Callable[[np.ndarray, int, int], None]  # of c, a row of it, and the member
 
 
-def interpreted(
-    function: Function, lanes: int, calls: Mapping[str, Opaque]
-) -> Callable[..., None]:
+def interpreted(function: Function, lanes: int, calls: Mapping[str, Opaque]) -> Callable[..., None]:
     """Return one function of a program.
 
     Parameters

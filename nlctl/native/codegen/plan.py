@@ -217,7 +217,13 @@ def plan(wanted: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int)
         if store.size > 1:
             loops.setdefault((level[store.expr], store.size), [])
     return Plan(
-        known=known, nodes=nodes, level=level, stored=stored, loops=loops, stores=tuple(written), rows=rows
+        known=known,
+        nodes=nodes,
+        level=level,
+        stored=stored,
+        loops=loops,
+        stores=tuple(written),
+        rows=rows,
     )
 
 

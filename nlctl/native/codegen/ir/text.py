@@ -86,7 +86,9 @@ class Module:
         tables = []
         for values, name in self.tables.items():
             inside = ", ".join(f"double {float_text(v)}" for v in values)
-            tables.append(f"{name} = private constant [{len(values)} x double] [{inside}], align 32")
+            tables.append(
+                f"{name} = private constant [{len(values)} x double] [{inside}], align 32"
+            )
         weights = '!0 = !{!"branch_weights", i32 1, i32 100000}\n'
         return "\n".join([*self.declared, *tables, "", *self.functions.values(), weights])
 
