@@ -67,6 +67,10 @@ class Lowered:
         """Rows of `c`."""
         return self.rows["c"]
 
+    def shape(self, array: str) -> tuple[int, ...]:
+        """Return the shape of one of its arrays."""
+        return (self.lanes,) if array == "t" else (self.rows[array], self.lanes)
+
     @property
     def opaque(self) -> dict[str, str]:
         """Why a function is called and not written out, by its name."""

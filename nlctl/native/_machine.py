@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._errors import CompileError
 from ._lower import Lowered, lower
 from ._lower_blocks import Equations, whole
 from ._routine import check, entry, lowered_code
@@ -72,6 +73,8 @@ def _made(compiled: Compiled, width: int, found: Equations | None) -> tuple[Lowe
     lowered = lower(compiled.schedule, compiled.program, width, found)
     try:
         prepare, rhs, out = lowered_code(lowered)
+    except CompileError:
+        raise
     except Exception as error:  # numba passes on whatever typing raises
         raise explained(error, compiled.program) from error
     return lowered, Machine(width=width, rows=lowered.size, prepare=prepare, rhs=rhs, out=out)
@@ -79,6 +82,7 @@ def _made(compiled: Compiled, width: int, found: Equations | None) -> tuple[Lowe
 
 def evaluations(compiled: Compiled) -> tuple[Callable[..., None], Callable[..., None]]:
     """Return ``rhs(t, x, u, p, dx, g)`` and ``out(t, x, u, p, y)`` of numbers and flat vectors."""
+    machine(compiled, compiled.parameter_vector()[:, None])
 
     def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: np.ndarray, g: np.ndarray) -> None:
         code, c = prepared_parameters(compiled, p)

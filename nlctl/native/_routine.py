@@ -115,7 +115,7 @@ def lowered_code(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
 
 
 def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Routine:
-    function, lanes = lowered.functions[name], lowered.lanes
+    function = lowered.functions[name]
     opaque = [
         Opaque(call=lowered.calls.calls[node.data[0]], row=row, native=native)
         for node, (_, row) in function.plan.stored.items()
@@ -123,9 +123,7 @@ def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Rou
     ]
     return Routine(
         address=loaded.addresses[name],
-        shapes=tuple(
-            (lanes,) if a == "t" else (lowered.rows[a], lanes) for a in function.arguments
-        ),
+        shapes=tuple(lowered.shape(array) for array in function.arguments),
         loaded=loaded,
         opaque=tuple(opaque),
     )

@@ -1,8 +1,8 @@
 """What an integration works on: the task, arrays for all members, and the right-hand side.
 
-The right-hand side is an address: what calls it is compiled once and not once per diagram.  Here and in what works on these arrays elements are assigned in loops: assigning a
-slice compiles to the same loop and to the text of errors that cannot happen, and takes ten times
-as long to compile.
+The right-hand side is an address: what calls it is compiled once and not once per diagram.  Here
+and in what works on these arrays elements are assigned in loops: assigning a slice compiles to the
+same loop and to the text of errors that cannot happen, and takes ten times as long to compile.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba import carray  # pyright: ignore[reportPrivateImportUsage]
 from numba.core.errors import NumbaWarning
 
 from ..._equation import equation
@@ -81,7 +82,7 @@ class Calls:
 
     @property
     def source(self) -> str:
-        """Source of all of them: ``name(given, y)``, and ``at_name(c, at, lane)`` for machine code."""
+        """Source of ``name(given, y)``, and of ``at_name(c, at, lane)`` for machine code."""
         lines = [*self.before.splitlines()]
         for call in self.calls.values():
             lines += ["", "", "@equation", f"def {call.name}(given, y):  # {call.reason}"]
@@ -92,7 +93,7 @@ class Calls:
     def namespace(self, *, native: bool) -> dict[str, Any]:
         """Return everything that the source refers to, by name."""
         records = {name: pair[native] for name, pair in self.records.items()}
-        own = {"np": np, "carray": numba.carray, "equation": equation}
+        own = {"np": np, "carray": carray, "equation": equation}
         return {**own, **self.constants, **self.functions, **records}
 
     def plain(self) -> dict[str, Callable[[np.ndarray, int, int], None]]:
@@ -135,7 +136,7 @@ class Calls:
 
 @dataclass(frozen=True, kw_only=True)
 class Native:
-    """Addresses of opaque functions by name, what they belong to, and the module of their source."""
+    """Addresses of opaque functions, what they belong to, and the module of their source."""
 
     symbols: Mapping[str, int]
     owners: tuple[Any, ...]
@@ -143,8 +144,8 @@ class Native:
 
     def raise_again(self, name: str, given: np.ndarray, count: int) -> None:
         """Call a function with the arguments with which it has failed."""
-        options = {"error_model": "numpy", "nogil": True}
-        numba.njit(getattr(self.module, name), **options)(given, np.empty(count))
+        function = numba.njit(error_model="numpy", nogil=True)(getattr(self.module, name))
+        function(given, np.empty(count))
 
 
 def _unpacked(call: Call) -> list[str]:

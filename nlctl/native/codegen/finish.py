@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import re
 import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from typing import Any
 import llvmlite
 import llvmlite.binding as llvm
 
+from ..._errors import CompileError
 from . import store
 
 PASSES = (
@@ -61,8 +63,8 @@ def finished(
 
     Raises
     ------
-    RuntimeError
-        If it is no IR, or calls what is nowhere.
+    CompileError
+        If it calls what is nowhere.
     """
     with _ONE_AT_A_TIME:
         key = _key(text)
@@ -72,11 +74,19 @@ def finished(
             store.write(key, code)
         for name, address in symbols.items():
             llvm.add_symbol(name, address)
+        _check_symbols(text)
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
         addresses = {name: engine.get_function_address(name) for name in names}
     return Loaded(addresses=addresses, owners=(engine, *owners))
+
+
+def _check_symbols(text: str) -> None:
+    """Check that all that is called is there: LLVM would end the process."""
+    for name in re.findall(r"^declare .*?@(\w+)\(", text, re.MULTILINE):  # LLVM's have a dot
+        if not llvm.address_of_symbol(name):
+            raise CompileError(f"this machine's C library has no function '{name}'")
 
 
 def _object_code(text: str) -> bytes:
