@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,10 +70,13 @@ class Routine:
             fits = array.shape == shape and array.dtype == float and array.flags.c_contiguous
             if not fits:
                 raise ValueError(f"an array of shape {shape} is needed, got {array.shape}")
-        call = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(arrays))(self.address)
-        call(*(array.ctypes.data for array in arrays))
+        self._function(*(array.ctypes.data for array in arrays))
         if self.opaque:
             self.check(arrays[3])
+
+    @cached_property
+    def _function(self) -> Any:
+        return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(self.shapes))(self.address)
 
     def check(self, c: np.ndarray) -> None:
         """Raise what a function that it has called has raised.

@@ -26,8 +26,7 @@ from ._schedule import Signal
 from .thirdparty.python_control import block_inputs, block_outputs, block_rates
 
 POINTS = 5  # of a trajectory, its start and end among them
-EQUAL = 1e-12  # relative difference that rounding explains without a closer look
-ROUNDING = 1e-10  # the same where values are sums of larger ones
+ROUNDING = 1e-10  # relative difference that rounding explains without a closer look
 SHAKEN = 1e-13  # relative change of states and inputs that shows what rounding does to a value
 _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
 
@@ -147,14 +146,14 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
         return
     shaken = _shaken(system, point, trial.params)
     for what, a, b, moved in zip(("state", "output"), ours, theirs, shaken, strict=True):
-        wrong = np.flatnonzero(~_close(a, b, ROUNDING, 100 * moved))
+        wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
         if wrong.size:
             _compare_blocks(compiled, trial, ours, point)  # it names the block, if it finds one
             labels = system.state_labels if what == "state" else system.output_labels
             raise _difference(labels[wrong[0]], system.name, (a[wrong[0]], b[wrong[0]]), point[0])
 
 
-def _close(a: np.ndarray, b: np.ndarray, relative: float = EQUAL, absolute: Any = 0.0) -> Any:
+def _close(a: np.ndarray, b: np.ndarray, relative: float = ROUNDING, absolute: Any = 0.0) -> Any:
     """Whether values are equal to rounding; NaN equals nothing."""
     return (a == b) | (np.abs(a - b) <= relative * np.maximum(np.abs(a), np.abs(b)) + absolute)
 
@@ -199,7 +198,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
         for a, function, labels in pairs if block.noutputs else pairs[1:]:
             b = function(block, t, x[own], inputs)
             moved = np.abs(function(block, t, x[own] * (1 + SHAKEN), inputs * (1 - SHAKEN)) - b)
-            wrong = np.flatnonzero(~_close(a, b, ROUNDING, 100 * moved))
+            wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
             if wrong.size:
                 raise _difference(labels[wrong[0]], node.path, (a[wrong[0]], b[wrong[0]]), t)
 
