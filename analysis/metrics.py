@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from nlctl._arguments import a_function, text
 from nlctl._equation import equation
+from nlctl._errors import ParameterError
 from nlctl.native.codegen.machine_code import kept
 
 __all__ = [
@@ -57,6 +59,11 @@ class Metric:
         ``function(t, y) -> float``.
     start, end : float
         Interval of time (s) that counts.
+
+    Raises
+    ------
+    ParameterError
+        If it has no name, signal or function, or the interval ends before it starts.
     """
 
     key: str
@@ -66,6 +73,15 @@ class Metric:
     function: Callable[[np.ndarray, np.ndarray], float]
     start: float = 0.0
     end: float = np.inf
+
+    def __post_init__(self) -> None:
+        text("a metric", "key", self.key)
+        text(f"metric '{self.key}'", "signal", self.signal)
+        a_function(f"metric '{self.key}'", "function", self.function)
+        if not self.start <= self.end:
+            raise ParameterError(
+                f"metric '{self.key}' needs start <= end, got {self.start:g} and {self.end:g}"
+            )
 
     @property
     def signals(self) -> tuple[str, ...]:

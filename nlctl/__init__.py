@@ -6,4 +6,6 @@ instant.  `__init__.pyi` lists them for readers, editors and type checkers alike
 
 import lazy_loader
 
+from ._version import __version__ as __version__
+
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,15 +1,17 @@
 from . import actuators, controllers, functions, native, paper, plants, references
-from ._block import Block, block
+from ._block import Block, Spec, block
 from ._diagram import initial_state, interconnect, parameters, state_names
 from ._equation import equation
 from ._errors import (
     AmbiguousNameError,
+    BlockError,
     DiagramError,
     DivergedError,
     ParameterError,
     UnknownNameError,
 )
 from ._param import param, record
+from ._version import __version__ as __version__
 from .actuators import Backlash, DeadZone, Gain, Saturation, cascade
 from .controllers import (
     PID,
@@ -36,12 +38,14 @@ from .controllers import (
 from .drawing import draw
 from .native import (
     AlgebraicLoopError,
+    BlockEquations,
     CacheWarning,
     Compiled,
     CompileError,
     Ensemble,
     compile,  # noqa: A004
     ensemble_response,
+    typeset,
 )
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
@@ -55,6 +59,8 @@ __all__ = [
     "Backlash",
     "BandLimitedNoise",
     "Block",
+    "BlockEquations",
+    "BlockError",
     "CacheWarning",
     "CompileError",
     "Compiled",
@@ -81,6 +87,7 @@ __all__ = [
     "RobustTerm",
     "Saturation",
     "SlidingModeLaw",
+    "Spec",
     "SumOfSines",
     "UnknownNameError",
     "Zero",
@@ -111,4 +118,5 @@ __all__ = [
     "replaced",
     "sliding_mode",
     "state_names",
+    "typeset",
 ]

@@ -10,27 +10,53 @@ from typing import Any, Protocol
 import control as ct
 import numpy as np
 
-from ._errors import ParameterError
+from ._errors import BlockError, ParameterError
 from ._names import Parameters, base_name, unknown
 from ._param import declared_params, ensure_checked, equation_arguments, with_overrides
 
 
 class Spec(Protocol):
-    """What a record offers to be made a block.
+    """What a record offers to be made a block: names of signals, and equations.
 
-    ``inputs``, ``outputs`` and ``states`` name the signals.  ``output(t, x, u, p)`` and, where
-    there are states, ``update(t, x, u, p)`` are equations: `p` holds the record's parameters
-    (``p.b_r``), the result is a tuple or a 1-D array.  ``feedthrough`` says whether the outputs
-    depend on `u`.  ``initial`` (optional) maps state names to initial values other than 0,
-    ``vector = True`` (optional) declares that the equations want `x` and `u` as 1-D arrays and
-    do not unpack them.
+    It is a contract, not a base class: any class with these attributes will do, and
+    `nlctl.record` makes one whose parameters are checked.
 
-    Two optional equations serve the native engine.  ``corners(t, x, u, p)`` returns a tuple of
-    switching functions: where one of them changes its sign, an equation has a corner or a jump,
-    and an integration step ends there.  ``memory`` names states that are memory; ``commit(t, x,
-    u, p)`` returns what they become at the end of a step that was accepted.  Within a step they
-    stand still, and a step in which a memory would turn round is divided where it does.  It must
-    be continuous except where a corner changes its sign.
+    Attributes
+    ----------
+    inputs, outputs, states : sequence of str
+        Names of the signals and states.
+    feedthrough : bool
+        Whether an output depends on `u` at the same instant.
+    output : callable
+        ``output(t, x, u, p)`` returns the outputs, as a tuple or a 1-D array: `t` is the time in
+        s, `x` the states, `u` the inputs, and `p` holds the record's parameters (``p.b_r``).
+    update : callable
+        ``update(t, x, u, p)`` returns x'; only where there are states.
+    discrete : bool, optional
+        True where `update` returns x[k+1] instead: such a block needs a ``dt``.
+    initial : mapping, optional
+        Initial values of states, ``{"zeta": 1.0}``; the others start from 0.
+    vector : bool, optional
+        True where the equations want `x` and `u` as 1-D arrays and do not unpack them.
+    corners : callable, optional
+        ``corners(t, x, u, p)`` returns a tuple of switching functions: where one of them changes
+        its sign, an equation has a corner or a jump, and a step of the native engine ends there.
+    memory : sequence of str, optional
+        States that are memory.  Within a step of the native engine they stand still.
+    commit : callable, optional
+        ``commit(t, x, u, p)`` returns what the states in `memory` become at the end of a step
+        that was accepted.  A step in which a memory would turn round is divided where it does.
+        It must be continuous except where a corner changes its sign.
+    derived : callable, optional
+        ``derived(self) -> dict`` of numbers that follow from the parameters; `p` has them too.
+    check : callable, optional
+        ``check(self)`` raises `nlctl.ParameterError` where several fields contradict each other.
+    plant_order : int, optional
+        Of a controller: the order of the plants that it is made for.
+
+    Notes
+    -----
+    Equations are pure, as `nlctl.equation` says.  Memory is a state, never an attribute.
     """
 
     inputs: Sequence[str]
@@ -39,7 +65,9 @@ class Spec(Protocol):
     feedthrough: bool
 
     @property
-    def output(self) -> Any: ...
+    def output(self) -> Any:
+        """The equation of the outputs, ``output(t, x, u, p)``."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,15 +194,20 @@ def _names(labels: Sequence[str]) -> str:
 
 def parameter_rows(block: Block, path: str = "") -> list[ParameterRow]:
     """Return the parameter table of a block, with names that begin with `path`."""
+    return record_rows(block.current_spec, path)
+
+
+def record_rows(spec: Any, path: str = "") -> list[ParameterRow]:
+    """Return the parameter table of a record, with names that begin with `path`."""
     return [
         ParameterRow(
             name=f"{path}{name}",
-            value=getattr(block.current_spec, name),
+            value=getattr(spec, name),
             unit=p.unit,
             meaning=p.meaning,
             bounds=p.bounds,
         )
-        for name, p in declared_params(block.current_spec).items()
+        for name, p in declared_params(spec).items()
     ]
 
 
@@ -188,7 +221,9 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     name : str
         Name of the block, and the first part of its parameters' names.
     dt : float, bool or None, optional
-        Timebase as in python-control, where None leaves the choice to its rules.
+        Timebase as in python-control, where None leaves the choice to its rules.  Records without
+        states may have any; one with states is in continuous time unless it says
+        ``discrete = True``.
 
     Returns
     -------
@@ -199,8 +234,8 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     Raises
     ------
     ParameterError
-        If a parameter is out of bounds.
-    TypeError
+        If a parameter is out of bounds, the name is none, or `dt` does not fit the record.
+    BlockError
         If `spec` lacks something that a block needs, or its equations return the wrong number
         of values, or ``feedthrough = False`` is not true.
     """
@@ -210,11 +245,35 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     if missing or isinstance(spec, type):
         what = spec.__name__ if isinstance(spec, type) else type(spec).__name__
         why = "is a class: make a record of it first" if isinstance(spec, type) else None
-        raise TypeError(f"{what} {why or 'is no block: it lacks ' + ', '.join(missing)}")
+        raise BlockError(f"{what} {why or 'is no block: it lacks ' + ', '.join(missing)}")
+    if not (name is None or (isinstance(name, str) and name)):
+        raise ParameterError(f"a block needs a name, got {name!r} for {type(spec).__name__}")
     ensure_checked(spec)
+    _check_timebase(spec, name, dt)
     made = Block(spec, name, **({} if dt is None else {"dt": dt}))
     _probe(made)
     return made
+
+
+def _check_timebase(spec: Any, name: str, dt: Any) -> None:
+    """Refuse x' for x[k+1], and the other way round."""
+    who = f"{type(spec).__name__} (block '{name}')"
+    is_number = isinstance(dt, int | float | np.number)
+    if not (dt is None or dt is True or (is_number and 0 <= dt < np.inf and dt is not False)):
+        raise ParameterError(f"{who} needs dt >= 0 in s, True or None, got {dt!r}")
+    if not spec.states:
+        return
+    is_discrete, sampled = bool(getattr(spec, "discrete", False)), dt is True or bool(dt)
+    if sampled and not is_discrete:
+        raise ParameterError(
+            f"{who} is in continuous time: its update returns x', which dt={dt} would take for "
+            "x[k+1]. Leave dt out; a record whose update returns x[k+1] says discrete = True"
+        )
+    if is_discrete and not sampled:
+        raise ParameterError(
+            f"{who} is in discrete time, its update returns x[k+1]: give its sampling time, "
+            f"dt=0.1 s for example, got {dt}"
+        )
 
 
 def default_state(system: ct.InputOutputSystem) -> np.ndarray:
@@ -256,7 +315,7 @@ def _probe(made: Block) -> None:
             got = np.size(function(0.0, x, u, p))
             if got != wanted:
                 names = made.output_labels if what == "output" else made.state_labels
-                raise TypeError(
+                raise BlockError(
                     f"{who} returns {got} values from {what}, needs {wanted}: {', '.join(names)}"
                 )
         # With NaN for an input, an output that it reaches turns NaN as well.
@@ -265,6 +324,6 @@ def _probe(made: Block) -> None:
             after = np.asarray(spec.output(0.0, x, u * np.nan, p), dtype=float)
             if not np.array_equal(before, after, equal_nan=True):
                 label = made.output_labels[int(np.argmax(before != after))]
-                raise TypeError(
+                raise BlockError(
                     f"{who} declares feedthrough = False, but output '{label}' depends on the input"
                 )

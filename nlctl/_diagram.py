@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,10 +10,17 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
-from ._block import Block, ParameterRow, block, default_state, parameter_rows
+from ._block import (
+    Block,
+    ParameterRow,
+    block,
+    default_state,
+    parameter_rows,
+    record_rows,
+)
 from ._errors import DiagramError, ParameterError
 from ._names import Parameters, find_name, unknown
-from ._param import as_numbers
+from ._param import as_numbers, declared_params
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -122,10 +130,16 @@ def interconnect(
     ------
     DiagramError
         If two blocks share a name, deliver the same signal, or an input is fed by nothing or
-        twice, or if one block stands in the diagram twice.
+        twice, if one block stands in the diagram twice, or if a controller is for plants of a
+        lower order than the one that it is connected to.
     UnknownNameError
         If `outputs` names a signal that no block delivers, or `inputs` one that none takes.
     """
+    if not isinstance(blocks, Mapping | Sequence) or isinstance(blocks, str) or not len(blocks):
+        raise DiagramError(
+            "interconnect needs blocks with their names, {'plant': ...}, got "
+            f"{'none' if isinstance(blocks, Mapping | Sequence) else type(blocks).__name__}"
+        )
     if isinstance(blocks, Mapping):
         systems = [as_system(thing, key) for key, thing in blocks.items()]
     else:
@@ -135,6 +149,7 @@ def interconnect(
     _check_blocks(systems)
     sources = _signal_sources(systems)
     _check_inputs(systems, sources, inputs)
+    _check_orders(systems, sources)
     outputs = list(sources) if outputs is None else list(outputs)
     for signal in outputs:
         if signal not in sources:
@@ -212,8 +227,43 @@ def _check_inputs(
                 raise DiagramError(f"block '{system.name}' takes a signal nobody delivers: {error}")
 
 
+def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str, str]) -> None:
+    """A controller that is made for plants of one order must not drive one of a higher order."""
+    for system in systems:
+        for leaf in leaves(system):
+            order = getattr(getattr(leaf.system, "spec", None), "plant_order", None)
+            if not isinstance(order, int):
+                continue
+            above = f"x{order + 1}"
+            taken = f"x{order}" in system.input_labels
+            if taken and above in sources and sources[above] == sources[f"x{order}"]:
+                raise DiagramError(
+                    f"'{system.name}' is a controller for plants of order {order}, and "
+                    f"'{sources[above]}' has a state {above} that it would not see: make a "
+                    f"controller of its order, such as nlctl.adaptive_neural(order={order + 1})"
+                )
+
+
+def known_system(who: str, system: Any) -> Any:
+    """Return a block or diagram; of a compiled diagram that which was compiled.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither.
+    """
+    inner = getattr(system, "system", system)
+    if not isinstance(inner, ct.InputOutputSystem):
+        raise ParameterError(
+            f"{who} needs a block or diagram, got {type(system).__name__}: nlctl.block makes a "
+            "block of a record"
+        )
+    return inner
+
+
 def state_names(system: ct.InputOutputSystem) -> list[str]:
     """Return the qualified names of all states, ``"controller.law.zeta"``, in vector order."""
+    system = known_system("state_names", system)
     return [f"{leaf.path}.{s}" for leaf in leaves(system) for s in leaf.system.state_labels]
 
 
@@ -244,6 +294,11 @@ def initial_state(
     ParameterError
         If a value is not a finite number.
     """
+    system = known_system("initial_state", system)
+    if not isinstance(values, Mapping | None):
+        raise ParameterError(
+            f"initial_state needs values by name, {{'plant.x1': 0.8}}, got {type(values).__name__}"
+        )
     x = np.concatenate([default_state(leaf.system) for leaf in leaves(system)])
     index = {name: i for i, name in enumerate(state_names(system))}
     for name, value in (values or {}).items():
@@ -271,21 +326,31 @@ def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
     return rows
 
 
-def parameters(system: ct.InputOutputSystem) -> pd.DataFrame:
-    """Return all parameters of a block or diagram as a table.
+def parameters(system: Any) -> pd.DataFrame:
+    """Return all parameters of a diagram, block or record as a table.
 
     Parameters
     ----------
-    system : control.InputOutputSystem
+    system : control.InputOutputSystem, record or Compiled
 
     Returns
     -------
     pandas.DataFrame
-        One row per parameter, indexed by qualified name; columns value, unit, bounds, meaning.
+        One row per parameter, indexed by qualified name, or by the name of the field for a
+        record; columns value, unit, bounds, meaning.
+
+    Raises
+    ------
+    ParameterError
+        If it is none of these.
     """
     import pandas as pd
 
-    rows = all_parameter_rows(system)
+    is_record = dataclasses.is_dataclass(system) and not isinstance(system, type)
+    if is_record and declared_params(system):
+        rows = record_rows(system)
+    else:
+        rows = all_parameter_rows(known_system("parameters", system))
     return pd.DataFrame(
         {
             "value": [row.value for row in rows],

@@ -1,15 +1,50 @@
 """Equations: plain Python functions that machine code may call too."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 from numba.extending import register_jitable
 
-equation = register_jitable
-"""Mark a function as an equation of a block.
+from ._errors import ParameterError
 
-An equation is written once, in plain Python and NumPy, and read by everybody: python-control
-calls it as it stands, the native engine compiles it, interval proofs evaluate it on balls and
-the reader finds it in the paper.  The decorator returns the function unchanged and only tells
-numba (whose ``register_jitable`` it is) that compiled code may call it.
+Function = TypeVar("Function", bound=Callable[..., Any])
 
-What an equation may contain is what both readers understand: arithmetic, comparisons, NumPy
-functions, tuples.  It is pure: the result depends on the arguments alone, which stay unchanged.
-"""
+
+def equation(function: Function) -> Function:
+    """Mark a function as an equation of a block.
+
+    An equation is written once, in plain Python and NumPy, and read by everybody: python-control
+    calls it as it stands, the native engine compiles it, interval proofs evaluate it on balls and
+    the reader finds it in the paper.
+
+    What an equation may contain is what all of these understand: arithmetic, comparisons, NumPy
+    functions, tuples.  It is pure: the result depends on the arguments alone, which stay
+    unchanged, and NaN in gives NaN out.
+
+    Parameters
+    ----------
+    function : callable
+        ``f(x, v)`` of a plant, or ``update(t, x, u, p)`` and ``output(t, x, u, p)`` of a block,
+        see `nlctl.Spec`.
+
+    Returns
+    -------
+    callable
+        The function, unchanged; numba is told that compiled code may call it.
+
+    Raises
+    ------
+    ParameterError
+        If it is no function.
+
+    Examples
+    --------
+    >>> @equation
+    ... def pendulum(x, v):
+    ...     return -9.81 * np.sin(x[0]) - 0.1 * x[1] + v
+    """
+    if not callable(function):
+        raise ParameterError(f"equation needs a function, got {type(function).__name__}")
+    return register_jitable(function)

@@ -25,6 +25,10 @@ class DiagramError(UsageError):
     """Blocks that cannot be joined: the message names block and signal."""
 
 
+class BlockError(DiagramError, TypeError):
+    """What cannot be made a block: the message says what it lacks; Python's kind as well."""
+
+
 class DivergedError(RuntimeError):
     """A run whose state left the finite numbers.
 

@@ -10,8 +10,11 @@ import control as ct
 import numpy as np
 
 from ._errors import DivergedError, ParameterError
+from ._names import unknown
 from ._run_arguments import Run, evaluation_array, input_array, state_array
+from ._time_response import as_response
 
+METHODS = ("LSODA", "RK23", "RK45", "DOP853", "Radau", "BDF")  # of scipy.integrate.solve_ivp
 STANDSTILL = 200  # steps in a row that do not advance the time
 
 
@@ -37,6 +40,9 @@ def interpreted(run: Run) -> ct.TimeResponseData:
             raise ParameterError("evaluation_times of a sampled system needs two times, got one")
     simulate: Any = ct.input_output_response  # its types are those of the defaults
     watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
+    method = solver["method"] or solver["solve_ivp_method"] or "LSODA"
+    if isinstance(method, str) and method not in METHODS:
+        raise unknown("method", method, METHODS, "of python-control's solve_ivp")
     settings = {"rtol": solver["rtol"], "atol": solver["atol"], "events": watch}
     with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
         try:
@@ -48,7 +54,7 @@ def interpreted(run: Run) -> ct.TimeResponseData:
                 params=dict(params or {}),
                 ignore_errors=run.ignore_errors,
                 evaluation_times=wanted,
-                solve_ivp_method=solver["method"] or solver["solve_ivp_method"] or "LSODA",
+                solve_ivp_method=method,
                 solve_ivp_kwargs=settings | solver["solve_ivp_kwargs"],
                 **run.form,
             )
@@ -59,7 +65,7 @@ def interpreted(run: Run) -> ct.TimeResponseData:
             raise
     if not np.all(np.isfinite(response.y)):
         raise _diverged(system, watch.reached)
-    return response
+    return as_response(response)
 
 
 @dataclass

@@ -16,6 +16,8 @@ import control as ct
 
 from ._errors import AmbiguousNameError, UnknownNameError
 
+LISTED = 24  # names that a message lists; it says how many more there are
+
 
 def unknown(
     kind: str,
@@ -30,7 +32,9 @@ def unknown(
     if near:
         hint = "nearest: " + ", ".join(f"'{n}'" for n in near)
     else:
-        hint = "known: " + (", ".join(f"'{n}'" for n in sorted(known)[:12]) or "none")
+        names = sorted(dict.fromkeys(known))
+        hint = "known: " + (", ".join(f"'{n}'" for n in names[:LISTED]) or "none")
+        hint += f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
     return error(f"unknown {kind} '{name}'{where and ' ' + where}; {hint}")
 
 

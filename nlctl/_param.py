@@ -24,7 +24,7 @@ _KEY = "nlctl"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Param:
-    """What `param` declares about one field: unit, meaning, bounds, number of axes."""
+    """What `param` declares about one field: unit, meaning, bounds, number of axes, symbol."""
 
     unit: str
     meaning: str
@@ -33,6 +33,7 @@ class Param:
     at_least: float | None
     at_most: float | None
     ndim: int
+    symbol: str | None
 
     def rules(self) -> Iterator[tuple[str, Callable[[float], bool]]]:
         """Yield each bound as ``("> 0", test)``."""
@@ -61,6 +62,7 @@ def param(
     below: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
+    symbol: str | None = None,
 ) -> Any:
     """Declare a parameter of a block record.
 
@@ -75,6 +77,8 @@ def param(
         Strict bounds of the value (of every element).
     at_least, at_most : float, optional
         Bounds that the value may attain.
+    symbol : str, optional
+        What formulas call it, where that is not its name: ``"mu"`` for centres.
 
     Returns
     -------
@@ -89,6 +93,7 @@ def param(
         at_least=at_least,
         at_most=at_most,
         ndim=np.ndim(default),
+        symbol=symbol,
     )
     return dataclasses.field(default=default, metadata={_KEY: declared})
 
@@ -109,10 +114,14 @@ def record(cls: type[T]) -> type[T]:
     UnknownNameError
         When it is made with a parameter that it does not have; also a `TypeError`.
     """
+    if not isinstance(cls, type):
+        raise ParameterError(f"record needs a class, got {type(cls).__name__}")
+    told = cls.__doc__ if cls.__dict__.get("__doc__") else ""
     if "__post_init__" not in cls.__dict__:
         cls.__post_init__ = check_params  # type: ignore[attr-defined]
         cls.__checked_at_birth__ = True  # type: ignore[attr-defined]
     made: Any = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    made.__doc__ = _documented(made, told or "")
     init, known = made.__init__, [f.name for f in dataclasses.fields(made) if f.init]
 
     @functools.wraps(init)
@@ -124,6 +133,47 @@ def record(cls: type[T]) -> type[T]:
 
     made.__init__ = by_name
     return made
+
+
+def _documented(cls: Any, told: str) -> str:
+    """Return the docstring of a record class with all fields in numpydoc's Parameters."""
+    margin = told.rpartition("\n")[2]  # what stands in front of the closing quotes
+    margin = margin if margin.isspace() else ""
+    there = re.findall(r"^\s*(\w+(?:, \w+)*) :", told, re.M)
+    told_of = {name for names in there for name in names.split(", ")}
+    lines = []
+    for field in dataclasses.fields(cls):
+        if field.name not in told_of:
+            lines += _entry(field, declared_params(cls).get(field.name))
+    if not lines:
+        return told
+    entries = "".join(f"{margin}{line}\n" for line in lines)
+    own = re.search(r"^\s*Parameters\n\s*-+\n", told, re.M)
+    if own:
+        return told[: own.end()] + entries + told[own.end() :]
+    section = f"{margin}Parameters\n{margin}----------\n{entries}{margin}"
+    first = re.search(r"^[ \t]*\w+\n[ \t]*-+$", told, re.M)  # a section that follows by numpydoc
+    if first:
+        return f"{told[: first.start()]}{section.rstrip()}\n\n{told[first.start() :]}"
+    return f"{told.rstrip()}\n\n{section}"
+
+
+def _entry(field: Any, rule: Param | None) -> list[str]:
+    """Return the lines of one field: name, type and default; meaning, unit and bounds."""
+    kind = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", "")
+    default = "" if field.default is dataclasses.MISSING else _default_text(field.default)
+    head = f"{field.name} : {kind}{default}"
+    if rule is None:
+        return [head]
+    bounds = f", {rule.bounds}" if rule.bounds else ""
+    return [head, f"    {rule.meaning[:1].upper()}{rule.meaning[1:]} ({rule.unit}){bounds}."]
+
+
+def _default_text(value: Any) -> str:
+    text = repr(value)
+    if len(text) > 60:
+        text = " x ".join(map(str, np.shape(value))) + " values" if np.size(value) > 1 else ""
+    return f", default {text}" if text else ", optional"
 
 
 def ensure_checked(spec: Any) -> None:
@@ -210,7 +260,10 @@ def checked_times(timepts: Any) -> np.ndarray:
     ParameterError
         If it has fewer than two times, or they are not finite and increasing.
     """
-    times = np.array(timepts, dtype=float)
+    times = as_numbers(timepts)
+    if times is None:
+        raise ParameterError(f"timepts needs numbers, got {str(timepts)[:60]!r}")
+    times = times.copy()
     if times.ndim != 1 or times.size < 2:
         raise ParameterError(f"timepts needs at least two times, got shape {times.shape}")
     if not np.all(np.isfinite(times)) or not np.all(np.diff(times) > 0):

@@ -39,6 +39,21 @@ class Run:
     solver: Mapping[str, Any]  # method, rtol, ..., and what SciPy is told
 
 
+def checked_params(params: Any) -> Mapping[str, Any] | None:
+    """Return the parameters of a run.
+
+    Raises
+    ------
+    ParameterError
+        If they are not given by name.
+    """
+    if not isinstance(params, Mapping | None):
+        raise ParameterError(
+            f"params needs values by name, {{'law.beta': 4.0}}, got {type(params).__name__}"
+        )
+    return params
+
+
 def with_aliases(
     given: Mapping[str, Any], aliases: Mapping[str, Any], defaults: Mapping[str, Any]
 ) -> dict[str, Any]:

@@ -239,6 +239,10 @@ def cascade(stages: Mapping[str, Any], *, name: str = "actuator") -> ct.Intercon
     DiagramError
         If there is no stage, or one has other signals.
     """
+    if not isinstance(stages, Mapping):
+        raise DiagramError(
+            f"cascade needs stages with their names, {{'limit': ...}}, got {type(stages).__name__}"
+        )
     systems, last = [], len(stages) - 1
     for i, (key, stage) in enumerate(stages.items()):
         system = as_system(stage, key).copy(name=key)

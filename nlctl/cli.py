@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import traceback
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +15,6 @@ app = typer.Typer(
     name="nlctl",
     help="Adaptive neural control of pure-feedback nonlinear systems with python-control.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
@@ -28,30 +26,67 @@ Set = Annotated[
         help='A parameter ("actuator.b_r=0.6") or an initial state ("plant.x1(0)=0.8").',
     ),
 ]
-Example = Annotated[str, typer.Argument(help="example-1 or example-2.")]
+Loop = Annotated[
+    str,
+    typer.Argument(
+        metavar="LOOP",
+        help="example-1, example-2, or a loop of your own: path/to/file.py:function or "
+        "package.module:function, a function that returns the diagram. Its code is run.",
+    ),
+]
+
+
+def _told_version(wanted: bool) -> None:
+    if wanted:
+        from ._version import __version__
+
+        print(f"nlctl {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def version(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_told_version, is_eager=True, help="Say which.")
+    ] = False,
+) -> None:
+    """Adaptive neural control of pure-feedback nonlinear systems with python-control."""
+    from ._beside import check_analysis
+
+    check_analysis()
 
 
 @app.command()
 def simulate(
-    example: Example,
+    loop: Loop,
     set_: Set = None,
+    input_: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="NAME=VALUE", help="A constant input; 0 by default."),
+    ] = None,
+    engine: Annotated[
+        str | None,
+        typer.Option(help="native, python-control, or auto: native if it can be compiled."),
+    ] = None,
     until: Annotated[float, typer.Option(help="Horizon in s.")] = 20.0,
     step: Annotated[float, typer.Option(help="Sampling interval of the output in s.")] = 0.01,
     plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
     csv: Annotated[Path | None, typer.Option(help="Table of signals to write.")] = None,
 ) -> None:
-    """Simulate an example, with parameters and initial states changed at will."""
-    from ._terminal import check_figure, check_writable, progress_bar, show_metrics, write_figure
+    """Simulate a loop, with parameters, initial states and inputs changed at will."""
+    from ._loops import assignments, input_values, named_loop, sampled_times
+    from ._terminal import check_figure, check_file, progress_bar, show_metrics, write_figure
     from .response import input_output_response
 
-    diagram = _diagram(example)
-    params, initial = _assignments(diagram, set_ or [])
-    times = _times(until, step)
+    times = sampled_times(until, step)
     if plot is not None:
         check_figure(plot)
     if csv is not None:
-        check_writable(csv.parent)
-    with progress_bar(f"simulating {example}", until) as advance:
+        check_file(csv)
+    diagram = named_loop(loop)
+    params, initial = assignments(diagram, set_ or [])
+    inputs = input_values(diagram, input_ or [])[:, None] + 0 * times
+    with progress_bar(f"simulating {loop}", until) as advance:
         reached = [0.0]
 
         def progress(t: float) -> None:
@@ -59,7 +94,7 @@ def simulate(
             reached[0] = t
 
         response = input_output_response(
-            diagram, times, 0, initial, params=params, progress=progress
+            diagram, times, inputs, initial, params=params, engine=engine, progress=progress
         )
     signals = {name: response.y[i] for name, i in diagram.output_index.items()}
     show_metrics(times, signals)
@@ -74,7 +109,7 @@ def simulate(
 
 @app.command()
 def check(
-    example: Example,
+    loop: Loop,
     set_: Set = None,
     horizon: Annotated[float, typer.Option(help="Length of the runs in s.")] = 20.0,
     ensemble: Annotated[
@@ -99,11 +134,12 @@ def check(
 
     from ._check import random_start, replay, show_ledger, summary, worst_lines
     from ._errors import ParameterError
+    from ._loops import assignments, named_loop
 
     if not 0 < horizon < float("inf"):
         raise ParameterError(f"check needs a horizon > 0, got {horizon:g}")
-    diagram = _diagram(example)
-    params, start = _assignments(diagram, set_ or [])
+    diagram = named_loop(loop)
+    params, start = assignments(diagram, set_ or [])
     if ensemble:
         start = random_start(diagram, start, ensemble, spread, seed)
     steps = round(20_000 * max(horizon, 10))  # several times what a run that ends well takes
@@ -115,86 +151,35 @@ def check(
         print(summary(found))
         for line in worst_lines(found) if ensemble else ():
             print(f"run {line.member}, worst in {line.key}, again (with constants of its own):")
-            print(f"  {replay(example, horizon, set_ or [], start, line.member)}")
+            print(f"  {replay(loop, horizon, set_ or [], start, line.member)}")
     if not found.holds:
         raise typer.Exit(1)
 
 
 @app.command("list")
 def list_(
-    name: Annotated[str | None, typer.Argument(help="Show this block only.")] = None,
+    name: Annotated[str | None, typer.Argument(help="A block, whose parameters are shown.")] = None,
 ) -> None:
-    """List the blocks with parameters, units and bounds, and the examples."""
-    from ._terminal import show_blocks
+    """List the blocks in groups, and the examples; with NAME, its parameters, units and bounds."""
+    from ._terminal import show_block, show_groups
 
-    show_blocks(name)
+    show_groups() if name is None else show_block(name)
 
 
 @app.command()
 def diagram(
-    example: Example,
+    loop: Loop,
     out: Annotated[Path, typer.Option("-o", "--out", help="File: .svg, .png, .pdf.")],
     expand: Annotated[bool, typer.Option(help="Show what is inside nested diagrams.")] = False,
 ) -> None:
-    """Draw the block diagram of an example."""
+    """Draw the block diagram of a loop."""
+    from ._loops import named_loop
     from ._terminal import check_figure, write_figure
     from .drawing import draw
 
     check_figure(out)
-    write_figure(out, draw(_diagram(example), expand=expand))
+    write_figure(out, draw(named_loop(loop), expand=expand))
     print(out)
-
-
-def _diagram(example: str):
-    from .paper import named_example
-
-    return named_example(example)()
-
-
-def _times(until: float, step: float):
-    import numpy as np
-
-    from ._errors import ParameterError
-
-    if not (0 < step < until < float("inf")):
-        raise ParameterError(f"simulate needs 0 < step < until, got step {step:g}, until {until:g}")
-    return np.linspace(0, until, round(until / step) + 1)
-
-
-def _assignments(diagram, texts: list[str]) -> tuple[dict, dict]:
-    """Sort ``NAME=VALUE`` texts into parameters and initial states; names must exist."""
-    from ._diagram import parameter_names
-    from ._errors import ParameterError
-    from ._names import base_name, find_name
-
-    params, initial = {}, {}
-    for text in texts:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not (name and equals and value):
-            raise ParameterError(f"--set needs NAME=VALUE, got '{text}'")
-        if name.endswith("(0)"):
-            initial[name.removesuffix("(0)")] = _number(name, value)
-        else:
-            find_name("parameter", base_name(name), dict.fromkeys(parameter_names(diagram)))
-            params[name] = _value(name, value)
-    return params, initial
-
-
-def _value(name: str, text: str) -> bool | float | tuple[float, ...]:
-    if text.lower() in ("true", "false"):
-        return text.lower() == "true"
-    if "," in text:
-        return tuple(_number(name, part) for part in text.split(","))
-    return _number(name, text)
-
-
-def _number(name: str, text: str) -> float:
-    from ._errors import ParameterError
-
-    try:
-        return float(text)
-    except ValueError:
-        raise ParameterError(f"{name} needs a number, got '{text}'") from None
 
 
 def _write_csv(path: Path, times, signals) -> None:
@@ -213,7 +198,7 @@ register_studies(app)
 def main() -> None:
     """Run the command line; what the user can put right ends in one sentence and exit code 2.
 
-    What he cannot, an internal error, ends with its trace and exit code 3.
+    An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
     """
     from ._errors import DivergedError, UsageError
 
@@ -222,6 +207,14 @@ def main() -> None:
     except (UsageError, DivergedError, OSError) as error:
         print(f"nlctl: {error}", file=sys.stderr)
         raise SystemExit(2) from None
-    except Exception:
-        traceback.print_exc()
+    except KeyboardInterrupt:
+        print("nlctl: interrupted", file=sys.stderr)
+        raise SystemExit(130) from None
+    except MemoryError as error:
+        print(f"nlctl: this needs more memory than there is ({error})", file=sys.stderr)
+        raise SystemExit(2) from None
+    except Exception as error:
+        from ._terminal import trace_of
+
+        print(trace_of(error), file=sys.stderr)
         raise SystemExit(3) from None

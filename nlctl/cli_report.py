@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
+import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .cli_studies import INCOMPLETE, INTERRUPTED, exit_codes, run_folder
+from .cli_studies import ANSWERS, INCOMPLETE, INTERRUPTED, Trust, exit_codes, run_folder
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -20,9 +21,14 @@ if TYPE_CHECKING:
     from analysis.report.document import Report
     from analysis.report.svg import Drawn
 
+    from ._errors import UsageError
+
 QUICK = ("example-1-quick", "example-2-quick")  # the studies of the paper's report
 
 Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser.")]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace files of others in the folder of the page.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 
@@ -55,13 +61,27 @@ def report(
     interactive: Annotated[
         bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
     ] = False,
+    force: Force = False,
+    trust: Trust = False,
 ) -> None:
-    """Write a report, one page that needs nothing else.  Exit 1 if a claim of it fails."""
+    """Write a report, one page that needs nothing else.  Exit 1 if a claim of it fails.
+
+    Rows of a study are drawn from its loop: the code that the study names is run.
+    """
     with exit_codes(json=False):
         made, page, code = (
-            _paper(out or Path("reports/paper"), jobs, far=far, pdf=pdf, interactive=interactive)
+            _paper(
+                out or Path("reports/paper"),
+                jobs,
+                far=far,
+                pdf=pdf,
+                interactive=interactive,
+                force=force,
+            )
             if study is None
-            else _study(study, out, jobs, pdf=pdf, interactive=interactive)
+            else _study(
+                study, out, jobs, pdf=pdf, interactive=interactive, force=force, trust=trust
+            )
         )
         print(made)
         finish_report(page, pdf=pdf, open_=open_)
@@ -70,18 +90,23 @@ def report(
 
 
 def _paper(
-    out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool
+    out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool
 ) -> tuple[str, Path, int]:
     """Reproduce the paper; return the verdict, the page and the exit code."""
-    check_report_options(out, pdf=pdf)
     with _other_process() as beside:
         compiling = beside.submit(_compile_ahead)  # first of all: imports here take seconds
+        check_report_options(out, pdf=pdf, force=force)
         from analysis.report.render import write_report
 
+        from .cli_study_report import clear_shipped
+
+        clear_shipped(QUICK, out, force=force)
         made, drawn, passed = _reproduced(beside, compiling, out, jobs, far=far)
         options = " --far" * far + " --interactive" * interactive
         made = replace(made, command=made.command + options)
-        page = write_report(made, out, interactive=interactive, pool=beside, drawn=drawn)
+        page = write_report(
+            made, out, interactive=interactive, force=force, pool=beside, drawn=drawn
+        )
     return made.verdict, page, int(not passed)
 
 
@@ -125,10 +150,11 @@ def _reproduced(
 @contextmanager
 def _other_process() -> Iterator[Executor]:
     """Lend a process for the other core; it ends when the body fails, whatever it is doing."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import active_children, get_context
+    from multiprocessing import active_children
 
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    from ._workers import process_pool
+
+    with process_pool(1) as pool:
         try:
             yield pool
         except BaseException:
@@ -171,19 +197,32 @@ def _compile_ahead() -> None:
 
 
 def _study(
-    study: Path, out: Path | None, jobs: int, *, pdf: bool, interactive: bool
+    study: Path,
+    out: Path | None,
+    jobs: int,
+    *,
+    pdf: bool,
+    interactive: bool,
+    force: bool,
+    trust: bool,
 ) -> tuple[str, Path, int]:
     """Report a study; return the verdict, the page and the exit code."""
     from ._sweep_progress import sweep_bar
     from .cli_study_report import report_study
 
     kept = run_folder(study) if study.suffix == ".toml" else study
-    check_report_options(out or kept, pdf=pdf)
+    check_report_options(out or kept, pdf=pdf, force=force)
     page, result = report_study(
-        study, out, threads=jobs or None, watch=sweep_bar, interactive=interactive
+        study,
+        out,
+        threads=jobs or None,
+        watch=sweep_bar,
+        interactive=interactive,
+        force=force,
+        trust=trust,
     )
     if result.complete:
-        return result.verdict, page, int(not result.holds)
+        return result.verdict, page, ANSWERS.get(result.answer, 0)
     if study.suffix == ".toml":
         print("nlctl: incomplete; the same command goes on", file=sys.stderr)
     return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE
@@ -203,22 +242,28 @@ def compare(
 def gallery(
     folder: Annotated[Path, typer.Argument(help="Folder with reports below it.")],
     open_: Open = False,
+    force: Force = False,
 ) -> None:
     """Write FOLDER/index.html: every report below it with its verdict."""
-    write_gallery_of(folder, open_=open_)
+    write_gallery_of(folder, open_=open_, force=force)
 
 
-def check_report_options(out: Path, *, pdf: bool) -> None:
+def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
     """Refuse, before anything is computed, what could not be written afterwards.
 
     Raises
     ------
     UsageError
-        If `out` cannot be written to, or a PDF is wanted and no browser is installed.
+        If `out` cannot be written to or holds files that no report has made, or a PDF is wanted
+        and no browser is installed.
     """
+    from analysis.report.own import check_report_folder
+
     from ._terminal import check_writable
 
     check_writable(out)
+    if not force:
+        check_report_folder(out)
     if pdf:
         from analysis.report.browser import find_browser
 
@@ -245,7 +290,7 @@ def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
 def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:
     """Print what differs, one thing a line; return whether nothing does.
 
-    Two folders without reports are compared by the results of their runs.
+    Two runs are compared by their results where one of them has no report.
 
     Raises
     ------
@@ -253,12 +298,19 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
         If a file is no report, or cannot be read.
     """
     from analysis.report.compare import compare
-    from analysis.studies import run_differences
+    from analysis.studies import origin_differences, run_differences
 
-    runs = [p.is_dir() and not (p / "report.json").exists() for p in (first, second)]
+    paths = (first, second)
+    without = [p for p in paths if p.is_dir() and not (p / "report.json").exists()]
+    as_runs = bool(without) and all((p / "results.json").exists() for p in paths)
+    if not as_runs:
+        for path in (p for p in paths if p in without or not p.exists()):
+            raise _no_report(path)
     found: list[Any] = (
-        run_differences(first, second) if all(runs) else compare(first, second, rtol=rtol)
+        run_differences(first, second) if as_runs else compare(first, second, rtol=rtol)
     )
+    if as_runs and (told := origin_differences(first, second)):
+        print(f"nlctl: the two runs were not computed from the same: {told}", file=sys.stderr)
     if as_json:
         told = [text if isinstance(text, str) else vars(text) for text in found]
         print(json_text.dumps(told, indent=1, ensure_ascii=False))
@@ -270,13 +322,29 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
     return not found
 
 
-def write_gallery_of(folder: Path, *, open_: bool) -> None:
+def _no_report(path: Path) -> UsageError:
+    """Return what is said of a path that cannot be compared, with the next step."""
+    from ._errors import UsageError
+
+    if not path.exists():
+        return UsageError(f"there is no '{path}': compare needs two reports, or two runs")
+    run = shlex.quote(str(path))
+    if (path / "results.json").exists():
+        return UsageError(f"'{path}' is a run without a report: make it with 'nlctl report {run}'")
+    if (path / "study.toml").exists():
+        return UsageError(
+            f"'{path}' is a run that is not done: finish it with 'nlctl run STUDY --resume'"
+        )
+    return UsageError(f"'{path}' holds neither a report nor a run of a study")
+
+
+def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     """Write the index page over the reports below a folder, and print where it is.
 
     Raises
     ------
     UsageError
-        If there is no report, or the folder cannot be written to.
+        If there is no report, or the folder cannot be written to, or its page is no gallery.
     """
     from analysis.report.browser import open_page
     from analysis.report.gallery import write_gallery
@@ -284,7 +352,7 @@ def write_gallery_of(folder: Path, *, open_: bool) -> None:
     from ._terminal import check_writable
 
     check_writable(folder)
-    page = write_gallery(folder)
+    page = write_gallery(folder, force=force)
     print(page)
     if open_ and not open_page(page):
         print("no browser was found to show it")

@@ -1,7 +1,8 @@
 """The commands about study files.  Like `nlctl.cli` it only reads arguments and prints.
 
-Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or an invalid study, 3 an internal error or
-one of the user's own functions, 4 incomplete and resumable, 130 interrupted.
+Exit codes: 0 all claims are shown, 1 a claim is refuted, 2 usage or an invalid study, 3 an
+internal error or one of the user's own functions, 4 incomplete and resumable, 5 no claim is
+refuted, but not all are shown yet, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ import errno
 import json as json_text
 import shlex
 import sys
-import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +18,8 @@ from typing import Annotated, Any
 
 import typer
 
-FAILS, INVALID, INTERNAL, INCOMPLETE, INTERRUPTED = 1, 2, 3, 4, 130
+FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
+ANSWERS = {"refuted": FAILS, "not shown yet": OPEN}  # exit code by the answer to a study's claims
 CONNECT = "5s"  # how long a scheduler may take to answer
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY", help="The study file, .toml.")]
@@ -29,6 +30,12 @@ Settings = Annotated[
         metavar="KEY=VALUE",
         help="Replace what stands in the file: runs.size=100, "
         'space."actuator.b_r".uniform=[0.3,0.6], analysis.0.confidence=0.9.',
+    ),
+]
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust", help="Run code from outside of the study's folder and of installed packages."
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
@@ -52,13 +59,23 @@ def run(
     out: Annotated[
         Path | None, typer.Option(help="Folder for the results; reports/NAME by default.")
     ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Use a folder with other files.")] = False,
+    trust: Trust = False,
     json: Json = False,
 ) -> None:
-    """Run a study, print what it found, and keep everything in a folder."""
+    """Run a study, print what it found, and keep everything in a folder.
+
+    A study file names code, which is run: run the studies of those whose programs you would run.
+
+    Exit codes: 0 all claims are shown, 1 a claim is refuted, 5 none is refuted but not all are
+    shown yet, 2 an invalid study, 3 an error in a function of yours, 4 incomplete: go on with
+    --resume.
+    """
     options = [part for text in set_ or [] for part in ("--set", text)]
     options += [] if out is None else ["--out", str(out)]
     options += [] if executor == "threads" else ["--executor", executor]
     options += ["--jobs", str(jobs)] if jobs else []
+    options += ["--force"] * force + ["--trust"] * trust
     folder = run_folder(study) if out is None else out
     with exit_codes(json), _told_how_to_go_on(study, options, folder, resume, json):
         from analysis.studies import read_study
@@ -66,12 +83,13 @@ def run(
 
         from ._sweep_progress import sweep_bar
 
-        file = read_study(study, set_ or [])
+        file = read_study(study, set_ or [], trust=trust)
         with _executor(executor, jobs) as pool:
             result = run_study(
                 file,
                 folder,
                 resume=resume,
+                force=force,
                 executor=pool,
                 threads=jobs or None if pool is None else None,
                 watch=sweep_bar,
@@ -79,16 +97,25 @@ def run(
         _show(result, json)
         if not result.complete:
             raise typer.Exit(INTERRUPTED if result.interrupted else INCOMPLETE)
-        if not result.holds:
-            raise typer.Exit(FAILS)
+        if result.answer in ANSWERS:
+            raise typer.Exit(ANSWERS[result.answer])
 
 
-def validate(study: StudyPath, set_: Settings = None, jobs: Jobs = 0, json: Json = False) -> None:
-    """Check a study file, and say how many runs, how much time and disk it will take."""
+def validate(
+    study: StudyPath,
+    set_: Settings = None,
+    jobs: Jobs = 0,
+    trust: Trust = False,
+    json: Json = False,
+) -> None:
+    """Check a study file, and say how many runs, how much time and disk it will take.
+
+    To know, it makes the loop and runs a few rows: the code that the file names is run.
+    """
     with exit_codes(json):
         from analysis.studies import plan, read_study
 
-        found = plan(read_study(study, set_ or []), jobs or None)
+        found = plan(read_study(study, set_ or [], trust=trust), jobs or None)
         if json:
             content = {"valid": True, **vars(found), "total": found.total}
             print(json_text.dumps(content, indent=1))
@@ -109,9 +136,13 @@ def replay(
         str, typer.Option(help="An analysis that keeps rows of its own, such as worst-case.")
     ] = "",
     plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
+    trust: Trust = False,
     json: Json = False,
 ) -> None:
-    """Run one row again, compare it with the stored one bit for bit, and plot its signals."""
+    """Run one row again, compare it with the stored one bit for bit, and plot its signals.
+
+    The loop is made anew: the code that the study names is run.
+    """
     with exit_codes(json):
         from analysis.studies import replay as replay_row
         from analysis.studies import replay_figure
@@ -120,7 +151,7 @@ def replay(
 
         if plot is not None:
             check_figure(plot)
-        made = replay_row(folder, row, part)
+        made = replay_row(folder, row, part, trust=trust)
         if plot is not None:
             write_figure(plot, replay_figure(made))
         if json:
@@ -191,7 +222,9 @@ def exit_codes(json: bool) -> Iterator[None]:
     except (typer.Exit, typer.Abort):
         raise
     except Exception as error:
-        traceback.print_exc()
+        from ._terminal import trace_of
+
+        print(trace_of(error), file=sys.stderr)
         if json:
             print(json_text.dumps({"error": f"{type(error).__name__}: {error}"}))
         raise typer.Exit(INTERNAL) from None
@@ -226,13 +259,10 @@ def _executor(text: str, jobs: int) -> Iterator[Any]:
     if text == "threads":
         yield None
     elif text == "processes":
-        import multiprocessing
-        from concurrent.futures import ProcessPoolExecutor
-
+        from ._workers import process_pool
         from .native._ensemble import cores
 
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(jobs or cores(), mp_context=context) as pool:
+        with process_pool(jobs or cores()) as pool:
             yield pool
     elif text.startswith("dask:"):
         with _dask_client(text.removeprefix("dask:")) as client:
@@ -271,7 +301,7 @@ def _show(result: Any, json: bool) -> None:
     for finding in result.findings:
         print(f"\n{finding.title}\n  {finding.sentence}")
         if finding.claim:
-            print(f"  Claim: {finding.claim}: {'holds' if finding.holds else 'FAILS'}.")
+            print(f"  Claim: {finding.claim}: {finding.told}.")
     print(f"\n{result.folder}")
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,10 +15,11 @@ from .cli_studies import run_folder
 if TYPE_CHECKING:
     from analysis.report.document import Section
     from analysis.report.robustness_histories import Histories
+    from analysis.robustness import Prepared
     from analysis.studies.result import Result
     from analysis.studies.run import Watch
 
-__all__ = ["compile_shipped", "report_study", "run_shipped", "studies_part"]
+__all__ = ["clear_shipped", "compile_shipped", "report_study", "run_shipped", "studies_part"]
 
 
 def report_study(
@@ -29,6 +29,8 @@ def report_study(
     threads: int | None = None,
     watch: Watch | None = None,
     interactive: bool = False,
+    force: bool = False,
+    trust: bool = False,
 ) -> tuple[Path, Result]:
     """Write the report of a study.
 
@@ -43,6 +45,10 @@ def report_study(
         Shows how far the rows are, see `analysis.studies.run.Watch`.
     interactive : bool, optional
         As in `analysis.report.render_html`.
+    force : bool, optional
+        Whether files of others are replaced, see `analysis.report.write_report`.
+    trust : bool, optional
+        As in `analysis.studies.read_study`.
 
     Returns
     -------
@@ -56,16 +62,21 @@ def report_study(
     """
     from analysis.report.render import write_report
     from analysis.report.robustness_part import study_report
+    from analysis.report.study_loop import loop_of
     from analysis.studies import load_result
 
-    result = _run(path, threads, watch) if path.suffix == ".toml" else load_result(path)
+    result = (
+        _run(path, threads, watch, force, trust) if path.suffix == ".toml" else load_result(path)
+    )
     command = f"nlctl report {shlex.quote(path.as_posix())}" + " --interactive" * interactive
-    made = study_report(result, _histories(result, threads), command)
+    prepared = _prepared(result, trust)
+    loop = None if prepared is None else loop_of(prepared)
+    made = study_report(result, _histories(result, prepared, threads), command, loop)
     if out is not None:  # the data stay with the run
         data = Path(os.path.relpath(result.folder, out))
         made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})
     folder = result.folder if out is None else out
-    return write_report(made, folder, interactive=interactive), result
+    return write_report(made, folder, interactive=interactive, force=force), result
 
 
 def compile_shipped(names: Sequence[str]) -> None:
@@ -78,8 +89,23 @@ def compile_shipped(names: Sequence[str]) -> None:
         compile_ahead(prepare(read_study(shipped(name)).experiment))
 
 
+def clear_shipped(names: Sequence[str], folder: Path, *, force: bool = False) -> None:
+    """Remove the runs of studies that come with nlctl, to make them anew: runs and nothing else.
+
+    Raises
+    ------
+    UsageError
+        If a folder of such a name holds something else; with `force` that goes as well.
+    """
+    from analysis.studies.folder import remove_run
+
+    for name in names:
+        if (folder / name).exists():
+            remove_run(folder / name, force=force)
+
+
 def run_shipped(names: Sequence[str], folder: Path, threads: int | None = None) -> None:
-    """Run studies that come with nlctl, each in ``folder/name``; a run that is there is replaced.
+    """Run studies that come with nlctl, each in ``folder/name``, see `clear_shipped`.
 
     It can be called in another process: what it finds is on the disk.
 
@@ -91,8 +117,6 @@ def run_shipped(names: Sequence[str], folder: Path, threads: int | None = None) 
     from analysis.studies import read_study, run, shipped
 
     for name in names:
-        if (folder / name / "run.json").exists():
-            shutil.rmtree(folder / name)
         if run(read_study(shipped(name)), folder / name, threads=threads).interrupted:
             raise KeyboardInterrupt
 
@@ -111,33 +135,52 @@ def studies_part(folders: Sequence[Path], *, threads: int | None = None) -> list
     from analysis.studies import load_result
 
     results = [load_result(folder) for folder in folders]
-    return study_part([(result, _histories(result, threads)) for result in results])
+    return study_part([(r, _histories(r, _prepared(r, False), threads)) for r in results])
 
 
-def _run(path: Path, threads: int | None, watch: Watch | None) -> Result:
+def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trust: bool) -> Result:
     from analysis.studies import read_study, run
 
     how: dict[str, Any] = {} if watch is None else {"watch": watch}
-    return run(read_study(path), run_folder(path), resume=True, threads=threads, **how)
+    folder = run_folder(path)
+    file = read_study(path, trust=trust)
+    return run(file, folder, resume=True, force=force, threads=threads, **how)
 
 
-def _histories(result: Result, threads: int | None) -> Histories | None:
-    """Simulate some rows of the main table again; None without rows, or if the loop has gone."""
-    from analysis.report.robustness_histories import histories
-    from analysis.robustness import prepare
-    from analysis.studies.run import rerun_file
+def _prepared(result: Result, trust: bool) -> Prepared | None:
+    """Return the loop of a run again; None, with a word on it, if the loop has gone.
+
+    Raises
+    ------
+    RunFolderError
+        If the results were computed from another loop than today's: nothing is drawn from it.
+    """
+    from analysis.studies import RunFolderError
+    from analysis.studies.run import reopened
 
     from ._errors import UsageError
 
-    if result.rows is None or not result.rows.done:
+    try:
+        run = reopened(result.folder, trust=trust)
+    except RunFolderError:
+        raise
+    except UsageError as error:  # what was found is shown all the same
+        print(f"nlctl: the report has no fans and no diagram: {error}", file=sys.stderr)
+        return None
+    if run.versions:
+        told = f"computed with other versions ({run.versions}): fans are drawn with those of today"
+        print(f"nlctl: '{result.folder}' was {told}", file=sys.stderr)
+    return run.prepared
+
+
+def _histories(result: Result, prepared: Prepared | None, threads: int | None) -> Histories | None:
+    """Simulate some rows of the main table again; None without rows or loop."""
+    from analysis.report.robustness_histories import histories
+
+    if prepared is None or result.rows is None or not result.rows.done:
         return None
     searched = [f.numbers for f in result.findings if f.kind == "worst case" and f.is_answered]
     witness = min(
         ((n["witness"], n["margin"]) for n in searched), key=lambda pair: pair[1], default=None
     )
-    try:
-        prepared = prepare(rerun_file(result.folder).experiment)
-    except UsageError as error:  # what was found is shown all the same
-        print(f"nlctl: the report has no fans: {error}", file=sys.stderr)
-        return None
     return histories(prepared, result.rows.table, witness, threads=threads)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ._arguments import a_function
 from ._equation import equation
 from ._errors import ParameterError
 from ._names import unknown
@@ -105,6 +106,8 @@ class PureFeedback:
         """Refuse an order below 1 and an initial value for a state that does not exist."""
         order = whole_number("PureFeedback", "an order", self.order, at_least=1)
         object.__setattr__(self, "order", order)
+        a_function("PureFeedback", "f", self.f)
+        a_function("PureFeedback", "d", self.d)
         for name, value in self.initial.items():
             if name not in self.states:
                 raise unknown("state", name, self.states, "in initial of PureFeedback")

@@ -44,11 +44,13 @@ class SumOfSines:
     """
 
     order: int = 2
-    amplitudes: tuple[float, ...] = param((0.5, 0.5), unit="1", meaning="amplitudes a_i")
-    frequencies: tuple[float, ...] = param(
-        (1.0, 0.5), unit="rad/s", meaning="frequencies w_i", at_least=0
+    amplitudes: tuple[float, ...] = param(
+        (0.5, 0.5), unit="1", meaning="amplitudes a_i", symbol="a"
     )
-    phases: tuple[float, ...] = param((0.0, 0.0), unit="rad", meaning="phases phi_i")
+    frequencies: tuple[float, ...] = param(
+        (1.0, 0.5), unit="rad/s", meaning="frequencies w_i", at_least=0, symbol="w"
+    )
+    phases: tuple[float, ...] = param((0.0, 0.0), unit="rad", meaning="phases phi_i", symbol="phi")
 
     inputs = ()
     states = ()

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import control as ct
 
+from ._arguments import number
 from ._errors import ParameterError
 from ._interpreted import interpreted
 from ._names import unknown
 from ._param import checked_times
-from ._run_arguments import Run, unified, with_aliases
+from ._run_arguments import Run, checked_params, unified, with_aliases
 
 if TYPE_CHECKING:
     from .native import Compiled
@@ -143,6 +144,11 @@ def input_output_response(
     UserWarning
         If `initial_state` has fewer values than there are states and the last one is not 0.
     """
+    checked_params(params)
+    for name, tolerance in (("rtol", rtol), ("atol", atol)):
+        number("input_output_response", name, tolerance, above=0)
+    if squeeze not in (None, True, False):
+        raise ParameterError(f"squeeze needs True, False or None, got {squeeze!r}")
     named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
     named |= {"evaluation_times": evaluation_times, "return_states": return_states}
     defaults = {
@@ -209,10 +215,12 @@ def _native(run: Run) -> ct.TimeResponseData:
     from .native import compile as compile_diagram
     from .native._response import respond
     from .native._solver_arguments import solver_settings
+    from .native.thirdparty.sizes import sized
 
     settings = solver_settings(**run.solver)
     compiled = run.system
     if isinstance(compiled, ct.InputOutputSystem):
+        compiled = sized(compiled, run.inputs, run.initial_state)
         compiled = compile_diagram(compiled, params=run.params)
     return respond(
         compiled,

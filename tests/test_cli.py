@@ -1,6 +1,7 @@
 """The command line, run as a user runs it."""
 
 import multiprocessing
+import os
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ import pytest
 from command_line import nlctl, nlctl_here
 from rows import each_row
 
+from nlctl._catalogue import block_records
 from nlctl.cli_report import _other_process
 
 
@@ -153,3 +155,121 @@ def test_the_other_process_of_a_report_ends_when_this_one_fails():
     for task in tasks:
         with pytest.raises((BrokenProcessPool, CancelledError)):
             task.result()
+
+
+OWN_LOOP = """
+import control as ct
+import nlctl
+
+def example():
+    return nlctl.paper.example_1()
+
+def driven():
+    return ct.ss([[-1.0]], [[1.0]], [[1.0]], [[0.0]], inputs=["w"], outputs=["y"], name="lag")
+
+def broken():
+    return helper(0)
+
+def helper(x):
+    return 1 / x
+
+def number():
+    return 3
+"""
+
+
+@pytest.fixture
+def own(tmp_path):
+    (tmp_path / "my.py").write_text(OWN_LOOP, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize("engine", ["native", "python-control"])
+def test_loops_of_ones_own_run_with_inputs(own, engine):
+    """y' = -y + w from 0: y = w (1 - exp(-t)), in either engine."""
+    result = nlctl_here(
+        *("simulate", "my.py:driven", "--until", "2", "--input", "w=3.0", "--csv", "out.csv"),
+        *("--engine", engine),
+        cwd=own,
+    )
+    assert result.returncode == 0, result.stderr
+    table = pd.read_csv(own / "out.csv")
+    np.testing.assert_allclose(table["y"], 3 * (1 - np.exp(-table["time"])), atol=1e-6)
+
+
+def test_loops_of_modules_and_files_are_drawn_and_checked(own):
+    """A function of a module, and one of a file."""
+    drawn = nlctl_here("diagram", "nlctl.paper:example_2", "-o", "out.svg", cwd=own)
+    assert (drawn.returncode, (own / "out.svg").exists()) == (0, True), drawn.stderr
+    checked = nlctl_here("check", "my.py:example", "--horizon", "0.5", cwd=own)
+    assert checked.returncode in (0, 1), checked.stderr
+    assert "lines:" in checked.stdout
+
+
+@each_row(
+    ("arguments", "message"),
+    [
+        (("simulate", "my.py:gone"), "unknown function 'gone' in 'my.py'"),
+        (("simulate", "gone.py:loop"), "there is no file"),
+        (("simulate", "my.py:number"), "needs to return a diagram, it returned int"),
+        (("simulate", "example-3"), "a loop of your own is path/to/file.py:function"),
+        (("simulate", "my.py:driven", "--input", "v=1"), "unknown input 'v' of 'lag'"),
+        (("simulate", "my.py:driven", "--input", "w=nan"), "needs a finite input 'w', got nan"),
+        (("simulate", "my.py:driven", "--engine", "fast"), "unknown engine 'fast'"),
+        (("simulate", "example-1", "--until", "1e12"), "at most 2e+06 samples"),
+        (("simulate", "example-1", "--step", "1e-9"), "at most 2e+06 samples"),
+        (("simulate", "example-1", "--plot", "gone/x.svg"), "there is no folder 'gone'"),
+        (("simulate", "example-1", "--csv", "."), "it is a folder"),
+        (("report", "--out", "/proc/foo"), "cannot write to '/proc/foo'"),
+    ],
+)
+def test_what_cannot_be_run_or_written_is_one_sentence(arguments, message, own):
+    """Before anything is computed."""
+    assert message in refused(*arguments, cwd=own)
+
+
+def test_an_error_in_a_users_function_shows_his_lines_alone(own):
+    """Kind, message and the lines of his files."""
+    for command in (("simulate", "my.py:broken"), ("diagram", "my.py:broken", "-o", "x.svg")):
+        told = nlctl_here(*command, cwd=own)
+        assert told.returncode == 3
+        lines = told.stderr.strip().splitlines()
+        assert lines[0] == "nlctl: ZeroDivisionError: division by zero"
+        files = [line for line in lines if line.strip().startswith("File ")]
+        ours = [line for line in files if "my.py" in line]
+        assert len(ours) == 2
+        assert not [line for line in files if "site-packages" in line or "nlctl/" in line]
+
+
+def test_the_version_is_the_packages():
+    """On the command line, as an attribute, and by `python -m nlctl`."""
+    import nlctl as package
+
+    told = subprocess.run(
+        [sys.executable, "-m", "nlctl", "--version"], capture_output=True, text=True, check=True
+    )
+    assert told.stdout.strip() == f"nlctl {package.__version__}"
+    assert nlctl_here("--version").stdout.strip() == told.stdout.strip()
+
+
+def test_the_list_has_one_line_per_block_in_groups():
+    """Every block once, below what it is for."""
+    lines = nlctl_here("list").stdout.splitlines()
+    assert [line for line in lines if line in ("Plants", "Actuators", "References", "Controllers")]
+    for name in block_records():
+        assert sum(line.split()[:1] == [name] for line in lines) == 1
+
+
+@pytest.mark.parametrize("name", ["analysis.py", "analysis/__init__.py"])
+def test_a_file_that_hides_the_analysis_package_is_named(name, tmp_path):
+    """A module or package of the user's own, found first: one sentence, no traceback."""
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    (tmp_path / name).write_text("", encoding="utf-8")
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    told = subprocess.run(
+        [sys.executable, "-P", "-m", "nlctl", "check", "example-1"],
+        capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": path},
+    )  # fmt: skip
+    assert told.returncode == 2
+    assert len(told.stderr.strip().splitlines()) == 1
+    assert f"'{tmp_path / name}' hides nlctl's package 'analysis'" in told.stderr

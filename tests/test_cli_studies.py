@@ -1,6 +1,7 @@
 """The commands about study files, run as a user runs them: exit codes, JSON, resuming."""
 
 import json
+import re
 import resource
 import shlex
 import signal
@@ -33,7 +34,7 @@ def test_a_study_is_validated_run_and_replayed(folder):
     assert "rows: 200 runs" in planned.stdout
     done = nlctl_here("run", path, "--jobs", "1", cwd=folder)
     assert done.returncode == 0, done.stderr
-    assert "The claim holds." in done.stdout
+    assert "The claim is shown." in done.stdout
     assert "Assumed: rows are independent draws" in done.stdout
     assert (folder / "reports" / "study" / "results.json").exists()
     again = nlctl_here("replay", "reports/study", 17, "--plot", "row.svg", cwd=folder)
@@ -50,12 +51,17 @@ def test_a_failing_claim_is_exit_code_1_and_json_is_json(folder):
     )
     assert failing.returncode == 1, failing.stderr
     content = json.loads(failing.stdout)
-    assert content["holds"] is False
+    assert (content["holds"], content["answer"]) == (False, "refuted")
     assert content["findings"][0]["claim"] == "a violation has at most probability 0.01"
     planned = json.loads(nlctl_here("validate", path, "--json", cwd=folder).stdout)
     assert (planned["valid"], planned["runs"]["rows"]) == (True, 200)
     row = json.loads(nlctl_here("replay", "fails", 0, "--json", cwd=folder).stdout)
     assert row["same"] is True
+    few = ("--set", "runs.size=4", "--set", "analysis.0.limit=0.2", "--out", "few")
+    told = nlctl_here("run", path, *few, cwd=folder)
+    assert told.returncode == 5, told.stderr
+    assert re.search(r"not shown yet \(needs at least \d+ more runs", told.stdout)
+    assert "FAILS" not in told.stdout
     schema = json.loads(nlctl_here("schema", cwd=folder).stdout)
     assert schema["properties"]["loop"]["type"] == "string"
 

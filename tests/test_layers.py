@@ -8,8 +8,22 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
-    ["nlctl._errors", "nlctl._files", "nlctl._equation", "nlctl._param", "nlctl._names"]
-    + ["nlctl._block", "nlctl._diagram", "nlctl._run_arguments", "nlctl.functions"]
+    [
+        "nlctl._errors",
+        "nlctl._version",
+        "nlctl._files",
+        "nlctl._equation",
+        "nlctl._param",
+        "nlctl._names",
+    ]
+    + ["nlctl._arguments", "nlctl._workers"]
+    + [
+        "nlctl._block",
+        "nlctl._diagram",
+        "nlctl._run_arguments",
+        "nlctl._time_response",
+        "nlctl.functions",
+    ]
     + ["nlctl._layout", "nlctl.drawing"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers"],
     ["nlctl._catalogue", "nlctl.paper"],
@@ -19,8 +33,15 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     + ["analysis.json_values"],
     ["analysis.figures", "analysis.robustness_figures", "analysis.report"],
     ["analysis.studies"],
-    ["nlctl._terminal", "nlctl._check", "nlctl._sweep_progress", "nlctl.cli"]
-    + ["nlctl.cli_report", "nlctl.cli_studies", "nlctl.cli_study_report"],
+    [
+        "nlctl._terminal",
+        "nlctl._loops",
+        "nlctl._beside",
+        "nlctl._check",
+        "nlctl._sweep_progress",
+        "nlctl.cli",
+    ]
+    + ["nlctl.cli_report", "nlctl.cli_studies", "nlctl.cli_study_report", "nlctl.__main__"],
 ]
 COMMAND_LINE = LAYERS[-1]
 BLOCK_MODULES = LAYERS[1]

@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 from rows import each_row
 
 import nlctl
-from analysis.lyapunov.ball import Ball, as_ball
+from analysis.lyapunov.ball import JUMPS, Ball, as_ball
 from analysis.lyapunov.balls import Box, Undecided, enclose, prove
 from nlctl._errors import ParameterError, UnknownNameError
 from nlctl._param import equation_arguments
+from nlctl.expressions.functions import FUNCTIONS as TABLE
 
 FUNCTIONS = {
     "sin": (np.sin, np.cos),
@@ -199,3 +200,35 @@ def test_a_box_refuses_what_is_no_interval():
             Box.of(x1=ends)
     with pytest.raises(UnknownNameError, match="x1"):
         Box.of(x1=(0, 1))["x_1"]
+
+
+@pytest.mark.parametrize(
+    "name", [n for n, row in TABLE.items() if row.enclosure and n not in JUMPS]
+)
+@given(data=st.data())
+def test_every_function_of_the_table_is_enclosed_with_its_derivative(name, data):
+    """A ball of an interval holds the values inside it, its gradient their difference quotients."""
+    low, high = {"arccosh": (1.1, 4.0), "log1p": (-0.9, 4.0)}.get(name, (-0.95, 0.95))
+    low = 0.1 if name in ("log", "log2", "log10", "sqrt") else low
+    ends = data.draw(st.lists(st.floats(low, high), min_size=2, max_size=2))
+    a, b = sorted(ends)
+    function = getattr(np, name)
+    ball = function(Ball(arb(a).union(arb(b)), (arb(1),)))
+    inside = np.linspace(a, b, 9)
+    for x in inside:
+        value = float(function(x))
+        assert (ball.value + arb(0, 4e-15 * max(1.0, abs(value)))).contains(arb(value))
+    if b - a > 1e-3:
+        quotient = (function(b) - function(a)) / (b - a)
+        assert (ball.gradient[0] + arb(0, 1e-11)).contains(arb(float(quotient)))
+
+
+def test_numbers_of_numpy_on_the_left_of_a_ball():
+    """np.float64 and arrays compute with balls as plain numbers do."""
+    ball = Ball(arb(2), (arb(1),))
+    for made in (np.float64(3.0) * ball, np.int64(3) * ball, ball * np.float64(3.0)):
+        assert made.value == arb(6)
+    assert [b.value for b in np.array([1.0, 2.0]) - ball] == [arb(-1), arb(0)]
+    with pytest.raises(Undecided, match="floor"):
+        np.floor(Ball(arb(1).union(arb(2))))
+    assert np.floor(Ball(arb(1.25))).value == arb(1)

@@ -95,6 +95,21 @@ class TestTracking:
             yd = 0.5 * (np.sin(t + k * np.pi / 2) + 0.5**k * np.sin(t / 2 + k * np.pi / 2))
             assert np.abs(yd).max() <= bound <= np.abs(yd).max() + 1e-5
 
+    @pytest.mark.parametrize(
+        ("frequencies", "attained"), [((0.1, 0.3), False), ((0.1, 0.2), True), ((1.0, 3.0), True)]
+    )
+    def test_decimal_frequencies_are_the_doubles_that_they_are(self, frequencies, attained):
+        """3 * 0.1 is not the double 0.3: their phases drift apart, and in the end the sines add up.
+
+        Of sines in step the bound is the supremum over their period.
+        """
+        reference = nlctl.SumOfSines(order=1, frequencies=frequencies)
+        t = np.linspace(0, 2 * np.pi / frequencies[0], 100_001)
+        yd = 0.5 * (np.sin(frequencies[0] * t) + np.sin(frequencies[1] * t))
+        bound = reference_bounds(reference)[0]
+        assert bound == pytest.approx(np.abs(yd).max() if attained else 1.0, rel=1e-5)
+        assert bound >= np.abs(yd).max()
+
     def test_frequencies_without_a_common_period(self):
         """The sum of the amplitudes, which such sines come arbitrarily near."""
         reference = nlctl.SumOfSines(order=1, frequencies=(1.0, np.sqrt(2)))

@@ -119,7 +119,7 @@ class TestCreep:
         assert burst == pytest.approx(exact, rel=0.02)
         found = creep(part(crossing, burst / 3), tame, window=4.0)
         assert 0.1 < found.share < 0.5
-        assert found.burst_by_balance == pytest.approx(burst, rel=0.03)
+        assert found.burst == pytest.approx(burst, rel=0.03)
         assert found.time < found.burst_range[0] <= found.burst <= found.burst_range[1]
         assert "creeps" in str(found)
 
@@ -130,7 +130,7 @@ class TestCreep:
         found = creep(run, tame, window=2.0)
         assert abs(tame(found.rest)) == pytest.approx(1 / abs(Y_d), rel=0.02)
         assert found.verdict == "settles"
-        assert found.burst_by_balance == np.inf
+        assert found.burst == np.inf
         late = scalar_loop(tame, -1.0, np.linspace(0, 2000, 6001), reference=Y_d)
         assert late.outputs[0, -1] == pytest.approx(found.rest, abs=0.01)
 

@@ -148,7 +148,7 @@ def test_page_shows_everything_that_was_asked_for(page):
 def test_svg_of_every_figure_is_valid_xml_with_a_description(page):
     """Readers who cannot see a figure get its title and what it shows, from the data."""
     drawings = re.findall(r"<svg role=.*?</svg>", page, flags=re.DOTALL)
-    assert len(drawings) == 2 * 8 + 2
+    assert len(drawings) == 1 + 2 * 8 + 2  # the picture at the top, both examples, the exchange
     for drawing in drawings:
         root = ElementTree.fromstring(drawing)
         title, description = root[0], root[1]
@@ -192,7 +192,7 @@ def test_a_missed_figure_is_the_first_sentence(runs):
     spoiled["1"] = dataclasses.replace(runs["1"], metrics=wrong)
     report = paper_report(spoiled)
     assert report.verdict == (
-        f"Not reproduced: 1 of {len(expectations())} figures is missed, most of all max |u| of "
+        f"Not reproduced: 1 of {len(expectations())} numbers is missed, most of all max |u| of "
         "case 1 (13 instead of 12.052217)."
     )
     assert [c.holds for c in report.claims] == [True, True, True, True, False]
@@ -238,7 +238,7 @@ def test_limits_state_how_far_zeta_moves(runs, page):
     """The drift of zeta over the last half is computed from the run."""
     t = runs["1"].time
     drift = 1 / 40 * (t[-1] - t[t >= TAIL][0])
-    assert f"changes by {drift:+.3g} in Example 1" in page
+    assert f"changes by {drift:+.3g} in Example\N{NO-BREAK SPACE}1" in page
 
 
 def test_curves_differ_in_more_than_their_colours(runs):

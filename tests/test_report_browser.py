@@ -1,6 +1,9 @@
 """The page in a real browser: nothing fetched, nothing executed, sorting, filtering, reading."""
 
 import math
+import re
+import shutil
+import subprocess
 
 import pytest
 from extras import needed, needed_program
@@ -125,12 +128,13 @@ def test_hostile_names_do_nothing_and_are_shown(visit, name):
 
 
 def column(page, place):
-    """Visible texts of one column of the long table."""
-    return page.evaluate(
+    """Visible texts of one column of the long table; numbers as a browser reads them."""
+    texts = page.evaluate(
         "i => [...document.querySelector('table.many').tBodies[0].rows].filter(r => !r.hidden)"
-        ".map(r => r.cells[i].textContent)",
+        ".map(r => r.cells[i].dataset.value ?? r.cells[i].textContent)",
         place,
     )
+    return [text.replace("\N{NO-BREAK SPACE}", " ") for text in texts]
 
 
 def test_a_click_or_a_key_sorts_by_number_and_again_downwards(visit):
@@ -178,11 +182,70 @@ def test_everything_is_readable_without_scripts(visit):
     with_scripts, without = visit("plain"), visit("plain", scripts=False)
     assert without.locator("button, input").count() == 0
     assert without.locator("tbody tr").count() == with_scripts.locator("tbody tr").count()
+    for summary in without.locator("summary").all():
+        summary.click()  # what is folded needs no script
     for place in range(without.locator("figure svg").count()):
         assert without.locator("figure svg").nth(place).bounding_box()["height"] > 100
     parts = without.locator("td, th, p, li, h1, h2, h3, caption, figcaption, pre")
     written, seen = parts.all_text_contents(), parts.all_inner_texts()
     assert ["".join(text.split()) for text in seen] == ["".join(text.split()) for text in written]
+
+
+def test_a_phone_shows_whole_figures(visit):
+    """Plots, diagrams and their legends are as wide as the screen, not wider."""
+    page = visit("paper", width=PHONE)
+    page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    for drawing in page.locator("figure svg").all():
+        box = drawing.bounding_box()
+        assert 0.5 * PHONE < box["width"] <= PHONE - box["x"]
+
+
+@pytest.mark.parametrize("scripts", [True, False])
+def test_what_is_folded_opens_for_a_link_and_for_paper(visit, scripts):
+    """Also where the link is in the address, and again after it has been closed by hand."""
+    page = visit("paper", scripts=scripts)
+    table = page.locator("#example-1-parameters-table")
+    fold = page.locator("details", has=table)
+    assert not table.is_visible()
+    page.locator('nav a[href="#example-1-parameters"]').click()
+    table.wait_for(state="visible")
+    assert page.locator("#example-2-parameters-table").is_hidden()
+    page.locator("summary", has_text="Parameters as printed").first.click()
+    table.wait_for(state="hidden")
+    if scripts:
+        page.locator('nav a[href="#example-1-parameters"]').click()
+        table.wait_for(state="visible")
+        page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = false; })")
+        page.goto(page.url.partition("#")[0] + "#example-1-figures-table")
+        page.locator("#example-1-figures-table").wait_for(state="visible")
+        assert fold.count() == 1
+    page.emulate_media(media="print")
+    heights = page.evaluate(
+        "[...document.querySelectorAll('details')].map(d => [d.open, d.scrollHeight])"
+    )
+    assert any(not is_open for is_open, _ in heights)
+    assert all(height > 100 for _, height in heights)
+
+
+def test_everything_unfolds_at_once_and_folds_again(visit):
+    """One button below the contents."""
+    page = visit("paper")
+    count = page.locator("details").count()
+    for name, wanted in (("Unfold all", count), ("Fold all", 0)):
+        page.get_by_role("button", name=name, exact=True).click()
+        assert page.locator("details[open]").count() == wanted > -1
+
+
+def test_the_first_screen_tells_the_story(visit):
+    """Question, verdict and picture side by side, and the first claims below them."""
+    page = visit("paper", width=1300)
+    verdict, picture, claims = (
+        page.locator(where).bounding_box() for where in (".verdict", "#lead svg", "#claims")
+    )
+    assert verdict["x"] + verdict["width"] < picture["x"]
+    assert abs(verdict["y"] - picture["y"]) < 60
+    assert claims["y"] < 600
+    assert page.locator(".verdict").inner_text().startswith("Asked:")
 
 
 def luminance(page, element, what):
@@ -224,7 +287,12 @@ def test_figures_enlarge_and_return(visit):
     for leave in ("Close", "Escape"):
         button.click()
         assert page.locator("dialog svg").is_visible()
-        assert page.locator("dialog svg").bounding_box()["width"] > small
+        large = page.locator("dialog svg").bounding_box()
+        room = page.locator("dialog").bounding_box()
+        assert large["width"] > small
+        assert large["width"] > 0.9 * room["width"]
+        assert large["height"] > 0.7 * room["height"]
+        assert page.locator("dialog p").inner_text() == "plain"  # its caption goes with it
         if leave == "Close":
             page.get_by_role("button", name="Close").click()
         else:
@@ -381,3 +449,21 @@ def test_a_page_is_printed_to_pdf(chromium, pages, tmp_path):
     assert content.startswith(b"%PDF-")
     assert content.count(b"/Type /Page\n") >= 2
     assert [p.name for p in tmp_path.iterdir()] == ["report.pdf"]
+
+
+def test_pages_of_paper_are_numbered_and_unfolded(chromium, pages, tmp_path):
+    """Each has its number and their count at its foot; what is folded on the screen is there."""
+    reader = shutil.which("pdftotext")
+    if reader is None:
+        pytest.skip("needs pdftotext of poppler-utils")
+    made = write_pdf(pages["paper"], tmp_path / "report.pdf")
+    run = subprocess.run([reader, "-layout", made, "-"], capture_output=True, text=True, check=True)
+    *sheets, _ = run.stdout.split("\f")
+    assert len(sheets) > 5
+    for number, sheet in enumerate(sheets, 1):
+        assert sheet.rstrip().endswith(f"{number} / {len(sheets)}")
+    assert "the play operator" in run.stdout  # of a folded table
+    heads = re.compile(r"case +quantity +found")
+    for sheet in sheets:
+        for head in heads.finditer(sheet):
+            assert sheet[head.end() :].count("pass") + sheet[head.end() :].count("fail") > 1

@@ -9,12 +9,16 @@ import pytest
 from fontTools.ttLib import TTFont
 from rows import each_row
 
+import nlctl
 from analysis.report import Equation
 from analysis.report import paper_text as text
+from analysis.report.equations import equations_of
 from analysis.report.formula import ATTRIBUTES, ELEMENTS, mathml
 from analysis.report.math_font import CHARACTERS, FAMILY, font_face, italic, subset
 
-FORMULAS = [text.PLANT_CLASS, *text.CONTROLLER, *text.PLANTS[1], *text.PLANTS[2]]
+EXAMPLES = (nlctl.paper.example_1(), nlctl.paper.example_2())
+FORMULAS = [text.PLANT_CLASS, *text.CONTROLLER]
+FORMULAS += [e for made in EXAMPLES for e in equations_of(made, ("plant", "actuator"))]
 HARMFUL = [
     r"\href{javascript:alert(1)}{x}",
     r"\href{https://example.org}{x}",

@@ -47,9 +47,10 @@ from analysis.report.outline import (
     sort_key,
     summary,
 )
-from analysis.report.page import fill, parts
+from analysis.report.page import fill
 from analysis.report.svg import draw_ahead, shapes_svg, svg, svg_files
 from analysis.report.svg_compact import short_path
+from analysis.report.typography import pieces
 from nlctl._errors import UsageError
 
 HOSTILE = {
@@ -402,10 +403,27 @@ def test_proved_and_checked_never_look_alike():
 def test_a_claim_that_does_not_hold_never_looks_well(status):
     """Whatever its status says, and neither does the report."""
     claim = Claim(text="", measured="", limit="", holds=False, evidence="", status=status)
-    assert claim_status(claim)[1] in ("fail", "caution")
+    assert claim_status(claim)[1] in ("fail", "refuted", "caution")
     well = dataclasses.replace(claim, holds=True, status="proved")
-    assert summary([well, claim])[0] in ("fail", "caution")
+    assert summary([well, claim])[0] in ("fail", "refuted", "caution")
     assert summary([well]) == ("pass", "The claim holds: 1 proved.")
+
+
+def test_the_colour_says_whose_claim_fails():
+    """A claim of the paper is refuted; one of the report's own fails, and outweighs it."""
+    own = Claim(text="", measured="", limit="", holds=False, evidence="")
+    paper = dataclasses.replace(own, by="the paper")
+    good = dataclasses.replace(own, holds=True, status="proved")
+    assert claim_status(paper) == ("refuted", "refuted")
+    assert summary([paper, good]) == (
+        "refuted",
+        "1 claim of the paper is refuted; 1 other holds (1 proved).",
+    )
+    assert summary([paper, own, good]) == ("fail", "1 of 3 claims fails.")
+    assert summary([paper, dataclasses.replace(paper, by="a rumour")])[1] == (
+        "2 claims are refuted."
+    )
+    assert claim_status(dataclasses.replace(paper, holds=True)) == ("holds", "pass")
 
 
 def test_the_first_sentence_says_how_the_claims_are_known():
@@ -439,7 +457,7 @@ def test_a_claim_shows_its_margin_and_leads_to_its_evidence():
 )
 def test_dois_become_links_and_nothing_else_does(text, dois):
     """Full stops and brackets after them stay text."""
-    assert [doi for _, doi in parts(text) if doi] == dois
+    assert [piece.doi for piece in pieces(text) if piece.doi] == dois
 
 
 def test_ragged_rows_are_shown_in_full():

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.text import Text
 from scipy import stats
 from studies_example import LOOP
 
@@ -26,7 +27,12 @@ from analysis.report.robustness_methods import METHODS
 from analysis.report.robustness_part import study_part, study_report, study_sections
 from analysis.report.robustness_rows import margin_items, row_items, running
 from analysis.report.robustness_searches import deviations
-from analysis.report.robustness_text import TITLES, margin_text, violate
+from analysis.report.robustness_text import (
+    TITLES,
+    margin_text,
+    violate,
+    without_assumptions,
+)
 from analysis.robustness import Space, Uncertain, confidence_sequence, independent, prepare
 from analysis.robustness.radius import size_of
 from analysis.robustness.spec import FAILED
@@ -175,6 +181,10 @@ def tables(report, key):
     return [item for item in section.items if isinstance(item, Table)]
 
 
+def tables_of(section):
+    return [item for item in section.items if isinstance(item, Table)]
+
+
 def column(table, title):
     return [row[table.columns.index(title)] for row in table.rows]
 
@@ -186,21 +196,23 @@ def numbers_in(values):
 def test_every_analysis_has_a_section_that_is_not_empty(result, report, page):
     """A section for what was asked, the rows, the fans and each finding; all ids differ."""
     keys = [section.key for section in report.sections]
-    assert keys[:2] == ["study_asked", "study_rows"]
+    assert keys[:3] == ["study_asked", "study_fans", "study_rows"]
     assert set(keys) == {
         "study_asked",
         "study_rows",
         "study_fans",
+        "study_assumed",
         *(f.key for f in result.findings),
     }
     assert all(section.items for section in report.sections)
     read = Reader(page)
     assert len(read.ids) == len(set(read.ids))
-    assert read.tags["figure"] == sum(
+    assert read.tags["figure"] == 1 + sum(  # and the picture at the top
         isinstance(i, Figure) for s in report.sections for i in s.items
     )
     told = [i.text for s in report.sections for i in s.items if isinstance(i, Paragraph)]
-    assert all(any(f.sentence in words for words in told) for f in result.findings)
+    brief = [without_assumptions(f.sentence) for f in result.findings]
+    assert all(any(words in told_of for told_of in told) for words in brief)
 
 
 def test_every_kind_of_analysis_has_title_and_methods(result):
@@ -272,13 +284,17 @@ def test_json_holds_every_number(result, report):
 def test_planted_violations_make_the_page_red(result, report, page):
     """Failing claims are named in the verdict; what holds is sampled, never proved."""
     looks = {c.evidence: claim_status(c) for c in report.claims}
-    assert looks["worst-case"][1] == looks["sequential"][1] == "fail"
-    assert looks["probability"] == ("sampled", "checked")
+    assert looks["worst-case"][1] == looks["sequential"][1] == "refuted"
+    assert looks["probability"] == ("shown", "checked")
     assert not any(look == "proved" for _, look in looks.values())
-    assert 'class="verdict fail"' in page
+    assert 'class="verdict refuted"' in page
     assert result["worst-case"].claim in report.verdict
-    assert result["probability"].sentence in report.verdict
-    assert "Assumed: rows are independent draws" in report.verdict
+    told, _, assumed = result["probability"].sentence.partition(" Assumed: ")
+    assert f"{told} Assumptions: see “What is assumed”." in report.verdict
+    (section,) = (s for s in report.sections if s.title == "What is assumed")
+    words = [item.text.lower() for item in section.items]
+    assert len(words) == len(set(words))
+    assert all(f"{part}." in words for part in assumed.lower().removesuffix(".").split("; "))
 
 
 def test_claims_point_to_sections(report):
@@ -290,13 +306,11 @@ def test_claims_point_to_sections(report):
 def test_a_violation_that_is_not_confirmed_is_open(result):
     """It neither holds nor fails; undecided tests as well."""
     worst = result["worst-case"]
-    doubted = replace(worst, numbers=dict(worst.numbers) | {"is_confirmed": False})
-    test = result["sequential"]
-    open_ = replace(test, numbers=dict(test.numbers) | {"decision": "undecided"}, holds=False)
+    doubted = replace(worst, answer="not shown yet")
+    open_ = replace(result["sequential"], answer="not shown yet", needs="9 more runs")
     findings = [{"worst-case": doubted, "sequential": open_}.get(f.key, f) for f in result.findings]
     found = {c.evidence: claim_status(c) for c in claims(replace(result, findings=tuple(findings)))}
-    assert found["worst-case"] == ("not confirmed", "caution")
-    assert found["sequential"] == ("undecided", "caution")
+    assert found["worst-case"] == found["sequential"] == ("not shown yet", "caution")
 
 
 @pytest.mark.parametrize("kind", ["Sobol'", "Latin hypercube", "corners"])
@@ -328,10 +342,10 @@ def test_an_analysis_without_an_answer_says_why(result):
             assert words.text == "Not answered: the rows do not admit it."
         told = {claim.evidence: claim for claim in made.claims if claim.evidence in gone}
         assert told.keys() == gone
-        assert all(claim_status(claim) == ("fails", "fail") for claim in told.values())
-        assert "do not admit it" in " ".join(
-            i.text for s in study_part([(part, None)]) for i in s.items if isinstance(i, Paragraph)
-        )
+        assert all(claim_status(claim) == ("refuted", "refuted") for claim in told.values())
+        (found,) = tables_of(study_part([(part, None)])[1])
+        said = dict(zip((f.key for f in findings), column(found, "found"), strict=True))
+        assert all("do not admit it" in said[key] for key in gone)
 
 
 def test_the_page_holds_the_study(result, report, page, tmp_path):
@@ -359,7 +373,7 @@ def test_an_unfinished_study_says_so(result):
     made = study_report(part)
     assert made.verdict.startswith("Incomplete: 2 of 10 analyses are done.")
     keys = [section.key for section in made.sections]
-    assert keys == ["study_asked", "study_rows", "probability", "sequential"]
+    assert keys == ["study_asked", "study_rows", "probability", "sequential", "study_assumed"]
 
 
 def test_the_report_of_a_folder_is_that_of_the_run(folder, kept, report):
@@ -439,6 +453,30 @@ def test_running_estimate_is_the_confidence_sequence():
             statement.lower,
             statement.upper,
         )
+
+
+def test_the_figure_of_the_estimate_says_what_decides(report):
+    """Exact bounds where the number of runs was fixed, the band in a sequential test."""
+    figures = {i.key: i for s in report.sections for i in s.items if isinstance(i, Figure)}
+    fixed, sequence = figures["probability-running"], figures["sequential-running"]
+    assert "rests on the exact bounds at the end alone" in fixed.caption
+    assert "rests on the band" in sequence.caption
+    for shown, label in ((fixed, "exact bounds: decide"), (sequence, "bounds at all n: decide")):
+        texts = [text.get_text() for text in shown.figure.findobj(Text)]
+        assert [t for t in texts if t.endswith("decide")] == [label]
+
+
+def test_nominal_values_that_violate_are_the_verdict(tmp_path):
+    """Before anything else, as a refuted claim, without an empty chart."""
+    asked = '[[analysis]]\nkind = "radius"\nruns = 20\nlimit = 0.5\n'
+    path = written(tmp_path, asked)
+    path.write_text(path.read_text().replace("|y| <= 0.5", "|y| <= 0.05"))
+    made = run(read_study(path), tmp_path / "run")
+    found = made["radius"]
+    assert found.sentence.startswith("The nominal values violate the spec (margin -")
+    assert (found.answer, found.numbers["upper"]) == ("refuted", 0.0)
+    (section,) = (s for s in study_report(made).sections if s.key == "radius")
+    assert not [item for item in section.items if isinstance(item, Figure)]
 
 
 @given(st.lists(st.floats(-2, 2), min_size=2, max_size=2))
@@ -591,14 +629,17 @@ def test_commands_write_the_report(tmp_path, monkeypatch, capsys):
 def test_studies_stand_side_by_side_in_another_report(result, kept):
     """Two studies have different anchors; each says what it found and what it does not show."""
     made = study_part([(result, kept), (result, None)])
-    assert [section.level for section in made] == [2, 3, 3]
+    assert [section.level for section in made if section.level < 4] == [2, 3, 3, 3]
     keys = [i.key for s in made for i in s.items if isinstance(i, Figure)]
     assert len(keys) == len(set(keys)) == 5  # margins and map of both, fans of one
     (overview,) = (item for item in made[0].items if isinstance(item, Table))
-    assert column(overview, "outcome") == ["fail", "fail"]
-    told = " ".join(item.text for item in made[1].items if isinstance(item, Paragraph))
-    assert all(finding.sentence in told for finding in result.findings)
-    assert "nothing is proved" in told
+    assert column(overview, "outcome") == ["refuted", "refuted"]
+    found = column(tables_of(made[1])[0], "found")
+    for finding, words in zip(result.findings, found, strict=True):
+        assert words.startswith(without_assumptions(finding.sentence))
+    limits = [item.text for item in made[-1].items]
+    assert "nothing is proved" in " ".join(limits)
+    assert len(limits) == len(set(limits))  # what both do not show is said once
 
 
 def test_levels_and_prefix_reach_every_section(result):

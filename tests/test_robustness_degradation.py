@@ -101,7 +101,7 @@ def test_nan_counts_as_a_violation():
     [
         ({"factors": ()}, nlctl.ParameterError, "at least one factor"),
         ({"factors": (-1.0,)}, SpaceError, "scale >= 0, got -1"),
-        ({"runs": 0}, nlctl.ParameterError, "size >= 1, got 0"),
+        ({"runs": 0}, nlctl.ParameterError, "runs >= 1, got 0"),
         ({"confidence": 1.0}, nlctl.ParameterError, "0 < confidence < 1"),
     ],
 )

@@ -290,7 +290,7 @@ def test_a_requirement_is_a_metric_of_an_ensemble():
         (
             lambda: Requirement(key="r", formula=SMALL, until=np.inf),
             nlctl.ParameterError,
-            "finite end",
+            "finite until",
         ),
         (lambda: Spec(requirements=()), nlctl.ParameterError, "at least one requirement"),
         (

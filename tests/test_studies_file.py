@@ -1,5 +1,7 @@
 """Study files: every mistake at once with its place, and what a correct one stands for."""
 
+import re
+
 import numpy as np
 import pytest
 from rows import each_row
@@ -7,9 +9,10 @@ from studies_example import HEAD, ROWS, write
 
 from analysis.robustness import nominal, resolved
 from analysis.studies import Study, StudyError, from_toml, read_study, to_toml
-from analysis.studies.problems import line_numbers
+from analysis.studies.problems import line_numbers, place_text
 from analysis.studies.schema import keyed
 from nlctl import ParameterError, paper
+from nlctl._names import unknown
 
 
 def mistakes(path, *settings):
@@ -209,6 +212,10 @@ def test_a_single_mistake_is_found_where_it_stands(old, new, place, message, tmp
     assert old in text
     path.write_text(text.replace(old, new), encoding="utf-8")
     found = mistakes(path)
+    if (
+        "design" in new and place == "runs"
+    ):  # its rows are no independent draws, which is another one
+        found.pop("analysis[0]", None)
     assert list(found) == [place]
     assert message in found[place][1]
 
@@ -380,3 +387,77 @@ def test_boxes_that_fit_one_by_one_but_not_together_are_a_mistake(tmp_path):
     ((line, message),) = mistakes(write(tmp_path, f"{head}[space]\n{boxes}\n[spec]{tail}")).values()
     assert line == text.splitlines().index("[space]") + 1
     assert message.startswith("boxes do not fit together: Backlash needs c_l < c_r")
+
+
+MISTAKES = [  # what is replaced, by what, and the place that has to be named
+    ("seed = 3", "seed = -3", "study.seed"),
+    ('title = "A lag"', 'titel = "A lag"', "study.titel"),
+    ('"lag.rate" = { uniform = [0.5, 2.5] }', '"lag.rat" = { uniform = [0.5, 2.5] }', "lag.rat"),
+    ("bounds = [0.5, 1.5]", "bounds = [1.5, 0.5]", "lag.x(0)"),
+    ("on y <= 0.5", "on yy <= 0.5", "spec.decays"),
+    ("always |z| <= 4", "alway |z| <= 4", "spec.small"),
+    ("step = 0.02", "step = 0.03", "time"),
+    ('error = "y"', 'error = "why"', "metrics.error"),
+    ("size = 200", "size = 200\nlevels = 3", "runs"),
+    ('kind = "probability"', 'kind = "probability"\nconfidence = 2', "analysis[0].confidence"),
+    ("trajectories = 4", "trajectories = 4\nlevels = 3", "analysis[1]"),
+    ("size = 16", "size = 17", "analysis[2]"),
+    ('keyword = "lag"', 'keyword = "lagg"', "analysis[3].keyword"),
+    ('x = "lag.rate"', 'x = "lag.speed"', "analysis[4].x"),
+]
+ALL_KINDS = """
+[[analysis]]
+kind = "morris"
+trajectories = 4
+[[analysis]]
+kind = "sobol"
+size = 16
+[[analysis]]
+kind = "compare"
+keyword = "lag"
+options = { a = { function = "loop.py:Lag" } }
+runs = 3
+metrics = { iae = "smaller" }
+[[analysis]]
+kind = "failure map"
+x = "lag.rate"
+y = "lag.x(0)"
+"""
+
+
+def test_all_mistakes_are_told_at_once(tmp_path):
+    """Of form, of names, of formulas and of designs: every one that is told alone."""
+    text = "\n".join((HEAD, ROWS, ALL_KINDS))
+    every = text
+    for before, after, place in MISTAKES:
+        assert before in every
+        every = every.replace(before, after, 1)
+        one = text.replace(before, after, 1)
+        with pytest.raises(StudyError) as told:
+            read_study(write(tmp_path, one))
+        assert any(place in place_text(p.place) for p in told.value.problems), told.value
+    with pytest.raises(StudyError) as told:
+        read_study(write(tmp_path, every))
+    named = [place_text(p.place) for p in told.value.problems]
+    assert [m[2] for m in MISTAKES if not any(m[2] in name for name in named)] == []
+
+
+def test_mistakes_of_settings_are_blamed_on_them(tmp_path):
+    """Not on a line of the file; where a setting has a part in it, the line is named as well."""
+    path = write(tmp_path)
+    settings = ["study.seed=-3", "study.titel=x", "time.step=0.03"]
+    with pytest.raises(StudyError) as told:
+        read_study(path, settings)
+    lines = str(told.value).splitlines()[1:]
+    assert lines[0].strip().startswith("--set study.seed=-3: ")
+    assert lines[1].strip().startswith("--set study.titel=x: unknown key 'titel'")
+    assert re.search(r"line \d+, time: .*\(with --set time.step=0.03\)", str(told.value))
+
+
+def test_lists_of_names_say_how_many_are_left_out():
+    """Nothing is cut in silence."""
+    names = [f"signal_{i:02}" for i in range(40)]
+    told = str(unknown("signal", "?", names))
+    shown = told.count("'signal_")
+    assert told.endswith(f"and {40 - shown} more")
+    assert str(unknown("signal", "?", names[:9])).count("'signal_") == 9

@@ -19,6 +19,7 @@ from .proof import (
     inequality_margins,
     long_zeta,
     lyapunov_bound,
+    story,
 )
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "lyapunov_bound",
     "nussbaum_gain",
     "overview",
+    "story",
     "tracking",
     "tracking_error",
     "upper_states",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,10 +15,12 @@ __all__ = [
     "GREY",
     "ORANGE",
     "PURPLE",
+    "SHORT_LINE",
     "STYLES",
     "TIME",
+    "WIDTH",
     "draw_lines",
-    "legend_beside",
+    "legend_above",
     "set_style",
     "stacked_axes",
 ]
@@ -26,11 +29,13 @@ __all__ = [
 BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#6b7280"
 STYLES = ((BLUE, "-"), (ORANGE, "--"), (GREEN, "-."), (PURPLE, ":"))
 TIME = "time t (s)"
+WIDTH = 6.2  # in, with letters that can still be read on a phone
+LINE, SHORT_LINE = 62, 42  # characters that a legend above the axes has room for
 
 
-def stacked_axes(rows: int = 1, height: float = 2.6) -> tuple[Figure, list[Axes]]:
+def stacked_axes(rows: int = 1, height: float = 2.4) -> tuple[Figure, list[Axes]]:
     """Return a figure with axes above each other, which share their horizontal axis."""
-    figure = Figure(figsize=(9.0, height * rows), layout="constrained")
+    figure = Figure(figsize=(WIDTH, height * rows), layout="constrained")
     axes = list(np.ravel(figure.subplots(rows, 1, sharex=rows > 1)))
     for ax in axes:
         set_style(ax)
@@ -46,13 +51,38 @@ def set_style(ax: Axes) -> None:
 
 
 def draw_lines(ax: Axes, t: np.ndarray, curves: Mapping[str, np.ndarray]) -> None:
-    """Draw up to four signals over time, with a legend beside them if there are several."""
+    """Draw up to four signals over time, with a legend above them if there are several."""
     for (label, y), (colour, style) in zip(curves.items(), STYLES, strict=False):
         ax.plot(t, y, style, color=colour, linewidth=1.4, label=label)
     if len(curves) > 1:
-        legend_beside(ax)
+        legend_above(ax)
 
 
-def legend_beside(ax: Axes) -> None:
-    """Put the legend to the right of axes, where it hides nothing."""
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+def legend_above(ax: Axes, shown: Mapping[str, Any] | None = None, line: int = LINE) -> None:
+    """Put the legend above axes, where it hides nothing and takes no width.
+
+    Parameters
+    ----------
+    ax : Axes
+    shown : mapping of str to artist, optional
+        What it shows; by default what the axes have labels for.
+    line : int, optional
+        Characters that the axes have room for; those with long names at the left have less.
+    """
+    if shown is None:
+        handles, labels = ax.get_legend_handles_labels()
+    else:
+        labels, handles = list(shown), list(shown.values())
+    if not labels:
+        return
+    widest = max(len(label.replace("\\", "")) for label in labels) + 6
+    ax.legend(
+        handles,
+        labels,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=max(1, min(len(labels), line // widest)),
+        frameon=False,
+        borderaxespad=0.2,
+        columnspacing=1.4,
+    )

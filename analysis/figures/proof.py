@@ -11,7 +11,19 @@ from matplotlib.ticker import FixedLocator
 
 from ..lyapunov.long_run import LongRun
 from ..lyapunov.signals import Margin
-from .axes import BLUE, GREEN, GREY, ORANGE, STYLES, TIME, legend_beside, set_style, stacked_axes
+from .axes import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SHORT_LINE,
+    STYLES,
+    TIME,
+    WIDTH,
+    legend_above,
+    set_style,
+    stacked_axes,
+)
 
 __all__ = [
     "bounds",
@@ -21,13 +33,14 @@ __all__ = [
     "inequality_margins",
     "long_zeta",
     "lyapunov_bound",
+    "story",
 ]
 
 
 def burst(run: LongRun) -> Figure:
     """A long run until its gain loses the sign: zeta and |e|, and the end of both, with r and u."""
-    figure = Figure(figsize=(9.0, 4.8), layout="constrained")
-    (whole, end), (error, signals) = figure.subplots(2, 2, sharex="col", width_ratios=(1.5, 1))
+    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
+    (whole, end), (error, signals) = figure.subplots(2, 2, sharex="col", width_ratios=(1.25, 1))
     time, s = run.time, run.signals
     for ax in (whole, end, error, signals):
         set_style(ax)
@@ -36,12 +49,12 @@ def burst(run: LongRun) -> Figure:
         ax.plot(across, s["zeta"], "-", color=BLUE, linewidth=1.4)
     for p, (colour, style) in zip(run.predictions, STYLES[2:], strict=False):
         for ax in (whole, error):
-            ax.axvline(p.burst_by_balance, color=colour, linestyle=style, linewidth=1.6)
-        label = f"foretold after {p.time:g} s, {100 * p.share:.2g} % of the lobe spent"
+            ax.axvline(p.burst, color=colour, linestyle=style, linewidth=1.6)
+        label = f"predicted after {p.time:g} s, {100 * p.share:.2g} % of the lobe spent"
         whole.plot(p.time, p.zeta, "o", linestyle=style, color=colour, markersize=5, label=label)
     for ax in (whole, error):
         ax.axvline(run.burst, color=ORANGE, linewidth=1.6, label="happened")
-    whole.legend(frameon=False, loc="lower center")
+    legend_above(whole)
     error.semilogy(*envelope(time, np.abs(s["e"])), color=BLUE, linewidth=1.4)
     shown = left <= 100.0
     for (name, label), (colour, style) in zip(
@@ -56,6 +69,54 @@ def burst(run: LongRun) -> Figure:
     whole.set(ylabel="$\\zeta$")
     error.set(xlabel=TIME, ylabel="largest $|e_1|$ per period")
     return figure
+
+
+def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) -> Figure:
+    """The paper in one picture: the output follows, and zeta creeps until the gain turns round.
+
+    Parameters
+    ----------
+    time : ndarray of shape (m,)
+        In s.
+    y, yd : ndarray of shape (m,)
+        Output and reference.
+    run : LongRun or None
+        The same loop until its burst; without it only the output is drawn.
+    """
+    figure = Figure(figsize=(WIDTH, 2.3 if run is None else 4.2), layout="constrained")
+    axes = np.ravel(figure.subplots(1 if run is None else 2, 1))
+    for ax in axes:
+        set_style(ax)
+    axes[0].plot(time, yd, "--", color=ORANGE, linewidth=1.6, label="reference $y_d$")
+    axes[0].plot(time, y, "-", color=BLUE, linewidth=1.4, label="output $y$")
+    legend_above(axes[0])
+    axes[0].set(xlabel=TIME)
+    axes[0].margins(x=0.01)
+    if run is not None:
+        _creeping(axes[1], run)
+    return figure
+
+
+def _creeping(ax: Axes, run: LongRun) -> None:
+    """Draw zeta until its burst, if it bursts, and where the gain has which sign."""
+    zeta, last = run.signals["zeta"], run.time[-1]
+    high = run.lobe.high
+    ax.plot(run.time, zeta, "-", color=BLUE, linewidth=1.6, label="argument $\\zeta$ of the gain")
+    ax.axhline(high, color=GREY, linewidth=1.0, linestyle="--")
+    ax.annotate(
+        f"$\\zeta$ = {high:g}: the gain changes its sign", (0, high), (3, -11),
+        textcoords="offset points", color=GREY,
+    )  # fmt: skip
+    if np.isfinite(run.burst):
+        ax.plot([run.burst], [high], "o", color=ORANGE, markersize=6, clip_on=False)
+        ax.annotate(
+            f"burst at {run.burst:.0f} s", (run.burst, high), (-6, 5), textcoords="offset points",
+            color=ORANGE, ha="right",
+        )  # fmt: skip
+    ax.set_xlim(-0.01 * last, 1.01 * last)
+    ax.set_ylim(float(np.min(zeta[run.time <= run.time[-1] / 2])) - 0.15, high + 0.35)
+    legend_above(ax)
+    ax.set(xlabel=TIME)
 
 
 def envelope(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi) -> np.ndarray:
@@ -88,7 +149,7 @@ def lyapunov_bound(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Figure:
         ax.semilogy(t, np.where(y > 0, y, np.nan), style, color=colour, linewidth=1.4, label=named)
     _, top = ax.get_ylim()
     ax.set_ylim(max(ax.get_ylim()[0], 1e-5 * top), top)
-    legend_beside(ax)
+    legend_above(ax)
     ax.set(xlabel=TIME, ylabel="$V$ and its bounds")
     return figure
 
@@ -121,16 +182,16 @@ def equality_residuals(margins: Sequence[Margin]) -> Figure:
 
 
 def _panels(margins: Sequence[Margin], *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
-    """Three panels in a row, one for each margin, with its number as the title."""
-    rows = -(-len(margins) // 3)
-    figure = Figure(figsize=(9.0, 1.5 * rows + 0.3), layout="constrained")
-    axes = list(np.ravel(figure.subplots(rows, 3, sharex=True, sharey=sharey, squeeze=False)))
+    """Two panels in a row, one for each margin, with its number as the title."""
+    rows = -(-len(margins) // 2)
+    figure = Figure(figsize=(WIDTH, 1.45 * rows + 0.3), layout="constrained")
+    axes = list(np.ravel(figure.subplots(rows, 2, sharex=True, sharey=sharey, squeeze=False)))
     for ax in axes[len(margins) :]:
         ax.set_axis_off()
     for ax, margin in zip(axes, margins, strict=False):
         set_style(ax)
         ax.set_title(margin.equation, fontsize=9, loc="left")
-    for ax in axes[: len(margins)][-3:]:
+    for ax in axes[: len(margins)][-2:]:
         ax.set_xlabel(TIME)
         ax.tick_params(labelbottom=True)
     return figure, axes[: len(margins)]
@@ -151,7 +212,7 @@ def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
     """
     shown = {name: pair for name, pair in values.items() if np.isfinite(pair[0])}
     numbers = [number for number, _ in shown.values()]
-    figure = Figure(figsize=(9.0, 0.3 * len(shown) + 0.6), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 0.3 * len(shown) + 0.6), layout="constrained")
     ax = figure.subplots()
     set_style(ax)
     for kind, colour in (("proved", GREEN), ("along this run", BLUE), ("what happens", GREY)):
@@ -161,5 +222,5 @@ def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
     ax.set_yticks(range(len(shown)), list(shown))
     ax.set(xscale="log", xlim=(0.5 * min(numbers), 3 * max(numbers)), xlabel="$|r|$")
     ax.invert_yaxis()
-    legend_beside(ax)
+    legend_above(ax, line=SHORT_LINE)
     return figure

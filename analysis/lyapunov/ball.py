@@ -13,24 +13,11 @@ from typing import Any
 import numpy as np
 from flint import arb
 
+from nlctl.expressions.functions import FUNCTIONS
+
 from .branches import Undecided, branch
 
-__all__ = ["DERIVATIVES", "Ball", "NumPyFunctions", "as_ball", "common", "power"]
-
-
-# phi' of every function that equations may use; it reads arb and Ball alike.
-DERIVATIVES: dict[str, Callable[[Any], Any]] = {
-    "sin": lambda x: x.cos(),
-    "cos": lambda x: -x.sin(),
-    "exp": lambda x: x.exp(),
-    "log": lambda x: 1 / x,
-    "sqrt": lambda x: 1 / (2 * x.sqrt()),
-    "sinh": lambda x: x.cosh(),
-    "cosh": lambda x: x.sinh(),
-    "tanh": lambda x: 1 - x.tanh() ** 2,
-    "arctan": lambda x: 1 / (1 + x * x),
-}
-_FLINT = {"arctan": "atan"}  # where its name is not NumPy's
+__all__ = ["Ball", "NumPyFunctions", "as_ball", "common", "power"]
 
 
 def _function(name: str) -> Callable[[Any], Any]:
@@ -41,22 +28,41 @@ def _function(name: str) -> Callable[[Any], Any]:
     return method
 
 
+JUMPS = ("floor", "ceil", "sign")
 Comparison = Callable[[arb, arb], Any]
 
 
 class NumPyFunctions:
-    """What balls and difference quotients share: the functions that NumPy looks for."""
+    """What balls and difference quotients share: the functions that NumPy looks for.
+
+    Those of one argument in the table `nlctl.expressions.functions` that have an enclosure, and
+    minimum and maximum.
+    """
 
     __slots__ = ()
-    sin, cos, exp, log, sqrt = (_function(n) for n in ("sin", "cos", "exp", "log", "sqrt"))
-    sinh, cosh, tanh, arctan = (_function(n) for n in ("sinh", "cosh", "tanh", "arctan"))
     __hash__ = None  # type: ignore[assignment]  # equality may be undecided
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
         if ufunc in (np.minimum, np.maximum):
             name = "minimum" if ufunc is np.minimum else "maximum"
             ufunc = np.frompyfunc(lambda a, b: _pairwise(name, a, b), 2, 1)
-        return getattr(ufunc, method)(*(np.asarray(x, dtype=object) for x in inputs), **kwargs)
+        return getattr(ufunc, method)(*map(_objects, inputs), **kwargs)
+
+
+NumPyFunctions.__floor__ = _function("floor")  # type: ignore[attr-defined]  # NumPy looks for it
+NumPyFunctions.__ceil__ = _function("ceil")  # type: ignore[attr-defined]
+for _name, _row in FUNCTIONS.items():
+    if _row.enclosure is not None and _row.count == 1:
+        setattr(NumPyFunctions, _name, _function(_name))
+
+
+def _objects(x: Any) -> np.ndarray:
+    """Return an array of plain objects: NumPy's own numbers would ask the ball in turn."""
+    plain = x.item() if isinstance(x, np.generic) else x
+    array = np.asarray(plain, dtype=object)
+    if isinstance(x, np.ndarray) and x.dtype != object:
+        array[...] = np.reshape(np.array(x.tolist(), dtype=object), x.shape)
+    return array
 
 
 def _pairwise(name: str, a: Any, b: Any) -> Any:
@@ -177,10 +183,14 @@ class Ball(NumPyFunctions):
 
     def apply(self, name: str) -> Ball:
         """Return phi of the ball for the NumPy function of that name."""
-        value = getattr(self.value, _FLINT.get(name, name))()
+        row = FUNCTIONS[name]
+        assert row.enclosure is not None
+        value = row.enclosure(self.value)
+        if name in JUMPS and not value.is_exact():
+            raise Undecided(f"{name}({self.value}) jumps")
         if not self.gradient:
             return Ball(value)
-        return self.chain(value, DERIVATIVES[name](Ball(self.value)).value)
+        return self.chain(value, as_ball(row.derivative[0](Ball(self.value))).value)
 
     def _compare(self, other: Any, yes: Comparison, no: Comparison) -> Any:
         """Return yes(self, other), where `no` is its negation; see `branch`."""

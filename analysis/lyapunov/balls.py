@@ -20,15 +20,17 @@ from typing import Any
 import numpy as np
 from flint import arb
 
+from nlctl._arguments import a_function, of_type, whole_number
+from nlctl._errors import ParameterError
+
 from .ball import Ball, as_ball, common
 from .box import Box, Cell
-from .branches import Decisions, Undecided, take
+from .branches import Undecided, every_way
 
 __all__ = ["Ball", "Box", "Proof", "Range", "Undecided", "enclose", "prove", "upper"]
 
 Function = Callable[[tuple[Any, ...]], Any]
 HOPELESS = 5_000  # boxes after which a function still without bound somewhere is given up
-BRANCHES = 64  # ways through an equation on one box, beyond which the box is split first
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +105,17 @@ def enclose(function: Function, box: Box, *, tol: float = 1e-3, max_boxes: int =
     Returns
     -------
     Range
+
+    Raises
+    ------
+    ParameterError
+        If it is no function or no box, `tol` is not positive, or `max_boxes` is below 1.
     """
+    a_function("enclose", "function", function)
+    of_type("enclose", "box", box, Box, "Box.of(x1=(-1, 1))")
+    if not tol > 0:  # infinite: the first box will do
+        raise ParameterError(f"enclose needs tol > 0, got {tol}")
+    whole_number("enclose", "max_boxes", max_boxes, at_least=1)
     start = time.perf_counter()
     high, greatest, n, lost = _supremum(function, box, tol, max_boxes)
     low, least, m, missed = _supremum(lambda x: -as_ball(function(x)), box, tol, max_boxes)
@@ -139,7 +151,17 @@ def prove(
         The claim.
     max_boxes : int, optional
         Number of boxes after which the rest counts as undecided.
+
+    Raises
+    ------
+    ParameterError
+        If it is no function or no box, the claim is not low <= high, or `max_boxes` is below 1.
     """
+    a_function("prove", "function", function)
+    of_type("prove", "box", box, Box, "Box.of(x1=(-1, 1))")
+    whole_number("prove", "max_boxes", max_boxes, at_least=1)
+    if not low <= high:  # refuses NaN, too
+        raise ParameterError(f"prove needs low <= high, got {low} and {high}")
     start, queue, boxes = time.perf_counter(), [box.cell], 0
     undecided, where, value, holds = 0, None, np.nan, True
     while queue and boxes < max_boxes:
@@ -241,21 +263,13 @@ def _bounds(function: Function, cell: Cell) -> tuple[arb, arb, tuple[arb, ...] |
 
 def _every_branch(function: Function, coordinates: Sequence[arb]) -> arb:
     """Return the hull over every way through the function; NaN if there is no end of them."""
-    balls, hull, count = tuple(map(Ball, coordinates)), None, 0
-    scripts: list[tuple[bool, ...]] = [()]
-    while scripts:
-        given = scripts.pop()
-        count += 1
-        try:
-            with take(Decisions(given=given)) as decisions:
-                value = as_ball(function(balls)).value
-        except Undecided:
-            return arb.nan()
-        hull = value if hull is None else hull.union(value)
-        taken = decisions.taken
-        scripts += [taken[:i] + (False,) for i in range(len(given), len(taken))]
-        if count + len(scripts) > BRANCHES:
-            return arb.nan()
+    balls, hull = tuple(map(Ball, coordinates)), None
+    try:
+        for result in every_way(lambda: function(balls)):
+            value = as_ball(result).value
+            hull = value if hull is None else hull.union(value)
+    except Undecided:
+        return arb.nan()
     assert hull is not None
     return hull
 

@@ -46,6 +46,11 @@ class Box:
         return cls(names=tuple(sides), low=low, high=high)
 
     def __post_init__(self) -> None:
+        if not len(self.names) == len(self.low) == len(self.high):
+            raise ParameterError(
+                f"Box needs low and high for each of {len(self.names)} sides, got "
+                f"{len(self.low)} and {len(self.high)}"
+            )
         for name, a, b in zip(self.names, self.low, self.high, strict=True):
             if not a <= b:  # refuses NaN, too
                 raise ParameterError(f"Box needs low <= high on side {name}, got [{a:g}, {b:g}]")
@@ -100,6 +105,11 @@ def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
         raise ParameterError(
             f"visited_box needs a response and margin >= 0, got {len(responses)} and {margin}"
         )
+    for response in responses:
+        if not hasattr(response, "output_labels"):
+            raise ParameterError(
+                f"visited_box needs responses with named outputs, got {type(response).__name__}"
+            )
     labels = [list(r.output_labels or ()) for r in responses]
     wanted = [n for n in labels[0] if n in ("u", "v") or _is_state(n)]
     if not any(map(_is_state, wanted)):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from typing import Any
 
-__all__ = ["Decisions", "Undecided", "branch", "take"]
+__all__ = ["Decisions", "Undecided", "branch", "every_way", "take"]
+
+BRANCHES = 64  # ways through an equation on one box, beyond which the box is split first
 
 
 class Undecided(ArithmeticError):  # noqa: N818
@@ -57,3 +60,25 @@ def branch(yes: bool, no: bool, what: str) -> bool:
     if decisions is None:
         raise Undecided(f"{what} is true for some points of the box and false for others")
     return decisions.next()
+
+
+def every_way(call: Callable[[], Any]) -> Iterator[Any]:
+    """Yield what a call returns on every way through it, with balls that cannot decide the way.
+
+    Raises
+    ------
+    Undecided
+        If a comparison has no answer at all, or there are too many ways.
+    """
+    scripts: list[tuple[bool, ...]] = [()]
+    count = 0
+    while scripts:
+        given = scripts.pop()
+        count += 1
+        with take(Decisions(given=given)) as decisions:
+            value = call()
+        yield value
+        taken = decisions.taken
+        scripts += [taken[:i] + (False,) for i in range(len(given), len(taken))]
+        if count + len(scripts) > BRANCHES:
+            raise Undecided(f"more than {BRANCHES} ways through an equation")

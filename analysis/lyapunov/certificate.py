@@ -14,6 +14,7 @@ in the box, and so |r| <= C_0(C).  No Nussbaum function and no Lemma 1 take part
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -21,11 +22,14 @@ from typing import Any
 import numpy as np
 from flint import arb
 
+from nlctl._errors import ParameterError
+from nlctl._param import whole_number
+
 from .ball import Ball
 from .balls import upper
-from .decomposition import Decomposition, decompose
+from .decomposition import Decomposition, check_gain, decompose
 from .demand import Demand, demand
-from .final_bound import KAPPA, alpha_0, alpha_1, initial_V
+from .final_bound import alpha_0, alpha_1, initial_V
 from .known_sign_loop import KnownSignLoop, read_loop
 from .record import Constant, per_second
 from .tracking import reference_bounds
@@ -87,18 +91,19 @@ class Certificate:
         alpha_1 = "min{2 beta, sigma_1 Gamma, sigma_2 gamma}"
         unit, error, energy = per_second(n), per_second(n - 1), per_second(2 * n - 2)
         k = (split.provenance, split.how, split.over)
+        sure = "given" if split.provenance == "given" else "proved"
         rows: list[tuple[str, float, str, Any, str, str]] = [
             ("G_min", need.G_min, unit, "proved", "F/v", f"all v, {over}"),
             ("G_max", need.G_max, unit, "proved", "F/v", f"all v, {over}"),
             ("k_1", split.k_1, "1", *k),
             ("k_2", split.k_2, "1", *k),
             ("eps_u*", split.eps_star, "1", *k),
-            ("N_0 k_1 G_min", gain, "1", "proved", "must be at least 1", over),
+            ("N_0 k_1 G_min", gain, "1", sure, "must be at least 1", over),
             ("sup |g + d|", need.matched, unit, "proved", f"{need.boxes} boxes", f"all t, {over}"),
-            ("delta*", need.delta_star, unit, "proved", "sup |g + d| + G_max eps_u*", over),
-            ("alpha_0", self.alpha_0, per_second(2 * n - 1), "proved", alpha_0, over),
+            ("delta*", need.delta_star, unit, sure, "sup |g + d| + G_max eps_u*", over),
+            ("alpha_0", self.alpha_0, per_second(2 * n - 1), sure, alpha_0, over),
             ("alpha_1", self.alpha_1, "1/s", "computed", alpha_1, "all t"),
-            ("V(0)", self.V_0, energy, "proved", "(21) with W = 0", "this initial state"),
+            ("V(0)", self.V_0, energy, sure, "(21) with W = 0", "this initial state"),
         ]
         if self.holds:
             bound, ultimate = "sqrt(2 max{V(0), alpha_0/alpha_1})", "sqrt(2 alpha_0/alpha_1)"
@@ -122,10 +127,10 @@ class Certificate:
 
 
 def bound_of_r(loop: KnownSignLoop, delta_star: float) -> tuple[arb, arb, float, arb]:
-    """Return C_0, alpha_0 (with 0.2785 b), alpha_1 and V(0) for W = 0 and a bound delta*."""
+    """Return C_0, alpha_0, alpha_1 and V(0) for W = 0 and a bound delta*."""
     gains, delta = loop.parts.gains, Ball(arb(delta_star))
     rate = alpha_1(gains)
-    drive = (alpha_0(gains, delta, 0.0) + KAPPA * loop.law.b).value * OUTWARD
+    drive = alpha_0(gains, delta, 0.0).value * OUTWARD
     V_0 = initial_V(gains, delta, sum(w * w for w in gains.W_hat_0)).value * OUTWARD
     return (2 * V_0.max(drive / rate * OUTWARD)).sqrt(), drive, rate, V_0
 
@@ -134,6 +139,7 @@ def certify(
     loop: Any,
     *,
     params: Mapping[str, Any] | None = None,
+    inputs: Mapping[str, float] | None = None,
     k: tuple[float, float] | None = None,
     u_max: float = 250.0,
     tol: float = 1e-3,
@@ -151,6 +157,9 @@ def certify(
         of the Nussbaum law and a `nlctl.SumOfSines` reference.
     params : mapping, optional
         Overrides by qualified name, as in a run.
+    inputs : mapping, optional
+        Bound of |w| for every external input w of the diagram, by name.  It must be added to the
+        plant's v, whatever its gain; it then belongs to eps_u.
     k : (k_1, k_2), optional
         Bounds that the actuator's k shall have, see `decompose`; a tight choice makes eps_u*
         small.
@@ -168,12 +177,20 @@ def certify(
     Raises
     ------
     DiagramError
-        If the loop has other blocks than the proof is about.
+        If the loop has other blocks, connections or equations than the proof is about, or an
+        external input without a bound.
     DecompositionError
         If the actuator has no split (2).
+    ParameterError
+        If `u_max`, `tol` or `max_iterations` is not positive, or a bound of an input is refused.
     """
-    read = read_loop(loop, params)
-    split = decompose(read.parts.actuator, k=k, u_max=u_max, tol=tol)
+    max_iterations = whole_number("certify", "max_iterations", max_iterations, at_least=1)
+    for name, value in (("u_max", u_max), ("tol", tol)):
+        if not 0 < value < np.inf:
+            raise ParameterError(f"certify needs a finite {name} > 0, got {value}")
+    check_gain("certify", k)
+    read = read_loop(loop, params, inputs)
+    split = _disturbed(decompose(read.parts.actuator, k=k, u_max=u_max, tol=tol), read)
     C = abs(read.parts.gains.r_0)
     iterations = [C]
     for _ in range(max_iterations):
@@ -188,10 +205,7 @@ def certify(
     else:
         reason = f"C_0 still grows after {max_iterations} iterations: {iterations[-1]:.6g}"
     u = _bound_of_u(read, need, C_0)
-    if not reason and split.provenance == "proved" and u > 2 * u_max:
-        reason = (
-            f"|u| may reach {u:.4g}, the actuator's split is proved to {2 * u_max:g}: raise u_max"
-        )
+    reason = reason or _doubt(read, split, u, u_max, iterations[-1])
     proved = f"the box closes: |r| < {need.C:.6g} implies |r| <= {iterations[-1]:.6g}"
     return Certificate(
         holds=not reason,
@@ -207,6 +221,34 @@ def certify(
         demand=need,
         split=split,
         loop=read,
+    )
+
+
+def _doubt(read: KnownSignLoop, split: Decomposition, u: float, u_max: float, C_0: float) -> str:
+    """Say why a box that closes proves nothing; nothing if it does."""
+    if split.provenance == "given":
+        return (
+            f"|r| <= {C_0:.6g} would follow from the split (2) that "
+            f"{type(read.parts.actuator).__name__} declares; samples do not refute it, and nothing "
+            "proves it: for an actuator without memory give k=(k_1, k_2), which is proved"
+        )
+    if split.provenance == "proved" and u > 2 * u_max:
+        return (
+            f"|u| may reach {u:.4g}, the actuator's split is proved to {2 * u_max:g}: raise u_max"
+        )
+    return ""
+
+
+def _disturbed(split: Decomposition, loop: KnownSignLoop) -> Decomposition:
+    """Return the split of v = k u + (eps_u + w) with the external inputs w."""
+    if not loop.disturbance:
+        return split
+    w = Ball(arb(loop.disturbance))
+    return dataclasses.replace(
+        split,
+        eps_low=-upper(w - split.eps_low),
+        eps_high=upper(w + split.eps_high),
+        how=f"{split.how}; external inputs add {loop.disturbance:g} at most",
     )
 
 

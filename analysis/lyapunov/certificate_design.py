@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
+from nlctl._arguments import number, whole_number
 from nlctl._errors import DivergedError, ParameterError
 from nlctl.native import compile as compiled_loop
 from nlctl.response import input_output_response
@@ -134,8 +135,10 @@ def design(
         If no gains were found for which the box closes and |u| keeps its limit, or a network
         has sigma_1 = 0.
     """
-    if not u_limit > 0:
-        raise ParameterError(f"design needs u_limit > 0, got {u_limit:g}")
+    u_limit = number("design", "u_limit", u_limit, above=0)
+    horizon = number("design", "horizon", horizon, above=0)
+    evaluations = whole_number("design", "evaluations", evaluations, at_least=1)
+    max_steps = whole_number("design", "max_steps", max_steps, at_least=1)
     read = read_loop(loop)
     if read.nodes and not read.parts.gains.sigma_1 > 0:
         raise ParameterError("design needs sigma_1 > 0, otherwise alpha_1 = 0; got sigma_1 = 0")
@@ -178,7 +181,7 @@ def _with_gains(
     changed = dataclasses.replace(
         parts,
         law=dataclasses.replace(parts.law, **law),
-        gains=dataclasses.replace(parts.gains, beta=beta, **robust, **weights),
+        gains=dataclasses.replace(parts.gains, beta=beta, b=b, **robust, **weights),
     )
     pieces = {"law": law, "robust": robust, "weights": weights}
     gains = {f"{paths[n]}.{key}": v for n, values in pieces.items() for key, v in values.items()}

@@ -48,13 +48,20 @@ class _Response:
 
 
 def creep_of(run: Run) -> Creep | None:
-    """Return where the creep of zeta leads; None if the run is too short to tell."""
-    if run.signals.t[-1] - run.signals.t[0] < 6 * WINDOW:
-        return None
+    """Return where the creep of zeta leads; None if the run does not tell."""
+    found = _creep_or_reason(run)
+    return None if isinstance(found, str) else found
+
+
+def _creep_or_reason(run: Run) -> Creep | str:
+    """Return where the creep leads, or why that cannot be told."""
+    length = run.signals.t[-1] - run.signals.t[0]
+    if length < 6 * WINDOW:
+        return f"{length:g} s show nothing of it: run {np.ceil(6 * WINDOW):g} s at least"
     try:
         return creep(_Response(run), run.parts.law.N, window=WINDOW)
-    except ParameterError:
-        return None
+    except ParameterError as error:
+        return str(error)
 
 
 def conclusions(loop: ct.InterconnectedSystem, run: Run, found: Constants) -> list[Line]:
@@ -72,12 +79,17 @@ def _property(given: Premises) -> Line:
         seen = nussbaum_property(given.N)
     except ParameterError as error:
         return Line(key="(12)", statement=statement, status="undecided", evidence=str(error))
+    told = f"{len(seen.means)} lobes on [0, {seen.end:.4g}]"
+    if not seen.means:
+        told = f"{len(seen.lobes) - 1} changes of sign on [0, {seen.end:.4g}], no four lobes"
     return Line(
         key="(12)",
         statement=statement,
         status="checked" if seen.type_a else "violated",
-        evidence=f"lobes on [0, {seen.end:g}], type B {'seen' if seen.type_b else 'not seen'}",
-        follows="" if seen.type_a else "N is no Nussbaum function on this range.",
+        evidence=f"{told}, type B {'seen' if seen.type_b else 'not seen'}",
+        follows=""
+        if seen.type_a
+        else "N is not a Nussbaum function on this range: take another N for the law.",
     )
 
 
@@ -176,18 +188,11 @@ def _remains(run: Run, given: Premises, found: Constants) -> list[Line]:
 
 def _creep(run: Run) -> Line:
     statement = "the drift of zeta ends before N changes its sign"
-    found = creep_of(run)
-    if found is None:
-        return Line(
-            key="creep",
-            statement=statement,
-            status="undecided",
-            evidence=f"{run.signals.t[-1]:g} s show nothing of it: run "
-            f"{np.ceil(6 * WINDOW):g} s at least",
-        )
+    found = _creep_or_reason(run)
+    if isinstance(found, str):
+        return Line(key="creep", statement=statement, status="undecided", evidence=found)
     calm = found.verdict in ("settles", "turned round")
-    burst = np.min([found.burst, found.burst_by_balance])
-    soon = f"; budget spent by {burst:.4g} s at the latest rate, then max |r| = {found.peak:.4g}"
+    soon = f"; budget spent by {found.burst:.4g} s or so, then max |r| = {found.peak:.4g}"
     return Line(
         key="creep",
         statement=statement,

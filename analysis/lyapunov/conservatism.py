@@ -194,6 +194,7 @@ def _shares(given: Premises, r_0: float, Q: float) -> tuple[Share, ...]:
          gains.sigma_2 * given.delta**2 / 2 / by),
         ("|W| in alpha_0", "sigma_1 |W|^2 / (2 alpha_1)", gains.sigma_1 * W / 2 / by),
         ("tau in alpha_0", "0.2785 tau delta* / alpha_1", KAPPA * gains.tau * given.delta / by),
+        *([("b in alpha_0", "0.2785 b / alpha_1", KAPPA * gains.b / by)] if gains.b else []),
         ("delta* in V(0)", "(delta* - delta_hat(0))^2 / (2 gamma)", start_delta),
         ("|W| in V(0)", "|W - W_hat(0)|^2 / (2 Gamma)", start_W),
         ("r(0) in V(0)", "r(0)^2 / 2", r_0**2 / 2),

@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from nlctl._arguments import number, of_type, vector
 from nlctl._errors import ParameterError
 from nlctl.functions import smooth_sign
 from nlctl.plants import coordinate_names
@@ -49,6 +50,9 @@ def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float 
         As in `analysis.lyapunov.balls.enclose`.
     """
     _, d = plant_terms(plant)
+    of_type("disturbance", "box", box, Box, "Box.of(x1=(-1, 1))")
+    if not (isinstance(times, tuple | list) and len(times) == 2 and times[0] <= times[1]):
+        raise ParameterError(f"disturbance needs times = (start, end) in s, got {times}")
     return enclose(lambda z: d(z[:-1], z[-1]), box.times("t", *times), tol=tol)
 
 
@@ -98,6 +102,8 @@ def constants(
         If the box lacks a side, W has the wrong length or its norm is above 1e5.
     """
     parts = read_parts(loop, start, params)
+    box = of_type("constants", "box", box, Box, "Box.of(x1=(-1, 1), v=(-5, 5))")
+    number("constants", "tol", tol, above=0)
     states = box.only(*coordinate_names(parts.order))
     v = box["v"] if "v" in box.names else (-np.inf, np.inf)
     over_v = states.times("v", *v)
@@ -131,7 +137,7 @@ def _weights(
     if W is None:
         W = tightest_weights(network_on_grid(parts.plant, parts.basis, box), parts.gains, rest)
         return W, ("computed", "argmin of C_0 (convex programme on a grid); any W will do")
-    W = np.asarray(W, dtype=float)
+    W = vector("constants", "W", W)
     if W.shape != (nodes,):
         raise ParameterError(f"constants needs W of shape ({nodes},), got {W.shape}")
     return W, ("given", "any W will do")

@@ -6,20 +6,30 @@ between the lines k_1 u and k_2 u, and eps_u the rest.  A small k_1 buys a small
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
+from flint import arb
 
+from nlctl._arguments import number, vector
 from nlctl._errors import ParameterError, UsageError
 from nlctl._param import equation_arguments
 from nlctl.actuators import Backlash, DeadZone, play_band
 from nlctl.functions import clip
 
-from .balls import Box, Range, enclose
+from .ball import Ball, as_ball, common
+from .balls import Box, Range, Undecided, enclose
+from .slope import slope_in
+from .time_dependence import UNREAD, reads_time
 
 __all__ = ["Decomposable", "Decomposition", "DecompositionError", "clipped_split", "decompose"]
+
+UNTIMED, TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
+Edge = Callable[[Any, Any], Any]
+TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared splits are tried
 
 
 class DecompositionError(UsageError):
@@ -39,7 +49,8 @@ class Decomposition:
     part : callable
         ``part(u, v)`` is k u; floats and arrays.  `gain` and `eps_u` follow from it.
     provenance : {"computed", "proved", "given"}
-        "computed" in closed form, "proved" by branch and bound.
+        "computed" in closed form, "proved" by branch and bound, "given" by the record alone:
+        samples do not refute it, and nothing proves it.
     how, over : str
         How the bounds were obtained, and for which inputs they hold.
     """
@@ -88,13 +99,32 @@ def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
 
     It serves numbers, arrays and balls, and leaves the smallest |eps_u| that any split with
     k_1 <= k <= k_2 leaves at (u, v).
+
+    Raises
+    ------
+    ParameterError
+        If not 0 < k_1 <= k_2, both finite.
     """
+    number("clipped_split", "k_1", k_1, above=0)
+    number("clipped_split", "k_2", k_2, at_least=k_1)
 
     def part(u: Any, v: Any) -> Any:
         one, other = k_1 * u, k_2 * u
         return clip(v, np.minimum(one, other), np.maximum(one, other))
 
     return part
+
+
+def check_gain(who: str, k: Any) -> None:
+    """Refuse bounds of k that are no pair with 0 < k_1 <= k_2; None is none.
+
+    Raises
+    ------
+    ParameterError
+    """
+    bounds = None if k is None else vector(who, "k = (k_1, k_2)", k)
+    if bounds is not None and (bounds.size != 2 or not 0 < bounds[0] <= bounds[1]):
+        raise ParameterError(f"{who} needs k = (k_1, k_2) with 0 < k_1 <= k_2, got {k}")
 
 
 def decompose(
@@ -121,6 +151,11 @@ def decompose(
     tol : float, optional
         eps_u* is at most this far from a value that is attained.
 
+    Notes
+    -----
+    The bounds hold for all t >= 0: time is a side of the boxes.  What a record declares itself is
+    "proved" where branch and bound confirms it, and "given" otherwise, whatever the record says.
+
     Returns
     -------
     Decomposition
@@ -130,14 +165,17 @@ def decompose(
     DecompositionError
         If eps_u is not bounded for all u, as with saturation, no split is known, or the record's
         own one is refuted by a sample of its output.
+    ParameterError
+        If `k` is no pair with 0 < k_1 <= k_2, or `u_max` or `tol` is not positive.
     """
+    u_max = number("decompose", "u_max", u_max, above=0)
+    tol = number("decompose", "tol", tol, above=0)
+    check_gain("decompose", k)
     if k is None and hasattr(actuator, "decomposition"):
-        split = actuator.decomposition(u_max)
-        _refute(actuator, split, u_max)
-        return split
-    if k is None and isinstance(actuator, DeadZone):
+        return _declared_split(actuator, u_max, tol)
+    if k is None and type(actuator) is DeadZone:
         return _textbook_dead_zone(actuator)
-    if k is None and isinstance(actuator, Backlash):
+    if k is None and type(actuator) is Backlash:
         if actuator.m_r == actuator.m_l:
             return _play(actuator)
         k = (min(actuator.m_r, actuator.m_l), max(actuator.m_r, actuator.m_l))
@@ -146,18 +184,35 @@ def decompose(
             f"{type(actuator).__name__} has no known split (2): give the bounds k=(k_1, k_2), or "
             "the record a method decomposition(u_max)"
         )
-    if not (np.isfinite(u_max) and u_max > 0 and 0 < k[0] <= k[1] < np.inf):
-        raise ParameterError(f"decompose needs u_max > 0 and 0 < k_1 <= k_2, got {u_max} and {k}")
     return _proved_split(actuator, k, u_max, tol)
 
 
+def _declared_split(actuator: Any, u_max: float, tol: float) -> Decomposition:
+    """Return the split that a record declares, with what is known of it."""
+    split = actuator.decomposition(u_max)
+    _refute(actuator, split, u_max)
+    given = dataclasses.replace(
+        split, provenance="given", how=f"declared by {type(actuator).__name__}: {split.how}"
+    )
+    try:
+        proved = _proved_split(actuator, (split.k_1, split.k_2), u_max, tol)
+    except DecompositionError:
+        return given
+    if proved.eps_low < split.eps_low - tol or proved.eps_high > split.eps_high + tol:
+        return given
+    low, high = min(proved.eps_low, split.eps_low), max(proved.eps_high, split.eps_high)
+    return dataclasses.replace(proved, eps_low=low, eps_high=high)
+
+
 def _refute(actuator: Any, split: Decomposition, u_max: float) -> None:
-    """Look for an input at which a memoryless actuator breaks the split that it declares."""
+    """Look for an input and a time at which a memoryless actuator breaks what it declares."""
     if len(actuator.states):
         return
-    output, _ = _edges(actuator)
-    for u in np.linspace(-u_max, u_max, 2001):
-        v = output(u)
+    _, output = _edges(actuator)
+    points = [(u, 0.0) for u in np.linspace(-u_max, u_max, 2001)]
+    points += [(u, t) for t in TIMES for u in np.linspace(-u_max, u_max, 101)]
+    for u, t in points:
+        v = output(u, t)
         k, eps_u = split.gain(u, v), split.eps_u(u, v)
         room = 1e-9 * (1 + abs(v))
         if not (
@@ -166,8 +221,8 @@ def _refute(actuator: Any, split: Decomposition, u_max: float) -> None:
         ):
             raise DecompositionError(
                 f"{type(actuator).__name__} declares k in [{split.k_1:g}, {split.k_2:g}] and eps_u "
-                f"in [{split.eps_low:g}, {split.eps_high:g}], but at u = {u:g} k is {k:g} and "
-                f"eps_u is {eps_u:g}: correct its decomposition"
+                f"in [{split.eps_low:g}, {split.eps_high:g}], but at u = {u:g}, t = {t:g} s k is "
+                f"{k:g} and eps_u is {eps_u:g}: correct its decomposition"
             )
 
 
@@ -211,65 +266,107 @@ def _play(play: Backlash) -> Decomposition:
 
 
 def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: float) -> Decomposition:
-    part, edges = clipped_split(*k), _edges(actuator)
-    reach = {factor: _eps_range(part, edges, factor * u_max, tol) for factor in (1.0, 2.0)}
-    _refuse_growth(actuator, k, u_max, reach)
+    edges = _edges(actuator)
+    wide = _eps_range(k, edges, 2 * u_max, tol)
+    undecided = sum(end.undecided for end in wide)
+    if undecided:
+        raise DecompositionError(
+            f"eps_u of {type(actuator).__name__} could not be bounded for |u| <= {2 * u_max:g}: "
+            f"{undecided} boxes are undecided"
+        )
+    _refuse_growth(actuator, k, u_max, (_eps_range(k, edges, u_max, tol), wide))
     return Decomposition(
         k_1=k[0],
         k_2=k[1],
-        eps_low=reach[2.0][0].low,
-        eps_high=reach[2.0][1].high,
-        part=part,
+        eps_low=wide[0].low,
+        eps_high=wide[1].high,
+        part=clipped_split(*k),
         provenance="proved",
-        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in reach[2.0])} boxes",
-        over=f"|u| <= {2 * u_max:g}",
+        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in wide)} boxes",
+        over=f"|u| <= {2 * u_max:g}, all t",
     )
 
 
-def _edges(actuator: Any) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
-    """Return the least and the greatest output v that the actuator can have at input u."""
+def _edges(actuator: Any) -> tuple[Edge, Edge]:
+    """Return the least and the greatest output v that the actuator can have at input u, time t."""
     p = equation_arguments(actuator)
-    if isinstance(actuator, Backlash):
-        return (lambda u: play_band(u, p)[0]), (lambda u: play_band(u, p)[1])
+    if type(actuator) is Backlash:
+        return (lambda u, t: play_band(u, p)[0]), (lambda u, t: play_band(u, p)[1])
     if len(actuator.states) or len(actuator.inputs) != 1 or len(actuator.outputs) != 1:
         raise DecompositionError(
             f"{type(actuator).__name__} has memory or several signals: give the record a method "
             "decomposition(u_max)"
         )
 
-    def output(u: Any) -> Any:
-        return actuator.output(0.0, (), (u,), p)[0]
+    def output(u: Any, t: Any) -> Any:
+        try:
+            return actuator.output(t, (), (u,), p)[0]
+        except Undecided:
+            raise
+        except Exception as error:  # a user's function may raise whatever it likes
+            raise DecompositionError(
+                f"the output of {type(actuator).__name__} cannot be evaluated on intervals of u "
+                f"and t ({type(error).__name__}: {error}): write it with arithmetic and NumPy "
+                "functions of numbers"
+            ) from error
 
     return output, output
 
 
-def _eps_range(part: Any, edges: Any, u_max: float, tol: float) -> tuple[Range, Range]:
-    """Ranges of eps_u along both edges; it grows with v, so these are its ends."""
+def _eps_range(
+    k: tuple[float, float], edges: tuple[Edge, Edge], u_max: float, tol: float
+) -> tuple[Range, Range]:
+    """Ranges of eps_u along both edges, for all t >= 0; it grows with v, so these are its ends."""
+    part = clipped_split(*k)
 
-    def along(edge: Callable[[Any], Any]) -> Range:
-        def eps_u(point: tuple[Any]) -> Any:
-            (u,) = point
-            v = edge(u)
-            return v - part(u, v)
+    def along(edge: Edge) -> Range:
+        def eps_u(point: tuple[Any, ...]) -> Any:
+            u, t = (*point, UNREAD)[:2]
+            v = edge(u, t)
+            rest = as_ball(v - part(u, v))
+            return rest if t is UNREAD else _sharpened(rest, edge, k, u, t)
 
-        return enclose(eps_u, Box.of(u=(-u_max, u_max)), tol=tol)
+        if reads_time(edge):
+            box, limit = Box.of(u=(-u_max, u_max), t=(0.0, np.inf)), TIMED
+        else:
+            box, limit = Box.of(u=(-u_max, u_max)), UNTIMED
+        return enclose(eps_u, box, tol=tol, max_boxes=limit)
 
     low = along(edges[0])
     return low, low if edges[1] is edges[0] else along(edges[1])
 
 
+def _sharpened(rest: Any, edge: Edge, k: tuple[float, float], u: Any, t: Any) -> Any:
+    """Return eps_u from the difference quotient q of v in u as well, v = q u + v(0, t).
+
+    v - clip(v, k_1 u, k_2 u) grows with v, and no faster: it is u (q - clip(q, k_1, k_2)) and what
+    lies between 0 and v(0, t).  Between v and its clipped self intervals forget that t is one time.
+    """
+    try:
+        q, start = slope_in(lambda w: edge(w, t), u).value, as_ball(edge(0.0, t)).value
+    except Undecided:
+        return rest
+    low, high = (_excess(end, k) for end in (q.lower(), q.upper()))
+    sharper = as_ball(u).value * low.union(high) + arb(0).union(start)
+    if not rest.value.overlaps(sharper):  # answers that contradict each other: nobody goes this way
+        return rest
+    value = common(rest.value, sharper)
+    return Ball(value, (arb(0, "inf"),) * len(as_ball(u).gradient))
+
+
+def _excess(q: arb, k: tuple[float, float]) -> arb:
+    return (q - k[1]).max(arb(0)) + (q - k[0]).min(arb(0))
+
+
 def _refuse_growth(
-    actuator: Any, k: tuple[float, float], u_max: float, reach: dict[float, tuple[Range, Range]]
+    actuator: Any,
+    k: tuple[float, float],
+    u_max: float,
+    reach: tuple[tuple[Range, Range], tuple[Range, Range]],
 ) -> None:
     """(2) wants one eps_u* for all u; where eps_u grows with the range of u, there is none."""
-    name, (low, high) = type(actuator).__name__, reach[2.0]
-    undecided = low.undecided + high.undecided
-    if undecided:
-        raise DecompositionError(
-            f"eps_u of {name} could not be bounded for |u| <= {2 * u_max:g}: {undecided} boxes "
-            "are undecided"
-        )
-    bound = max(-reach[1.0][0].low, reach[1.0][1].high)
+    name, near, (low, high) = type(actuator).__name__, *reach
+    bound = max(-near[0].low, near[1].high)
     attained = max(high.greatest, -low.least)
     if attained > bound:
         raise DecompositionError(

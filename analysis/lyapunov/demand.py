@@ -16,7 +16,7 @@ from .box import Box
 from .decomposition import Decomposition
 from .final_bound import total_error
 from .known_sign_loop import KnownSignLoop
-from .sector import plant_terms, sector
+from .sector import quotient_range
 from .tracking import error_bounds, reference_bounds
 
 __all__ = ["Demand", "demand"]
@@ -77,18 +77,25 @@ def demand(loop: KnownSignLoop, split: Decomposition, C: float, *, tol: float = 
     low, names = tuple(-a for a in reach), coordinate_names(len(reach))
     box = Box(names=names, low=low, high=reach, how=f"|r| <= {C:.6g}")
 
-    def over_all(name: str) -> Box:
-        return Box(names=(*names, name), low=(*low, -np.inf), high=(*reach, np.inf))
-
-    f, d = plant_terms(loop.parts.plant)
+    def over_all(*more: str) -> Box:
+        sides = {"t": (0.0, np.inf), "v": (-np.inf, np.inf)}
+        whole = box
+        for name in more:
+            whole = whole.times(name, *sides[name])
+        return whole
 
     def matched(point: tuple[Any, ...]) -> Any:
         *x, t = point
-        return f(tuple(x), 0.0) + d(tuple(x), t)
+        return loop.acceleration(t, x, 0.0)
 
-    rough = enclose(matched, over_all("t"), tol=np.inf, max_boxes=1).magnitude
+    rough = enclose(matched, over_all("t"), max_boxes=1).magnitude
     fine = enclose(matched, over_all("t"), tol=tol * rough, max_boxes=20_000)
-    gain = sector(loop.parts.plant, over_all("v"), tol=tol, max_boxes=2_000)
+    gain = quotient_range(
+        lambda x, v: loop.acceleration(x[-1], x[:-1], v),
+        over_all("t", "v"),
+        tol=tol,
+        max_boxes=2_000,
+    )
     return Demand(
         C=C,
         box=box,

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from nlctl import functions
+from nlctl._arguments import number
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
 
@@ -95,6 +96,10 @@ def drift(response: Any, N: Function = functions.nussbaum) -> Drift:
     UnknownNameError, ParameterError
         If zeta, r or u is missing or not finite.
     """
+    if not hasattr(response, "output_labels"):
+        raise ParameterError(
+            f"drift needs a response with the outputs zeta, r and u, got {type(response).__name__}"
+        )
     time = np.asarray(response.time, dtype=float)
     zeta, r, u = (signal(response, name) for name in ("zeta", "r", "u"))
     integral = antiderivative(N)(zeta)
@@ -227,8 +232,9 @@ def safe_horizon(
         If a bound is refused, or N has no whole lobe with N < 0 within 8 above zeta_0.
     """
     _check_gain(l_min, l_max)
-    if not alpha_0 > 0:
-        raise ParameterError(f"safe_horizon needs alpha_0 > 0, got {alpha_0:g}")
+    number("safe_horizon", "V_0", V_0, at_least=0)
+    number("safe_horizon", "zeta_0", zeta_0)
+    number("safe_horizon", "alpha_0", alpha_0, above=0)
     crossed = lobes(N, zeta_0, zeta_0 + 8.0)
     falling = [i for i, lobe in enumerate(crossed[:-1]) if lobe.sign < 0]
     if not falling:

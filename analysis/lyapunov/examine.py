@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native
+from nlctl._arguments import one_of, whole_number
 
 from .box import Box, visited_box
 from .constants import constants
@@ -119,6 +120,9 @@ def examine(
     ParameterError, UnknownNameError
         If a run, a box or a name is refused.
     """
+    max_steps = whole_number("examine", "max_steps", max_steps, at_least=1)
+    if isinstance(W, str):
+        one_of("examine", "W", W, ["tightest"])
     members = members_of(loop, run, step, start, params)
     fixed = _numbers(start), _numbers(params)
     if len(members) == 1:
@@ -150,19 +154,11 @@ def _numbers(values: Mapping[str, Any] | None) -> dict[str, Any]:
     return {k: v for k, v in (values or {}).items() if np.ndim(v) == 0 or isinstance(v, tuple)}
 
 
-@dataclass(frozen=True)
-class _Extremes:
-    """What `visited_box` reads of a run."""
-
-    time: np.ndarray
-    output_labels: list[str]
-    y: list[np.ndarray]
-
-
 def _visited(runs: Runs) -> Box:
     reached = []
     for run in runs:
         names = [n for n in run.signals.values if n == "v" or (n[:1] == "x" and n[1:].isdigit())]
         y = [np.array([np.min(run.signals[n]), np.max(run.signals[n])]) for n in names]
-        reached.append(_Extremes(run.signals.t[[0, -1]], names, y))
+        ends = run.signals.t[[0, -1]]  # whatever lies in between does not count
+        reached.append(ct.TimeResponseData(ends, np.array(y), output_labels=names, issiso=False))
     return visited_box(*reached)

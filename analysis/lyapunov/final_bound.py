@@ -32,6 +32,9 @@ class Gains:
         r(0) and delta_hat(0).
     W_hat_0 : tuple of float
         W_hat(0); empty where there is no network.
+    b : float
+        Width of the smooth sign of r s in a law with a damped base, r (beta r + s) <= r eta +
+        0.2785 b; 0 for eta of (23).
     """
 
     beta: float
@@ -43,6 +46,7 @@ class Gains:
     r_0: float
     delta_hat_0: float
     W_hat_0: tuple[float, ...]
+    b: float = 0.0
 
 
 def total_error(G_max: Any, eps_u: Any, d: Any, eps: Any) -> Any:
@@ -62,7 +66,7 @@ def alpha_1(gains: Gains) -> float:
 
 
 def alpha_0(gains: Gains, delta: Any, W_squared: Any) -> Any:
-    """Return alpha_0 = 0.2785 tau delta* + sigma_1 |W|^2 / 2 + sigma_2 delta*^2 / 2, (31).
+    """Return alpha_0 = 0.2785 (tau delta* + b) + sigma_1 |W|^2 / 2 + sigma_2 delta*^2 / 2, (31).
 
     Parameters
     ----------
@@ -73,7 +77,10 @@ def alpha_0(gains: Gains, delta: Any, W_squared: Any) -> Any:
         |W|^2.
     """
     return (
-        KAPPA * gains.tau * delta + 0.5 * gains.sigma_1 * W_squared + 0.5 * gains.sigma_2 * delta**2
+        KAPPA * gains.tau * delta
+        + KAPPA * gains.b
+        + 0.5 * gains.sigma_1 * W_squared
+        + 0.5 * gains.sigma_2 * delta**2
     )
 
 

@@ -6,11 +6,13 @@ diagram: the rates come from the blocks' own equations, see `analysis.lyapunov.o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from nlctl.functions import smooth_sign
+from nlctl.plants import coordinate_names
 
 from .final_bound import KAPPA
 from .premises import Premises
@@ -127,7 +129,7 @@ def inequalities(signals: Signals, given: Premises) -> tuple[Margin, ...]:
     Returns
     -------
     tuple of Margin
-        (9), (14), (15), (18), (20), (22), (26)-(32), (34), (36), in this order.
+        (1), (9), (14), (15), (18), (20), (22), (26)-(32), (34), (36), in this order.
     """
     x = terms(signals, given)
     return (
@@ -142,14 +144,38 @@ def inequalities(signals: Signals, given: Premises) -> tuple[Margin, ...]:
 def _equations(signals: Signals, given: Premises, x: Terms) -> tuple[Margin, ...]:
     """The loop is of the form that the proof starts from: (9), (14), (15)."""
     t, n = signals.t, len(given.lambdas) + 1
+    names = coordinate_names(n)
     e = [signals[f"x{i + 1}"] - signals["yd" if i == 0 else f"yd{i}"] for i in range(n)]
     filtered = sum(c * e_i for c, e_i in zip((*reversed(given.lambdas), 1.0), e, strict=True))
     parts = x.g + x.kGu + x.rest
+    filter_signals = [x.r], [np.asarray(filtered)]
+    if "e" in signals.values:
+        filter_signals = [x.r, signals["e"]], [np.asarray(filtered), e[0]]
+    told = [signals[name] for name in ("y", *names)]
+    told += [signals[f"rate_{name}"] for name in names[:-1]]
+    states = [signals[f"state_{name}"] for name in (names[0], *names, *names[1:])]
     return (
+        equality(
+            "(1)",
+            "x_i' = x_{i+1}, y = x_1, and the outputs are the states",
+            t,
+            *_farthest(told, states),
+        ),
         equality("(9)", "x_n' = g + k G u + G eps_u + d", t, signals[f"rate_x{n}"], parts),
-        equality("(14)", "r = [A^T 1] e", t, x.r, filtered),
+        equality("(14)", "r = [A^T 1] e, e = e_1", t, *_farthest(*filter_signals)),
         equality("(15)", "r' = g + k G u + G eps_u + d + Y_d", t, x.r_rate, parts + x.Y_d),
     )
+
+
+def _farthest(
+    one: Sequence[np.ndarray], other: Sequence[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return of several pairs of signals the pair that is farthest apart, at every time."""
+    a, b = np.stack(one), np.stack(other)
+    with np.errstate(invalid="ignore"):
+        far = np.abs(a - b)
+    worst = np.argmax(np.where(np.isnan(far), np.inf, far), axis=0)[None]
+    return tuple(np.take_along_axis(side, worst, axis=0)[0] for side in (a, b))  # type: ignore[return-value]
 
 
 def _energy(t: np.ndarray, given: Premises, x: Terms) -> tuple[Margin, ...]:
@@ -184,15 +210,21 @@ def _adaptation(t: np.ndarray, given: Premises, x: Terms) -> tuple[Margin, ...]:
     slack = given.delta * (np.abs(x.r) - x.smooth)
     damped = -gains.beta * x.r**2 + x.zeta_rate
     rhs_27 = (
-        forced + slack + damped
+        forced + slack + damped + KAPPA * gains.b
         - (x.adaptation_W - x.r * x.W_network)
         - (x.adaptation_delta - x.delta_error * x.smooth)
     )  # fmt: skip
     leak = gains.sigma_1 * x.W_W_hat + gains.sigma_2 * x.delta_delta_hat
-    rhs_28 = forced + slack + damped + leak
+    rhs_28 = forced + slack + damped + KAPPA * gains.b + leak
+    into_27 = (
+        inequality("(27)", "(26) <= (27) with zeta' = r eta of a damped base, "
+                   "r (beta r + s) <= r eta + 0.2785 b", t, rhs_26, rhs_27, x.size)
+        if gains.b
+        else equality("(27)", "= (26) with (24)", t, rhs_26, rhs_27, x.size)
+    )  # fmt: skip
     return (
         equality("(26)", "= (22) with (23), (24): r u = N zeta'", t, rhs_22, rhs_26, x.size),
-        equality("(27)", "= (26) with (24)", t, rhs_26, rhs_27, x.size),
+        into_27,
         equality("(28)", "= (27) with (25)", t, rhs_27, rhs_28, x.size),
     )
 
@@ -202,7 +234,8 @@ def _decay(t: np.ndarray, given: Premises, x: Terms) -> tuple[Margin, ...]:
     gains = given.gains
     leak_W, leak_delta = gains.sigma_1 * x.W_W_hat, gains.sigma_2 * x.delta_delta_hat
     driven = (x.kGN + 1) * x.zeta_rate
-    rhs_30 = -gains.beta * x.r**2 + driven + leak_W + leak_delta + KAPPA * gains.tau * given.delta
+    slack = KAPPA * (gains.tau * given.delta + gains.b)
+    rhs_30 = -gains.beta * x.r**2 + driven + leak_W + leak_delta + slack
     W, delta = gains.sigma_1 / 2 * (given.W @ given.W), gains.sigma_2 / 2 * given.delta**2
     rhs_31 = -given.alpha_1 * x.V + driven + given.alpha_0
     return (

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
+from nlctl._errors import UnknownKeywordError
 from nlctl._names import unknown
 
 from ..json_values import as_json
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["Ledger", "Line", "ledger"]
+
+SETTINGS = ("box", "W", "k", "start", "params", "step", "max_steps")
+"""What `examine` takes by name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,6 +141,9 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
     DiagramError, DecompositionError, ParameterError, UnknownNameError
         As `examine` does.
     """
+    for name in settings:
+        if name not in SETTINGS:
+            raise unknown("setting", name, SETTINGS, "of ledger", UnknownKeywordError)
     found = loop if isinstance(loop, Examination) else examine(loop, run, **settings)
     return _assembled(found)
 

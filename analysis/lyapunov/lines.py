@@ -10,6 +10,7 @@ import numpy as np
 
 from .assumptions import assumptions
 from .constants import kappa
+from .declared_terms import update_is_declared
 from .final_bound import alpha_1
 from .inequalities import inequalities
 from .premises import literal, premises
@@ -36,6 +37,8 @@ FOLLOWS = {
     "A2": "the disturbance is larger than declared: delta* of (20), C_0 of (36) are too small.",
     "A3": "the gain leaves its sector: (8) fails, G_max and the sign of k G are not as supposed.",
     "(10)": "eps* does not bound the network's error: delta* of (20) is too small.",
+    "(1)": "the plant is not a chain of integrators with measured states: another plant.",
+    "(yd)": "the reference's derivatives are not those of yd: (14), (15), (18) speak of others.",
     "(9)": "the plant is not x_n' = f(x, v) + d(x, t): the proof is about another plant.",
     "(14)": "r is not the filtered error of (14): (36) says nothing about e.",
     "(15)": "r' is not what (18) starts from: Y_d or the plant differs from the paper's.",
@@ -155,6 +158,7 @@ def assumption_lines(run: Run, found: Constants, u_max: float) -> list[Line]:
     """Return the lines of Assumptions 1 to 3, (10) and the compact set."""
     given = premises(found, run.gains)
     how = found.table()
+    declared = update_is_declared(run.parts.roles.places["plant"])
     sources = {"A1": "eps_u*", "A2": "d*", "A3": "G_max", "(10)": "eps*"}
     lines = []
     for margin in assumptions(run.signals, given, found.box, u_max):
@@ -167,6 +171,9 @@ def assumption_lines(run: Run, found: Constants, u_max: float) -> list[Line]:
             line = dataclasses.replace(
                 line, status=KNOWN[row["provenance"]], evidence=f"{row['how']}; over {over}"
             )
+            if line.status == "proved" and margin.equation != "A1" and not declared:
+                evidence = f"{line.evidence}; of f and d, which the update follows at the samples"
+                line = dataclasses.replace(line, status="checked", evidence=evidence)
         if margin.equation == "Omega":
             line = dataclasses.replace(line, evidence=f"box {found.box.how}")
         lines.append(line)
@@ -176,9 +183,9 @@ def assumption_lines(run: Run, found: Constants, u_max: float) -> list[Line]:
 def inequality_lines(run: Run, found: Constants) -> list[Line]:
     """Return the lines of the numbered inequalities, corrected and, where it fails, as printed."""
     given = premises(found, run.gains)
+    margins = [*inequalities(run.signals, given), *([run.reference] if run.reference else [])]
     lines = [
-        _line(margin, run.signals, "checked", f"{margin.t.size} samples")
-        for margin in inequalities(run.signals, given)
+        _line(margin, run.signals, "checked", f"{margin.t.size} samples") for margin in margins
     ]
     lines = [_beyond_samples(line) for line in lines]
     printed = literal(given, found, run.parts.plant)

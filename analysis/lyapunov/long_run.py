@@ -90,10 +90,10 @@ class LongRun:
         ]
         for p in self.predictions:
             rest = "" if p.rest is None else f", at rest at zeta = {p.rest:.4g}"
-            burst = f", burst at {p.burst_by_balance:.4g} s"
+            burst = f", burst at {p.burst:.4g} s"
             lines.append(
                 f"foretold after {p.time:g} s: {p.verdict}"
-                + (burst if np.isfinite(p.burst_by_balance) else rest)
+                + (burst if np.isfinite(p.burst) else rest)
             )
         return "\n".join(lines)
 

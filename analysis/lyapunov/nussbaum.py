@@ -35,6 +35,7 @@ __all__ = [
 Function = Callable[[float], float]
 Antiderivative = Callable[[np.ndarray], np.ndarray]
 DENSE = 4096
+RANGES = tuple(9.0 * 2**i for i in range(8))  # ends of ranges that are tried for four lobes
 GROWTH = 1.5  # what a quantity must gain from the middle of the range to its end to count
 
 
@@ -232,7 +233,9 @@ def lobe_around(zeta: float, N: Function = functions.nussbaum, *, reach: float =
     return inside[0]
 
 
-def nussbaum_property(N: Function = functions.nussbaum, end: float = 9.0) -> NussbaumProperty:
+def nussbaum_property(
+    N: Function = functions.nussbaum, end: float | None = None
+) -> NussbaumProperty:
     """Check property (12) on [0, end].
 
     A quantity counts as growing if it gains a factor of 1.5 from the middle lobe of its sign to
@@ -243,20 +246,20 @@ def nussbaum_property(N: Function = functions.nussbaum, end: float = 9.0) -> Nus
     N : callable, optional
         Function of one number; the paper's by default.
     end : float, optional
-        End of the range; it must hold four lobes at least.
+        End of the range; it must hold four lobes at least.  By default [0, 9], and twice as long
+        again and again until it holds four lobes or N is no longer finite, 1152 at most.  A
+        function that has fewer zeros up to there has neither property on it.
 
     Raises
     ------
     ParameterError
-        If the range holds fewer than four lobes, or N is not finite on it.
+        If a range is given that holds fewer than four lobes or on which N is not finite, or if N is
+        not finite at 0.
     """
-    found = lobes(N, 0.0, end)
-    last = abs(N(end)) <= 1e-9 * abs(found[-1].extremum)
-    whole = found if last else found[:-1]
+    end, found, whole = _with_lobes(N) if end is None else _lobes_until(N, end)
     if len(whole) < 4:
-        raise ParameterError(
-            f"property (12) needs four lobes of N at least, [0, {end:g}] holds {len(whole)}: "
-            "choose a longer range"
+        return NussbaumProperty(
+            end=end, lobes=found, means=(), ratios=(), type_a=False, type_b=False
         )
     integrals = np.array([lobe.integral for lobe in whole])
     ends = np.array([lobe.high for lobe in whole])
@@ -275,6 +278,43 @@ def nussbaum_property(N: Function = functions.nussbaum, end: float = 9.0) -> Nus
         type_a=type_a,
         type_b=bool(type_a and all(_grows(part[np.isfinite(part)]) for part in (*shares, *parts))),
     )
+
+
+def _lobes_until(N: Function, end: float) -> tuple[float, tuple[Lobe, ...], tuple[Lobe, ...]]:
+    """Return the end, the lobes on [0, end], and those that it does not cut off."""
+    found, whole = _whole_lobes(N, end)
+    if len(whole) < 4:
+        raise ParameterError(
+            f"property (12) needs four lobes of N at least, [0, {end:g}] holds {len(whole)}: "
+            "choose a longer range"
+        )
+    return end, found, whole
+
+
+def _with_lobes(N: Function) -> tuple[float, tuple[Lobe, ...], tuple[Lobe, ...]]:
+    """Return the same for a range that holds four lobes, or the longest on which N is finite."""
+    end = RANGES[0]
+    best = end, *_whole_lobes(N, _finite_until(N, end))
+    for end in RANGES[1:]:
+        if len(best[2]) >= 4 or _finite_until(N, best[0]) < best[0]:
+            break
+        best = end, *_whole_lobes(N, _finite_until(N, end))
+    return best[1][-1].high, best[1], best[2]
+
+
+def _finite_until(N: Function, end: float) -> float:
+    """Return the largest of `end`, 0.99 end, ... at which N is finite."""
+    for share in np.linspace(1.0, 0.01, 100):
+        with np.errstate(all="ignore"):
+            if np.isfinite(N(share * end)):
+                return float(share * end)
+    raise ParameterError(f"the Nussbaum function is not finite at zeta = {0.01 * end:g}")
+
+
+def _whole_lobes(N: Function, end: float) -> tuple[tuple[Lobe, ...], tuple[Lobe, ...]]:
+    found = lobes(N, 0.0, end, step=max(0.01, end / 4000))
+    last = abs(N(end)) <= 1e-9 * abs(found[-1].extremum)
+    return found, found if last else found[:-1]
 
 
 def _grows(values: np.ndarray) -> bool:

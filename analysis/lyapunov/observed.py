@@ -1,4 +1,4 @@
-"""A loop whose blocks also deliver what the proof speaks of: rates of the states, g, G and d.
+"""A loop whose blocks also output what the proof speaks of: rates of the states, g, G and d.
 
 The rates are the blocks' own update equations on the loop's own signals, so that V' is the
 gradient of V times the right-hand side of the diagram, and no difference of samples.
@@ -17,11 +17,12 @@ from nlctl._block import Block, block
 from nlctl._diagram import interconnect
 from nlctl._equation import equation
 from nlctl._errors import DiagramError
-from nlctl.plants import PureFeedback
 
+from .declared_terms import terms_with_parameters
 from .decomposition import Decomposition
 from .integral import NussbaumIntegral
 from .parts import Parts
+from .roles import joined_again
 
 __all__ = ["input_gain", "observed"]
 
@@ -62,7 +63,8 @@ def observed(
     """Return the loop with all its signals as outputs, and with the integrals of (32), (33).
 
     Added are ``rate_<state>`` for every state of plant, weights, robust term and law, the
-    estimates ``W_hat[i]``, ``g``, ``G`` and ``d`` of the plant, and `NussbaumIntegral`.
+    estimates ``W_hat[i]``, ``g``, ``G``, ``d`` and ``state_<state>`` of the plant, and
+    `NussbaumIntegral`.
 
     Parameters
     ----------
@@ -82,73 +84,38 @@ def observed(
     Raises
     ------
     DiagramError
-        If the law has no Nussbaum argument, or signals are not joined by their names.
+        If the law has no Nussbaum argument.
     """
     if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
         raise DiagramError(
             "(23), (24) need a law with the state zeta and a function N, got "
             f"{type(parts.law).__name__}: for a known sign see certify"
         )
-    roles = {path: part for part, path in parts.paths.items()}
     integral = NussbaumIntegral(alpha_1=alpha_1, part=split.part)
-    systems = [*_opened(loop, "", roles), block(integral, "integral")]
+    systems = [*joined_again(loop, parts.roles, _observed_block), block(integral, "integral")]
     return interconnect(systems, name=f"{loop.name}_observed")
 
 
-def _opened(diagram: Any, path: str, roles: dict[str, str]) -> list[Any]:
-    """Return copies of a diagram's blocks, nested diagrams with all signals as outputs."""
-    copies = []
-    for system in diagram.syslist:
-        here = f"{path}{system.name}"
-        if isinstance(system, ct.InterconnectedSystem):
-            inner = _opened(system, f"{here}.", roles)
-            inputs = list(system.input_labels)
-            copies.append(interconnect(inner, inputs=inputs, name=system.name))
-        elif isinstance(system, Block):
-            copies.append(_observed_block(system, roles.get(here)))
-        else:
-            copies.append(system.copy(name=system.name))
-    return copies
-
-
-def _observed_block(system: Block, part: str | None) -> Block:
-    spec = system.current_spec
+def _observed_block(part: str, spec: Any, name: str) -> Block:
     if part == "plant":
         spec = _with_outputs(spec, *_plant_terms(spec))
     elif part in ("weights", "robust", "law"):
         spec = _with_outputs(spec)
-    return block(spec, system.name)
+    return block(spec, name)
 
 
 def _plant_terms(plant: Any) -> tuple[tuple[str, ...], Callable]:
-    """Return the outputs g, G, d of a plant, and the equation that delivers them."""
-    f, d = _with_parameters(plant)
+    """Return the outputs g, G, d and the states of a plant, and the equation of them."""
+    f, d = terms_with_parameters(plant)
     G = input_gain(f)
 
     @equation
     def terms(t, x, u, p):
         (v,) = u
         state = tuple(x)
-        return f(state, 0.0, p), G(state, v, p), d(state, t, p)
+        return (f(state, 0.0, p), G(state, v, p), d(state, t, p)) + state
 
-    return ("g", "G", "d"), terms
-
-
-def _with_parameters(plant: Any) -> tuple[Callable, Callable]:
-    """Return ``f(x, v, p)`` and ``d(x, t, p)`` as equations that machine code can call."""
-    if not isinstance(plant, PureFeedback):
-        return plant.f, plant.d
-    own_f, own_d = equation(plant.f), equation(plant.d)  # the user's functions, without parameters
-
-    @equation
-    def f(x, v, p):
-        return own_f(x, v)
-
-    @equation
-    def d(x, t, p):
-        return own_d(x, t)
-
-    return f, d
+    return ("g", "G", "d", *(f"state_{name}" for name in plant.states)), terms
 
 
 def _with_outputs(spec: Any, names: tuple[str, ...] = (), terms: Callable | None = None) -> Any:

@@ -9,26 +9,16 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from nlctl._block import Block
-from nlctl._diagram import initial_state, leaves
+from nlctl._diagram import initial_state
 from nlctl._errors import DiagramError
-from nlctl.controllers import AdaptiveWeights
+from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
 
 from .final_bound import Gains
+from .roles import Roles, read_roles
 
 __all__ = ["Parts", "read_parts"]
 
-# A block is known by a signal that it delivers, and by what the proof reads of its record.
-PIECES = {
-    "reference": ("yd", ()),
-    "plant": ("y", ("f", "d")),
-    "actuator": ("v", ()),
-    "filtered_error": ("r", ("lambdas",)),
-    "basis": ("psi[0]", ("centres",)),
-    "weights": ("W_psi", ()),
-    "robust": ("robust", ("gamma", "sigma_2", "tau")),
-    "law": ("u", ("beta",)),
-}
+DAMPED = (KnownSignLaw, MonotoneNussbaumLaw)  # laws with eta = beta r + s tanh(r s / b)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +31,8 @@ class Parts:
         With the parameters of the run.
     basis, weights : record or None
         None where `nlctl.Zero` stands in the place of the network.
-    paths : dict
-        Path of every block in the diagram, by part.
+    roles : Roles
+        Places of the blocks in the diagram.
     gains : Gains
         Gains and initial values of the controller.
     """
@@ -54,8 +44,13 @@ class Parts:
     law: Any
     basis: Any
     weights: Any
-    paths: dict[str, str]
+    roles: Roles
     gains: Gains
+
+    @property
+    def paths(self) -> dict[str, str]:
+        """Path of every block in the diagram, by part."""
+        return self.roles.paths
 
     @property
     def order(self) -> int:
@@ -67,31 +62,37 @@ def read_parts(
     loop: ct.InterconnectedSystem,
     start: Mapping[str, float] | None = None,
     params: Mapping[str, Any] | None = None,
+    inputs: bool = False,
 ) -> Parts:
     """Read plant, actuator and controller pieces of a loop such as `nlctl.paper.example_1`.
 
     Parameters
     ----------
     loop : control.InterconnectedSystem
-        With the output r, without external inputs.
+        With the output r.
     start : mapping, optional
         Initial states other than the blocks' own, ``{"plant.x1": 0.8}``.
     params : mapping, optional
         Qualified parameters other than the blocks' own.
+    inputs : bool, optional
+        Whether external inputs may be added to the plant's v.
 
     Raises
     ------
     DiagramError
-        If a part is missing, is no nlctl block, lacks a parameter that the proof needs, or if
-        there is a block that the proof does not know, such as a sensor.
+        As `analysis.lyapunov.roles.read_roles` does, or if there are external inputs.
     """
-    if not isinstance(loop, ct.InterconnectedSystem) or "r" not in loop.output_labels:
-        raise DiagramError("the proof needs a closed loop, a diagram with the output r")
+    roles = read_roles(loop)
+    if roles.disturbances and not inputs:
+        names = ", ".join(f"'{name}'" for name in roles.disturbances)
+        raise DiagramError(
+            f"external input {names} is added to the plant's v: the proof needs its bound, and "
+            "takes one in certify(loop, inputs={...}) only"
+        )
     loop._update_params(dict(params or {}))
-    found = _found(loop)
-    specs = {part: leaf.system.current_spec for part, leaf in found.items() if part != "reference"}
+    specs = {part: roles.spec(part) for part in roles.places}
     x0 = initial_state(loop, start)
-    own = {part: x0[f.state_offset :][: f.system.nstates or 0] for part, f in found.items()}
+    own = {p: x0[f.state_offset :][: f.system.nstates or 0] for p, f in roles.places.items()}
     outputs = np.asarray(loop.output(0.0, x0, np.zeros(loop.ninputs or 0), dict(params or {})))
     weights = specs["weights"] if isinstance(specs["weights"], AdaptiveWeights) else None
     gains = Gains(
@@ -104,6 +105,7 @@ def read_parts(
         r_0=float(outputs[loop.output_labels.index("r")]),
         delta_hat_0=float(own["robust"][0]),
         W_hat_0=tuple(map(float, own["weights"])) if weights else (),
+        b=specs["law"].b if isinstance(specs["law"], DAMPED) else 0.0,
     )
     return Parts(
         plant=specs["plant"],
@@ -113,42 +115,6 @@ def read_parts(
         law=specs["law"],
         basis=specs.get("basis") if weights else None,
         weights=weights,
-        paths={part: leaf.path for part, leaf in found.items()},
+        roles=roles,
         gains=gains,
     )
-
-
-def _found(loop: ct.InterconnectedSystem) -> dict[str, Any]:
-    """Return the block of every part."""
-    found: dict[str, Any] = {}
-    for leaf in leaves(loop):
-        labels = leaf.system.output_labels
-        part = next((p for p, (signal, _) in PIECES.items() if signal in labels), None)
-        if part is None or part in found:
-            raise DiagramError(
-                f"the proof does not know what block '{leaf.path}' ({', '.join(labels)}) is for: "
-                "it is about a plant, an actuator, a reference and the paper's controller only"
-            )
-        found[part] = leaf
-    for part, (signal, needed) in PIECES.items():
-        if part not in found:
-            if part == "basis" and not isinstance(_spec(found.get("weights")), AdaptiveWeights):
-                continue
-            raise DiagramError(f"the proof needs a block that delivers '{signal}' ({part})")
-        spec = _spec(found[part])
-        if part != "reference" and spec is None:
-            raise DiagramError(
-                f"the proof reads the record of '{found[part].path}', which is no nlctl block"
-            )
-        missing = [name for name in needed if not hasattr(spec, name)]
-        if missing:
-            raise DiagramError(
-                f"the proof needs {', '.join(missing)} of block '{found[part].path}', and "
-                f"{type(spec).__name__} has no such thing"
-            )
-    return found
-
-
-def _spec(leaf: Any) -> Any:
-    """The record of a leaf with the parameters of the run; None for a foreign block."""
-    return leaf.system.current_spec if leaf and isinstance(leaf.system, Block) else None

@@ -10,6 +10,8 @@ import control as ct
 import numpy as np
 
 from nlctl import native
+from nlctl._arguments import number
+from nlctl._diagram import initial_state
 from nlctl._diagram import state_names as all_states
 from nlctl._errors import ParameterError
 from nlctl.response import input_output_response
@@ -18,10 +20,14 @@ from .decomposition import Decomposition
 from .final_bound import Gains, alpha_1
 from .observed import observed
 from .parts import Parts, read_parts
-from .signals import Signals, signals_of
+from .reference_rates import reference_margin
+from .response_of_loop import own_parameters
+from .same_loop import check_same, points_around
+from .signals import Margin, Signals, signals_of
 
 __all__ = ["Member", "Run", "members_of", "observe", "observed_loop"]
 
+LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
 AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
 
 
@@ -64,6 +70,8 @@ class Run:
         Time (s) at which the run ended early, diverged or too stiff.
     message : str
         Why it ended early.
+    reference : Margin or None
+        Of the reference's derivatives, see `analysis.lyapunov.reference_rates`.
     """
 
     member: Member
@@ -71,6 +79,7 @@ class Run:
     signals: Signals
     lost: float | None
     message: str = ""
+    reference: Margin | None = None
 
     @property
     def gains(self) -> Gains:
@@ -107,7 +116,7 @@ def members_of(
             raise ParameterError("ledger takes start and params of the responses: leave them out")
         responses = list(run) if isinstance(run, Sequence) else [run]
         return [_of_response(loop, response) for response in responses]
-    horizon = float(run)  # type: ignore[arg-type]
+    horizon, step = number("ledger", "horizon", run), number("ledger", "step", step)
     if not (0 < step < horizon < np.inf):
         raise ParameterError(f"ledger needs 0 < step < horizon, got {step:g} and {horizon:g}")
     times = np.linspace(0.0, horizon, round(horizon / step) + 1)
@@ -134,9 +143,7 @@ def _of_response(loop: ct.InterconnectedSystem, response: Any) -> Member:
             f"{states.shape[0]}"
         )
     start = dict(zip(all_states(loop), map(float, states[:, 0]), strict=True))
-    usual = dict(loop.params)
-    given = (response.params or {}).items()
-    own = {k: v for k, v in given if "." in k and not np.array_equal(usual.get(k, np.nan), v)}
+    own = own_parameters(loop, response)
     return Member(
         start=start, params=own, times=np.asarray(response.time, dtype=float), expected=response
     )
@@ -163,11 +170,16 @@ def observe(
     ------
     ParameterError
         If a member does not reproduce the response that it stands for.
+    DiagramError
+        If the loop is not the one that the proof is about.
     """
     compiled = observed_loop(loop, split)
-    for member in members:
+    for place, member in enumerate(members):
         parts = read_parts(loop, member.start, member.params)
         params = {**member.params, "integral.alpha_1": alpha_1(parts.gains)}
+        x0 = initial_state(loop, member.start)
+        points = points_around(x0) if place == 0 else [(0.0, x0)]
+        check_same(loop, compiled.system, points, member.params, params)
         response: Any = input_output_response(
             compiled,
             member.times,
@@ -178,10 +190,42 @@ def observe(
             ignore_errors=True,
         )
         signals = signals_of(native.uninterrupted(response))
+        seen = _along(loop, response, LOOKS if place == 0 else 1)
+        check_same(loop, compiled.system, seen, member.params, params)
         _check_reproduced(member, signals)
         lost = None if response.success else float(response.statistics.time)
         message = str(response.message or "")
-        yield Run(member=member, parts=parts, signals=signals, lost=lost, message=message)
+        yield Run(
+            member=member,
+            parts=parts,
+            signals=signals,
+            lost=lost,
+            message=message,
+            reference=_reference(loop, parts, response, signals, member.params),
+        )
+
+
+def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any]:
+    """Return times and states of the loop that a response of the observed loop has visited."""
+    states = np.asarray(response.states)[: loop.nstates or 0]
+    finite = np.flatnonzero(np.isfinite(states).all(axis=0))
+    places = np.unique(np.linspace(finite.size - 1, 0, count).astype(int)) if finite.size else []
+    return [(float(response.time[i]), states[:, i].copy()) for i in finite[places]]
+
+
+def _reference(
+    loop: ct.InterconnectedSystem,
+    parts: Parts,
+    response: Any,
+    signals: Signals,
+    params: Mapping[str, Any],
+) -> Margin | None:
+    """Compare the reference's derivatives with those of its own outputs."""
+    loop._update_params(dict(params))
+    states = np.asarray(response.states)[: loop.nstates or 0]
+    whole = np.isfinite(states).all(axis=0)
+    place = parts.roles.places["reference"]
+    return reference_margin(place, signals.t[whole], states[:, whole]) if whole.sum() > 1 else None
 
 
 def observed_loop(loop: ct.InterconnectedSystem, split: Decomposition) -> native.Compiled:

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._errors import DiagramError
+from nlctl._arguments import of_type
+from nlctl._errors import DiagramError, ParameterError
 from nlctl._param import equation_arguments
 from nlctl.plants import PureFeedback, coordinate_names
 
@@ -16,7 +17,7 @@ from .balls import Range, enclose
 from .box import Box
 from .slope import slope_in
 
-__all__ = ["Sector", "plant_terms", "sector"]
+__all__ = ["Sector", "plant_terms", "quotient_range", "sector"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,17 +116,38 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     ------
     UnknownNameError
         If the box lacks a side.
+    ParameterError
+        If it is no box, or `tol` is not positive.
     """
     f, _ = plant_terms(plant)
-    names = coordinate_names(len(plant.states))
+    box = of_type("sector", "box", box, Box, "Box.of(x1=(-1, 1), v=(-5, 5))")
+    if not tol > 0:
+        raise ParameterError(f"sector needs tol > 0, got {tol}")
+    box = box.only(*coordinate_names(len(plant.states)), "v")
+    return quotient_range(lambda x, v: f(tuple(x), v), box, tol=tol, max_boxes=max_boxes)
+
+
+def quotient_range(
+    function: Callable[[tuple[Any, ...], Any], Any], box: Box, *, tol: float, max_boxes: int
+) -> Sector:
+    """Prove the range of (q(x, v) - q(x, 0)) / v over a box whose last side is v.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(x, v)``, x the coordinates of the other sides.
+    box : Box
+    tol, max_boxes
+        As for `sector`.
+    """
 
     def gain(point: tuple[Any, ...]) -> Any:
         *x, v = point
-        return slope_in(lambda v: f(tuple(x), v), v)
+        return slope_in(lambda v: function(tuple(x), v), v)
 
-    (low, high), states = box["v"], box.only(*names)
+    (low, high), rest = box["v"], box.only(*box.names[:-1])
     halves: list[Range | None] = []
     for a, b in ((max(low, 0.0), high), (low, min(high, 0.0))):
-        part = states.times("v", a, b) if a < b or (a == b and low == high) else None
+        part = rest.times("v", a, b) if a < b or (a == b and low == high) else None
         halves.append(enclose(gain, part, tol=tol, max_boxes=max_boxes) if part else None)
-    return Sector(positive=halves[0], negative=halves[1], box=box.only(*names, "v"))
+    return Sector(positive=halves[0], negative=halves[1], box=box)

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from nlctl._errors import ParameterError
 from nlctl._names import unknown
 
 __all__ = ["Margin", "Signals", "equality", "inequality", "signals_of"]
@@ -58,7 +59,16 @@ def signals_of(response: Any) -> Signals:
     ----------
     response : control.TimeResponseData
         With several outputs.
+
+    Raises
+    ------
+    ParameterError
+        If it is no response.
     """
+    if not hasattr(response, "output_labels"):
+        raise ParameterError(
+            f"signals_of needs a response with named outputs, got {type(response).__name__}"
+        )
     rows = np.atleast_2d(np.asarray(response.outputs))
     return Signals(
         t=np.asarray(response.time, dtype=float),

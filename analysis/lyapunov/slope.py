@@ -11,7 +11,9 @@ from typing import Any
 
 from flint import arb
 
-from .ball import DERIVATIVES, Ball, NumPyFunctions, as_ball, common
+from nlctl.expressions.functions import FUNCTIONS
+
+from .ball import Ball, NumPyFunctions, as_ball, common
 from .branches import Undecided
 
 __all__ = ["Slope", "slope_in"]
@@ -149,7 +151,7 @@ def _secant(name: str, a: Ball, b: Ball, at_a: Ball, at_b: Ball) -> Ball:
     respect to a and b lie in phi''(hull) / 2.  Where a - b has no zero the quotient itself is
     an enclosure as well.
     """
-    mean = DERIVATIVES[name](Ball(a.value.union(b.value), (arb(1),)))
+    mean = as_ball(FUNCTIONS[name].derivative[0](Ball(a.value.union(b.value), (arb(1),))))
     half = (mean.gradient[0] if mean.gradient else arb(0)) / 2
     enclosure = (a + b).chain(mean.value, half)
     distance = a - b

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from nlctl import native
+from nlctl._arguments import number, whole_number
 from nlctl._errors import DivergedError, ParameterError
 from nlctl._names import unknown
 from nlctl.plants import coordinate_names
@@ -158,11 +159,9 @@ def tighten(
     """
     if bound not in BOUNDS:
         raise unknown("bound", bound, BOUNDS)
-    if not (u_limit > 0 and horizon > 0 and evaluations >= 1):
-        raise ParameterError(
-            f"tighten needs u_limit, horizon and evaluations > 0, got {u_limit:g}, {horizon:g}, "
-            f"{evaluations}"
-        )
+    u_limit = number("tighten", "u_limit", u_limit, above=0)
+    horizon = number("tighten", "horizon", horizon, above=0)
+    evaluations = whole_number("tighten", "evaluations", evaluations, at_least=1)
     parts = read_parts(loop)
     split = sharpest(decompose(parts.actuator, k=k, u_max=U_MAX))
     search = _Search(

@@ -108,9 +108,11 @@ def _dot(row: Sequence[arb], values: Sequence[arb | float]) -> arb:
 def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[float, ...]:
     """Return sup |yd|, ..., sup |yd^(n)| over all time of a sum of sines.
 
-    Where the frequencies have a common period of moderate length, from samples of the reference's
-    own equation over it: between two samples h apart a function exceeds the nearer one by at
-    most |y'| h/2 + sup|y''| h^2/8.  Otherwise, and at most, the sum of the amplitudes.
+    Where the frequencies, as the doubles that they are, have a common period of moderate length,
+    from samples of the reference's own equation over it: between two samples h apart a function
+    exceeds the nearer one by at most |y'| h/2 + sup|y''| h^2/8.  Otherwise, and at most, the sum of
+    the amplitudes: 0.5 and 1 have a period, and so have 0.1 and 0.2, but 0.1 and 0.3 have none,
+    since the double next to 0.3 is not three times that next to 0.1 and their phases drift apart.
 
     Parameters
     ----------
@@ -125,14 +127,14 @@ def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[flo
     a, w = np.abs(reference.amplitudes), np.array(reference.frequencies)
     n = reference.order
     largest = [float(np.sum(a * w**k)) * (1 + ROUNDING) for k in range(n + 3)]
-    turning = [Fraction(f).limit_denominator(10**6) for f in reference.frequencies if f > 0]
-    exact = all(float(f) == v for f, v in zip(turning, w[w > 0], strict=True))
-    if not turning or not exact:
+    turning = [Fraction(f) for f in reference.frequencies if f > 0]  # exact
+    if not turning:
         return tuple(largest[: n + 1])
     slowest = functools.reduce(_common_divisor, turning)
-    beats = int(max(turning) / slowest)
+    beats = max(turning) / slowest
     if beats > 100:
         return tuple(largest[: n + 1])
+    beats = int(beats)
     h = 2 * np.pi / float(slowest) / (samples * beats)
     p = equation_arguments(dataclasses.replace(reference, order=n + 1))
     y = np.abs([reference.output(i * h, (), (), p) for i in range(samples * beats + 1)])

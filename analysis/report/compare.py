@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,11 +15,12 @@ from typing import Any
 from nlctl._errors import ParameterError, UsageError
 
 from .outline import sort_key
+from .own import PARTS
 
 __all__ = ["Difference", "compare", "read_report"]
 
 ABSENT = "absent"
-PARTS = ("title", "verdict", "claims", "numbers", "sections")
+FOLDER = re.compile(r"\b(nlctl (?:replay|report|run)) (?:'[^']*'|\"[^\"]*\"|[^\s'\"])+")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +40,8 @@ def compare(
 ) -> list[Difference]:
     """Compare what two reports claim, measure and list.
 
-    Provenance, command, prose and hashes of files are left out: they may differ between two
-    machines that find the same.
+    Provenance, command, prose, hashes of files, and the folders in commands are left out: they
+    may differ between two machines that find the same.
 
     Parameters
     ----------
@@ -114,11 +116,17 @@ def _leaves(where: str, value: Any) -> dict[str, Any]:
     return {where: value}
 
 
+def _placeless(value: Any) -> Any:
+    """Return a cell without the folder that a command in it names: where a run is kept."""
+    return FOLDER.sub(r"\1 RUN", value) if isinstance(value, str) else value
+
+
 def _cells(where: str, table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the cells of a table by row and column; rows are told by their first cells."""
     found = {f"{where}, columns": list(table["columns"])}
     columns = _names(table["columns"])
-    for name, row in zip(_row_names(table["rows"]), table["rows"], strict=True):
+    rows = [[_placeless(value) for value in row] for row in table["rows"]]
+    for name, row in zip(_row_names(rows), rows, strict=True):
         for place, value in enumerate(row):
             column = columns[place] if place < len(columns) else str(place + 1)
             found[f"{where}, row '{name}', column '{column}'"] = value

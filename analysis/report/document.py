@@ -1,5 +1,7 @@
 """What a report is made of: plain records, no HTML.
 
+Text is plain text; a formula inside it stands between ``\\(`` and ``\\)``, in LaTeX.
+
 A report is data until the last step; `analysis.report.render` turns it into a page and into
 ``report.json``, so that every number on the page is also in the file beside it.
 """
@@ -54,12 +56,15 @@ class Table:
     ----------
     status : str
         Title of a column that holds ``"pass"``, ``"fail"`` and the like, drawn as a badge.
+    folded : bool
+        Whether the page shows the caption only until it is opened; paper shows all.
     """
 
     caption: str
     columns: Sequence[str]
     rows: Sequence[Sequence[Any]]
     status: str = ""
+    folded: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,17 +133,25 @@ Item = Paragraph | Equation | Table | Figure | History
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A headed part of a report; `key` is its anchor."""
+    """A headed part of a report; `key` is its anchor.
+
+    Attributes
+    ----------
+    folded : bool
+        Whether the page shows the heading only, until it is opened or something inside is linked
+        to; paper shows all.
+    """
 
     key: str
     title: str
     items: Sequence[Item]
     level: int = 2
+    folded: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One line of the verdict: claim, what was measured, the limit, and where the evidence is.
+    """One line of the verdict: what was asked, what was found, the limit, where the evidence is.
 
     Attributes
     ----------
@@ -150,6 +163,9 @@ class Claim:
         What kind of statement it is, such as ``"proved"``, ``"checked"`` or ``"undecided"``;
         where it is empty, the page says that the claim holds or fails.  A claim that does not
         hold is drawn as failed, or as open where its status says so; never as one that holds.
+    by : str
+        Who else claims it, such as ``"the paper"``: where it does not hold, they are refuted and
+        nothing of ours has failed, which the page says in another colour.
     """
 
     text: str
@@ -159,6 +175,7 @@ class Claim:
     evidence: str
     margin: str = ""
     status: str = ""
+    by: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,7 +185,7 @@ class Report:
     Attributes
     ----------
     title, verdict : str
-        The verdict is one sentence and comes first.
+        The verdict is what was found, in a sentence or two, and comes first.
     claims : sequence of Claim
     sections : sequence of Section
     command : str
@@ -184,6 +201,10 @@ class Report:
         (``doi 10...``) becomes a link, the only kind that leads out of the page.
     files : mapping
         Name and SHA-256 of each data file beside the page (`analysis.report.file_hashes`).
+    question : str
+        What was asked; it stands before the verdict.
+    lead : Figure, optional
+        The picture beside the verdict that tells the story.
     """
 
     title: str
@@ -198,3 +219,5 @@ class Report:
     limits: Sequence[str] = ()
     references: Sequence[str] = ()
     files: Mapping[str, str] = field(default_factory=dict)
+    question: str = ""
+    lead: Figure | None = None

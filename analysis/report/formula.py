@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from xml.etree import ElementTree
 
 from latex2mathml.converter import convert_to_element
@@ -10,7 +11,7 @@ from markupsafe import Markup
 
 from .document import Equation
 
-__all__ = ["ATTRIBUTES", "ELEMENTS", "mathml"]
+__all__ = ["ATTRIBUTES", "ELEMENTS", "inline", "mathml", "spoken"]
 
 ELEMENTS = frozenset(
     (
@@ -30,6 +31,8 @@ ATTRIBUTES = frozenset(
 IGNORED = frozenset(["mathbackground", "mathcolor", "xmlns"])  # the page has its own colours
 ACCENTS = {"^": "ˆ", "~": "˜", "¯": "¯", "˙": "˙", "¨": "¨", "→": "→"}
 UPRIGHT = frozenset("ΓΔΘΛΞΠΣΥΦΨΩ")
+COMBINING = {"ˆ": "\u0302", "˜": "\u0303", "¯": "\u0304", "˙": "\u0307", "¨": "\u0308"}
+BINARY = frozenset("=≤≥<>+−-∈±→")
 SIGNS = frozenset("+−±-")
 CLOSING = frozenset(")]}⟩‖|!…")
 OPERANDS = frozenset(["mfrac", "mi", "mn", "mover", "msqrt", "msub", "msubsup", "msup"])
@@ -43,16 +46,62 @@ class NotMathError(ValueError):
 
 def mathml(equation: Equation) -> Markup:
     """Return a formula as MathML; one that cannot be read or trusted, as its LaTeX source."""
+    return _markup(equation.latex, "block")
+
+
+def inline(latex: str) -> Markup:
+    """Return a formula inside a line of text; else as `mathml`."""
+    return _markup(latex, "inline")
+
+
+def spoken(latex: str) -> str:
+    """Return the letters and signs of a formula in a row: V̇ ≤ −α_1 V."""
+    root = _tree(latex, "inline")
+    return latex if root is None else unicodedata.normalize("NFC", " ".join(_letters(root).split()))
+
+
+def _letters(element: ElementTree.Element) -> str:
+    parts = [_letters(child) for child in element]
+    if element.tag == "mover" and len(parts) == 2:
+        return parts[0] + COMBINING.get(parts[1].strip(), parts[1])
+    if element.tag in ("msub", "msup", "msubsup") and len(parts) > 1:
+        marks = {"msub": "_", "msup": "^", "msubsup": "_^"}[element.tag]
+        scripts = (p.strip() if len(p.strip()) < 4 else f"({p.strip()})" for p in parts[1:])
+        told = (mark + script for mark, script in zip(marks, scripts, strict=True))
+        return f"{parts[0].rstrip()}{''.join(told)}"
+    if element.tag == "mspace":
+        return " "
+    if element.tag == "mfrac":
+        return "/".join(parts)
+    if element.tag == "msqrt":
+        return f"√({''.join(parts)})"
+    text = element.text or ""
+    if element.tag == "mo" and text == ",":
+        return ", "
+    spaced = element.tag == "mo" and text in BINARY and element.get("form") != "prefix"
+    row = f" {text} " if spaced else text + "".join(parts)
+    return f"−{row[3:]}" if row.startswith(" − ") and parts else row  # the sign of the first term
+
+
+def _markup(latex: str, display: str) -> Markup:
+    root = _tree(latex, display)
+    if root is None:
+        return Markup("<code>{}</code>").format(latex)
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def _tree(latex: str, display: str) -> ElementTree.Element | None:
+    """Return a formula as elements that are on the lists; None if it is no such formula."""
     try:
-        root = convert_to_element(equation.latex, display="block")
+        root = convert_to_element(latex, display=display)
         for element in root.iter():
             _check(element)
     except Exception:  # the parser fails in many ways, and none may cost the report
-        return Markup("<code>{}</code>").format(equation.latex)
+        return None
     for element in list(root.iter()):
         _accent(element)
         _set_row(element)
-    return Markup(ElementTree.tostring(root, encoding="unicode"))
+    return root
 
 
 def _check(element: ElementTree.Element) -> None:

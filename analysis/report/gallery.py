@@ -12,6 +12,7 @@ from nlctl._errors import UsageError
 from .compare import read_report
 from .document import Claim
 from .outline import summary
+from .own import check_gallery_folder
 from .page import fill, write_files
 
 __all__ = ["Entry", "entries", "write_gallery"]
@@ -70,16 +71,25 @@ def _entry(folder: Path, name: str) -> Entry:
     )
 
 
-def write_gallery(folder: str | os.PathLike[str]) -> Path:
+def write_gallery(folder: str | os.PathLike[str], *, force: bool = False) -> Path:
     """Write FOLDER/index.html: every report below it with its verdict and a link.
+
+    Parameters
+    ----------
+    folder : path
+    force : bool, optional
+        Whether an ``index.html`` is replaced that is no gallery.
 
     Raises
     ------
     UsageError
-        If there is no report.
+        If there is no report, or an ``index.html`` that is no gallery.
     OSError
         If the folder cannot be written to.
     """
-    page = fill("gallery.html", entries=entries(folder))
+    found = entries(folder)
+    if not force:
+        check_gallery_folder(folder)
+    page = fill("gallery.html", entries=found)
     write_files(Path(folder), {"index.html": page})
     return Path(folder) / "index.html"

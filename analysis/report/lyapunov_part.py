@@ -12,7 +12,8 @@ from ..lyapunov.long_run import LongRun
 from . import lyapunov_text as text
 from .document import Figure, Item, Paragraph, Section, Table
 from .lyapunov_evidence import FAR, LOOK, Evidence, evidence
-from .lyapunov_text import LONG_RUN, pretty
+from .lyapunov_text import LONG_RUN
+from .notation import formulas
 
 __all__ = ["LONG_RUN", "Evidence", "evidence", "lyapunov_sections"]
 
@@ -98,7 +99,7 @@ def _creep_table(found: Mapping[int, Evidence]) -> Table:
     rows = []
     for number, one in found.items():
         c = one.creep
-        burst = f"{c.burst_by_balance:.4g} s" if np.isfinite(c.burst_by_balance) else "none"
+        burst = f"{c.burst:.4g} s" if np.isfinite(c.burst) else "none"
         rest = "none" if c.rest is None else f"{c.rest:.4g}"
         if c.rest_range is not None:
             rest = f"{rest}, by parts of the data {c.rest_range[0]:.4g} to {c.rest_range[1]:.4g}"
@@ -127,24 +128,28 @@ def _example(number: int, one: Evidence) -> list[Section]:
             key=key,
             title=f"Example {number}: the proof line by line",
             level=3,
+            folded=True,
             items=[Paragraph(text=text.summary(one.ledger)), *_ledger_tables(one.ledger.lines)],
         ),
         Section(
             key=f"{key}-bound",
             title=f"Example {number}: V, its bound, and how far the bound is from what happens",
             level=3,
+            folded=True,
             items=[*_bound(key, one)],
         ),
         Section(
             key=f"{key}-steps",
             title=f"Example {number}: every margin over time",
             level=3,
+            folded=True,
             items=[*_margins(key, one)],
         ),
         Section(
             key=f"{key}-constants",
             title=f"Example {number}: the constants of the proof",
             level=3,
+            folded=True,
             items=[_constants(one)],
         ),
     ]
@@ -161,12 +166,15 @@ def _ledger_tables(lines: Sequence[Line]) -> Iterator[Table]:
 
 def _row(line: Line) -> tuple[str, ...]:
     least, at = ("" if np.isnan(x) else f"{x + 0.0:.4g}" for x in (line.least, line.time))
-    told = pretty(line.evidence)
+    told = formulas(line.evidence)
     if not np.isnan(line.first):
         told = f"{told}, first at {line.first:.4g} s"
     if line.follows:
-        told = f"{told}. What follows: {pretty(line.follows)}"
-    return line.key, line.status, pretty(line.statement), least, at, told
+        told = f"{told}. What follows: {formulas(line.follows)}"
+    status = line.status
+    if status == "violated" and line.reading == "paper":
+        status = "violated as printed"  # the paper's statement is wrong, nothing of ours
+    return line.key, status, formulas(line.statement), least, at, told
 
 
 def _bound(key: str, one: Evidence) -> Iterator[Item]:
@@ -182,7 +190,7 @@ def _bound(key: str, one: Evidence) -> Iterator[Item]:
             caption=caption,
             columns=("term", "formula", "value", "share"),
             rows=[
-                (pretty(x.term), pretty(x.formula), f"{x.value:.4g}", f"{100 * x.share:.1f} %")
+                (formulas(x.term), formulas(x.formula), f"{x.value:.4g}", f"{100 * x.share:.1f} %")
                 for x in group
             ],
         )
@@ -222,10 +230,10 @@ def _margins(key: str, one: Evidence) -> Iterator[Item]:
 def _constants(one: Evidence) -> Table:
     entries = one.ledger.constants.entries
     return Table(
-        caption=f"{text.CONSTANTS} {pretty(str(one.ledger.constants.box))}.",
+        caption=f"{text.CONSTANTS} {formulas(str(one.ledger.constants.box))}.",
         columns=("constant", "value", "unit", "provenance", "how"),
         rows=[
-            (pretty(c.symbol), f"{c.value:.6g}", pretty(c.unit), c.provenance, pretty(c.how))
+            (formulas(c.symbol), f"{c.value:.6g}", formulas(c.unit), c.provenance, formulas(c.how))
             for c in entries
         ],
         status="provenance",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 
 import numpy as np
@@ -11,6 +10,7 @@ from ..lyapunov.conservatism import Conservatism
 from ..lyapunov.ledger import Ledger
 from ..lyapunov.long_run import LOOKS, LongRun
 from .lyapunov_evidence import Evidence
+from .notation import formulas
 
 _IMPORT = "import nlctl; from analysis.lyapunov.long_run import long_run"
 LONG_RUN = f'python -c "{_IMPORT}; print(long_run(nlctl.paper.example_2(), rtol=1e-8))"'
@@ -48,18 +48,20 @@ CREEP = (
     "Undecided: the fits disagree, or the chirp of Example 1 has not shown enough."
 )
 LEMMA = (
-    "The paper bounds V, ζ and the integral of k G N dζ by its Lemma 1, for all time. The lemma is "
-    "false on [0, ∞): with ζ′ = c₁ c₂/(2 + exp(ζ²)) and V = c₁ + I, its premise holds and ζ grows "
-    "without bound. The reason is the constant α₀ of (31): it pays for a slow drift of ζ for ever. "
-    "So the steps (33) to (36), and that the loop is uniformly ultimately bounded, do not follow "
-    "from the paper's argument.",
-    "What does follow: over any time that a run was seen to stay in the box, every step up to "
-    "(32) holds, and |r| ≤ C₀ with Q = sup I(t) taken from the run. Without the lemma, (31) gives "
-    "line (c) of the lists below, V ≤ V(0) + α₀ t + ζ − ζ(0) + l₊ E₊ − l₋ E₋, with l₋ and l₊ the "
-    "bounds of k G and E₊, E₋ the energy that the Nussbaum term has given and taken; it grows "
-    "with t. For a constant gain or a ζ that never falls, line (b) turns it into a time before "
-    "which N cannot change its sign. A bound for all time needs another law: with the sign of the "
-    "gain known, analysis.lyapunov.certify proves one, shown with each example below.",
+    r"The paper bounds \(V\), \(\zeta\) and \(\int k\,G\,N\,d\zeta\) by its Lemma 1, for all time. "
+    r"The lemma is false on [0, ∞): with \(\dot\zeta = c_1 c_2/(2 + e^{\zeta^2})\) and \(V = c_1 + "
+    r"I\) its premise holds and \(\zeta\) grows without bound. The reason is the constant "
+    r"\(\alpha_0\) of (31): it pays for a slow drift of \(\zeta\) for ever. So the steps (33) to "
+    r"(36), and that the loop is uniformly ultimately bounded, do not follow from the paper's "
+    r"argument.",
+    r"What does follow: over any time that a run was seen to stay in the box, every step up to "
+    r"(32) holds, and \(|r| \le C_0\) with \(Q = \sup I(t)\) taken from the run. Without the "
+    r"lemma, (31) gives line (c) of the lists below, \(V \le V(0) + \alpha_0 t + \zeta - \zeta(0) "
+    r"+ l_+ E_+ - l_- E_-\), with \(l_-\) and \(l_+\) the bounds of \(k\,G\) and \(E_+\), \(E_-\) "
+    r"the energy that the Nussbaum term has given and taken; it grows with \(t\). For a constant "
+    r"gain or a \(\zeta\) that never falls, line (b) turns it into a time before which \(N\) "
+    r"cannot change its sign. A bound for all time needs another law: with the sign of the gain "
+    r"known, analysis.lyapunov.certify proves one, shown with each example below.",
 )
 PROVED = (
     "Proved: by interval arithmetic over the whole box of states, or for all arguments. Computed: "
@@ -78,9 +80,10 @@ FAILING = (
 )
 OPEN = "Left open: what this run cannot decide, and what does not apply to it."
 V_CAPTION = (
-    "V of (21) against its bounds: the level of (34), which is C₀²/2, the bound (32) that depends "
-    "on time, and the part r²/2 that the filtered error has in V. I and Q are those of this run. "
-    "Logarithmic."
+    r"\(V\) of (21) against its bounds: the level of (34), which is \(C_0^2/2\), the bound (32) "
+    r"that depends on time, and the part \(r^2/2\) that the filtered error has in \(V\). \(I\) and "
+    r"\(Q\) are "
+    "those of this run. Logarithmic."
 )
 LADDER = (
     "Bounds of |r|, and what |r| reaches; logarithmic. Only what is proved for all time is called "
@@ -104,34 +107,6 @@ EQUATIONS = (
 )
 CONSTANTS = "Every constant of the proof, with how it was obtained. They hold over the box"
 
-_WORDS = {
-    "eps_u*": "ε_u*", "eps_u": "ε_u", "eps*": "ε*", "delta_hat": "δ̂", "delta~": "δ̃",
-    "delta*": "δ*", "delta": "δ", "W_hat": "Ŵ", "W~": "W̃", "W*": "W*", "alpha_0": "α₀",
-    "alpha_1": "α₁", "sigma_1": "σ₁", "sigma_2": "σ₂", "Gamma": "Γ", "gamma": "γ", "beta": "β",
-    "tau": "τ", "dzeta": "dζ", "zeta": "ζ", "kappa": "κ", "psi": "ψ", "x_n": "xₙ", "C_0": "C₀",
-    "k_1": "k₁", "k_2": "k₂", "N_0": "N₀", "int_0^s": "∫₀ˢ", "int": "∫", "c1": "c₁", "c2": "c₂",
-    "inf": "∞", "m1": "m₁", "m2": "m₂", "m3": "m₃", "m4": "m₄", "x1": "x₁", "x2": "x₂", "x3": "x₃",
-}  # fmt: skip
-_SIGNS = (
-    (r"\^-1", "⁻¹"), (r"\^2", "²"), (r"\^3", "³"), (r"\^T", "ᵀ"), ("<=", "≤"), (">=", "≥"),
-    (r"sqrt\(", "√("), (r"l\+", "l₊"), ("l- ", "l₋ "), (r"E\+", "E₊"), ("E-", "E₋"),
-    (r"(?<![A-Za-z]{2})(?<=[A-Za-zŴαβγδζψₙ\u0302\u0303])'(?![a-z])", "′"),  # of one letter
-    (r"\)-\(", ")–("), (" - ", " − "), (r"(?:^|(?<=[\s(\[=]))-(?=\S)", "−"),
-)  # fmt: skip
-_WORD = re.compile(
-    r"(?<![A-Za-z_])(?:"
-    + "|".join(map(re.escape, sorted(_WORDS, key=len)[::-1]))
-    + r")(?![A-Za-z_])"
-)
-
-
-def pretty(words: str) -> str:
-    """Return a statement of the ledger with the letters and signs of the paper."""
-    words = _WORD.sub(lambda match: _WORDS[match.group()], words)
-    for pattern, sign in _SIGNS:
-        words = re.sub(pattern, sign, words)
-    return words
-
 
 def burst(run: LongRun) -> str:
     """Return what a long run came to, in one paragraph."""
@@ -147,8 +122,8 @@ def burst(run: LongRun) -> str:
         "other tolerances the burst comes at other times, since errors add up over hours; the "
         "command below prints one. The drift told so long "
         f"before: from the first {early.time:g} s the burst is foretold for "
-        f"{early.burst_by_balance:.0f} s, from the first {late.time:g} s for "
-        f"{late.burst_by_balance:.0f} s."
+        f"{early.burst:.0f} s, from the first {late.time:g} s for "
+        f"{late.burst:.0f} s."
     )
 
 
@@ -162,8 +137,8 @@ def told(run: LongRun) -> tuple[str, str]:
     before = [
         f"at rest at ζ = {p.rest:.3f}"
         if p.rest is not None
-        else f"burst at {p.burst_by_balance:.0f} s"
-        if np.isfinite(p.burst_by_balance)
+        else f"burst at {p.burst:.0f} s"
+        if np.isfinite(p.burst)
         else p.verdict
         for p in run.predictions
     ]
@@ -182,7 +157,7 @@ def summary(found: Ledger) -> str:
     return (
         f"Corrected statements violated: {own or 'none'}. False as the paper has them: "
         f"{paper or 'none'}. One run over {found.horizon:g} s; of {len(found.lines)} lines "
-        f"{told}. The constants hold on the box {pretty(str(found.constants.box))}."
+        f"{told}. The constants hold on the box {formulas(str(found.constants.box))}."
     )
 
 
@@ -191,14 +166,14 @@ def shares(c: Conservatism) -> str:
     most = max(c.shares, key=lambda share: share.share)
     return (
         f"What the bound is made of: C₀ = {c.C_0:.4g}, {c.ratio:.3g} times max |r| = "
-        f"{c.max_r:.4g}. The terms of C₀²/2; the largest is {pretty(most.term)}."
+        f"{c.max_r:.4g}. The terms of C₀²/2; the largest is {formulas(most.term)}."
     )
 
 
 def delta_shares(c: Conservatism) -> str:
     """Return the caption of the terms of delta*."""
     most = max(c.delta_shares, key=lambda share: share.share)
-    return f"The terms of δ*; the largest is {pretty(most.term)}."
+    return f"The terms of δ*; the largest is {formulas(most.term)}."
 
 
 def ladder(one: Evidence) -> dict[str, tuple[float, str]]:

@@ -33,7 +33,9 @@ __all__ = [
     "summary",
 ]
 
-SHELL = frozenset(["claims", "contents", "provenance", "files"])  # anchors of the page itself
+SHELL = frozenset(
+    ["claims", "contents", "provenance", "files", "lead", "lead-title", "lead-desc"]
+)  # anchors of the page itself
 LONG = 32  # characters of a word that must be broken to fit a column
 SHORT = 24  # characters of a text that stays on one line
 
@@ -41,8 +43,9 @@ SHORT = 24  # characters of a text that stays on one line
 LIGHTS = {
     "pass": ("pass", "passes", "hold", "holds", "ok", "reached", "confirmed"),
     "proved": ("proved", "computed"),
-    "checked": ("checked", "sampled"),
-    "caution": ("undecided", "open", "inconclusive", "not confirmed"),
+    "checked": ("checked", "sampled", "shown"),
+    "caution": ("undecided", "open", "inconclusive", "not confirmed", "not shown yet"),
+    "refuted": ("refuted", "violated as printed"),
     "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
 }
 MEANINGS = {  # of the statuses of claims, as the page explains them
@@ -51,11 +54,16 @@ MEANINGS = {  # of the statuses of claims, as the page explains them
     "computed": "in closed form",
     "checked": "at every sample of one simulated run, which proves nothing of others",
     "sampled": "found by simulated runs, at most with a stated confidence, which is no proof",
+    "shown": "by simulated runs, at most with a stated confidence, which is no proof",
+    "refuted": "there is a run that contradicts it, or many with a stated confidence; the claim "
+    "is wrong, and nothing of this report failed",
+    "not shown yet": "what was run neither shows nor refutes it",
     "undecided": "what was run does not tell",
     "not confirmed": "a violation was found, but not by other integrators",
     "violated": "there is a counterexample",
     "fails": "what was measured is beyond the limit",
 }
+ANSWERS = ("shown", "refuted", "not shown yet")  # to the claims of studies
 _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in statuses}
 
 
@@ -187,7 +195,7 @@ def sort_key(value: Any) -> str:
 
 
 def light(status: str) -> str:
-    """Return the look of a status: pass, proved, checked, caution, fail, or neutral."""
+    """Return the look of a status: pass, proved, checked, caution, refuted, fail, or neutral."""
     return _LIGHT_OF.get(status.strip().lower(), "neutral")
 
 
@@ -196,6 +204,8 @@ def claim_status(claim: Claim) -> tuple[str, str]:
     status = claim.status or ("holds" if claim.holds else "fails")
     look = light(status)
     if not claim.holds and look != "caution":
+        if claim.by or look == "refuted":
+            return "refuted", "refuted"
         return status if look == "fail" else "fails", "fail"
     return status, look
 
@@ -219,14 +229,32 @@ def summary(claims: Sequence[Claim]) -> tuple[str, str]:
     """
     statuses = [claim_status(claim) for claim in claims]
     looks = [look for _, look in statuses]
-    failed, open_ = looks.count("fail"), looks.count("caution")
+    failed, refuted, open_ = (looks.count(look) for look in ("fail", "refuted", "caution"))
+    total = len(claims)
     if failed:
-        return "fail", f"{failed} of {len(claims)} claims {'fails' if failed == 1 else 'fail'}."
+        return "fail", f"{failed} of {total} claims {'fails' if failed == 1 else 'fail'}."
+    kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
+    kept = ", ".join(f"{number} {status}" for status, number in kinds.items())
+    waiting = "not shown yet" if {status for status, _ in statuses} <= set(ANSWERS) else "open"
+    if refuted:
+        left = total - refuted - open_
+        told = [f"{_whose(claims)} refuted"]
+        told += [f"{open_} {'is' if open_ == 1 else 'are'} {waiting}"] * bool(open_)
+        holds = "other holds" if left == 1 else "others hold"
+        told += [f"{left} {holds}{f' ({kept})' if kept else ''}"] * bool(left)
+        return "refuted", f"{'; '.join(told)}."
     if open_:
-        return "caution", f"{open_} of {len(claims)} claims {'is' if open_ == 1 else 'are'} open."
+        return "caution", f"{open_} of {total} claims {'is' if open_ == 1 else 'are'} {waiting}."
     if not claims:
         return "neutral", "No claims are made."
-    kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
-    told = ", ".join(f"{number} {status}" for status, number in kinds.items())
-    hold = "The claim holds" if len(claims) == 1 else f"All {len(claims)} claims hold"
-    return "pass", f"{hold}: {told}." if told else f"{hold}."
+    hold = "The claim holds" if total == 1 else f"All {total} claims hold"
+    return "pass", f"{hold}: {kept}." if kept else f"{hold}."
+
+
+def _whose(claims: Sequence[Claim]) -> str:
+    """Return how many claims are refuted, and whose they are if all are somebody's: 1 claim is."""
+    of = [claim.by for claim in claims if claim_status(claim)[1] == "refuted"]
+    whose = f" of {of[0]}" if len(set(of)) == 1 and of[0] else f" of {len(claims)}" * (not any(of))
+    if whose.startswith(f" of {len(claims)}"):
+        return f"{len(of)}{whose} claims {'is' if len(of) == 1 else 'are'}"
+    return f"{len(of)} claim{'s' * (len(of) > 1)}{whose} {'is' if len(of) == 1 else 'are'}"

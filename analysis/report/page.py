@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import re
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -14,13 +13,14 @@ from markupsafe import Markup
 
 from nlctl._files import replace_file
 
-from .formula import mathml
+from .formula import inline, mathml
 from .math_font import font_face
 from .outline import cells, claim_status, is_long, is_short, numeric
+from .own import generator
+from .typography import pieces, plain
 
-__all__ = ["fill", "parts", "to_bytes", "write_files"]
+__all__ = ["fill", "to_bytes", "write_files"]
 
-DOI = re.compile(r"(?:\bdoi:?\s*|https://doi\.org/)(10\.\d{4,9}/[\w.()/:-]*\w)", re.IGNORECASE)
 UPLOT = "vendor/uplot"
 CONTROL = {code: "\ufffd" for code in [*range(32), *range(127, 160)] if chr(code) not in "\t\n\r"}
 
@@ -37,7 +37,11 @@ def fill(template: str, *, interactive: bool = False, **content: object) -> str:
         script += licence + _own(f"{UPLOT}/uPlot.iife.min.js") + _own("templates/history.js")
     page = _environment().get_template(template)
     text = page.render(
-        style=Markup(style), script=Markup(script), policy=_policy(style, script), **content
+        style=Markup(style),
+        script=Markup(script),
+        policy=_policy(style, script),
+        generator=generator(template),
+        **content,
     )
     return text.translate(CONTROL)
 
@@ -72,18 +76,13 @@ def _environment() -> Environment:
         "claim_status": claim_status,
         "long": is_long,
         "short": is_short,
+        "inline": inline,
         "mathml": mathml,
         "numeric": numeric,
-        "parts": parts,
+        "pieces": pieces,
+        "plain": plain,
     }
     return environment
-
-
-def parts(text: str) -> list[tuple[str, str]]:
-    """Split a text at its DOIs: pairs of plain text and the DOI after it, or nothing."""
-    plain, *found = DOI.split(text)
-    texts, dois = [plain, *found[1::2]], [*found[0::2], ""]
-    return [(f"{t}doi " if d else t, d) for t, d in zip(texts, dois, strict=True)]
 
 
 def to_bytes(text: str) -> bytes:

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..lyapunov.long_run import LongRun
 from ..reproduction import HORIZON, TAIL, Check, Run
-from . import paper_text as text
 from .document import Claim
 from .lyapunov_evidence import Evidence
 
@@ -22,34 +21,39 @@ def verdict(compared: Sequence[Check], far: Mapping[str, LongRun]) -> str:
         worst = missed[int(np.argmax(apart))]
         are = "is" if len(missed) == 1 else "are"
         return (
-            f"Not reproduced: {len(missed)} of {total} figures {are} missed, most of all "
+            f"Not reproduced: {len(missed)} of {total} numbers {are} missed, most of all "
             f"{worst.metric.meaning} of case {worst.expectation.case} "
             f"({worst.value:.8g} instead of {worst.expectation.printed})."
         )
     reproduced = (
-        f"Both examples are reproduced: all {total} figures are reached, and the same controller "
-        f"follows the reference through a dead zone and through backlash over {HORIZON:g} s."
+        f"Over {HORIZON:g} s both examples are reproduced: all {total} numbers of an independent "
+        "computation are reached, and the same controller follows its reference through a dead "
+        "zone and through backlash."
     )
     bursts = [f"{_loop(run)} loses the sign of its gain at {run.burst:.0f} s" for run in _lost(far)]
-    return f"{reproduced} But not for all time: {'; '.join(bursts)}." if bursts else reproduced
+    if not bursts:
+        return reproduced
+    return (
+        f"{reproduced} Not for all time: {'; '.join(bursts)}, and the lemma that the paper's proof "
+        "rests on is false. With a law that knows the sign of the gain a bound is proved."
+    )
 
 
 def claims(runs: Mapping[str, Run], compared: Sequence[Check]) -> list[Claim]:
     """Return what the paper claims and these runs can show, with what was found."""
     found = [
         Claim(
-            text=f"{text.TITLES[n]}: the output follows the reference as closely as in an "
-            "independent computation",
+            text=f"Example {n}: does the output follow its reference through {what}?",
             measured=_error(runs[key], compared),
             limit=_limit(key, "tail_max_e", compared),
             holds=_holds(key, "tail_max_e", compared),
             evidence=f"example-{n}",
         )
-        for n, key in ((1, "1"), (2, "2"))
+        for n, key, what in ((1, "1", "the dead zone"), (2, "2", "backlash"))
     ]
     found += [
         Claim(
-            text=f"Example {n}'s controller, unchanged, drives {what} as well",
+            text=f"Does Example {n}'s controller, unchanged, drive {what} as well?",
             measured=_error(runs[key], compared),
             limit=_limit(key, "tail_max_e", compared),
             holds=_holds(key, "tail_max_e", compared),
@@ -60,9 +64,9 @@ def claims(runs: Mapping[str, Run], compared: Sequence[Check]) -> list[Claim]:
     reached = sum(c.passed for c in compared)
     found.append(
         Claim(
-            text="All figures of an independent computation are reached",
+            text="Are all numbers of an independent computation reached?",
             measured=f"{reached} of {len(compared)}",
-            limit=f"{len(compared)}",
+            limit=f"all {len(compared)}",
             holds=reached == len(compared),
             evidence="example-1-figures",
         )
@@ -102,13 +106,13 @@ def proof_claims(proofs: Mapping[int, Evidence], far: Mapping[str, LongRun]) -> 
     """Return what the paper's proof claims, and what nlctl proves in its place."""
     found = [
         Claim(
-            text="The paper's theorem: all signals stay bounded for all time",
-            measured=f"{_loop(run)} as published loses the sign of its gain at "
-            f"{run.burst:.0f} s; Lemma 1, which the proof rests on, is false",
+            text="The paper's theorem: do all signals stay bounded for all time?",
+            measured=f"no: {_loop(run)} bursts at {run.burst:.0f} s, and Lemma 1 is false",
             limit="bounded for all t",
             holds=False,
             evidence="proof",
-            status="violated",
+            status="refuted",
+            by="the paper",
         )
         for run in _lost(far)
     ]
@@ -117,19 +121,19 @@ def proof_claims(proofs: Mapping[int, Evidence], far: Mapping[str, LongRun]) -> 
         checked = [line for line in lines.lines if line.reading == "corrected"]
         found += [
             Claim(
-                text=f"Example {number}: the proof's steps, as far as they can be corrected, hold "
-                f"along the run of {HORIZON:g} s",
+                text=f"Example {number}: do the proof's steps, corrected where they can be, hold "
+                f"along a run of {HORIZON:g} s?",
                 measured=f"{len(checked) - len(lines.violated)} of {len(checked)} lines",
-                limit=f"{len(checked)}",
+                limit=f"all {len(checked)}",
                 holds=lines.holds,
                 evidence=f"proof-{number}",
                 status="checked" if lines.holds else "violated",
             ),
             Claim(
-                text=f"Example {number} with a law that knows the sign of the gain: a bound for "
-                "all time",
-                measured=f"|r| ≤ {bound:.3f}, max |r| of a run {one.certified_max_r:.3f}",
-                limit="proved by interval arithmetic",
+                text=f"Example {number} with a law that knows the sign of the gain: is there a "
+                "bound for all time?",
+                measured=f"|r| ≤ {bound:.3f}; a run reaches {one.certified_max_r:.3f}",
+                limit="any bound, proved",
                 holds=bool(np.isfinite(bound)),
                 evidence=f"proof-{number}-bound",
                 status="proved" if np.isfinite(bound) else "undecided",

@@ -47,6 +47,7 @@ def _choices(runs: Runs) -> Section:
     return Section(
         key="choices",
         title="What the paper leaves open",
+        folded=True,
         items=[
             Paragraph(
                 text="Each row changes one reading of the paper and leaves the rest as it is. "
@@ -71,6 +72,7 @@ def _numerics(runs: Runs, found: pd.DataFrame | None) -> Section:
     return Section(
         key="numerics",
         title="Numerics",
+        folded=True,
         items=[
             Paragraph(
                 text=f"The runs over {HORIZON:g} s were made by machine code that nlctl compiles "

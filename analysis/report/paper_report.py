@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import control as ct
+import numpy as np
 import pandas as pd
 
 from nlctl._diagram import leaves
@@ -14,7 +15,8 @@ from .. import figures
 from ..lyapunov.long_run import LongRun
 from ..reproduction import CASES, HORIZON, TAIL, Check, Run, checks
 from . import paper_text as text
-from .document import Figure, History, Paragraph, Report, Section, Table
+from .document import Figure, History, Item, Paragraph, Report, Section, Table
+from .equations import equations_of
 from .lyapunov_part import Evidence, lyapunov_sections
 from .paper_claims import claims, proof_claims, verdict
 from .paper_closing import closing_sections, metric_table
@@ -59,8 +61,10 @@ def paper_report(
     if sections is None:
         sections = paper_sections(runs, proofs=proofs, far=far)
     return Report(
-        title="Adaptive neural control with an uncertain actuator: the paper reproduced",
+        title="Adaptive neural control with an uncertain actuator, reproduced",
+        question=text.QUESTION,
         verdict=verdict(compared, far or {}),
+        lead=_lead(runs, (far or {}).get("2")),
         claims=[*claims(runs, compared), *proof_claims(proofs or {}, far or {})],
         sections=[*sections, *studies, *closing_sections(runs, numerics)],
         command="nlctl report",
@@ -88,10 +92,25 @@ def paper_sections(
     ]
 
 
+def _lead(runs: Runs, long: LongRun | None) -> Figure:
+    """Return the picture at the top: Example 2 follows its reference, and zeta creeps."""
+    run = runs["2"]
+    told = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_CREEP}"
+    if long is not None and np.isfinite(long.burst):
+        told = f"{told} {text.LEAD_BURST.format(hours=long.burst / 3600)}"
+    return Figure(
+        key="lead",
+        caption=told,
+        description=f"{told} max |e₁| for t ≥ {TAIL:g} s is {run.metrics['tail_max_e']:.5g}.",
+        figure=figures.story(run.time, run.signals["y"], run.signals["yd"], long),
+    )
+
+
 def _model() -> Section:
     return Section(
         key="model",
         title="Plant class and controller",
+        folded=True,
         items=[
             Paragraph(text=f"The paper: {text.CITATION}"),
             Paragraph(text="The plant is a chain of integrators with a non-affine last equation:"),
@@ -106,51 +125,61 @@ def _example(number: int, runs: Runs, compared: Sequence[Check]) -> list[Section
     diagram = run.case.diagram
     blocks = ", ".join(system.name for system in diagram.syslist)
     key = f"example-{number}"
+    tracking, control, *others = _time_histories(key, run)
+    picture = Figure(
+        key=f"{key}-diagram",
+        caption="The closed loop as simulated, and the inside of its controller.",
+        description=f"Block diagram of {diagram.name} with the blocks {blocks}.",
+        figure=draw(diagram, expand=True),
+    )
+    equations = equations_of(diagram, ("plant", "actuator"), f"Ex. {number}")
+    shown = [*equations, picture, tracking, control, _interactive(number, run)]
+    folded: tuple[tuple[str, str, list[Item]], ...] = (
+        ("signals", "The other signals over time, and the actuator's characteristic", [*others]),
+        ("parameters", "Parameters as printed and as used", [_parameter_table(number, diagram)]),
+        (
+            "figures",
+            f"The {_count(number, compared)} numbers to reach",
+            [_check_table(number, compared)],
+        ),
+    )
     return [
-        Section(
-            key=key,
-            title=text.TITLES[number],
-            items=[
-                *text.PLANTS[number],
-                Figure(
-                    key=f"{key}-diagram",
-                    caption="The closed loop as simulated, and the inside of its controller.",
-                    description=f"Block diagram of {diagram.name} with the blocks {blocks}.",
-                    figure=draw(diagram, expand=True),
-                ),
-                *_time_histories(key, run),
-                _interactive(number, run),
-            ],
-        ),
-        Section(
-            key=f"{key}-parameters",
-            title="Parameters as printed and as used",
-            level=3,
-            items=[_parameter_table(number, diagram)],
-        ),
-        Section(
-            key=f"{key}-figures",
-            title="Figures to reach",
-            level=3,
-            items=[_check_table(number, compared)],
+        Section(key=key, title=text.TITLES[number], items=shown),
+        *(
+            Section(key=f"{key}-{name}", title=title, level=3, folded=True, items=items)
+            for name, title, items in folded
         ),
     ]
+
+
+def _count(number: int, compared: Sequence[Check]) -> int:
+    own = {case.key for case in CASES if case.example == number}
+    return sum(check.expectation.case in own for check in compared)
 
 
 def _time_histories(key: str, run: Run) -> list[Figure]:
     m = run.metrics
     plots = (
-        ("tracking", figures.tracking, "Output and reference."),
+        ("tracking", figures.tracking, r"Output \(y\) and reference \(y_d\)."),
+        ("input", figures.control_input, r"Control input \(u\), and output \(v\) of the actuator."),
         (
             "error",
             figures.tracking_error,
-            f"Tracking error; the band holds it for t ≥ {TAIL:g} s.",
+            r"Tracking error \(e_1\); the band holds it for "
+            f"t ≥ {TAIL:g} s.",
         ),
         ("states", figures.upper_states, "The other states of the plant."),
-        ("input", figures.control_input, "Control input, and output of the actuator."),
         ("actuator", figures.actuator_path, "The part of the actuator's characteristic in use."),
-        ("nussbaum", figures.nussbaum_gain, "Argument and value of the Nussbaum gain."),
-        ("adaptation", figures.adaptation, "Norm of the weights, and estimate of the robust term."),
+        (
+            "nussbaum",
+            figures.nussbaum_gain,
+            r"Argument \(\zeta\) and value \(N(\zeta)\) of the Nussbaum gain.",
+        ),
+        (
+            "adaptation",
+            figures.adaptation,
+            r"Norm of the weights \(\hat W\), and estimate \(\hat\delta\) of the robust term.",
+        ),
     )
     summary = (
         f"max |e₁| for t ≥ {TAIL:g} s is {m['tail_max_e']:.5g}, max |u| {m['max_u']:.5g}, "
@@ -213,7 +242,7 @@ def _check_table(number: int, compared: Sequence[Check]) -> Table:
             "Found by nlctl's engine from the python-control diagrams; to reach: converged digits "
             "of an independent event-located integration."
         ),
-        columns=("case", "figure", "found", "to reach", "difference", "tolerance", "status"),
+        columns=("case", "quantity", "found", "to reach", "difference", "tolerance", "status"),
         rows=rows,
         status="status",
     )

@@ -10,41 +10,56 @@ from .document import Equation, Paragraph
 CITATION = (
     "M. Lv, Y. Wang, S. Baldi, Z. Liu, C. Shi, C. Fu, X. Meng, Y. Qi: Adaptive Neural Control for "
     "Pure Feedback Nonlinear Systems with Uncertain Actuator Nonlinearity. Neural Information "
-    "Processing (ICONIP 2017), LNCS 10639, pp. 201-211. doi 10.1007/978-3-319-70136-3_22."
+    "Processing (ICONIP 2017), LNCS 10639, pp. 201–211. doi 10.1007/978-3-319-70136-3_22."
 )
 
 CLOPPER = (
     "C. J. Clopper, E. S. Pearson: The use of confidence or fiducial limits illustrated in the "
-    "case of the binomial. Biometrika 26 (1934), pp. 404-413. doi 10.1093/biomet/26.4.404."
+    "case of the binomial. Biometrika 26 (1934), pp. 404–413. doi 10.1093/biomet/26.4.404."
+)
+
+QUESTION = (
+    "do both examples do what the paper says, over 20 s and for all time, and does its proof hold?"
+)
+LEAD = "Example 2, top: the output follows its reference through backlash."
+LEAD_CREEP = (
+    r"Bottom, the same loop over hours: the argument \(\zeta\) of the Nussbaum gain creeps upwards."
+)
+LEAD_BURST = (
+    "After {hours:.1f} h it reaches 3, where the gain changes to the wrong sign, and the loop "
+    "bursts."
 )
 
 METHODS = (
     "Plant, actuator, reference and controller are blocks of python-control, joined by their "
     "signals; each equation is written once, as in the paper, and compiled to machine code. The "
-    "numbers under “Figures to reach” are held against an independent computation, to the "
+    "numbers to reach are held against an independent computation, to the "
     "tolerances printed there.",
     "The proof is taken as a list of numbered statements. Those about all states of a box are "
     "proved by ball arithmetic on the same equations; those about a run are evaluated along it, "
-    "with V′ as the gradient of V times the right-hand side, and are called checked. The studies "
-    "draw independent samples; their probabilities have exact binomial bounds (Clopper, Pearson).",
+    "with \\(\\dot V\\) as the gradient of V times the right-hand side, and are called checked. "
+    "The studies draw independent samples; their probabilities have exact binomial bounds "
+    "(Clopper, Pearson).",
 )
 REFERENCES = (
     CITATION,
     CLOPPER,
     "F. Johansson: Arb: efficient arbitrary-precision midpoint-radius interval arithmetic. IEEE "
-    "Transactions on Computers 66 (2017), pp. 1281-1292. doi 10.1109/TC.2017.2690633.",
+    "Transactions on Computers 66 (2017), pp. 1281–1292. doi 10.1109/TC.2017.2690633.",
     "Ch. Tsitouras: Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying "
-    "assumption. Computers & Mathematics with Applications 62 (2011), pp. 770-775. "
+    "assumption. Computers & Mathematics with Applications 62 (2011), pp. 770–775. "
     "doi 10.1016/j.camwa.2011.06.002.",
 )
 
 SYMBOLS = (
-    "x: state of the plant; y, y_d: its output and the reference, here also x_d = (y_d, y_d′, …); "
-    "e: tracking error, e₁ = y − y_d; r: filtered error; u: control input; v: what the actuator "
-    "makes of it; d: disturbance; ψ: Gaussian basis with centres μ and widths ν; Ŵ: weights of the "
-    "network; δ̂: estimate of the robust term; ζ: argument of the Nussbaum gain N, which finds the "
-    "sign of the control direction. As signals: yd, e for e₁, zeta, delta_hat, and W_norm for the "
-    "norm of Ŵ. The paper gives no units: y, u and v are pure numbers, time is in s."
+    r"\(x\): state of the plant; \(y\), \(y_d\): its output and the reference, here also "
+    r"\(x_d = (y_d, \dot y_d, \dots)\); \(e\): tracking error, \(e_1 = y - y_d\); \(r\): filtered "
+    r"error; \(u\): control input; \(v\): what the actuator makes of it; \(d\): disturbance; "
+    r"\(\psi\): Gaussian basis with centres \(\mu\) and widths \(\nu\); \(\hat W\): weights of the "
+    r"network; \(\hat\delta\): estimate of the robust term; \(\zeta\): argument of the Nussbaum "
+    r"gain \(N\), which finds the sign of the control direction. As signals: yd, e for \(e_1\), "
+    r"zeta, delta_hat, and W_norm for the norm of \(\hat W\). The paper gives no units: \(y\), "
+    r"\(u\) and \(v\) are pure numbers, time is in s."
 )
 
 PLANT_CLASS = Equation(
@@ -82,33 +97,6 @@ CONTROLLER_PART = (
     Paragraph(text=SYMBOLS),
 )
 
-PLANTS = {
-    1: (
-        Equation(
-            latex=r"\dot x_2 = -p_1 x_1 - p\,x_2 - x_1^3 + q\cos(w t)"
-            r" + (1 + 0.1\cos(x_1))(1 + 0.2\cos(v))\,v + 0.1\,(x_1^2 + x_2^2)\sin(t)",
-            number="Ex. 1",
-        ),
-        Equation(
-            latex=r"v(u) = \begin{cases} (1 + 0.3\sin(u))(u - 0.5) & u \ge 0.5 \\"
-            r" 0 & -0.3 < u < 0.5 \\ (0.8 + 0.2\cos(u))(u + 0.3) & u \le -0.3 \end{cases}",
-            number="Ex. 1",
-        ),
-    ),
-    2: (
-        Equation(
-            latex=r"\dot x_3 = -c x_1 - b x_2 - a x_3 + x_1^2"
-            r" + (2 + \cos(x_1))(1 + 0.2\sin^2(v))\,v + \sin(0.1 t)",
-            number="Ex. 2",
-        ),
-        Equation(
-            latex=r"v(t) = \min\left(\max\left(v(t^-),\ 1.2\,(u - 0.5)\right),"
-            r"\ 1.2\,(u + 0.6)\right)",
-            number="Ex. 2",
-        ),
-    ),
-}
-
 EXAMPLES = {"example-1": 1, "example-2": 2}  # number by the name that studies call it
 
 TITLES = {
@@ -118,12 +106,12 @@ TITLES = {
 
 # quantity, as printed, as used (filled from the blocks), why they differ or what is open
 _SHARED = (
-    ("y_d", "0.5 (sin t + sin 0.5t)", "{reference.amplitudes[0]:g} (sin t + sin 0.5t)", ""),
+    (r"\(y_d\)", "0.5 (sin t + sin 0.5t)", "{reference.amplitudes[0]:g} (sin t + sin 0.5t)", ""),
     (
         "widths ν",
         "2",
         "{basis.widths[0]:g}",
-        "printed as v_i, the letter of the actuator's output",
+        r"printed as \(v_i\), the letter of the actuator's output",
     ),
     ("Γ", "diag[0.5]", "{weights.Gamma:g} I", "(21) prints Γ = Γ⁻¹ for Γ = Γᵀ > 0"),
     ("initial Ŵ, δ̂, ζ", "0, 0, 1", "0, 0, {law.initial[zeta]:g}", "ζ = 1 is a zero of N: u(0) = 0"),

@@ -22,6 +22,7 @@ from ..json_values import as_json
 from .document import Figure, History, Item, Report, Table
 from .history import chart
 from .outline import evidence, kind, meanings, place, summary
+from .own import check_report_folder
 from .page import fill, to_bytes, write_files
 from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
 
@@ -58,7 +59,8 @@ def render_html(
     placed = place(report)
     light, told = summary(report.claims)
     items = {anchor: item for part in placed for anchor, _, item in part.items}
-    figures = {anchor: item for anchor, item in items.items() if isinstance(item, Figure)}
+    figures = {} if report.lead is None else {"lead": report.lead}
+    figures |= {anchor: item for anchor, item in items.items() if isinstance(item, Figure)}
     files = svg_files([figure.figure for figure in figures.values()], pool, drawn)
     shapes: dict[str, str] = {}
     drawings = {
@@ -102,7 +104,9 @@ def render_json(report: Report) -> str:
     """Return every number and table of the report as JSON."""
     content = {
         "title": report.title,
+        "question": report.question,
         "verdict": report.verdict,
+        "lead": None if report.lead is None else _plain(report.lead),
         "claims": [vars(claim) for claim in report.claims],
         "sections": {
             part.anchor: {
@@ -132,6 +136,7 @@ def write_report(
     folder: str | os.PathLike[str],
     *,
     interactive: bool = False,
+    force: bool = False,
     pool: Executor | None = None,
     drawn: Drawn = NONE_DRAWN,
 ) -> Path:
@@ -144,6 +149,8 @@ def write_report(
         Made where it does not exist.
     interactive : bool, optional
         As in `render_html`; ``report.json`` is the same either way.
+    force : bool, optional
+        Whether files of these names are replaced that no report has made.
     pool : concurrent.futures.Executor, optional
     drawn : mapping, optional
         As in `render_html`.
@@ -155,10 +162,14 @@ def write_report(
 
     Raises
     ------
+    UsageError
+        If it would replace files that no report has made.
     OSError
         If the folder cannot be written to.
     """
     folder = Path(folder)
+    if not force:
+        check_report_folder(folder)
     page = render_html(report, interactive=interactive, pool=pool, drawn=drawn)
     write_files(folder, {"report.json": render_json(report), "index.html": page})
     return folder / "index.html"

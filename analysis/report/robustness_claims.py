@@ -20,13 +20,16 @@ STATEMENTS = ("probability", "sequential")
 
 
 def verdict(result: Result) -> str:
-    """Return the report's first sentences: what fails, and the statement with its assumptions."""
+    """Return the report's first sentences: what is refuted, what is not shown yet, and the
+    statement with its assumptions."""
     told = []
-    failing = [finding.claim for finding in result.claims if not finding.holds]
     if not result.complete:
         told.append(result.verdict)
-    elif failing:
-        told.append(f"What does not hold: {'; '.join(failing)}.")
+    for answer in ("refuted", "not shown yet"):
+        these = [finding for finding in result.claims if finding.answer == answer]
+        claimed = [f.claim + (f" (needs {f.needs})" if f.needs else "") for f in these]
+        if these and result.complete:
+            told.append(f"{answer.capitalize()}: {'; '.join(claimed)}.")
     statements = [f.sentence for f in result.findings if f.kind in STATEMENTS]
     if statements:
         told.append(statements[0])
@@ -51,13 +54,14 @@ def refusal(result: Result) -> str:
 def claims(result: Result, prefix: str = "") -> list[Claim]:
     """Return what the study claims, with what was found.
 
-    A claim that holds was sampled, never proved.
+    What is shown was sampled, never proved.
     """
     asked = result.asked
     return [
         Claim(
             text=finding.claim,
             holds=bool(finding.holds),
+            status=finding.answer,
             evidence=f"{prefix}{finding.key}",
             **(MEASURED[finding.kind] if finding.is_answered else _no_answer)(
                 finding, asked[finding.key]
@@ -73,62 +77,70 @@ def _no_answer(finding: Finding, asked: Any) -> dict[str, str]:
 
 def _probability(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
+    low, high = n["singly"]
+    bound = f"at most {rounded_up(high)}" if high < 1 else ""
+    if low > 0:
+        bound = f"{bound}{', ' * bool(bound)}at least {rounded_down(low)}"
+    each = " each" if low > 0 and n["side"] != "both" and high < 1 else ""
     return {
-        "measured": f"{n['violations']} of {n['runs']} runs; at most {rounded_up(n['upper'])} with "
-        f"confidence {100 * n['confidence']:g} %",
+        "measured": f"{n['violations']} of {n['runs']} runs; {bound or 'nothing'} with "
+        f"confidence {100 * n['confidence']:g} %{each}{_needs(finding)}",
         "limit": f"≤ {asked.limit:g}",
-        "margin": f"{asked.limit - n['upper']:.3g}",
-        "status": "sampled",
+        "margin": f"{asked.limit - high:.3g}",
     }
+
+
+def _needs(finding: Finding) -> str:
+    return f"; needs {finding.needs}" if finding.needs else ""
 
 
 def _sequential(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
-    undecided = n["decision"] == "undecided"
     return {
         "measured": f"{n['violations']} of {n['runs']} runs; {rounded_down(n['lower'])} to "
-        f"{rounded_up(n['upper'])} with confidence {100 * n['confidence']:g} %",
+        f"{rounded_up(n['upper'])} with confidence {100 * n['confidence']:g} %{_needs(finding)}",
         "limit": f"< {asked.limit:g}",
         "margin": f"{asked.limit - n['upper']:.3g}",
-        "status": "undecided" if undecided else "sampled",
     }
 
 
 def _worst_case(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
-    doubted = not finding.holds and not n.get("is_confirmed", True)
     ended = margin_text(n["margin"]) == DID_NOT_END
     return {
-        "measured": "a run that did not reach its end"
-        if ended
-        else f"lowest margin found: {margin_text(n['margin'])}",
+        "measured": (
+            "a run that did not reach its end"
+            if ended
+            else f"lowest margin found: {margin_text(n['margin'])}"
+        )
+        + _needs(finding),
         "limit": f"> {asked.limit:g}",
         "margin": "" if ended else f"{n['margin'] - asked.limit:.3g}",
-        "status": "not confirmed" if doubted else "sampled",
     }
 
 
 def _radius(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
     found = f"violation at size {n['upper']:.4g}"
-    if n["witness"] is None:
+    if n["upper"] == 0:
+        found = f"the nominal values violate, margin {margin_text(n['margin'])}"
+    elif n["witness"] is None:
         found = f"no violation found up to size {n['largest']:.4g}"
     return {
-        "measured": found,
+        "measured": found + _needs(finding),
         "limit": f"≥ {asked.limit:g}",
         "margin": f"{min(n['upper'], n['largest']) - asked.limit:.3g}",
-        "status": "sampled",
     }
 
 
 def _degradation(finding: Finding, asked: Any) -> dict[str, str]:
     row = finding.tables["curve"].loc[asked.at]
     return {
-        "measured": f"{row['violations']:.0f} of {row['runs']:.0f} runs at size {asked.at:g}; at "
-        f"most {rounded_up(row['upper'])} with confidence {100 * asked.confidence:g} %",
+        "measured": f"{row['violations']:.0f} of {row['runs']:.0f} runs at size {asked.at:g}; "
+        f"{rounded_down(row['lower'])} to {rounded_up(row['upper'])} with confidence "
+        f"{100 * asked.confidence:g} %{_needs(finding)}",
         "limit": f"≤ {asked.limit:g}",
         "margin": f"{asked.limit - row['upper']:.3g}",
-        "status": "sampled",
     }
 
 
@@ -143,10 +155,10 @@ def _compare(finding: Finding, asked: Any) -> dict[str, str]:
     )
     level = 1 - asked.confidence
     return {
-        "measured": f"median of {text} in {metric}: {row['median']:.4g}, p = {row['p_holm']:.2g}",
+        "measured": f"median of {text} in {metric}: {row['median']:.4g}, p = {row['p_holm']:.2g}"
+        + _needs(finding),
         "limit": f"p ≤ {level:.2g}, {asked.metrics[metric]} is better",
         "margin": f"{level - row['p_holm']:.2g}",
-        "status": "sampled",
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,20 @@ import pandas as pd
 
 from nlctl.native import Status
 
+from .. import metrics
 from ..robustness.evaluation import as_table, margins_of
 from ..robustness.experiment import Prepared, by_diagram, simulate
+from ..robustness.formula import Always, And, Band, Formula
 from ..robustness.space import nominal
+from ..robustness_figures import Limit
 
-__all__ = ["Histories", "histories"]
+__all__ = ["Histories", "histories", "limits"]
 
 MOST = 4  # signals
+IN_UNIT = (  # metrics whose unit is that of their signal
+    *(metrics.peak, metrics.rms, metrics.highest, metrics.spread, metrics.ultimate_bound),
+    metrics.total_variation,
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,6 +43,12 @@ class Histories:
         That margin.
     ended : int
         How many of the rows did not reach their end.
+    limits : mapping
+        By signal what the spec always requires: value, and from when to when (s).
+    units : mapping
+        By signal, as far as a metric of the study tells.
+    groups : tuple of str
+        Options of each row, where the study chooses between some; else empty.
     """
 
     time: np.ndarray
@@ -44,6 +57,9 @@ class Histories:
     worst: Mapping[str, np.ndarray]
     margin: float
     ended: int
+    limits: Mapping[str, Sequence[Limit]] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    groups: tuple[str, ...] = ()
 
 
 def histories(
@@ -91,7 +107,38 @@ def histories(
         worst={name: samples[1] for name, samples in signals.items()},
         margin=margin,
         ended=int(np.sum(status[2:] != Status.OK.name)),
+        limits=limits(prepared.experiment.spec.requirements),
+        units={m.signals[0]: m.unit for m in prepared.experiment.metrics if m.function in IN_UNIT},
+        groups=_groups(table.iloc[:count], [choice.name for choice in space.choices]),
     )
+
+
+def limits(requirements: Sequence[Any]) -> dict[str, list[Limit]]:
+    """Return what requirements always ask of each signal; what they ask else is no line."""
+    found: dict[str, list[Limit]] = {}
+
+    def walk(formula: Formula, start: float, end: float, until: float) -> None:
+        if isinstance(formula, And):
+            for part in formula.parts:
+                walk(part, start, end, until)
+        elif isinstance(formula, Always):
+            walk(formula.part, start + formula.start, end + formula.end, until)
+        elif isinstance(formula, Band) and end > start:
+            for value in (formula.lower, formula.upper):
+                line = (value, start, min(end, until))
+                if np.isfinite(value) and line not in found.setdefault(formula.signal, []):
+                    found[formula.signal].append(line)
+
+    for requirement in requirements:
+        walk(requirement.formula, 0.0, 0.0, requirement.until)
+    return found
+
+
+def _groups(rows: pd.DataFrame, choices: Sequence[str]) -> tuple[str, ...]:
+    """Return the options of each row; nothing if there is nothing to choose."""
+    if not choices:
+        return ()
+    return tuple(rows[list(choices)].astype(str).agg(", ".join, axis=1))
 
 
 def _kept(

@@ -13,15 +13,15 @@ __all__ = ["METHODS", "limits", "methods"]
 
 ROBBINS = (
     "H. Robbins: Statistical methods related to the law of the iterated logarithm. Ann. Math. "
-    "Statist. 41 (1970) 1397-1409. doi 10.1214/aoms/1177696786."
+    "Statist. 41 (1970) 1397–1409. doi 10.1214/aoms/1177696786."
 )
 HOWARD = (
     "S. Howard, A. Ramdas, J. McAuliffe, J. Sekhon: Time-uniform, nonparametric, nonasymptotic "
-    "confidence sequences. Ann. Statist. 49 (2021) 1055-1080. doi 10.1214/20-AOS1991."
+    "confidence sequences. Ann. Statist. 49 (2021) 1055–1080. doi 10.1214/20-AOS1991."
 )
 DONZE = (
     "A. Donzé, O. Maler: Robust satisfaction of temporal logic over real-valued signals. FORMATS "
-    "2010, LNCS 6246, 92-106. doi 10.1007/978-3-642-15297-9_9."
+    "2010, LNCS 6246, 92–106. doi 10.1007/978-3-642-15297-9_9."
 )
 HANSEN = (
     "N. Hansen: The CMA evolution strategy: a tutorial. arXiv 1604.00772 (2016). "
@@ -29,40 +29,40 @@ HANSEN = (
 )
 AUGER = (
     "A. Auger, N. Hansen: A restart CMA evolution strategy with increasing population size. CEC "
-    "2005, 1769-1776. doi 10.1109/CEC.2005.1554902."
+    "2005, 1769–1776. doi 10.1109/CEC.2005.1554902."
 )
 ZELLER = (
     "A. Zeller, R. Hildebrandt: Simplifying and isolating failure-inducing input. IEEE Trans. "
-    "Softw. Eng. 28 (2002) 183-200. doi 10.1109/32.988498."
+    "Softw. Eng. 28 (2002) 183–200. doi 10.1109/32.988498."
 )
 MORRIS_1991 = (
     "M. Morris: Factorial sampling plans for preliminary computational experiments. Technometrics "
-    "33 (1991) 161-174. doi 10.1080/00401706.1991.10484804."
+    "33 (1991) 161–174. doi 10.1080/00401706.1991.10484804."
 )
 SALTELLI = (
     "A. Saltelli, P. Annoni, I. Azzini, F. Campolongo, M. Ratto, S. Tarantola: Variance based "
-    "sensitivity analysis of model output. Comput. Phys. Commun. 181 (2010) 259-270. "
+    "sensitivity analysis of model output. Comput. Phys. Commun. 181 (2010) 259–270. "
     "doi 10.1016/j.cpc.2009.09.018."
 )
 SOBOL_2001 = (
     "I. Sobol': Global sensitivity indices for nonlinear mathematical models and their Monte Carlo "
-    "estimates. Math. Comput. Simul. 55 (2001) 271-280. doi 10.1016/S0378-4754(00)00270-6."
+    "estimates. Math. Comput. Simul. 55 (2001) 271–280. doi 10.1016/S0378-4754(00)00270-6."
 )
 SPEAR = (
     "R. Spear, G. Hornberger: Eutrophication in Peel Inlet, II: identification of critical "
-    "uncertainties via generalized sensitivity analysis. Water Research 14 (1980) 43-49. "
+    "uncertainties via generalized sensitivity analysis. Water Research 14 (1980) 43–49. "
     "doi 10.1016/0043-1354(80)90040-8."
 )
 MCNEMAR_1947 = (
     "Q. McNemar: Note on the sampling error of the difference between correlated proportions or "
-    "percentages. Psychometrika 12 (1947) 153-157. doi 10.1007/BF02295996."
+    "percentages. Psychometrika 12 (1947) 153–157. doi 10.1007/BF02295996."
 )
 HOLM = (
     "S. Holm: A simple sequentially rejective multiple test procedure. Scand. J. Statist. 6 "
-    "(1979) 65-70."
+    "(1979) 65–70."
 )
 EFRON = (
-    "B. Efron: Better bootstrap confidence intervals. J. Amer. Statist. Assoc. 82 (1987) 171-185. "
+    "B. Efron: Better bootstrap confidence intervals. J. Amer. Statist. Assoc. 82 (1987) 171–185. "
     "doi 10.1080/01621459.1987.10478410."
 )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from . import robustness_methods as how
 from . import robustness_text as text
-from .document import Item, Paragraph, Report, Section, Table
+from .document import Figure, Item, Paragraph, Report, Section, Table
 from .outline import summary
 from .paper_text import EXAMPLES
 from .render import file_hashes
@@ -28,6 +29,7 @@ from .robustness_rows import (
     statement_items,
 )
 from .robustness_searches import degradation, failure_map, radius, worst_case
+from .study_loop import Loop, loop_sections
 from .versions import versions
 
 if TYPE_CHECKING:
@@ -47,11 +49,18 @@ KINDS: dict[str, Items] = {  # in the order of the report
     "failure map": failure_map,
     "compare": compare,
 }
-OUTCOMES = {"pass": "sampled", "caution": "open", "neutral": "no claims"}  # by the light
+OUTCOMES = {  # by the light
+    "pass": "shown",
+    "caution": "not shown yet",
+    "neutral": "no claims",
+}
 
 
 def study_report(
-    result: Result, kept: Histories | None = None, command: str = "nlctl report RUN"
+    result: Result,
+    kept: Histories | None = None,
+    command: str = "nlctl report RUN",
+    loop: Loop | None = None,
 ) -> Report:
     """Compose the report of a study.
 
@@ -64,15 +73,19 @@ def study_report(
         Signals of some rows; without them there are no fans.
     command : str, optional
         What makes the report again.
+    loop : Loop, optional
+        What was simulated; without it there is no diagram.
     """
     paragraphs, sources = how.methods(result)
     return Report(
         title=result.study.study.title,
-        verdict=verdict(result),
+        question=result.study.study.question,
+        verdict=text.without_assumptions(verdict(result)),
+        lead=_lead(result, kept),
         claims=claims(result),
-        sections=study_sections(result, kept, limits=False),
+        sections=study_sections(result, kept, loop, limits=False),
         command=command,
-        provenance=versions("cma") | {"seed": str(result.study.study.seed)} | _table_hash(result),
+        provenance=_provenance(result),
         numbers=numbers(result),
         methods=paragraphs,
         limits=[*how.limits(result), *result.notes],
@@ -82,9 +95,17 @@ def study_report(
     )
 
 
+def _provenance(result: Result) -> dict[str, str]:
+    """Return what made the numbers: the versions of the run, not those that draw the page."""
+    then = {"Python" if k == "python" else k: v for k, v in result.made_with.items()}
+    seed = {"seed": str(result.study.study.seed)}
+    return versions("cma") | then | seed | _table_hash(result)
+
+
 def study_sections(
     result: Result,
     kept: Histories | None = None,
+    loop: Loop | None = None,
     *,
     prefix: str = "",
     level: int = 2,
@@ -94,7 +115,7 @@ def study_sections(
 
     Parameters
     ----------
-    result, kept
+    result, kept, loop
         As in `study_report`.
     prefix : str, optional
         In front of every key, so that several studies can stand in one report.
@@ -104,28 +125,55 @@ def study_sections(
         Whether what the study does not show is a section as well.
     """
     table = None if result.rows is None or not result.rows.done else result.rows.table
-    made = [("study_asked", "What was asked", [*setup_items(result)])]
+    asked = [Section(key="study_asked", title="What was asked", items=[*setup_items(result)])]
     if result.study.loop in EXAMPLES:
-        made.append(
-            ("study_loop", "The loop as published", [*loop_items(EXAMPLES[result.study.loop])])
-        )
-    if table is not None:
-        key = "study_rows"  # no analysis is called that: keys of these have hyphens only
-        made.append((key, "How the runs ended", [*row_items(result, table, f"{prefix}{key}")]))
-        margins = table["spec"].to_numpy(dtype=float)
-        statements = [f for f in _answered(result) if f.kind in STATEMENTS]
-        made += [_statement(f, result, margins, prefix) for f in statements]
+        items = [*loop_items()]
+        title = "The loop as published"
+        asked.append(Section(key="study_published", title=title, items=items, folded=True))
+    if loop is not None:
+        asked += loop_sections(loop, result, "", 2)
     if kept is not None:
         shown = [*fan_items(kept, f"{prefix}study")]
-        made.append(("study_fans", "The runs over time", shown))
-    made += _findings(result, prefix)
+        asked.append(Section(key="study_fans", title="The runs over time", items=shown))
+    if table is not None:
+        key = "study_rows"  # no analysis is called that: keys of these have hyphens only
+        rows = [*row_items(result, table, f"{prefix}{key}")]
+        asked.append(Section(key=key, title="How the runs ended", items=rows))
+        margins = table["spec"].to_numpy(dtype=float)
+        statements = [f for f in _answered(result) if f.kind in STATEMENTS]
+        asked += [_statement(f, result, margins, prefix) for f in statements]
+    asked += _findings(result, prefix)
+    asked += _assumed(result)
     if limits:
         told: list[Item] = [Paragraph(text=words) for words in how.limits(result)]
-        made.append(("study_limits", "What this study does not show", told))
+        asked.append(Section(key="study_limits", title="What this study does not show", items=told))
     return [
-        Section(key=f"{prefix}{key}", title=title, items=items, level=level)
-        for key, title, items in made
+        replace(made, key=f"{prefix}{made.key}", level=made.level - 2 + level) for made in asked
     ]
+
+
+def _lead(result: Result, kept: Histories | None) -> Figure | None:
+    """Return the picture of a study: its runs over time, or else their margins."""
+    if kept is not None:
+        name = next(iter([n for n in kept.limits if n in kept.signals] or kept.signals))
+        one = replace(
+            kept,
+            signals={name: kept.signals[name]},
+            nominal={name: kept.nominal[name]},
+            worst={name: kept.worst[name]},
+        )
+        return next(item for item in fan_items(one, "lead") if isinstance(item, Figure))
+    if result.rows is not None and result.rows.done:
+        items = margin_items(result, result.rows.table, "lead")
+        return next(item for item in items if isinstance(item, Figure))
+    return None
+
+
+def _assumed(result: Result) -> list[Section]:
+    """Return the assumptions of all statements, each once; nothing if there are none."""
+    found = text.assumptions_in(finding.sentence for finding in result.findings)
+    items = [Paragraph(text=f"{words[:1].upper()}{words[1:]}.") for words in found]
+    return [Section(key="study_assumed", title=text.ASSUMED, items=items)] if found else []
 
 
 def study_part(
@@ -142,58 +190,72 @@ def study_part(
     rows = []
     for result, _ in studies:
         look, told = summary(claims(result))
-        outcome = OUTCOMES.get(look, look)
-        rows.append((result.study.study.title, outcome, f"{told} {verdict(result)}"))
+        words = f"{told} {text.without_assumptions(verdict(result))}"
+        asked = result.study.study.question
+        rows.append((result.study.study.title, asked, OUTCOMES.get(look, look), words))
     overview = Table(
-        caption="The studies and their verdicts.",
-        columns=("study", "outcome", "verdict"),
+        caption="The studies: what was asked, and what was found.",
+        columns=("study", "asked", "outcome", "found"),
         rows=rows,
         status="outcome",
     )
+    parts = [
+        section
+        for number, (result, kept) in enumerate(studies, 1)
+        for section in _brief(result, kept, f"{key}-{number}")
+    ]
+    limits = dict.fromkeys(words for result, _ in studies for words in how.limits(result))
     return [
         Section(key=key, title="Robustness", items=[Paragraph(text=text.PART), overview]),
-        *(
-            Section(
-                key=f"{key}-{number}",
-                title=result.study.study.title,
-                items=[*_brief(result, kept, f"{key}-{number}")],
-                level=3,
-            )
-            for number, (result, kept) in enumerate(studies, 1)
+        *parts,
+        Section(
+            key=f"{key}-limits",
+            title="What these studies do not show",
+            items=[Paragraph(text=words) for words in limits],
+            level=3,
+            folded=True,
         ),
     ]
 
 
-def _brief(result: Result, kept: Histories | None, key: str) -> Iterator[Item]:
-    """Yield a study in short: margins, fans, what each analysis found, and the failure map."""
-    yield from setup_items(result)
-    if result.rows is not None and result.rows.done:
-        yield from margin_items(result, result.rows.table, key)
-    if kept is not None:
-        yield from fan_items(kept, key)
+def _brief(result: Result, kept: Histories | None, key: str) -> Iterator[Section]:
+    """Yield a study in short: what each analysis found, runs over time, and what it rests on."""
     asked = result.asked
+    found = Table(
+        caption=text.FOUND,
+        columns=("asked", "found"),
+        rows=[(_title(f, result), _told(f, asked[f.key])) for f in result.findings],
+    )
+    fans = () if kept is None else fan_items(kept, key)
+    yield Section(key=key, title=result.study.study.title, items=[found, *fans], level=3)
+    setup = [*setup_items(result)]
+    if result.rows is not None and result.rows.done:
+        setup += margin_items(result, result.rows.table, key)
+    title = "What was asked, and of which runs"
+    yield Section(key=f"{key}-asked", title=title, items=setup, level=4, folded=True)
+    for made in _assumed(result):
+        yield replace(made, key=f"{key}-assumed", level=4, folded=True)
     for finding in result.findings:
-        title, told = _title(finding, result), _told(finding, asked[finding.key])
-        yield Paragraph(text=f"{title}{'' if title.endswith(('?', '!', '.')) else '.'} {told}")
         if finding.kind == "failure map" and finding.is_answered:
-            yield from failure_map(finding, result, asked[finding.key], f"{key}-{finding.key}")
-    yield Paragraph(text=f"What this does not show. {' '.join(how.limits(result))}")
+            items = [*failure_map(finding, result, asked[finding.key], f"{key}-{finding.key}")]
+            yield Section(
+                key=f"{key}-map", title=_title(finding, result), items=items, level=4, folded=True
+            )
 
 
-def _statement(
-    finding: Finding, result: Result, margins: np.ndarray, prefix: str
-) -> tuple[str, str, list[Item]]:
+def _statement(finding: Finding, result: Result, margins: np.ndarray, prefix: str) -> Section:
     limit = result.asked[finding.key].limit
     shown = statement_items(finding, limit, margins, f"{prefix}{finding.key}")
-    return finding.key, _title(finding, result), [Paragraph(text=finding.sentence), *shown]
+    told = Paragraph(text=text.without_assumptions(finding.sentence))
+    return Section(key=finding.key, title=_title(finding, result), items=[told, *shown])
 
 
 def _told(finding: Finding, asked: Any) -> str:
     """Return what was found, and what was varied if that is not everything."""
-    some = getattr(asked, "quantities", ())
+    some, sentence = getattr(asked, "quantities", ()), text.without_assumptions(finding.sentence)
     if not some:
-        return finding.sentence
-    return f"{finding.sentence} Here only {', '.join(some)} vary, all others are nominal."
+        return sentence
+    return f"{sentence} Here only {', '.join(some)} vary, all others are nominal."
 
 
 def _title(finding: Finding, result: Result) -> str:
@@ -203,8 +265,8 @@ def _title(finding: Finding, result: Result) -> str:
     return asked.title or text.TITLES[finding.kind] + ("" if of == "spec" else f" of {of}")
 
 
-def _findings(result: Result, prefix: str) -> list[tuple[str, str, list[Item]]]:
-    """Return key, title and items of every other analysis, in the order of `KINDS`.
+def _findings(result: Result, prefix: str) -> list[Section]:
+    """Return a section for every other analysis, in the order of `KINDS`.
 
     Those without an answer come last, with the sentence that says why.
     """
@@ -215,9 +277,9 @@ def _findings(result: Result, prefix: str) -> list[tuple[str, str, list[Item]]]:
             if f.kind == kind:
                 shown = items(f, result, asked[f.key], f"{prefix}{f.key}")
                 told = Paragraph(text=_told(f, asked[f.key]))
-                made.append((f.key, _title(f, result), [told, *shown]))
+                made.append(Section(key=f.key, title=_title(f, result), items=[told, *shown]))
     return made + [
-        (f.key, _title(f, result), [Paragraph(text=f.sentence)])
+        Section(key=f.key, title=_title(f, result), items=[Paragraph(text=f.sentence)])
         for f in result.findings
         if not f.is_answered
     ]

@@ -33,7 +33,7 @@ def morris(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     )
     yield _table(
         table.sort_values("mu_star", ascending=False, kind="stable"),
-        "The same in numbers; μ: mean effect with its sign.",
+        f"{text.SAME}; μ: mean effect with its sign.",
         {"mu": "μ", "mu_star": "μ*", "low": "from", "high": "to", "sigma": "σ"},
     )
 
@@ -53,7 +53,7 @@ def sobol(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[It
     columns = {"S1": "S₁", "S1_low": "from", "S1_high": "to"}
     columns |= {"ST": "S_T", "ST_low": "from", "ST_high": "to"}
     ordered = table.sort_values("ST", ascending=False, kind="stable")
-    yield _table(ordered, "The same in numbers.", columns)
+    yield _table(ordered, f"{text.SAME}.", columns)
 
 
 def regional(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
@@ -71,7 +71,7 @@ def regional(finding: Finding, result: Result, asked: Any, key: str) -> Iterator
     if np.isfinite(table["p"].to_numpy()).any():  # rows are independent draws
         columns |= {"p": "p", "p_holm": "p (Holm)"}
     ordered = table.sort_values("statistic", ascending=False, kind="stable")
-    yield _table(ordered, "The same in numbers.", columns)
+    yield _table(ordered, f"{text.SAME}.", columns)
 
 
 def compare(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
@@ -138,6 +138,7 @@ def _table(table: pd.DataFrame, caption: str, columns: Mapping[str, str]) -> Tab
         caption=caption,
         columns=(*names, *columns.values()),
         rows=[tuple(map(_cell, row)) for row in chosen.itertuples(index=False, name=None)],
+        folded=caption.startswith(text.SAME),
     )
 
 

@@ -13,11 +13,12 @@ from nlctl.native import Status
 
 from .. import robustness_figures as figures
 from ..robustness.evaluation import margins_of
+from ..robustness.guarantee import rounded_down, rounded_up
 from ..robustness.sequential import sequence_bounds
 from ..robustness.spec import violates
 from . import robustness_text as text
 from .document import Figure, History, Item, Paragraph, Table
-from .paper_text import CONTROLLER_PART, EXAMPLES, PLANT_CLASS, PLANTS, TITLES
+from .paper_text import CONTROLLER_PART, EXAMPLES, PLANT_CLASS, TITLES
 from .robustness_claims import refusal
 from .robustness_histories import Histories
 from .robustness_text import margin_text
@@ -43,10 +44,8 @@ PARTS = {0.5: "median", 0.95: "95 %", 1.0: "largest"}  # quantiles of the metric
 
 
 def setup_items(result: Result) -> Iterator[Item]:
-    """Yield the question, the spec, and what is uncertain."""
+    """Yield the loop, the spec, and what is uncertain."""
     study = result.study
-    if study.study.question:
-        yield Paragraph(text=study.study.question)
     number = EXAMPLES.get(study.loop)
     about = f" ({TITLES[number]}; Lv et al. 2017)" if number else ""
     options = ", ".join(f"{key} = {value}" for key, value in study.options.items())
@@ -72,10 +71,10 @@ def setup_items(result: Result) -> Iterator[Item]:
     )
 
 
-def loop_items(number: int) -> Iterator[Item]:
-    """Yield the equations of one of the paper's examples."""
-    yield Paragraph(text="The class of plants, the last equation of this one, and its actuator:")
-    yield from (PLANT_CLASS, *PLANTS[number], *CONTROLLER_PART)
+def loop_items() -> Iterator[Item]:
+    """Yield the class of plants and the controller of the paper's examples, as it prints them."""
+    yield Paragraph(text="The class of plants:")
+    yield from (PLANT_CLASS, *CONTROLLER_PART)
 
 
 def known(quantities: pd.DataFrame, *columns: str) -> Iterable[tuple[Any, ...]]:
@@ -168,9 +167,15 @@ def _worst_rows(result: Result, table: pd.DataFrame) -> Iterator[Table]:
         "bit.",
         columns=("row", "margin", "least in", "status", "reached (s)", "again"),
         rows=ended,
+        folded=True,
     )
     values = worst[names].itertuples(name=None)
-    yield Table(caption="The values of these rows.", columns=("row", *names), rows=list(values))
+    yield Table(
+        caption="The values of these rows.",
+        columns=("row", *names),
+        rows=list(values),
+        folded=True,
+    )
 
 
 def _metrics(result: Result, table: pd.DataFrame) -> Table:
@@ -185,6 +190,7 @@ def _metrics(result: Result, table: pd.DataFrame) -> Table:
         caption=text.METRICS,
         columns=("metric", "meaning", "unit", *PARTS.values(), "missing"),
         rows=rows,
+        folded=True,
     )
 
 
@@ -199,28 +205,44 @@ def fan_items(kept: Histories, key: str) -> Iterator[Item]:
     )
     worst = margin_text(kept.margin)
     caption = (
-        f"The first {count} rows simulated again: bands that hold all, 90 % and 50 % of them at "
-        f"each time, the nominal run, and the worst run that is known (margin {worst}), in the "
-        f"loop's own units.{ended} Lines that leave the picture are cut off."
+        f"The first {count} rows simulated again: {_bands(kept)}, the nominal run, and the worst "
+        f"run that is known (margin {worst}).{_limits(kept)}{ended} What leaves the picture is cut "
+        "off."
     )
     yield Figure(
         key=f"{key}-fans",
         caption=caption,
         description=f"{caption} {_peaks(kept)}",
-        figure=figures.fans(kept.time, kept.signals, kept.nominal, kept.worst),
-    )
+        figure=figures.fans(
+            kept.time, kept.signals, kept.nominal, kept.worst,
+            limits=kept.limits, units=kept.units, groups=kept.groups,
+        ),
+    )  # fmt: skip
     runs = {"nominal": kept.nominal, "worst": kept.worst}
     both = {f"{name}, {run}": runs[run][name] for name in kept.nominal for run in runs}
     yield History(
         key=f"{key}-history",
-        caption=f"The nominal run and the worst one that is known (margin {worst}), in the loop's "
-        "own units.",
+        caption=f"The nominal run and the worst one that is known (margin {worst}).",
         description=f"Chart of {', '.join(kept.nominal)} in the nominal and in the worst run; the "
         "figure above shows the same runs, the slider below tells their values.",
         time=kept.time,
         signals=both,
         shown=list(both)[: len(runs)],
     )
+
+
+def _bands(kept: Histories) -> str:
+    """Say what the bands are; rows of different kinds have one each."""
+    if not kept.groups:
+        return "bands that hold all, 90 % and 50 % of them at each time"
+    shown, every = figures.most_frequent(kept.groups), set(kept.groups)
+    which = "each option" if len(shown) == len(every) else f"the {len(shown)} most frequent options"
+    return f"for {which} the median at each time and a band that holds 90 % of its rows"
+
+
+def _limits(kept: Histories) -> str:
+    shown = any(kept.limits.get(name) for name in kept.signals)
+    return " Straight lines: limits of the spec, where and as long as they count." * shown
 
 
 def _peaks(kept: Histories) -> str:
@@ -246,12 +268,17 @@ def statement_items(
     curve = running(margins[: int(finding.numbers["runs"])], confidence)
     last = curve.iloc[-1]
     caption = text.RUNNING.format(confidence=100 * confidence)
+    fixed = None
+    if finding.kind == "probability":
+        fixed = (float(finding.numbers["singly"][0]), float(finding.numbers["singly"][1]))
+    caption += text.DECIDES_FIXED if fixed else text.DECIDES_SEQUENCE
+    ends = f", exact bounds {rounded_down(fixed[0])} and {rounded_up(fixed[1])}" if fixed else ""
     yield Figure(
         key=f"{key}-running",
         caption=caption,
-        description=f"{caption} After {curve.index[-1]} runs: {last['rate']:.4g}, between "
-        f"{last['low']:.4g} and {last['high']:.4g}.",
-        figure=figures.running_estimate(curve, limit),
+        description=f"{caption} After {curve.index[-1]} runs: {last['rate']:.4g}, band from "
+        f"{last['low']:.4g} to {last['high']:.4g}{ends}.",
+        figure=figures.running_estimate(curve, limit, fixed),
     )
 
 

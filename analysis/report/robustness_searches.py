@@ -85,7 +85,7 @@ def _rows(rows: Mapping[str, Row], quantities: pd.DataFrame, key: str) -> Iterat
             for name, unit, middle in known(quantities, "unit", "nominal")
         ],
     )
-    if len(table):
+    if np.any(table.to_numpy() != 0):
         told = "; ".join(
             f"{name}: " + ", ".join(f"{row} {value:.3g}" for row, value in line.items())
             for name, line in table.iterrows()
@@ -129,6 +129,9 @@ def deviations(rows: Mapping[str, Row], quantities: pd.DataFrame) -> pd.DataFram
 def radius(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
     """Yield which sizes were looked at, and the row at the edge of the smallest violation."""
     n, steps = finding.numbers, finding.tables["steps"]
+    if n["upper"] == 0:  # the nominal values violate: no other size was looked at
+        yield from _rows({"violating row": n["witness"]}, result.quantities, key)
+        return
     told = ", ".join(
         f"{step['size']:.4g}: {margin_text(float(step['margin']))}"
         for step in steps.to_dict("records")
@@ -159,7 +162,8 @@ def degradation(finding: Finding, result: Result, asked: Any, key: str) -> Itera
         figure=figures.degradation(curve, asked.at, asked.limit),
     )
     yield Table(
-        caption="The same in numbers.",
+        caption=f"{text.SAME}.",
+        folded=True,
         columns=("factor", "violations", "runs", "share", "from", "to", "least margin", "median"),
         rows=[
             (
@@ -183,7 +187,8 @@ def failure_map(finding: Finding, result: Result, asked: Any, key: str) -> Itera
     labels = tuple(f"{name} ({unit or '1'})" for name, unit in known(about, "unit"))
     edge, is_nominal = finding.tables["boundary"], bool(np.all(np.isfinite(nominal)))
     caption = text.MAP + text.VIOLATED * bool(np.any(violates(points["spec"])))
-    caption += text.BOUNDARY * bool(len(edge)) + text.STAR * is_nominal
+    caption += text.BOUNDARY * bool(len(edge)) + text.STAR * is_nominal + text.BOX
+    box = tuple((float(row["low"]), float(row["high"])) for _, row in about.iterrows())
     yield Figure(
         key=f"{key}-map",
         caption=caption,
@@ -194,6 +199,7 @@ def failure_map(finding: Finding, result: Result, asked: Any, key: str) -> Itera
             names,
             labels=labels,  # type: ignore[arg-type]
             nominal=nominal if is_nominal else None,  # type: ignore[arg-type]
+            box=box,  # type: ignore[arg-type]
         ),
     )
     if len(edge):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from ..robustness.spec import FAILED
 from ..robustness_figures import CLIP
+from .typography import typeset
 
 SPEC = (
     "What is required of every run. A margin tells by how much a requirement holds, in multiples "
@@ -31,10 +33,15 @@ CLIPPED = (
     f" Margins below −{CLIP:g}, and runs that did not reach their end, are drawn at −{CLIP:g}."
 )
 RUNNING = (
-    "Share of violations after n runs, in their order, and bounds that hold at all n at once with "
-    "confidence {confidence:g} % (a confidence sequence: wider than a bound for a fixed number of "
-    "runs)."
+    "Line: share of violations after n runs, in their order. Band: bounds that hold at all n at "
+    "once with confidence {confidence:g} % (a confidence sequence)."
 )
+DECIDES_FIXED = (
+    " The verdict rests on the exact bounds at the end alone, drawn as a bar: their number of runs "
+    "was fixed in advance. The band shows how the estimate settled; it is wider because it allows "
+    "for looking after every run, and decides nothing."
+)
+DECIDES_SEQUENCE = " The verdict rests on the band: it is reached where the limit leaves it."
 SEARCH = "Lowest margin after each run of the search; the background tells what chose the run."
 DEVIATIONS = "How far each quantity lies from nominal: ±1 is the end of its box on that side."
 RADIUS = "Sizes that were looked at, as factors of the box, with the lowest margin found there."
@@ -62,6 +69,7 @@ MAP = (
 VIOLATED = " Orange: violated."
 BOUNDARY = " Line: margin 0."
 STAR = " Star: nominal."
+BOX = " Dashed: the box of the study."
 RANKING = (
     "Options on the same samples, best first: by violations, then by the mean rank in the first "
     "metric. Did not end: such runs violate the spec, lose in every metric, and are not in the "
@@ -89,6 +97,19 @@ PART = (
     "the paper's. nlctl report STUDY.toml makes a whole report on one, and on longer studies; the "
     "files reports/*.toml of nlctl are such studies."
 )
+SAME = "The same in numbers"
+DIAGRAM = "The loop as simulated, with nominal values, and the inside of its nested diagrams."
+PARAMETERS = (
+    "All parameters of the loop, with their values; varied: by which law the study changed them."
+)
+EQUATIONS = (
+    "Read from the functions that are run, block by block; letters are the names of signals, "
+    "parameters and local variables."
+)
+SOURCE = "As it was when this page was made:"
+ASSUMED = "What is assumed"
+WITH_ASSUMPTIONS = f" Assumptions: see “{ASSUMED}”."
+FOUND = "What was asked of the loop, and what was found."
 TITLES = {  # kind of analysis: heading
     "probability": "Probability of a violation",
     "sequential": "Sequential test",
@@ -105,6 +126,20 @@ TITLES = {  # kind of analysis: heading
 DID_NOT_END = "did not end"
 
 
+_ASSUMED = re.compile(r" Assumed: (?:at each size )?(.*?)\.(?=\s|$)", re.DOTALL)
+
+
+def without_assumptions(sentence: str) -> str:
+    """Return a statement that refers to its assumptions instead of spelling them out."""
+    return _ASSUMED.sub(WITH_ASSUMPTIONS, sentence)
+
+
+def assumptions_in(sentences: Iterable[str]) -> list[str]:
+    """Return what statements assume, each assumption once."""
+    clauses = (clause for words in sentences for clause in _ASSUMED.findall(words))
+    return list(dict.fromkeys(part for told in clauses for part in told.split("; ")))
+
+
 def violate(count: int, total: int) -> str:
     """Return how many runs violate the spec."""
     return f"{count} of {total} runs {'violates' if count == 1 else 'violate'} the spec"
@@ -117,7 +152,7 @@ def clipped(margins: Iterable[float]) -> str:
 
 def unit_text(unit: Any) -> str:
     """Return a unit with its powers raised."""
-    return "" if unit is None else str(unit).replace("^2", "²").replace("^3", "³")
+    return "" if unit is None else typeset(str(unit))
 
 
 def margin_text(value: float) -> str:

@@ -20,6 +20,7 @@ from nlctl import drawing
 from ..figures import axes
 from .document import Figure, Section
 from .svg_compact import compact, shared_shape, short_path
+from .typography import plain
 
 __all__ = ["draw_ahead", "shapes_svg", "svg", "svg_files"]
 
@@ -36,7 +37,7 @@ THEME = {
     axes.PURPLE.lower(): "var(--purple)",
 }
 SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": 9.0}
-WIDE = 450.0  # points; a phone shows wider figures in a box that scrolls
+WIDE, BROAD = 400.0, 560.0  # points; as wide as the text, and as wide as the page
 DECIMALS = re.compile(r"-?\d+\.\d{2,}")
 PLACE = re.compile(r"translate\([^)]*\)|^[-\d.]+$")
 TAG = re.compile(r"<(\w+)")
@@ -112,12 +113,13 @@ def svg(figure: Figure, file: bytes, key: str, shapes: dict[str, str]) -> Markup
         _rename(element, key, shared, referred)
     compact(root, shapes)
     attributes = {"role": "img", "aria-labelledby": f"{key}-title {key}-desc"}
-    if float(root.get("width", "0pt").removesuffix("pt")) > WIDE:
-        attributes["class"] = "wide"
+    width = float(root.get("width", "0pt").removesuffix("pt"))
+    if width > WIDE:
+        attributes["class"] = "broad" if width > BROAD else "wide"
     root.attrib = attributes | {k: v for k, v in root.attrib.items() if k != "version"}
     title = ElementTree.Element("title", id=f"{key}-title")
     description = ElementTree.Element("desc", id=f"{key}-desc")
-    title.text, description.text = figure.caption, figure.description
+    title.text, description.text = plain(figure.caption), plain(figure.description)
     root[:] = [title, description, *root]
     return Markup(ElementTree.tostring(root, encoding="unicode"))
 

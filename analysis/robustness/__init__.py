@@ -38,6 +38,7 @@ from .spec import Requirement, Spec, margin, margins, unfinished_margin
 from .store import StoreError
 from .sweep import Sweep, load, sweep
 from .tracking import tracking_metrics
+from .verdict import Verdict, bound_verdict, test_verdict
 from .watch import Progress, until_decided
 from .worst_case import WorstCase, worst_case
 
@@ -63,10 +64,12 @@ __all__ = [
     "StoreError",
     "Sweep",
     "Uncertain",
+    "Verdict",
     "Violation",
     "WorstCase",
     "always",
     "arguments",
+    "bound_verdict",
     "boundary",
     "censored",
     "clopper_pearson",
@@ -113,6 +116,7 @@ __all__ = [
     "sobol",
     "sobol_indices",
     "sweep",
+    "test_verdict",
     "tracking_metrics",
     "unfinished_margin",
     "until_decided",

@@ -65,6 +65,6 @@ class BurstForecast:
             return float(t[beyond[0]])
         run: Any = _Samples(time=t, outputs=np.array([zeta, r, u]))
         try:
-            return float(creep(run, self.N, window=self.window).burst_by_balance)
+            return float(creep(run, self.N, window=self.window).burst)
         except ParameterError:
             return np.nan

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
+from nlctl._arguments import fraction, of_type, one_of
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
 
@@ -82,6 +84,7 @@ def crossed(design: Design, choice: Choice) -> pd.DataFrame:
     pandas.DataFrame
         For `experiment.evaluate`, or as `design.from_table` of a space with the choice.
     """
+    of_type("a comparison", "choice", choice, Choice)
     labels = list(choice.options)
     drawn = design.table.drop(columns=choice.name, errors="ignore")
     table = drawn.loc[drawn.index.repeat(len(labels))].reset_index(drop=True)
@@ -131,6 +134,13 @@ def compare(
     NoGuaranteeError
         If the design's rows are no independent draws.
     """
+    of_type("a comparison", "design", design, Design)
+    of_type("a comparison", "choice", choice, Choice)
+    of_type("a comparison", "table", table, pd.DataFrame)
+    of_type("a comparison", "metrics", metrics, Mapping, '{column: "smaller" or "larger"}')
+    for metric, better in metrics.items():
+        one_of("a comparison", f"metrics['{metric}']", better, get_args(Better))
+    fraction("a comparison", "confidence", confidence)
     if not metrics:
         raise ParameterError("a comparison needs at least one metric, got none")
     paired = _paired(design, choice, table, (spec, "status", *metrics))

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from nlctl._arguments import flag, of_type
 from nlctl._errors import DivergedError
 from nlctl.native import Status
 from nlctl.response import input_output_response
 
 from .evaluation import as_table
 from .experiment import Experiment, Prepared, by_diagram, evaluate
-from .space import arguments
+from .space import arguments, checked_row
 from .spec import margins, unfinished_margin
 
 __all__ = ["TIGHTER", "Confirmation", "confirm"]
@@ -87,8 +89,15 @@ def confirm(
     python_control : bool, optional
         Also run it in python-control, at the tighter tolerances: another engine, and other code of
         the diagram.  There memory blocks relax instead of being exact, see `nlctl.Backlash`.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        If the row lacks a quantity, has another one, or a number is not finite.
     """
-    study = prepared.experiment
+    study = of_type("confirm", "prepared", prepared, Prepared, "prepare(experiment)").experiment
+    row = checked_row(study.space, row)
+    python_control = flag("confirm", "python_control", python_control)
     tighter = replace(study, rtol=study.rtol / TIGHTER, atol=study.atol / TIGHTER)
     table = as_table(study.space, [row])
     replays = []
@@ -102,11 +111,16 @@ def confirm(
 
 
 def _replay(
-    engine: str, experiment: Experiment, status: str, time: float, margin: float
+    engine: str,
+    experiment: Experiment,
+    status: str,
+    time: float,
+    margin: float,
+    method: str = "",
 ) -> dict[str, Any]:
     return {
         "engine": engine,
-        "method": experiment.method,
+        "method": method or experiment.method,
         "rtol": experiment.rtol,
         "atol": experiment.atol,
         "status": status,
@@ -118,17 +132,17 @@ def _replay(
 def _in_python_control(
     prepared: Prepared, experiment: Experiment, table: pd.DataFrame
 ) -> dict[str, Any]:
-    experiment = replace(experiment, method=REFERENCE)
     ((loop, _),) = by_diagram(prepared, table)
     given = arguments(experiment.space, table)
     end = float(experiment.timepts[-1])
+    told = partial(_replay, "python-control", experiment, method=REFERENCE)
     try:
         response = input_output_response(
             loop.system,
             experiment.timepts,
             experiment.inputs,
             engine="python-control",
-            method=experiment.method,
+            method=REFERENCE,
             rtol=experiment.rtol,
             atol=experiment.atol,
             initial_state={name: values[0] for name, values in given["initial_state"].items()},
@@ -136,10 +150,10 @@ def _in_python_control(
         )
     except DivergedError as error:
         margin = unfinished_margin(error.time, end)
-        return _replay("python-control", experiment, Status.DIVERGED.name, error.time, margin)
+        return told(Status.DIVERGED.name, error.time, margin)
     signals = dict(zip(loop.system.output_labels, np.atleast_2d(response.outputs), strict=True))
     margin = margins(experiment.spec, experiment.timepts, signals)["spec"]
-    return _replay("python-control", experiment, Status.OK.name, end, margin)
+    return told(Status.OK.name, end, margin)
 
 
 def _reason(replays: pd.DataFrame) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from nlctl._arguments import flag, of_type, vector, whole_number
 from nlctl._errors import ParameterError
 
 from .design import checked_entropy, independent
@@ -107,17 +108,21 @@ def degradation_curve(
         If Ctrl-C kept rows from finishing.
     """
     confidence = checked_confidence(confidence)
-    if not len(factors):
+    simultaneous = flag("a degradation curve", "simultaneous", simultaneous)
+    sizes = vector("a degradation curve", "factors", factors).tolist()
+    if not sizes:
         raise ParameterError("a degradation curve needs at least one factor, got none")
+    runs = whole_number("a degradation curve", "runs", runs, at_least=1)
+    of_type("a degradation curve", "space", space, Space)
     entropy = checked_entropy(entropy)
-    each = 1 - (1 - confidence) / len(factors) if simultaneous else confidence
+    each = 1 - (1 - confidence) / len(sizes) if simultaneous else confidence
     statements, margins = [], []
-    for factor in factors:
+    for factor in sizes:
         design = independent(scaled(space, factor), runs, entropy)
         margins.append(evaluated(evaluate, design.table)["spec"].to_numpy(dtype=float))
         statements.append(violation_probability(design, margins[-1], each, "both"))
     return Degradation(
-        factors=tuple(map(float, factors)),
+        factors=tuple(sizes),
         statements=tuple(statements),
         margins=tuple(margins),
         confidence=confidence,

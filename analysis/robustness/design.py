@@ -9,15 +9,16 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
+from nlctl._arguments import flag, of_type, whole_number
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
-from nlctl._param import whole_number
 
 from .space import Space, sampled
 
 __all__ = [
     "Design",
     "Kind",
+    "affordable",
     "checked_entropy",
     "from_table",
     "independent",
@@ -27,6 +28,11 @@ __all__ = [
     "rows",
     "seed_number",
 ]
+
+MOST_ROWS = 10**9
+"""Rows of a design at most: what is drawn row by row."""
+MOST_HELD = 10**8
+"""Numbers that a design holds in memory at most, 800 MB: rows times columns."""
 
 Kind = Literal[
     "i.i.d.", "Sobol'", "Latin hypercube", "grid", "corners", "one at a time", "Saltelli",
@@ -76,6 +82,7 @@ def row_seed(design: Design, row: int) -> np.random.SeedSequence:
     It depends on the design's entropy and the row's number alone: any row can be run again without
     the others, and a longer design begins with the same rows.
     """
+    row = whole_number("a design", "row", row, at_least=0)
     return np.random.SeedSequence(design.entropy, spawn_key=(row,))
 
 
@@ -92,6 +99,7 @@ def rows(design: Design, numbers: range) -> pd.DataFrame:
     ParameterError
         If a number is not in the design.
     """
+    of_type("a design", "numbers", numbers, range)
     if len(numbers) and not (min(numbers) >= 0 and max(numbers) < design.size):
         raise ParameterError(
             f"the design has rows 0 to {design.size - 1}, asked for {min(numbers)} to "
@@ -129,10 +137,29 @@ def independent(space: Space, size: int, entropy: int | None = None) -> Design:
     entropy : int, optional
         Fresh by default; the design keeps it.
     """
+    of_type("a design", "space", space, Space)
     size = whole_number("a design", "size", size, at_least=1)
+    if size > MOST_ROWS:
+        raise ParameterError(f"a design needs size <= {MOST_ROWS:.0e}, got {size}")
     return Design(
         space=space, kind="i.i.d.", size=size, is_iid=True, entropy=checked_entropy(entropy)
     )  # fmt: skip
+
+
+def affordable(what: str, rows: int, columns: int) -> int:
+    """Return the number of rows of a design that is held in memory.
+
+    Raises
+    ------
+    ParameterError
+        If it would be larger than `MOST_HELD` numbers.
+    """
+    if rows * columns > MOST_HELD:
+        raise ParameterError(
+            f"{what} of {rows} rows with {columns} columns needs more memory than a design may: "
+            f"at most {MOST_HELD // columns} rows; independent draws are made row by row"
+        )
+    return rows
 
 
 def from_table(
@@ -161,6 +188,11 @@ def from_table(
     ParameterError
         If a column is missing, there is no row, or a number is not finite.
     """
+    of_type("a design", "table", table, pd.DataFrame, "pandas.DataFrame(...)")
+    independently = flag("a design", "drawn_independently", drawn_independently)
+    if not table.columns.is_unique:
+        twice = table.columns[table.columns.duplicated()][0]
+        raise ParameterError(f"a table needs each column once, '{twice}' comes twice")
     for column in table.columns:
         if column not in space.names:
             raise unknown("quantity", str(column), space.names, "in the table")
@@ -182,7 +214,7 @@ def from_table(
             if label not in choice.options:
                 raise unknown("option", label, choice.options, f"of '{choice.name}'")
     made = listed(space, "user's table", pd.DataFrame(columns), checked_entropy(entropy))
-    return replace(made, is_iid=drawn_independently)
+    return replace(made, is_iid=independently)
 
 
 def listed(

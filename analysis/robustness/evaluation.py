@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlctl._arguments import a_function
 from nlctl._errors import ParameterError
 
 from .quantity import Uncertain
@@ -28,15 +29,25 @@ def evaluated(evaluate: Evaluate, table: pd.DataFrame) -> pd.DataFrame:
     KeyboardInterrupt
         If rows are missing, because Ctrl-C kept them from finishing.
     ParameterError
-        If the result has no column ``spec``.
+        If `evaluate` is no function, or its result is no table of these rows with a column
+        ``spec``.
     """
-    results = evaluate(table)
+    results = a_function("a search", "evaluate", evaluate)(table)
+    if not isinstance(results, pd.DataFrame):
+        raise ParameterError(
+            f"a search needs results as a pandas.DataFrame, got {type(results).__name__}"
+        )
     if "spec" not in results.columns:
         raise ParameterError(
             f"a search needs results with a column 'spec', got {list(results.columns)}"
         )
     if len(results) < len(table):
         raise KeyboardInterrupt
+    if not table.index.isin(results.index).all():
+        raise ParameterError(
+            "a search needs results with the index of the rows, got "
+            f"{list(results.index[:3])} ... for {list(table.index[:3])} ..."
+        )
     return results.loc[table.index]
 
 

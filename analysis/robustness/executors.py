@@ -25,6 +25,7 @@ import numpy as np
 import pandas as pd
 
 from nlctl._errors import UsageError
+from nlctl._workers import end_with_parent
 from nlctl.native._ensemble import cores
 
 from .columns import columns_of, typed
@@ -177,6 +178,7 @@ def _worked(
     payload: bytes, points: pd.DataFrame | None, numbers: range, threads: int
 ) -> pd.DataFrame:
     """What a worker does: one chunk."""
+    end_with_parent()
     in_main = threading.current_thread() is threading.main_thread()
     if in_main and multiprocessing.parent_process() is not None:
         # Ctrl-C reaches all processes of a terminal; the parent decides what is finished

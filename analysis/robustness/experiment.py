@@ -12,16 +12,19 @@ import numpy as np
 import pandas as pd
 
 from nlctl import native
+from nlctl._arguments import a_function, of_type
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
-from nlctl._param import checked_times
+from nlctl._param import as_numbers, checked_times
+from nlctl._run_arguments import input_array
 from nlctl.native import Compiled, Ensemble, Status, ensemble_response
 from nlctl.native import compile as compiled
+from nlctl.native._simulate import Settings
 
 from ..metrics import Metric, machine_code
 from .piecewise import with_vertices
 from .resolve import diagrams, resolved
-from .space import Space, arguments
+from .space import Space, arguments, checked_rows
 from .spec import Requirement, Spec, unfinished_margin
 
 __all__ = [
@@ -62,8 +65,10 @@ class Experiment:
     Raises
     ------
     ParameterError
-        If times do not start at 0, a requirement looks beyond the last one, or two numbers or
-        quantities have the same name.
+        If times do not start at 0, a requirement looks beyond the last one, two numbers or
+        quantities have the same name, or a tolerance or a number of steps is not positive.
+    UnknownNameError
+        If there is no such method.
     """
 
     space: Space
@@ -78,6 +83,19 @@ class Experiment:
     method: str = "auto"
 
     def __post_init__(self) -> None:
+        who = "an experiment"
+        of_type(who, "space", self.space, Space)
+        of_type(who, "spec", self.spec, Spec)
+        a_function(who, "build", self.build)
+        for metric in self.metrics:
+            if not (hasattr(metric, "key") and hasattr(metric, "signals")):
+                raise ParameterError(
+                    f"{who} needs metrics such as analysis.metrics.Metric, got {metric!r}"
+                )
+        Settings(rtol=self.rtol, atol=self.atol, max_steps=self.max_steps, method=self.method)
+        given = as_numbers(self.inputs)
+        if given is not None and not np.all(np.isfinite(given)):
+            raise ParameterError(f"{who} needs finite inputs, got {self.inputs!r}")
         times = checked_times(self.timepts)
         object.__setattr__(self, "timepts", times)
         if times[0] != 0:
@@ -123,14 +141,17 @@ def prepare(experiment: Experiment) -> Prepared:
     ------
     UsageError
         As in `resolve.diagrams` and `nlctl.compile`.
+    ParameterError
+        If the inputs do not fit a diagram, or are not finite.
     UnknownNameError
         If a requirement or a metric asks for a signal that a diagram lacks.
     """
-    space = experiment.space
+    space = of_type("prepare", "experiment", experiment, Experiment).space
     built = diagrams(space, experiment.build)
     middle = {choice.name: choice.nominal for choice in space.choices}
     full = resolved(space, next(diagram for labels, diagram in built if labels == middle))
     for _, diagram in built:
+        input_array(diagram, experiment.inputs, experiment.timepts)
         resolved(full, diagram)  # the full names must be known to every diagram
         for asked in (*experiment.spec.requirements, *experiment.metrics):
             for signal in asked.signals:
@@ -168,7 +189,16 @@ def evaluate(
         ``steps``, metrics (NaN for a failed run), the margin of each requirement by its key
         (`spec.unfinished_margin` for a failed run) and their least as ``spec``.  Rows that
         Ctrl-C kept from finishing are missing.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        If the table lacks a column, has a row twice, or a number that is not finite.
     """
+    of_type("evaluate", "prepared", prepared, Prepared, "prepare(experiment)")
+    checked_rows(prepared.experiment.space, table)
+    of_type("evaluate", "prepared", prepared, Prepared, "prepare(experiment)")
+    checked_rows(prepared.experiment.space, table)
     parts, finished = [], 0
     for loop, rows in by_diagram(prepared, table):
         notify = None if progress is None else partial(_forward, progress, finished)

@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import Delaunay
 
+from nlctl._arguments import number, of_type, whole_number
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
-from nlctl._param import whole_number
 
-from .design import numbered
+from .design import affordable, numbered
 from .evaluation import Evaluate, evaluated, margins_of
 from .space import Space, boxed, ends, nominal
 
@@ -24,6 +24,10 @@ Cell = tuple[int, int, int]
 """Lower left corner and side, in steps of the finest grid."""
 CLOSE = 0.5
 """A cell is near the boundary if its least |margin| is below this part of their range in it."""
+FINEST = 30
+"""Divisions beyond which the finest cells are no wider than rounding."""
+WORK = 40
+"""What a point of the first grid takes beside its row, in numbers."""
 NEW = 5
 """Points that the refinement of a cell adds at most."""
 
@@ -101,9 +105,15 @@ def failure_map(
     KeyboardInterrupt
         If Ctrl-C kept rows from finishing.
     """
-    given = _given(space, (x, y), at or {})
-    cells = whole_number("a failure map", "cells", cells, at_least=1)
-    levels = whole_number("a failure map", "levels", levels, at_least=0)
+    who = "a failure map"
+    of_type(who, "space", space, Space)
+    given = _given(space, (x, y), {} if at is None else of_type(who, "at", at, Mapping))
+    cells = whole_number(who, "cells", cells, at_least=1)
+    levels = whole_number(who, "levels", levels, at_least=0)
+    most = whole_number(who, "most", most, at_least=0)
+    if levels > FINEST:
+        raise ParameterError(f"{who} needs levels <= {FINEST}, got {levels}")
+    affordable("the first grid of a failure map", (cells + 1) ** 2, len(space.names) + WORK)
     plane = _Plane(evaluate, space, (x, y), given, cells << levels)
     side = 1 << levels
     leaves = {(i * side, j * side, side) for i in range(cells) for j in range(cells)}
@@ -135,6 +145,8 @@ def _given(space: Space, axes: tuple[str, str], at: Mapping[str, Any]) -> dict[s
             raise unknown(
                 "quantity", name, space.names, "of the row that a failure map goes through"
             )
+    for name in (name for name in at if name in quantities):
+        number("a failure map", f"'{name}'", at[name])
     if axes[0] == axes[1]:
         raise ParameterError(f"a failure map needs two quantities, got '{axes[0]}' twice")
     others = [name for name in space.names if name not in axes and name not in at]
@@ -216,6 +228,7 @@ def boundary(made: FailureMap) -> pd.DataFrame:
     pandas.DataFrame
         Columns by the names of the two quantities.
     """
+    of_type("a boundary", "made", made, FailureMap, "failure_map(...)")
     edges = np.sort(made.triangles[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
     edges = np.unique(edges, axis=0)
     margins = np.clip(margins_of(made.table), -1.0, 1.0)[edges]

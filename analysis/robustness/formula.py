@@ -19,6 +19,7 @@ from functools import cache
 
 import numpy as np
 
+from nlctl._arguments import number, of_type, text
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
 
@@ -41,14 +42,17 @@ __all__ = [
 ]
 
 
+HOW = 'in_band("y", upper=1.0), always(...), eventually(...)'
+
+
 class Formula:
     """What ``&``, ``|`` and ``~`` are defined for."""
 
     def __and__(self, other: Formula) -> And:
-        return And(parts=(self, other))
+        return And(parts=(self, of_type("'&'", "its right side", other, Formula, HOW)))
 
     def __or__(self, other: Formula) -> Formula:
-        return ~(~self & ~other)
+        return ~(~self & ~of_type("'|'", "its right side", other, Formula, HOW))
 
     def __invert__(self) -> Formula:
         return Not(part=self)
@@ -148,6 +152,10 @@ def in_band(
     ParameterError
         If both bounds are infinite or they are in the wrong order, or the scale is not positive.
     """
+    text("a band", "signal", signal)
+    for name, bound in (("lower", lower), ("upper", upper)):
+        if not (isinstance(bound, float) and np.isinf(bound)):
+            number(f"a band of '{signal}'", name, bound)
     finite = [abs(bound) for bound in (lower, upper) if np.isfinite(bound)]
     if not finite or not lower <= upper:
         raise ParameterError(
@@ -155,8 +163,7 @@ def in_band(
             f"got [{lower}, {upper}]"
         )
     scale = (max(finite) or 1.0) if scale is None else scale
-    if not (np.isfinite(scale) and scale > 0):
-        raise ParameterError(f"a band of '{signal}' needs a finite scale > 0, got {scale}")
+    number(f"a band of '{signal}'", "scale", scale, above=0)
     return Band(signal=signal, lower=float(lower), upper=float(upper), scale=float(scale))
 
 
@@ -170,17 +177,21 @@ def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
     ParameterError
         If not 0 <= start <= end, or start is infinite.
     """
-    _check_window("always", start, end)
+    _check_window("always", part, start, end)
     return Always(part=part, start=float(start), end=float(end))
 
 
 def eventually(part: Formula, start: float = 0.0, end: float = np.inf) -> Eventually:
     """Require `part` once between start and end; arguments and errors as in `always`."""
-    _check_window("eventually", start, end)
+    _check_window("eventually", part, start, end)
     return Eventually(part=part, start=float(start), end=float(end))
 
 
-def _check_window(name: str, start: float, end: float) -> None:
+def _check_window(name: str, part: Formula, start: float, end: float) -> None:
+    of_type(f"'{name}'", "part", part, Formula, HOW)
+    number(f"'{name}'", "start", start, at_least=0)
+    if not (isinstance(end, float) and np.isinf(end)):
+        number(f"'{name}'", "end", end)
     if not (0 <= start <= end and np.isfinite(start)):
         raise ParameterError(
             f"'{name}' needs 0 <= start <= end with a finite start, got [{start}, {end}] s"

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
+from nlctl._arguments import fraction, of_type, one_of, whole_number
 from nlctl._errors import ParameterError, UsageError
-from nlctl._param import whole_number
 
 from .design import Design
 from .spec import violates
@@ -28,12 +28,15 @@ __all__ = [
     "rounded_down",
     "rounded_up",
     "runs_needed",
+    "series_of",
     "violation_probability",
     "violations_of",
 ]
 
 Side = Literal["upper", "lower", "both"]
 Margins = Sequence[float] | np.ndarray | pd.Series
+MOST_RUNS = 10**9
+"""Up to so many runs the beta quantiles are good to four digits; beyond, SciPy's are not always."""
 
 
 class NoGuaranteeError(UsageError):
@@ -49,7 +52,12 @@ class Violation:
     violations, runs : int
     confidence : float
     lower, upper : float
-        Bounds of the probability that hold with this confidence.
+        Bounds of the probability that hold together with this confidence.
+    side : {"upper", "lower", "both"}
+        Which of the two is in use; the other is 0 or 1.
+    singly : tuple of 2 floats
+        A lower and an upper bound that hold with this confidence each by itself; `lower` and
+        `upper` where both are in use.
     method : str
     assumptions : tuple of str
         What the statement rests on.
@@ -60,20 +68,34 @@ class Violation:
     confidence: float
     lower: float
     upper: float
+    side: Side
+    singly: tuple[float, float]
     method: str
     assumptions: tuple[str, ...]
 
     def __str__(self) -> str:
-        bounds = f"between {rounded_down(self.lower)} and {rounded_up(self.upper)}"
-        if self.lower == 0:
-            bounds = f"at most {rounded_up(self.upper)}"
-        elif self.upper == 1:
-            bounds = f"at least {rounded_down(self.lower)}"
         return (
-            f"{self.violations} of {self.runs} runs violate the spec. With confidence "
-            f"{100 * self.confidence:.10g} % the probability of a violation is {bounds} "
+            f"{self.violations} of {self.runs} runs violate the spec. {self.bounds} "
             f"({self.method}). Assumed: {'; '.join(self.assumptions)}."
         )
+
+    @property
+    def bounds(self) -> str:
+        """What is known of the probability, in words, without method and assumptions.
+
+        Runs that violate are evidence of a lower bound, the others of an upper one; what there is
+        evidence of is told, also where only the other side was asked for.
+        """
+        low, high = rounded_down(self.singly[0]), rounded_up(self.singly[1])
+        confidence = f"confidence {100 * self.confidence:.10g} %"
+        told = f"With {confidence} the probability of a violation is"
+        if self.lower > 0 and self.upper < 1:
+            return f"{told} between {low} and {high}"
+        sides = {f"at most {high}": self.singly[1] < 1, f"at least {low}": self.singly[0] > 0}
+        first, *rest = [text for text, is_there in sides.items() if is_there] or ["at most 1"]
+        if self.lower > 0 and rest:  # the side that was asked for comes first
+            first, rest = rest[0], [first]
+        return f"{told} {first}" + "".join(f"; with the same confidence, {r}" for r in rest)
 
 
 def rounded_up(value: float) -> str:
@@ -101,9 +123,7 @@ def checked_confidence(confidence: float) -> float:
     ParameterError
         If it is not between 0 and 1.
     """
-    if not 0 < confidence < 1:
-        raise ParameterError(f"a confidence needs 0 < confidence < 1, got {confidence}")
-    return float(confidence)
+    return fraction("a statement", "confidence", confidence)
 
 
 def clopper_pearson(
@@ -120,7 +140,7 @@ def clopper_pearson(
     Parameters
     ----------
     violations, runs : int
-        k and n.
+        k and n, at most 10^9.
     confidence : float, optional
     side : {"upper", "lower", "both"}, optional
         The bound that is left out is 0 or 1.
@@ -128,9 +148,11 @@ def clopper_pearson(
     Raises
     ------
     ParameterError
-        If not 0 <= violations <= runs with at least one run, or the confidence is none.
+        If not 0 <= violations <= runs with at least one run and at most 10^9, the confidence is
+        none, or the side.
     """
     k, n = checked_counts(violations, runs)
+    side = one_of("a bound", "side", side, get_args(Side))
     a = (1 - checked_confidence(confidence)) / (2 if side == "both" else 1)
     upper = float(stats.beta.isf(a, k + 1, n - k)) if side != "lower" and k < n else 1.0
     lower = float(stats.beta.ppf(a, k, n - k + 1)) if side != "upper" and k > 0 else 0.0
@@ -143,10 +165,15 @@ def checked_counts(violations: int, runs: int) -> tuple[int, int]:
     Raises
     ------
     ParameterError
-        If not 0 <= violations <= runs with at least one run.
+        If not 0 <= violations <= runs with at least one run and at most `MOST_RUNS`.
     """
     n = whole_number("a probability", "runs", runs, at_least=1)
     k = whole_number("a probability", "violations", violations, at_least=0)
+    if n > MOST_RUNS:
+        raise ParameterError(
+            f"a probability needs runs <= {MOST_RUNS:.0e}, beyond which its bounds lose digits, "
+            f"got {n}"
+        )
     if k > n:
         raise ParameterError(f"a probability needs violations <= runs, got {k} of {n}")
     return k, n
@@ -162,16 +189,20 @@ def runs_needed(probability: float, confidence: float = 0.99, violations: int = 
     Raises
     ------
     ParameterError
-        If the probability is not between 0 and 1, the confidence is none, or `violations` is no
-        whole number >= 0.
+        If the probability is not between 0 and 1, the confidence is none, `violations` is no
+        integer >= 0, or more than 10^9 runs would be needed.
     """
     k = whole_number("a plan", "violations", violations, at_least=0)
     a = 1 - checked_confidence(confidence)
-    if not 0 < probability < 1:
-        raise ParameterError(f"a plan needs 0 < probability < 1, got {probability}")
+    probability = fraction("a plan", "probability", probability)
     too_few, enough = k, k + 1
     while stats.binom.cdf(k, enough, probability) > a:
         too_few, enough = enough, 2 * enough
+        if too_few > MOST_RUNS:
+            raise ParameterError(
+                f"a plan for the probability {probability:g} needs more than {MOST_RUNS:.0e} runs, "
+                "which nobody counts: take a larger probability"
+            )
     while enough - too_few > 1:
         middle = (too_few + enough) // 2
         if stats.binom.cdf(k, middle, probability) > a:
@@ -202,7 +233,11 @@ def violation_probability(
     ------
     NoGuaranteeError
         If the rows are no independent draws, or some are missing.
+    ParameterError
+        If the confidence is none, or the side.
     """
+    side = one_of("a bound", "side", side, get_args(Side))
+    confidence = checked_confidence(confidence)
     violated = violations_of(design, margins)
     k, n = int(np.count_nonzero(violated)), violated.size
     if n != design.size:
@@ -212,6 +247,10 @@ def violation_probability(
             "looked at any time"
         )
     lower, upper = clopper_pearson(k, n, confidence, side)
+    single = (
+        clopper_pearson(k, n, confidence, "lower")[0],
+        clopper_pearson(k, n, confidence, "upper")[1],
+    )
     fixed = "the number of runs was fixed in advance"
     return Violation(
         violations=k,
@@ -219,6 +258,8 @@ def violation_probability(
         confidence=confidence,
         lower=lower,
         upper=upper,
+        side=side,
+        singly=(lower, upper) if side == "both" else single,
         method=f"Clopper-Pearson, {'two-sided' if side == 'both' else 'one-sided'}",
         assumptions=(*assumptions(design), fixed),
     )
@@ -234,7 +275,7 @@ def violations_of(design: Design, margins: Margins) -> np.ndarray:
         runs end first may depend on whether they violate.
     """
     check_iid(design)
-    series = pd.Series(margins, dtype=float).sort_index()
+    series = series_of(margins, "margins").sort_index()
     if not np.array_equal(series.index, np.arange(series.size)):
         raise NoGuaranteeError(
             "a statement needs the first rows of the design without a gap, and rows are missing: "
@@ -248,6 +289,23 @@ def violations_of(design: Design, margins: Margins) -> np.ndarray:
     return violates(series)
 
 
+def series_of(values: Any, name: str) -> pd.Series:
+    """Return numbers by row.
+
+    Raises
+    ------
+    ParameterError
+        If they are no numbers, or not one-dimensional.
+    """
+    try:
+        return pd.Series(values, dtype=float)
+    except (TypeError, ValueError):
+        shape = f" of shape {np.shape(values)}" if isinstance(values, np.ndarray) else ""
+        raise ParameterError(
+            f"a statement needs one number per row for {name}, got {type(values).__name__}{shape}"
+        ) from None
+
+
 def check_iid(design: Design) -> None:
     """Refuse a design whose rows are no independent draws.
 
@@ -256,6 +314,7 @@ def check_iid(design: Design) -> None:
     NoGuaranteeError
         The message says why, and what to run instead.
     """
+    of_type("a statement", "design", design, Design, "independent(space, size)")
     if design.is_iid:
         return
     if design.kind == "user's table":

@@ -4,28 +4,35 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import inspect
 import json
 import platform
 from collections.abc import Iterator, Mapping
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from nlctl._diagram import initial_state
+from nlctl import _errors
 from nlctl.native import Compiled
-from nlctl.native.codegen.fingerprint import program_key
 
 from ..metrics import Metric
 from .design import Design
 from .experiment import Prepared
+from .loop_record import array_text, loop_facts, short_key
 from .quantity import Uncertain
+from .space import Space
 
-__all__ = ["differences_of", "identity_of"]
+__all__ = ["differences_of", "experiment_facts", "identity_of", "labels_text", "versions"]
 
-VERSIONS = ("nlctl", "numpy", "scipy", "numba", "llvmlite")
+VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
+COMPUTING = {
+    Path(_errors.__file__).parent: ("**/*.py",),
+    Path(__file__).parents[1]: ("robustness/**/*.py", "studies/**/*.py", "metrics*/**/*.py")
+    + ("metrics.py",),
+}
+TOLD = ("cli", "_layout", "drawing", "_terminal", "analysis")  # compute nothing, or are counted
 PROBES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])
 
 
@@ -43,23 +50,7 @@ def identity_of(
     more : mapping, optional
         What else belongs to it, under ``"study"``; JSON must be able to hold it.
     """
-    experiment = prepared.experiment
-    content = {
-        "space": {q.name: _quantity(q) for q in design.space.quantities},
-        "choices": {
-            c.name: dict(zip(c.options, c.weights, strict=True)) for c in design.space.choices
-        },
-        "scale": design.space.scale,
-        "spec": {
-            r.key: {"formula": repr(r.formula), "until": r.until}
-            for r in experiment.spec.requirements
-        },
-        "metrics": {m.key: _metric(m) for m in experiment.metrics},
-        "settings": {
-            "times": _numbers(experiment.timepts),
-            "inputs": _numbers(experiment.inputs),
-            **{k: getattr(experiment, k) for k in ("rtol", "atol", "max_steps", "method")},
-        },
+    content = experiment_facts(prepared, design.space) | {
         "design": {
             "kind": design.kind,
             "size": design.size,
@@ -67,15 +58,67 @@ def identity_of(
             "entropy": str(design.entropy),  # too long for the numbers of other JSON readers
             "points": None if design.points is None else _table(design.points),
         },
-        "diagrams": {
-            ", ".join(f"{k} = {v}" for k, v in labels.items()) or "only": _diagram(loop)
-            for labels, loop in prepared.loops
-        },
-        "versions": {name: metadata.version(name) for name in VERSIONS}
-        | {"python": platform.python_version()},
         "study": dict(more or {}),
     }
     return json.loads(json.dumps(content)) | {"sha256": _digest(json.dumps(content))}
+
+
+def experiment_facts(prepared: Prepared, space: Space | None = None) -> dict[str, Any]:
+    """Return what the numbers of any row of an experiment follow from, its design aside.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    space : Space, optional
+        Where rows are drawn, if not in the experiment's own space.
+    """
+    experiment = prepared.experiment
+    space = experiment.space if space is None else space
+    return {
+        "space": {q.name: _quantity(q) for q in space.quantities},
+        "choices": {c.name: dict(zip(c.options, c.weights, strict=True)) for c in space.choices},
+        "scale": space.scale,
+        "spec": {
+            r.key: {"formula": repr(r.formula), "until": r.until}
+            for r in experiment.spec.requirements
+        },
+        "metrics": {m.key: _metric(m) for m in experiment.metrics},
+        "settings": {
+            "times": array_text(experiment.timepts),
+            "inputs": array_text(experiment.inputs),
+            **{k: getattr(experiment, k) for k in ("rtol", "atol", "max_steps", "method")},
+        },
+        "diagrams": {
+            labels_text(labels): {"program": _program(loop), **loop_facts(loop.system)}
+            for labels, loop in prepared.loops
+        },
+        "versions": versions(),
+    }
+
+
+def _program(loop: Compiled) -> str:
+    """Return a key of the program that was written for a diagram."""
+    parts = loop.program.namespace(native=True)
+    return short_key(loop.source, *((name, parts[name]) for name in sorted(parts)))
+
+
+def labels_text(labels: Mapping[str, str]) -> str:
+    """Return which diagram of an experiment this is: the options that it has."""
+    return ", ".join(f"{name} = {label}" for name, label in labels.items()) or "only"
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """Return the versions of all that computes numbers; nlctl's with a key of its source."""
+    source = hashlib.sha256()
+    for root, parts in COMPUTING.items():
+        for path in (path for part in parts for path in sorted(root.glob(part))):
+            name = path.relative_to(root).as_posix()
+            if not name.startswith(TOLD):
+                source.update(f"{name}\0".encode() + path.read_bytes())
+    own = f"{metadata.version('nlctl')} ({source.hexdigest()[:12]})"
+    found = {name: metadata.version(name) for name in VERSIONS}
+    return {"nlctl": own, **found, "python": platform.python_version()}
 
 
 def _quantity(quantity: Uncertain) -> dict[str, Any]:
@@ -102,29 +145,13 @@ def _metric(metric: Metric) -> dict[str, Any]:
 
 
 def _function(function: Any) -> str:
-    """Return a function's name, its source's digest and the arguments that it was given."""
-    if isinstance(function, functools.partial):
-        given = [*map(repr, function.args), *(f"{k}={v!r}" for k, v in function.keywords.items())]
-        return f"{_function(function.func)} with {', '.join(given)}"
-    plain = getattr(function, "py_func", function)
-    name = f"{getattr(plain, '__module__', '')}.{getattr(plain, '__qualname__', type(plain))}"
-    try:
-        return f"{name} {_digest(inspect.getsource(plain))[:16]}"
-    except (OSError, TypeError):  # made at run time, or no function
-        return name
-
-
-def _diagram(loop: Compiled) -> dict[str, str]:
-    return {
-        "program": program_key(loop.program),
-        "parameters": _numbers(loop.parameter_vector()),
-        "initial_state": _numbers(initial_state(loop.system)),
-    }
-
-
-def _numbers(values: Any) -> str:
-    array = np.asarray(values, dtype="<f8")
-    return f"{_digest(array.tobytes())[:16]} of shape {array.shape}"
+    """Return a function's name, and a key of it and of all that it reaches."""
+    plain = function
+    while isinstance(plain, functools.partial):
+        plain = plain.func
+    plain = getattr(plain, "py_func", plain)
+    name = getattr(plain, "__qualname__", type(plain).__qualname__)
+    return f"{name} {short_key(function)}"
 
 
 def _table(points: pd.DataFrame) -> str:
@@ -148,8 +175,17 @@ def differences_of(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[st
     return [
         f"{place} was {old.get(place, missing)}, now {new.get(place, missing)}"
         for place in places
-        if old.get(place, missing) != new.get(place, missing)
+        if not _same(old.get(place, missing), new.get(place, missing))
     ]
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values of JSON are equal; NaN equals NaN, here and inside of lists."""
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
+    return one == other or (one != one and other != other)
 
 
 def _flat(content: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:

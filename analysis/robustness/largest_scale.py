@@ -9,9 +9,10 @@ from functools import partial
 from typing import Any
 
 import control as ct
-import numpy as np
 
+from nlctl._arguments import number, of_type
 from nlctl._errors import ParameterError
+from nlctl._names import unknown
 from nlctl._param import with_overrides
 
 from .evaluation import towards_nominal
@@ -56,10 +57,15 @@ def largest_scale(
     ------
     ParameterError
         If `at_most` is no finite number > 0, or the nominal values themselves are refused.
+    UnknownNameError
+        If the space has no quantity of such a name.
     """
-    if not 0 < at_most < np.inf:
-        raise ParameterError(f"a largest scale needs a finite at_most > 0, got {at_most}")
-    space, factor, why = prepared.experiment.space, float(at_most), ""
+    of_type("a largest scale", "prepared", prepared, Prepared, "prepare(experiment)")
+    factor, why = number("a largest scale", "at_most", at_most, above=0), ""
+    space = prepared.experiment.space
+    for name in () if names is None else names:
+        if name not in space.names:
+            raise unknown("quantity", str(name), space.names, "of a largest scale")
     systems = [loop.system for _, loop in prepared.loops]
     tries = list(_tries(space, systems, space.names if names is None else names))
     while (refusal := next((one for one in tries if one(factor)), None)) is not None:

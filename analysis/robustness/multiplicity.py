@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from nlctl._errors import ParameterError
+from nlctl._param import as_numbers
+
 __all__ = ["holm"]
 
 
@@ -14,8 +17,17 @@ def holm(p_values: np.ndarray) -> np.ndarray:
 
     Rejecting what is at most a makes any false rejection at all happen with probability at most a,
     whatever the dependence between the tests.  NaN stays NaN and is not counted.
+
+    Raises
+    ------
+    ParameterError
+        If a value is no number in [0, 1], or they are not in one row.
     """
-    p = np.asarray(p_values, dtype=float)
+    p = as_numbers(p_values)
+    if p is None or p.ndim != 1 or np.any((p < 0) | (p > 1)):
+        raise ParameterError(
+            f"Holm's adjustment needs p-values in [0, 1] in one row, got {p_values!r}"
+        )
     adjusted = np.full(p.shape, np.nan)
     order = np.argsort(p)[: np.count_nonzero(~np.isnan(p))]  # NaN sorts last
     steps = np.minimum(1.0, np.arange(order.size, 0, -1) * p[order])

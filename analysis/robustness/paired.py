@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
+from nlctl._arguments import of_type, one_of
 from nlctl._errors import ParameterError
 
 from .design import Design
-from .guarantee import Margins, check_iid, checked_confidence
+from .guarantee import Margins, check_iid, checked_confidence, series_of
 from .multiplicity import holm
 from .spec import violates
 
@@ -61,7 +62,8 @@ def differences(
         If there are less than two controllers, or numbers are missing.
     """
     check_iid(design)
-    checked_confidence(confidence)
+    confidence = checked_confidence(confidence)
+    of_type("a comparison", "outcomes", outcomes, Mapping, "{controller: numbers}")
     rows = []
     for a, b, delta in _pairs(design, outcomes, better):
         median_low, median_high = median_interval(delta, confidence)
@@ -93,6 +95,7 @@ def wins(
     count for neither, NaN loses against numbers.  Arguments and errors as in `differences`, but
     any design will do.
     """
+    of_type("a comparison", "outcomes", outcomes, Mapping, "{controller: numbers}")
     names = list(outcomes)
     table = pd.DataFrame(0, index=pd.Index(names, name="winner"), columns=names)
     sign = 1 if better == "smaller" else -1
@@ -129,6 +132,7 @@ def mcnemar(design: Design, margins: Mapping[str, Margins]) -> pd.DataFrame:
         If there are less than two controllers, or margins are missing.
     """
     check_iid(design)
+    of_type("a comparison", "margins", margins, Mapping, "{controller: margins}")
     failed = {name: violates(_column(design, name, values)) for name, values in margins.items()}
     rows = []
     for a, b in itertools.combinations(_two_or_more(failed), 2):
@@ -183,8 +187,8 @@ def _sign_test(one: int, other: int) -> float:
 
 def _pairs(design: Design, outcomes: Mapping[str, Margins], better: Better):
     """Yield (a, b, a - b) of every pair; what is NaN is infinitely bad."""
-    if better not in ("smaller", "larger"):
-        raise ParameterError(f"better needs to be 'smaller' or 'larger', got {better!r}")
+    one_of("a comparison", "better", better, get_args(Better))
+    of_type("a comparison", "design", design, Design)
     worst = np.inf if better == "smaller" else -np.inf
     columns = {}
     for name, values in outcomes.items():
@@ -203,7 +207,7 @@ def _two_or_more(columns: Mapping[str, np.ndarray]) -> list[str]:
 
 
 def _column(design: Design, name: str, values: Margins) -> np.ndarray:
-    series = pd.Series(values, dtype=float).sort_index()
+    series = series_of(values, f"'{name}'").sort_index()
     if not np.array_equal(series.index, np.arange(design.size)):
         raise ParameterError(
             f"a comparison needs a number of '{name}' for each of {design.size} rows, got "

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
+from nlctl._arguments import of_type, whole_number
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
-from nlctl._param import whole_number
 
-from .design import Design, checked_entropy, listed
+from .design import Design, affordable, checked_entropy, listed
 from .space import Space, boxed, nominal, sampled
 
 __all__ = ["corners", "grid", "latin_hypercube", "one_at_a_time", "sobol", "sobol_points"]
@@ -42,6 +43,7 @@ def sobol_points(dimension: int, size: int, entropy: int) -> np.ndarray:
             f"a Sobol' design needs a power of 2 as its size, got {size}: take "
             f"{2 ** (size.bit_length() - 1)} or {2 ** size.bit_length()}"
         )
+    affordable("a Sobol' design", size, dimension)
     return qmc.Sobol(dimension, rng=entropy).random_base2(size.bit_length() - 1)
 
 
@@ -51,6 +53,7 @@ def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Desi
     Arguments as in `independent`.
     """
     size = whole_number("a Latin hypercube", "size", size, at_least=1)
+    affordable("a Latin hypercube", size, len(space.names))
     entropy = checked_entropy(entropy)
     unit = qmc.LatinHypercube(len(space.names), rng=entropy).random(size)
     return listed(space, "Latin hypercube", sampled(space, unit), entropy)
@@ -74,15 +77,16 @@ def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = No
     UnknownNameError
         If a level is given for an unknown quantity.
     """
-    names = [q.name for q in space.quantities]
-    counts = dict.fromkeys(names, levels) if isinstance(levels, int) else dict(levels)
-    for name in counts:
+    names = [q.name for q in of_type("a grid", "space", space, Space).quantities]
+    given = levels if isinstance(levels, Mapping) else dict.fromkeys(names, levels)
+    for name in given:
         if name not in names:
-            raise unknown("quantity", name, names)
-    axes = []
-    for name in names:
-        n = whole_number("a grid", f"levels of '{name}'", counts.get(name), at_least=1)
-        axes.append(np.linspace(0, 1, n) if n > 1 else np.array([0.5]))
+            raise unknown("quantity", str(name), names)
+    counts = [
+        whole_number("a grid", f"levels of '{name}'", given.get(name), at_least=1) for name in names
+    ]
+    affordable("a grid", math.prod([*counts, *_options(space)]), len(space.names))
+    axes = [np.linspace(0, 1, n) if n > 1 else np.array([0.5]) for n in counts]
     return listed(space, "grid", _crossed(space, axes), checked_entropy(entropy))
 
 
@@ -94,8 +98,14 @@ def corners(space: Space, entropy: int | None = None) -> Design:
     ParameterError
         If an option of a choice has weight 0.
     """
+    rows = math.prod([2] * len(space.quantities) + _options(space))
+    affordable("a design of corners", rows, len(space.names))
     axes = [np.array([0.0, 1.0])] * len(space.quantities)
     return listed(space, "corners", _crossed(space, axes), checked_entropy(entropy))
+
+
+def _options(space: Space) -> list[int]:
+    return [len(choice.options) for choice in space.choices]
 
 
 def _crossed(space: Space, axes: Sequence[np.ndarray]) -> pd.DataFrame:
@@ -127,6 +137,7 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
         If a quantity has no nominal value.
     """
     levels = whole_number("one at a time", "levels", levels, at_least=2)
+    affordable("a design", levels * len(space.names), len(space.names))
     middle = nominal(space)
     made, varied = [middle], [""]
     unit = np.tile(np.linspace(0, 1, levels)[:, None], len(space.names))

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from nlctl._arguments import number, of_type, text, vector
 from nlctl._errors import UsageError
+from nlctl._param import as_numbers
 
 __all__ = ["QUANTILES", "Choice", "SpaceError", "Uncertain"]
 
@@ -54,6 +56,7 @@ class Uncertain:
     unit: str = ""
 
     def __post_init__(self) -> None:
+        text("an uncertain quantity", "name", self.name)
         if self.law is None:
             if self.bounds is None:
                 raise SpaceError(f"'{self.name}' needs a law (scipy.stats) or bounds, got neither")
@@ -65,6 +68,8 @@ class Uncertain:
                 f"got {self.law!r}"
             )
         low, high = self.box
+        if self.nominal is not None:
+            number(f"'{self.name}'", "nominal", self.nominal)
         if self.nominal is not None and not low <= self.nominal <= high:
             raise SpaceError(
                 f"'{self.name}' needs a nominal value in its box [{low:g}, {high:g}], "
@@ -103,9 +108,10 @@ class Uncertain:
 
 
 def _interval(name: str, bounds: Sequence[float] | np.ndarray) -> tuple[float, float]:
-    if np.size(bounds) != 2 or not np.all(np.isfinite(bounds)) or not bounds[0] < bounds[1]:
+    ends = as_numbers(bounds)
+    if ends is None or ends.shape != (2,) or not np.all(np.isfinite(ends)) or not ends[0] < ends[1]:
         raise SpaceError(f"'{name}' needs finite bounds (low, high) with low < high, got {bounds}")
-    return float(bounds[0]), float(bounds[1])
+    return float(ends[0]), float(ends[1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +142,9 @@ class Choice:
     weights: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        labels = list(self.options)
+        text("a choice", "name", self.name)
+        of_type(f"choice '{self.name}'", "options", self.options, Mapping, "{label: block}")
+        labels = [text(f"choice '{self.name}'", "a label", label) for label in self.options]
         if not labels:
             raise SpaceError(f"choice '{self.name}' needs at least one option, got none")
         if self.nominal not in ("", *labels):
@@ -144,7 +152,8 @@ class Choice:
                 f"choice '{self.name}' needs a nominal option among {labels}, got '{self.nominal}'"
             )
         object.__setattr__(self, "nominal", self.nominal or labels[0])
-        weights = self.weights or (1 / len(labels),) * len(labels)
+        given = (1 / len(labels),) * len(labels) if self.weights == () else self.weights
+        weights = vector(f"choice '{self.name}'", "weights", given).tolist()
         if len(weights) != len(labels) or min(weights) < 0 or not np.isclose(sum(weights), 1):
             raise SpaceError(
                 f"choice '{self.name}' needs {len(labels)} weights >= 0 that add up to 1, "

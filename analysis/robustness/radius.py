@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl._errors import ParameterError, UsageError
-from nlctl._param import whole_number
+from nlctl._arguments import fraction, number, of_type, whole_number
+from nlctl._errors import UsageError
 
 from .design import checked_entropy, independent
 from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
@@ -38,7 +38,7 @@ class Radius:
     ----------
     upper : float
         A violation exists in the box of this size: the radius is at most that.  Infinite if none
-        was found.
+        was found, 0 if the nominal values violate the spec.
     witness : dict, optional
         The violating row, at the edge of that box.
     margin : float
@@ -67,13 +67,23 @@ class Radius:
     steps: pd.DataFrame
 
     @property
+    def violates_at_nominal(self) -> bool:
+        """Whether the nominal values violate the spec, with some option of every choice."""
+        return self.upper == 0
+
+    @property
     def runs(self) -> int:
         """Number of runs of the search, without the independent draws."""
         return sum(self.steps["runs"].tolist())
 
     def __str__(self) -> str:
         searched = f"the size {self.searched:.4g}"
-        if self.witness is None:
+        if self.violates_at_nominal:
+            text = [
+                f"The nominal values violate the spec (margin {self.margin:.4g}): "
+                f"{row_text(self.witness or {})}. There is no robustness radius."
+            ]
+        elif self.witness is None:
             text = [f"No violation was found up to {searched}, which proves nothing."]
         else:
             text = [
@@ -102,7 +112,7 @@ def size_of(space: Space, row: Mapping[str, Any]) -> float:
         low, high = quantity.box
         deviation = (row[quantity.name] - middle[quantity.name]) / space.scale
         side = (high if deviation > 0 else low) - middle[quantity.name]
-        sizes.append(np.inf if deviation and not side else deviation / (side or 1.0))
+        sizes.append(np.inf if deviation and not side else abs(deviation / (side or 1.0)))
     return float(np.max(sizes))
 
 
@@ -157,12 +167,14 @@ def robustness_radius(
     KeyboardInterrupt
         If Ctrl-C kept rows from finishing.
     """
-    draws = whole_number("a robustness radius", "draws", draws, at_least=0)
-    if not 0 < tolerance < 1:
-        raise ParameterError(f"a robustness radius needs 0 < tolerance < 1, got {tolerance}")
-    for name, value in (("largest", largest), ("scale", space.scale)):
-        if not 0 < value < np.inf:
-            raise ParameterError(f"a robustness radius needs a finite {name} > 0, got {value}")
+    who = "a robustness radius"
+    of_type(who, "space", space, Space)
+    runs = whole_number(who, "runs", runs, at_least=1)
+    draws = whole_number(who, "draws", draws, at_least=0)
+    fraction(who, "tolerance", tolerance)
+    fraction(who, "confidence", confidence)
+    number(who, "largest", largest, above=0)
+    number(who, "scale", space.scale, above=0)
     search = _Search(evaluate, space, runs, checked_entropy(entropy))
     search.at_nominal()
     size = largest * START
@@ -241,6 +253,8 @@ class _Search:
 def _drawn(search: _Search, draws: int, confidence: float) -> tuple[Violation | None, str]:
     """Return a statement from draws at the size that was searched, or why there is none."""
     if not draws:
+        return None, ""
+    if search.upper == 0:
         return None, ""
     if not search.searched:
         return None, "There is no statement: no size was searched without a violation"

@@ -12,9 +12,10 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from nlctl._arguments import a_function, of_type
 from nlctl._block import Block
 from nlctl._diagram import Place, all_parameter_rows, initial_state, leaves, state_names
-from nlctl._errors import UsageError
+from nlctl._errors import ParameterError, UsageError
 from nlctl._names import Parameters, base_name, find_name, unknown
 from nlctl._param import with_overrides
 from nlctl.native import Compiled
@@ -42,6 +43,7 @@ def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
         as another one, or the diagram's own value lies outside the box.
     """
     system = diagram.system if isinstance(diagram, Compiled) else diagram
+    of_type("a space", "diagram", system, ct.InputOutputSystem, "nlctl.interconnect(...)")
     place = {True: _state, False: _parameter}
     quantities = tuple(place[q.is_initial](q, system) for q in space.quantities)
     return replace(space, quantities=quantities)
@@ -150,12 +152,18 @@ def diagrams(
     UsageError
         As in `resolved`; the message names the combination.
     """
+    a_function("an experiment", "build", build)
     for choice in space.choices:
         check_keyword(build, choice.name)
     options = {choice.name: choice.options for choice in space.choices}
     built = []
     for labels in combinations(space):
         diagram = build(**{name: options[name][label] for name, label in labels.items()})
+        if not isinstance(diagram, ct.InputOutputSystem):
+            raise ParameterError(
+                f"build needs to return a diagram, {getattr(build, '__name__', 'it')} returned "
+                f"{type(diagram).__name__} (with {_text(labels)})"
+            )
         try:
             resolved(space, diagram)
         except UsageError as error:

@@ -9,17 +9,19 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from nlctl._arguments import of_type, whole_number
 from nlctl._errors import ParameterError
-from nlctl._param import whole_number
 
-from .design import Design, checked_entropy, listed
-from .guarantee import Margins, checked_confidence
+from .design import Design, affordable, checked_entropy, listed
+from .guarantee import Margins, checked_confidence, series_of
 from .multiplicity import holm
 from .patterns import sobol_points
 from .space import Space, boxed, sampled
 from .spec import FAILED
 
 __all__ = ["censored", "elementary_effects", "morris", "regional", "saltelli", "sobol_indices"]
+
+_WHO = "shares of the variance"
 
 
 def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
@@ -42,7 +44,7 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
     ParameterError
         If no run reached its end.
     """
-    values = np.array(margins, dtype=float)
+    values = series_of(margins, "margins").to_numpy(copy=True)
     ended = values > -FAILED  # not of NaN
     if not ended.any():
         raise ParameterError(
@@ -80,6 +82,7 @@ def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None
             "screen each combination on its own, or use saltelli"
         )
     r = whole_number("screening", "trajectories", trajectories, at_least=2)
+    affordable("screening", r * (len(space.names) + 1), len(space.names))
     if whole_number("screening", "levels", levels, at_least=2) % 2:
         raise ParameterError(f"screening needs an even number of levels, got {levels}")
     d, entropy = len(space.names), checked_entropy(entropy)
@@ -167,6 +170,7 @@ def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
     d, entropy = len(space.names), checked_entropy(entropy)
     if d < 2:
         raise ParameterError(f"shares of the variance need two quantities, got {space.names}")
+    affordable(_WHO, whole_number(_WHO, "size", size, at_least=1) * (d + 2), d)
     both = sobol_points(2 * d, size, entropy)
     a, b = both[:, :d], both[:, d:]
     mixed = np.tile(a, (d, 1, 1))
@@ -206,6 +210,7 @@ def sobol_indices(
         If the design is another, or a value is not finite.
     """
     y = _checked(design, values, "Saltelli", "saltelli")
+    resamples = whole_number(_WHO, "resamples", resamples, at_least=1)
     d, n = len(design.space.names), design.details["size"]
     f_a, f_b, f_ab = y[:n], y[n : 2 * n], y[2 * n :].reshape(d, 1, n)
 
@@ -225,12 +230,12 @@ def sobol_indices(
 
 
 def _checked(design: Design, values: Sequence[float] | np.ndarray, kind: str, maker: str) -> Any:
-    if design.kind != kind:
+    if of_type("this analysis", "design", design, Design).kind != kind:
         raise ParameterError(
             f"this analysis needs a design from {maker}(space, ...), got one of kind "
             f"'{design.kind}'"
         )
-    y = pd.Series(values, dtype=float).sort_index().to_numpy()
+    y = series_of(values, "the response").sort_index().to_numpy()
     bad = np.nonzero(~np.isfinite(y))[0]
     if y.size != design.size or bad.size:
         what = f"row {bad[0]} has {y[bad[0]]}" if bad.size else f"got {y.size}"
@@ -264,7 +269,8 @@ def regional(design: Design, margins: Margins) -> pd.DataFrame:
     ParameterError
         If a margin is missing, or all runs pass or all fail.
     """
-    passed = pd.Series(margins, dtype=float).sort_index().to_numpy() > 0
+    of_type("regional sensitivity", "design", design, Design)
+    passed = series_of(margins, "margins").sort_index().to_numpy() > 0
     if passed.size != design.size or passed.all() or not passed.any():
         raise ParameterError(
             f"regional sensitivity needs a margin for each of {design.size} rows with passing and "

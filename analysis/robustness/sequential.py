@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import optimize, special
 
-from nlctl._errors import ParameterError
+from nlctl._arguments import fraction
 
 from .design import Design
 from .guarantee import (
@@ -154,6 +154,8 @@ def _statement(design: Design, k: int, n: int, confidence: float) -> Violation:
         confidence=confidence,
         lower=lower,
         upper=upper,
+        side="both",
+        singly=(lower, upper),
         method="beta-binomial confidence sequence, valid at every number of runs",
         assumptions=(*assumptions(design), "rows are counted in the order of the design"),
     )
@@ -178,8 +180,7 @@ def decide(
     ParameterError
         If the threshold is not between 0 and 1.
     """
-    if not 0 < threshold < 1:
-        raise ParameterError(f"a test needs 0 < threshold < 1, got {threshold}")
+    threshold = fraction("a test", "threshold", threshold)
     limit = -np.log(1 - checked_confidence(confidence))
     k = np.cumsum(violations_of(design, margins))
     n = np.arange(1, k.size + 1)
@@ -193,6 +194,7 @@ def decision(
 ) -> SequentialTest:
     """Return what these counts of the first rows of a design decide, as in `decide`."""
     k, n = checked_counts(violations, runs)
+    threshold = fraction("a test", "threshold", threshold)
     is_decided = log_evidence(k, n, threshold) >= -np.log(1 - checked_confidence(confidence))
     side: Literal["below", "above"] = "below" if k / n < threshold else "above"
     return SequentialTest(

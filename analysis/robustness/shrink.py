@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from nlctl._arguments import of_type, whole_number
 from nlctl._errors import ParameterError
-from nlctl._param import whole_number
 
 from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
-from .space import Space, nominal
+from .space import Space, checked_row, nominal
 
 __all__ = ["Shrunk", "shrink"]
 
@@ -93,14 +93,18 @@ def shrink(
 
     Raises
     ------
+    UnknownNameError
+        If the row lacks a quantity.
     ParameterError
-        If the row does not violate the spec, or a number is out of range.
+        If the row does not violate the spec, or a number is out of range or not finite.
     SpaceError
         If a quantity has no nominal value.
     """
+    of_type("shrinking", "space", space, Space)
     steps = whole_number("shrinking", "steps", steps, at_least=0)
+    most = whole_number("shrinking", "most", most, at_least=0)
+    first = checked_row(space, row)
     task = _Task(evaluate, space)
-    first = {name: row[name] for name in space.names}
     margin = task.margins([first])[0]
     if margin > 0:
         raise ParameterError(f"only a violation can be shrunk, this row has margin {margin:.4g}")

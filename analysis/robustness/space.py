@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from nlctl._arguments import number, of_type, tuple_of
 from nlctl._errors import ParameterError
+from nlctl._names import unknown
 
 from .quantity import Choice, SpaceError, Uncertain
 
@@ -17,6 +20,8 @@ __all__ = [
     "Space",
     "arguments",
     "boxed",
+    "checked_row",
+    "checked_rows",
     "combinations",
     "ends",
     "moved",
@@ -50,12 +55,14 @@ class Space:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        tuple_of("a space", "quantities", self.quantities, Uncertain)
+        tuple_of("a space", "choices", self.choices, Choice)
         if not self.names:
             raise SpaceError("a space needs at least one quantity or choice, got none")
         twice = {name for name in self.names if self.names.count(name) > 1}
         if twice:
             raise SpaceError(f"a space needs each name once, got twice: {sorted(twice)}")
-        if not (np.isfinite(self.scale) and self.scale >= 0):
+        if not number("a space", "scale", self.scale) >= 0:
             raise SpaceError(f"a space needs a finite scale >= 0, got {self.scale}")
         for quantity in self.quantities if self.scale != 1 else ():
             _nominal_of(quantity)
@@ -99,7 +106,8 @@ def nominal(space: Space) -> dict[str, Any]:
 
 def scaled(space: Space, factor: float) -> Space:
     """Return the space with all deviations from the nominal values multiplied by `factor`."""
-    return replace(space, scale=space.scale * factor)
+    of_type("a scaled space", "space", space, Space)
+    return replace(space, scale=space.scale * number("a scaled space", "factor", factor))
 
 
 def moved(middle: float, value: Any, factor: float) -> Any:
@@ -178,15 +186,78 @@ def arguments(space: Space, table: pd.DataFrame) -> dict[str, dict[str, np.ndarr
     """Return the ``params`` and ``initial_state`` of `nlctl.ensemble_response` for these rows.
 
     Choices are left out: rows with the same labels share a diagram, see `resolve.diagrams`.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        As in `checked_rows`.
     """
     params, states = {}, {}
+    checked = checked_rows(space, table)
     for quantity in space.quantities:
-        values = table[quantity.name].to_numpy(dtype=float)
+        values = checked[quantity.name]
         if quantity.is_initial:
             states[quantity.name.removesuffix("(0)")] = values
         else:
             params[quantity.name] = values.astype(int) if quantity.is_whole else values
     return {"params": params, "initial_state": states}
+
+
+def checked_rows(space: Space, table: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Return the numbers of a table of rows by quantity, all finite.
+
+    Raises
+    ------
+    UnknownNameError
+        If the table lacks a column of the space, or has an option that the space does not have.
+    ParameterError
+        If it is no table, has a row twice, or a number that is none, NaN or infinite.
+    """
+    of_type("a run of rows", "table", table, pd.DataFrame, "design.table")
+    if not table.index.is_unique:
+        twice = table.index[table.index.duplicated()][0]
+        raise ParameterError(f"a run of rows needs each row once, row {twice} comes twice")
+    for name in space.names:
+        if name not in table.columns:
+            raise unknown("column", name, map(str, table.columns), "of the table of rows")
+    for choice in space.choices:
+        for label in table[choice.name].unique():
+            if label not in choice.options:
+                raise unknown("option", str(label), choice.options, f"of '{choice.name}'")
+    columns = {}
+    for quantity in space.quantities:
+        values = np.array(pd.to_numeric(table[quantity.name], errors="coerce"), dtype=float)
+        for place in np.nonzero(~np.isfinite(values))[0][:1]:
+            raise ParameterError(
+                f"'{quantity.name}' needs finite numbers, row {table.index[place]} has "
+                f"{table[quantity.name].iloc[place]!r}"
+            )
+        columns[quantity.name] = values
+    return columns
+
+
+def checked_row(space: Space, row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row in the order of the space.
+
+    Raises
+    ------
+    UnknownNameError
+        If it lacks a quantity or a choice, or has one that the space does not have.
+    ParameterError
+        If it is no mapping, or a number is none, NaN or infinite.
+    """
+    of_type("a row", "row", row, Mapping, "{name: value}")
+    for name in row:
+        if name not in space.names:
+            raise unknown("quantity", str(name), space.names, "of the row")
+    for name in space.names:
+        if name not in row:
+            raise unknown("quantity", name, map(str, row), "of the row")
+    numbers = {q.name: number("a row", f"'{q.name}'", row[q.name]) for q in space.quantities}
+    for choice in space.choices:
+        if row[choice.name] not in choice.options:
+            raise unknown("option", str(row[choice.name]), choice.options, f"of '{choice.name}'")
+    return numbers | {c.name: row[c.name] for c in space.choices}
 
 
 def combinations(space: Space) -> list[dict[str, str]]:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nlctl._arguments import number, of_type, text, tuple_of
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
+from nlctl._param import as_numbers
 
-from .formula import Formula, Signals, horizon, signals_of, trace
+from .formula import HOW, Formula, Signals, horizon, signals_of, trace
 
 __all__ = [
     "FAILED",
@@ -56,6 +59,9 @@ class Requirement:
     unit = "1"
 
     def __post_init__(self) -> None:
+        text("a requirement", "key", self.key)
+        of_type(f"requirement '{self.key}'", "formula", self.formula, Formula, HOW)
+        number(f"requirement '{self.key}'", "until", self.until)
         need = horizon(self.formula)
         if not need <= self.until < np.inf:
             raise ParameterError(
@@ -86,6 +92,7 @@ class Spec:
     requirements: tuple[Requirement, ...]
 
     def __post_init__(self) -> None:
+        tuple_of("a spec", "requirements", self.requirements, Requirement)
         keys = [requirement.key for requirement in self.requirements]
         if not keys or len(set(keys)) < len(keys) or "spec" in keys:
             raise ParameterError(
@@ -133,10 +140,11 @@ def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.nda
         If a signal is missing.
     """
     until = requirement.until
+    of_type("a margin", "signals", signals, Mapping, "{name: samples}")
     for name in requirement.signals:
         if name not in signals:
             raise unknown("signal", name, signals, f"in requirement '{requirement.key}'")
-    rows = np.array([t, *(signals[name] for name in requirement.signals)], dtype=float)
+    rows = _samples(requirement, t, signals)
     good = np.all(np.isfinite(rows), axis=0)
     t, *samples = rows if good.all() else rows[:, : np.argmin(good)]
     if t.size and t[0] > 0:
@@ -149,6 +157,25 @@ def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.nda
     with np.errstate(over="ignore", invalid="ignore"):  # samples near the largest number
         value = trace(requirement.formula, finite, 0.0, 0.0).y[0]
     return float(np.fmax(value, -FAILED))  # NaN becomes -FAILED
+
+
+def _samples(requirement: Requirement, t: Any, signals: Mapping[str, Any]) -> np.ndarray:
+    """Return the times and the signals that count as rows of one array."""
+    given = {"t": t} | {f"signal '{name}'": signals[name] for name in requirement.signals}
+    rows = {name: as_numbers(values) for name, values in given.items()}
+    times = rows["t"]
+    size = (0,) if times is None else times.shape
+    for name, row in rows.items():
+        if row is None or row.shape != size or row.ndim != 1:
+            what = "no numbers" if row is None else f"shape {row.shape}"
+            raise ParameterError(
+                f"requirement '{requirement.key}' needs numbers of shape {size} for {name}, as "
+                f"many as there are times, got {what}"
+            )
+    good = times[np.isfinite(times)] if times is not None else np.empty(0)
+    if np.any(np.diff(good) <= 0):
+        raise ParameterError(f"requirement '{requirement.key}' needs increasing times")
+    return np.array([*rows.values()], dtype=float)
 
 
 def margins(spec: Spec, t: np.ndarray, signals: Mapping[str, np.ndarray]) -> dict[str, float]:

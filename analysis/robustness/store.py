@@ -8,6 +8,7 @@ chunks/000000000-000000999.parquet
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -30,6 +31,8 @@ from nlctl._files import replace_file
 
 from .columns import Columns, typed
 from .identity import differences_of
+
+SEALS = b"nlctl.seals"  # a key of each column, in a chunk's file
 
 __all__ = [
     "Store",
@@ -201,12 +204,33 @@ def put(store: Store, frame: pd.DataFrame) -> None:
     columns = {"row": frame.index.to_numpy()} | {name: frame[name].array for name in frame}
     arrays = {name: pa.array(v, from_pandas=False) for name, v in columns.items()}  # NaN, not null
     labels: Any = [name for name, kind in store.columns.items() if not isinstance(kind, str)]
+    seals = {name: _seal(frame[name]) for name in store.columns}
+    table = pa.table(arrays).replace_schema_metadata({SEALS: json.dumps(seals)})
     sink = pa.BufferOutputStream()
-    pq.write_table(
-        pa.table(arrays), sink, compression="zstd", use_dictionary=labels, write_page_checksum=True
-    )
+    pq.write_table(table, sink, compression="zstd", use_dictionary=labels, write_page_checksum=True)
     numbers = range(frame.index[0], frame.index[-1] + 1)
     _write(store, _path(store, numbers), memoryview(sink.getvalue()))
+
+
+def _seal(column: Any) -> str:
+    """Return a key of a column's values, which whoever edits the file does not keep."""
+    is_number = isinstance(column.dtype, np.dtype) and column.dtype.kind in "iufb"
+    text = b"" if is_number else "\0".join(map(str, column)).encode()
+    return hashlib.sha256(column.to_numpy().tobytes() if is_number else text).hexdigest()[:16]
+
+
+def _check_seals(path: Path, frame: pd.DataFrame) -> None:
+    """Refuse rows that are not what was written into a file.
+
+    Raises
+    ------
+    ValueError
+        If a value has changed since, or somebody else has written the file.
+    """
+    seals = json.loads((pq.read_schema(path).metadata or {}).get(SEALS, b"{}"))
+    changed = [name for name in frame if seals.get(name) != _seal(frame[name])]
+    if changed:
+        raise ValueError(f"'{path.name}' is not as it was written: '{changed[0]}' was edited")
 
 
 def _ranges(store: Store) -> list[range]:
@@ -295,4 +319,8 @@ def _read(
     layout = ds.ParquetFileFormat(default_fragment_scan_options=options)
     found = ds.dataset([str(path) for path in paths], format=layout)
     frame = found.to_table(columns=["row", *chosen]).to_pandas().set_index("row")
-    return typed(frame, chosen)
+    frame, end = typed(frame, chosen), 0
+    for path in paths:
+        first, end = end, end + pq.read_metadata(path).num_rows
+        _check_seals(path, frame.iloc[first:end])
+    return frame

@@ -14,9 +14,9 @@ from typing import Any
 
 import pandas as pd
 
+from nlctl._arguments import of_type, whole_number
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
-from nlctl._param import whole_number
 
 from .columns import columns_of
 from .design import Design
@@ -143,11 +143,12 @@ def sweep(
     Raises
     ------
     ParameterError
-        If the design is of another space, or `chunk` is no whole number >= 1.
+        If the design is of another space, `chunk` or `threads` is no integer >= 1, or there is no
+        folder to resume.
     StoreError
         As in `store.claimed`, or if a chunk cannot be written; those before it are kept.
     """
-    _check_space(prepared, design)
+    _check(prepared, design, executor, threads, resume and folder is None)
     chunk = _chunk_size(design) if chunk is None else whole_number("a sweep", "chunk", chunk, 1)
     tally, frames, notes = Tally(design), [], []
     keep: Callable[[pd.DataFrame], object] = frames.append
@@ -182,6 +183,20 @@ def sweep(
         notes=tuple(notes),
         held=held,
     )
+
+
+def _check(
+    prepared: Prepared, design: Design, executor: Any, threads: int | None, nothing_kept: bool
+) -> None:
+    of_type("a sweep", "prepared", prepared, Prepared, "prepare(experiment)")
+    of_type("a sweep", "design", design, Design, "independent(space, size)")
+    if executor is not None:
+        of_type("a sweep", "executor", executor, Executor, "concurrent.futures")
+    if threads is not None:
+        whole_number("a sweep", "threads", threads, at_least=1)
+    if nothing_kept:
+        raise ParameterError("a sweep needs a folder to resume, got none")
+    _check_space(prepared, design)
 
 
 def _check_space(prepared: Prepared, design: Design) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
+from nlctl._arguments import number
+
 from .. import metrics
 from ..metrics import Metric
 
@@ -35,7 +37,15 @@ def tracking_metrics(
         Swings of the control input up to this size do not count as reversals.
     error, control, actuated, weights, gain : str, optional
         Names of the signals e, u, v, |W_hat| and zeta; an empty name leaves its numbers out.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite, the band not positive or the swing negative.
     """
+    number("tracking metrics", "start", start)
+    number("tracking metrics", "band", band, above=0)
+    number("tracking metrics", "swing", swing, at_least=0)
     e, u, v, after = error, control, actuated, f"for t ≥ {start:g} s"
     settled = partial(metrics.settling_time, band=band)
     turns = partial(metrics.reversals, above=swing)

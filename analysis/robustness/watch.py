@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlctl._errors import ParameterError
+from nlctl._arguments import fraction
 
 from .design import Design
 from .guarantee import check_iid, checked_confidence
@@ -135,8 +135,7 @@ def until_decided(
     """
     check_iid(design)
     checked_confidence(confidence)
-    if not 0 < threshold < 1:
-        raise ParameterError(f"a test needs 0 < threshold < 1, got {threshold}")
+    fraction("a test", "threshold", threshold)
 
     def condition(progress: Progress) -> SequentialTest | None:
         if not progress.runs:

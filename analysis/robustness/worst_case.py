@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl._param import whole_number
+from nlctl._arguments import number, of_type, whole_number
 
 from .design import Design, checked_entropy, listed
 from .evaluation import Evaluate, margins_of, row_text
@@ -130,7 +130,10 @@ def worst_case(
     KeyboardInterrupt
         If Ctrl-C comes before the first batch is done; later it ends the search.
     """
+    of_type("a worst case", "space", space, Space)
     runs = whole_number("a worst case", "runs", runs, at_least=1)
+    if target is not None and not (isinstance(target, float) and np.isinf(target)):
+        number("a worst case", "target", target)
     entropy = checked_entropy(entropy)
     found = Found(evaluate, space, runs, target)
     is_finished = True

@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
-from ..figures.axes import set_style
+from ..figures.axes import WIDTH, set_style
 
 __all__ = ["arms", "number_axes", "plain"]
 
-LONGEST = 36
+LONGEST = 30
 
 
 def plain(name: object) -> str:
@@ -39,7 +39,7 @@ def _drawn(character: str) -> str:
 def number_axes(names: Iterable[object]) -> tuple[Figure, Axes]:
     """Return axes with one line for each name, from the top: names may be alike once cut."""
     labels = [plain(name) for name in names]
-    figure = Figure(figsize=(9.0, 0.32 * len(labels) + 0.9), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 0.32 * len(labels) + 0.9), layout="constrained")
     ax = figure.subplots()
     set_style(ax)
     ax.set_yticks(np.arange(len(labels)), labels, parse_math=False)

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
+from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from ..figures.axes import BLUE, GREY, ORANGE, legend_beside
+from ..figures.axes import BLUE, GREY, ORANGE, SHORT_LINE, legend_above
 from .labels import arms, number_axes
 
 __all__ = ["paired_differences", "screening", "set_apart", "shares", "violation_rates"]
@@ -23,7 +23,7 @@ def screening(effects: pd.DataFrame) -> Figure:
     _bar(ax, effects, ("mu_star", "low", "high"), BLUE, "$\\mu^*$, mean magnitude")
     at = np.arange(len(effects))
     ax.plot(effects["sigma"], at, "D", color=ORANGE, markersize=5, label="$\\sigma$, deviation")
-    legend_beside(ax)
+    legend_above(ax, line=SHORT_LINE)
     ax.set_xlabel("effect: change of the response per width of the box")
     return figure
 
@@ -34,7 +34,7 @@ def shares(indices: pd.DataFrame) -> Figure:
     figure, ax = number_axes(indices.index)
     _bar(ax, indices, ("S1", "S1_low", "S1_high"), BLUE, "$S_1$, by itself", -0.18)
     _bar(ax, indices, ("ST", "ST_low", "ST_high"), ORANGE, "$S_T$, with interactions", 0.18, "///")
-    legend_beside(ax)
+    legend_above(ax, line=SHORT_LINE)
     ax.set_xlabel("share of the variance (1)")
     return figure
 
@@ -81,6 +81,7 @@ def paired_differences(table: pd.DataFrame, labels: Sequence[str], quantity: str
     ax.plot(middle[inside], at[inside], "o", color=BLUE, markersize=5)
     ax.axvline(0.0, color=GREY, linewidth=1.0, linestyle="--")
     ax.set_xlim(-1.05 * reach, 1.05 * reach)
+    ax.xaxis.set_major_locator(MaxNLocator(5))
     ax.set_xlabel(quantity, parse_math=False)
     return figure
 

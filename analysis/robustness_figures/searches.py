@@ -7,10 +7,22 @@ from itertools import pairwise
 
 import numpy as np
 import pandas as pd
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from ..figures.axes import BLUE, GREEN, GREY, ORANGE, PURPLE, legend_beside, stacked_axes
+from ..figures.axes import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SHORT_LINE,
+    WIDTH,
+    legend_above,
+    stacked_axes,
+)
 from ..robustness.spec import violates
 from .labels import arms, number_axes, plain
 from .runs import shown
@@ -19,6 +31,7 @@ __all__ = ["degradation", "deviations", "failure_map", "radius_steps", "search"]
 
 SEARCHERS = {"corners": GREY, "uniform": BLUE, "CMA-ES": GREEN}
 INK = "#111111"  # on the map, which is light on dark pages as well
+COLOURS = ListedColormap(colormaps["PuOr"](np.linspace(0.15, 0.85, 256)))  # INK shows on all
 
 
 def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
@@ -36,7 +49,7 @@ def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
         labelled.add(name)
     ax.step(np.arange(1, y.size + 1), y, where="post", color=ORANGE, linewidth=1.4)
     ax.axhline(0.0, color=GREY, linewidth=1.0, linestyle="--")
-    legend_beside(ax)
+    legend_above(ax)
     ax.set(xlabel="runs", ylabel="lowest margin (1)")
     return figure
 
@@ -59,7 +72,7 @@ def deviations(table: pd.DataFrame) -> Figure:
         ax.barh(at, values, height, color=colour, hatch=hatch, edgecolor="white", label=str(name))
     for end in (-1.0, 0.0, 1.0):
         ax.axvline(end, color=GREY, linewidth=0.8, linestyle="--" if end else "-")
-    legend_beside(ax)
+    legend_above(ax, line=SHORT_LINE)
     ax.set_xlabel("deviation from nominal, in sides of the box (1)")
     return figure
 
@@ -95,7 +108,7 @@ def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
     if np.isfinite(radius):
         ax.axvline(radius, color=ORANGE, linewidth=1.2, linestyle="--", label="radius at most")
     ax.axhline(0.0, color=GREY, linewidth=1.0)
-    legend_beside(ax)
+    legend_above(ax)
     ax.set(xlabel="size of the uncertainty (1)", ylabel="lowest margin (1)")
     return figure
 
@@ -106,8 +119,12 @@ def failure_map(
     names: tuple[str, str],
     labels: tuple[str, str] | None = None,
     nominal: tuple[float, float] | None = None,
+    box: tuple[tuple[float, float], tuple[float, float]] | None = None,
 ) -> Figure:
     """Margins over the plane of two quantities, where they are 0, and the points that were run.
+
+    The colours go from the least to the largest margin, with white at 0; margins beyond ±1 are
+    drawn as ±1.
 
     Parameters
     ----------
@@ -119,24 +136,42 @@ def failure_map(
     labels : tuple of 2 str, optional
         Of the axes, with units.
     nominal : tuple of 2 floats, optional
+    box : tuple of 2 pairs, optional
+        What the study takes to be possible: ends of both quantities.
     """
-    figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
     ax = figure.subplots()
     x, y = (points[name].to_numpy(dtype=float) for name in names)
     margin = np.clip(shown(points["spec"]), -1.0, 1.0)
     net = Triangulation(x, y, triangles)
-    box = (x.min(), x.max(), y.min(), y.max())
-    plane = np.meshgrid(np.linspace(*box[:2], 240), np.linspace(*box[2:], 180))
+    span = (x.min(), x.max(), y.min(), y.max())
+    plane = np.meshgrid(np.linspace(*span[:2], 240), np.linspace(*span[2:], 180))
     field = LinearTriInterpolator(net, margin)(*plane)
     image = ax.imshow(
-        field, extent=box, origin="lower", aspect="auto", cmap="PuOr", vmin=-1.0, vmax=1.0
+        field, extent=span, origin="lower", aspect="auto", cmap=COLOURS, norm=_centred(margin)
     )
     ax.plot(x, y, ".", color=INK, markersize=1.5, alpha=0.5, rasterized=True)
     if margin.min() <= 0 < margin.max():
         ax.tricontour(net, margin, levels=[0.0], colors=INK, linewidths=1.6)
+    if box is not None:
+        (left, right), (low, high) = box
+        ax.plot(
+            [left, right, right, left, left], [low, low, high, high, low], "--", color=INK,
+            linewidth=1.2,
+        )  # fmt: skip
     if nominal is not None:
         ax.plot(*nominal, "*", color=INK, markeredgecolor="white", markersize=13)
+    ax.set_xlim(*span[:2])
+    ax.set_ylim(*span[2:])
     ax.set_xlabel(plain((labels or names)[0]), parse_math=False)
     ax.set_ylabel(plain((labels or names)[1]), parse_math=False)
-    figure.colorbar(image, ax=ax, label="margin (1), cut off at ±1")
+    bar = figure.colorbar(image, ax=ax, label="margin (1)")
+    bar.ax.set_ylim(float(margin.min()), max(float(margin.max()), float(margin.min()) + 1e-6))
     return figure
+
+
+def _centred(margin: np.ndarray) -> Normalize:
+    """Return the scale of colours that fits margins: 0 in the middle, their ends at its ends."""
+    low, high = float(margin.min()), float(margin.max())
+    least = 0.05  # a map that is all alike is not made to look as if it were not
+    return TwoSlopeNorm(0.0, min(low, -least), max(high, least))

@@ -1,6 +1,6 @@
 """Study files: what is uncertain, what is asked, and everything joined to answer it."""
 
-from .folder import load_result, run_differences
+from .folder import load_result, origin_differences, run_differences
 from .plain import RunFolderError
 from .plan import Plan, plan
 from .problems import Problem, StudyError
@@ -24,6 +24,7 @@ __all__ = [
     "StudyFile",
     "from_toml",
     "load_result",
+    "origin_differences",
     "plan",
     "read_study",
     "replay",

@@ -10,10 +10,12 @@ import numpy as np
 
 from analysis.robustness import (
     Design,
+    bound_verdict,
     decide,
     elementary_effects,
     regional,
     sobol_indices,
+    test_verdict,
     violation_probability,
 )
 from analysis.robustness.sensitivity import censored
@@ -58,7 +60,7 @@ def unanswered(key: str, asked: Any, error: UsageError, runs: int = 0) -> Findin
         asked,
         f"Not answered: {error}.",
         claim="the analysis can be made",
-        holds=False,
+        answer="refuted",
         runs=runs,
         is_answered=False,
     )
@@ -72,12 +74,14 @@ def _headed(key: str, asked: Any, found: Finding) -> Finding:
 def _probability(asked: Probability, ground: Ground) -> Finding:
     design, margins = ground.main
     found = violation_probability(design, margins, asked.confidence, asked.side)
-    claim = "" if asked.limit is None else f"a violation has at most probability {asked.limit:g}"
+    claimed: dict[str, Any] = {}
+    if asked.limit is not None:
+        claimed["claim"] = f"a violation has at most probability {asked.limit:g}"
+        claimed |= vars(bound_verdict(found, asked.limit))
     return made(
         asked,
         str(found),
-        claim=claim,
-        holds=None if asked.limit is None else found.upper <= asked.limit,
+        **claimed,
         runs=found.runs,
         numbers=statement_numbers(found),
     )
@@ -90,7 +94,7 @@ def _sequential(asked: Sequential, ground: Ground) -> Finding:
         asked,
         str(test),
         claim=f"the probability of a violation is below {asked.limit:g}",
-        holds=test.decision == "below",
+        **vars(test_verdict(test)),
         runs=test.statement.runs,
         numbers={"decision": test.decision, **statement_numbers(test.statement)},
     )

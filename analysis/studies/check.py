@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,15 +12,15 @@ from typing import Any, TypeVar
 import control as ct
 
 from analysis.metrics import Metric
-from analysis.robustness import Experiment, Requirement, Space, Uncertain, resolved
+from analysis.robustness import Choice, Design, Experiment, Requirement, Space, Uncertain, resolved
 from analysis.robustness.guarantee import check_iid
 from analysis.robustness.largest_scale import refusal_of
 from analysis.robustness.resolve import check_keyword
 from analysis.robustness.space import combinations
-from nlctl._errors import UsageError
+from nlctl._errors import ParameterError, UsageError
 from nlctl._names import unknown
 
-from .analyses import Compare, Map
+from .analyses import Compare, Degradation, Map, Morris, Sobol
 from .build import (
     SIGNALS,
     choice,
@@ -39,6 +41,8 @@ from .schema import Study
 __all__ = ["bound"]
 
 T = TypeVar("T")
+MOST_ROWS = 10_000_000  # of a design or a search
+MOST_DIAGRAMS = 1000
 NEED_ROWS = ("probability", "sequential", "regional")
 
 
@@ -80,15 +84,56 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
     signals = frozenset.intersection(*(frozenset(d.output_labels) for d in diagrams or [_Empty]))
     for diagram in diagrams:
         _check_names(study, diagram, quantities, requirements, notes)
+    large = _too_large(study, notes)
     metrics = notes.attempt(("metrics",), metrics_of, study, folder, signals) if diagrams else None
     inputs = notes.attempt(("inputs",), inputs_of, study, diagrams) if diagrams else None
     _check_analyses(study, metrics, notes)
-    if notes.problems or not diagrams:
-        return None, _unique(notes.problems)
-    made = notes.attempt((), experiment, study, folder, signals, inputs or ())
-    if made is not None:
-        _check_designs(study, made, diagrams, folder, notes)
+    made = None
+    if diagrams and not notes.problems:
+        made = notes.attempt((), experiment, study, folder, signals, inputs or ())
+    if made is None:
+        _check_designs(study, _stand_in(study, quantities), large, notes)
+        _comparable(study, folder, notes)
+    else:
+        space = notes.attempt(("space",), resolved, made.space, diagrams[0])
+        if space is not None:
+            if refusal := notes.attempt(("space",), refusal_of, space, diagrams):
+                notes.add(("space",), f"boxes do not fit together: {refusal}")
+            _check_designs(study, space, large, notes)
+        for i, asked in _comparable(study, folder, notes):
+            notes.attempt(("analysis", i), _check_options, study, made, asked, folder)
     return made, _unique(notes.problems)
+
+
+def _stand_in(study: Study, quantities: Mapping[str, Uncertain | None]) -> Space:
+    """Return a space of the study's size, whatever its mistakes: designs are held against it."""
+
+    def some(name: str, quantity: Uncertain | None) -> Uncertain:
+        known = quantity if quantity is not None else Uncertain(name=name, bounds=(0.0, 1.0))
+        middle = sum(known.box) / 2 if known.nominal is None else known.nominal
+        return replace(known, nominal=middle)
+
+    return Space(
+        quantities=tuple(some(name, quantity) for name, quantity in quantities.items()),
+        choices=tuple(
+            Choice(name=name, options=dict.fromkeys(map(str, asked.options)) or {"": None})
+            for name, asked in study.choices.items()
+        ),
+    )
+
+
+def _comparable(study: Study, folder: Path, notes: _Notes) -> list[tuple[int, Compare]]:
+    """Return the comparisons whose keyword the loop's function takes; the others are noted."""
+    try:
+        function = loop_function(study.loop, folder)
+    except UsageError:  # noted already
+        return []
+    asked = [(i, one) for i, one in enumerate(study.analysis) if isinstance(one, Compare)]
+    before = len(notes.problems)
+    for i, one in asked:
+        notes.attempt(("analysis", i, "keyword"), check_keyword, function, one.keyword)
+    lost = {problem.place[1] for problem in notes.problems[before:]}
+    return [(i, one) for i, one in asked if i not in lost]
 
 
 class _Empty:
@@ -111,7 +156,7 @@ def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputS
             notes.attempt(("options", key), check_keyword, function, key)
         notes.attempt(("options", key), option, value, folder)
     if len(notes.problems) > before:
-        return []
+        return _as_it_comes(function)
     build = loop(study, folder)
     made = []
     for name, asked in study.choices.items():
@@ -119,15 +164,43 @@ def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputS
         found = notes.attempt(("choices", name), choice, name, asked, build, folder)
         made += [] if found is None else [found]
     if len(notes.problems) > before:
-        return []
+        return _as_it_comes(function)
     options = {c.name: c.options for c in made}
+    count = math.prod(len(c.options) for c in made)
+    if count > MOST_DIAGRAMS:
+        notes.add(
+            ("choices",), f"at most {MOST_DIAGRAMS:,} diagrams can be made, got {_count(count)}"
+        )
+        return []
     every = combinations(Space(choices=tuple(made))) if made else [{}]
     built = []
     for labels in every:
         chosen = {name: options[name][label] for name, label in labels.items()}
-        system = notes.attempt(("loop",), partial(build, **chosen))
+        system = notes.attempt(("loop",), _diagram, partial(build, **chosen), study.loop)
         built += [] if system is None else [system]
-    return built
+    return built or _as_it_comes(function)
+
+
+def _as_it_comes(function: Callable[..., Any] | None) -> list[ct.InputOutputSystem]:
+    """Return the loop without the study's options, so that names can be held against it."""
+    try:
+        return [] if function is None else [_diagram(function, "")]
+    except Exception:  # whatever a function of the user's does without what it was to be given
+        return []
+
+
+def _diagram(build: Callable[[], Any], name: str) -> ct.InputOutputSystem:
+    """Return the diagram that a loop's function returns.
+
+    Raises
+    ------
+    ParameterError
+        If it returns something else.
+    """
+    made = build()
+    if not isinstance(made, ct.InputOutputSystem):
+        raise ParameterError(f"'{name}' returns {type(made).__name__}, and not a diagram")
+    return made
 
 
 def _check_names(
@@ -170,27 +243,52 @@ def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Note
                 notes.add(("analysis", i, key), str(unknown("quantity", name, study.space)))
 
 
-def _check_designs(
-    study: Study,
-    made: Experiment,
-    diagrams: Sequence[ct.InputOutputSystem],
-    folder: Path,
-    notes: _Notes,
-) -> None:
-    """Make every design that is known in advance, and hold the analyses against it."""
-    space, main = notes.attempt(("space",), resolved, made.space, diagrams[0]), None
-    if space is None:
-        return
-    if refusal := notes.attempt(("space",), refusal_of, space, diagrams):
-        notes.add(("space",), f"boxes do not fit together: {refusal}")
+def _too_large(study: Study, notes: _Notes) -> set[Place]:
+    """Refuse numbers of runs that no machine can make; return where they are asked for."""
+    wide, options = len(study.space), math.prod(len(c.options) for c in study.choices.values())
+    counts: dict[Place, int] = {
+        ("analysis", i): max(_sizes(asked, wide)) for i, asked in enumerate(study.analysis)
+    }
     if study.runs is not None:
-        main = notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
+        counts["runs",] = study.runs.size or 1
+        if study.runs.design in ("grid", "corners"):
+            counts["runs",] = (study.runs.levels or 2) ** wide * options
+    large = {place: count for place, count in counts.items() if count > MOST_ROWS}
+    for place, count in large.items():
+        what = "rows can be run" if place == ("runs",) else "runs can be made"
+        notes.add(place, f"at most {MOST_ROWS:,} {what}, got {_count(count)}")
+    return set(large)
+
+
+def _sizes(asked: Any, wide: int) -> list[int]:
+    """Return the numbers of runs that an analysis asks for."""
+    sizes = [getattr(asked, key, 0) for key in ("runs", "draws", "levels", "trajectories")]
+    if isinstance(asked, Map):
+        sizes.append((asked.cells + 1) ** 2)
+    if isinstance(asked, Degradation):
+        sizes.append(asked.runs * len(asked.factors))
+    if isinstance(asked, Morris | Sobol):
+        sizes.append((asked.trajectories if isinstance(asked, Morris) else asked.size) * (wide + 2))
+    if isinstance(asked, Compare):
+        sizes.append(asked.runs * len(asked.options))
+    return sizes
+
+
+def _count(rows: int) -> str:
+    return f"{rows:,}" if rows < 10**15 else f"about 10^{math.log10(rows):.0f}"
+
+
+def _check_designs(study: Study, space: Space, large: set[Place], notes: _Notes) -> None:
+    """Make designs that are known in advance, unless too large; hold the analyses against them."""
+    if study.runs is not None and ("runs",) not in large:
+        notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
     for i, asked in enumerate(study.analysis):
-        if main is not None and asked.kind in ("probability", "sequential"):
-            notes.attempt(("analysis", i), check_iid, main)
-        if isinstance(asked, Compare):
-            notes.attempt(("analysis", i), _check_options, study, made, asked, folder)
-        notes.attempt(("analysis", i), own_design, asked, space, study.study.seed)
+        if asked.kind in ("probability", "sequential") and study.runs is not None:
+            kind = study.runs.design
+            made = Design(space=space, kind=kind, size=1, is_iid=kind == "i.i.d.", entropy=0)
+            notes.attempt(("analysis", i), check_iid, made)
+        if ("analysis", i) not in large:
+            notes.attempt(("analysis", i), own_design, asked, space, study.study.seed)
 
 
 def _quantities_of(asked: Any) -> list[tuple[str, str]]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import control as ct
 
 from analysis.robustness import (
     Choice,
@@ -18,6 +20,7 @@ from analysis.robustness import (
     prepare,
 )
 from analysis.robustness.compare import Comparison, compare, crossed
+from analysis.robustness.verdict import better_verdict
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
 
@@ -28,7 +31,7 @@ from .parts import option
 from .result import Finding
 from .schema import Choices, Study
 
-__all__ = ["alternatives", "comparison", "widened"]
+__all__ = ["alternatives", "compared", "comparison", "widened"]
 
 
 def alternatives(asked: Compare, build: Callable[..., Any], folder: Path) -> Choice:
@@ -71,8 +74,7 @@ def widened(
         If the loop has no such keyword, or a quantity, a requirement or its signal does not exist
         with every option.
     """
-    others = tuple(c for c in experiment.space.choices if c.name != options.name)
-    space = Space(quantities=experiment.space.quantities, choices=(*others, options))
+    space = _with_options(experiment, options)
     built = diagrams(space, experiment.build)
     inputs_of(study, [diagram for _, diagram in built])
     signals = frozenset.intersection(*(frozenset(d.output_labels) for _, d in built))
@@ -92,6 +94,26 @@ def widened(
     return replace(experiment, space=space, spec=spec, metrics=metrics)
 
 
+def _with_options(experiment: Experiment, options: Choice) -> Space:
+    """Return the space with a choice more, which takes the place of one of its name."""
+    others = tuple(c for c in experiment.space.choices if c.name != options.name)
+    return Space(quantities=experiment.space.quantities, choices=(*others, options))
+
+
+def compared(
+    experiment: Experiment, asked: Compare, folder: Path
+) -> list[tuple[Mapping[str, str], ct.InputOutputSystem]]:
+    """Return the diagrams of a comparison, each with its labels.
+
+    Raises
+    ------
+    UsageError
+        As in `alternatives` and `analysis.robustness.diagrams`.
+    """
+    options = alternatives(asked, experiment.build, folder)
+    return diagrams(_with_options(experiment, options), experiment.build)
+
+
 def comparison(asked: Compare, ground: Ground) -> Finding | None:
     """Run every sample with every option; None if rows are missing."""
     own = ground.prepared.experiment
@@ -107,12 +129,10 @@ def comparison(asked: Compare, ground: Ground) -> Finding | None:
         return None
     table = done.table.astype({c.name: str for c in space.choices})
     found = compare(design, options, table, asked.metrics, confidence=asked.confidence)
-    claim, holds = _claim(asked, found)
     return made(
         asked,
         _sentence(asked, found),
-        claim=claim,
-        holds=holds,
+        **_claimed(asked, found),
         runs=len(table),
         numbers={"keyword": asked.keyword, "samples": found.size, "confidence": found.confidence}
         | {"requirements": [r.key for r in experiment.spec.requirements]},
@@ -138,15 +158,15 @@ def _sentence(asked: Compare, found: Comparison) -> str:
     )
 
 
-def _claim(asked: Compare, found: Comparison) -> tuple[str, bool | None]:
-    """Return the claim that one option is better than another, and whether it holds."""
+def _claimed(asked: Compare, found: Comparison) -> dict[str, str]:
+    """Return the claim that one option is better than another, and the answer."""
     if asked.better is None:
-        return "", None
-    (metric, better), (a, b) = next(iter(asked.metrics.items())), asked.better
+        return {}
+    metric, (a, b), level = next(iter(asked.metrics)), asked.better, 1 - asked.confidence
     pairs = found.differences.loc[metric]
-    sign = 1 if (a, b) in pairs.index else -1
-    row = pairs.loc[(a, b) if sign == 1 else (b, a)]
-    difference = sign * float(row["median"])
-    is_better = difference < 0 if better == "smaller" else difference > 0
-    holds = is_better and float(row["p_holm"]) <= 1 - asked.confidence
-    return f"{a} is better than {b} in {metric}, at the level {1 - asked.confidence:.2g}", holds
+    row = pairs.loc[(a, b) if (a, b) in pairs.index else (b, a)]
+    p, adjusted = float(row["p"]), float(row["p_holm"])
+    won, lost = (int(found.wins.loc[(metric, x), y]) for x, y in ((a, b), (b, a)))  # type: ignore[arg-type]
+    verdict = better_verdict(won, lost, adjusted, level, adjusted / p)
+    claim = f"{a} is better than {b} in {metric}, at the level {level:.2g}"
+    return {"claim": claim, **vars(verdict)}

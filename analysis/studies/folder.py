@@ -1,72 +1,172 @@
 """The folder of a run.
 
 study.toml           the study as it was run, with the settings of the command line
-run.json             where the files that it refers to are
+run.json             where the files that it refers to are, and what all is computed from: `origin`
 rows/                the main table, see `analysis.robustness.store`
 KEY/finding.json     what one analysis found, its tables beside it in Parquet
 KEY/rows/            the rows that it ran itself, where their number is known in advance
 results.json         everything but the tables, for other programs
+
+Every file but study.toml carries a key of its content, and every part the key of its origin: what
+was edited or belongs to another loop is refused, not shown.
 """
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
-from analysis.robustness import Space
+from analysis.robustness import Design, Space
 from analysis.robustness.identity import differences_of
-from analysis.robustness.sweep import load
+from analysis.robustness.store import opened
+from analysis.robustness.sweep import Sweep, load
 from nlctl._files import replace_file
 
 from .build import labels, main_design
+from .origin import loop_differences, plain_study, version_differences
 from .parts import uncertain
-from .plain import RunFolderError, read_json, write_json
+from .plain import ANEW, RunFolderError, file_digest, origin_key, read_json, write_json
 from .result import Finding, Result
-from .schema import Study
+from .schema import Study, keyed
 from .written import from_toml
 
 __all__ = [
     "METRIC_COLUMNS",
     "load_finding",
     "load_result",
+    "load_rows",
+    "load_run",
+    "load_study",
+    "origin_differences",
+    "remove_run",
     "run_differences",
     "save_finding",
 ]
 
+OWN = ("study.toml", "run.json", "results.json", "rows", ".lock", ".owner")
+OWN += ("index.html", "report.json", "report.pdf")
 METRIC_COLUMNS = ("key", "signal", "unit", "meaning")
 
 
-def save_finding(folder: Path, finding: Finding) -> None:
-    """Write a finding into ``folder / key``, its tables first: with the file it is whole."""
+def save_finding(folder: Path, finding: Finding, origin: str) -> None:
+    """Write a finding into ``folder / key``, its tables first: with the file it is whole.
+
+    `origin` is the key of what it was computed from.
+    """
     here = folder / finding.key
     here.mkdir(parents=True, exist_ok=True)
+    keys = {}
     for name, table in finding.tables.items():
-        replace_file(here / f"{name}.parquet", lambda file, table=table: table.to_parquet(file))
-    write_json(here / "finding.json", finding.plain())
+        path = here / f"{name}.parquet"
+        replace_file(path, lambda file, table=table: table.to_parquet(file))
+        keys[name] = file_digest(path)
+    write_json(here / "finding.json", finding.plain() | {"tables": keys, "origin": origin})
 
 
-def load_finding(folder: Path, key: str) -> Finding | None:
+def load_finding(folder: Path, key: str, origin: str) -> Finding | None:
     """Return the finding in ``folder / key``; None if that analysis is not done.
 
     Raises
     ------
     RunFolderError
-        If its files are damaged.
+        If its files are damaged or edited, or it was computed from something else than `origin`.
     """
     path = folder / key / "finding.json"
     if not path.exists():
         return None
-    content = read_json(path)
-    try:
-        names = content.pop("tables")
-        tables = {name: pd.read_parquet(path.with_name(f"{name}.parquet")) for name in names}
-        return Finding(**content, tables=tables)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    remedy = f"delete '{path}' and continue with --resume"
+    content = read_json(path, remedy)
+    if content.pop("origin", None) != origin:
         raise RunFolderError(
-            f"'{path.parent}' is damaged ({error}): delete it and continue with --resume"
-        ) from error
+            f"'{path.parent}' was computed from another loop than the rest of the run: {remedy}"
+        )
+    tables = {}
+    for name, kept in content.pop("tables").items():
+        file = path.with_name(f"{name}.parquet")
+        try:
+            if file_digest(file) != kept:
+                raise RunFolderError(f"'{file}' is not as it was written: {remedy}")
+            tables[name] = pd.read_parquet(file)
+        except (OSError, ValueError) as error:
+            if isinstance(error, RunFolderError):
+                raise
+            raise RunFolderError(f"'{file}' cannot be read: {remedy}") from error
+    return Finding(**content, tables=tables)
+
+
+def load_run(folder: Path) -> dict[str, Any]:
+    """Return what ``run.json`` holds.
+
+    Raises
+    ------
+    RunFolderError
+        If the folder holds no run, or the file is damaged.
+    """
+    return read_json(folder / "run.json")
+
+
+def remove_run(folder: Path, *, force: bool = False) -> None:
+    """Remove the folder of a run, with its page.
+
+    Raises
+    ------
+    RunFolderError
+        If it holds something else, and `force` is False.
+    """
+    if not force:
+        known = {*OWN, *keyed(load_study(folder))} if (folder / "study.toml").exists() else set()
+        others = sorted(p.name for p in folder.iterdir() if p.name not in known)
+        if others:
+            raise RunFolderError(
+                f"'{folder}' would be replaced, and holds what no run has made ({others[0]}): take "
+                "another folder with --out, or replace it with --force"
+            )
+    shutil.rmtree(folder)
+
+
+def load_study(folder: Path) -> Study:
+    """Return the study of a run, as it was begun.
+
+    Raises
+    ------
+    RunFolderError
+        If its file is missing, damaged, or edited since.
+    """
+    path = folder / "study.toml"
+    try:
+        study = from_toml(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RunFolderError(f"'{folder}' holds no run of a study") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise RunFolderError(f"'{path}' is damaged, or cut off: {ANEW}") from error
+    if (folder / "run.json").exists() and plain_study(study) != load_run(folder)["origin"]["study"]:
+        raise RunFolderError(f"'{path}' is not the study that was run: {ANEW}")
+    return study
+
+
+def load_rows(folder: Path, origin: str, design: Design | None = None) -> Sweep | None:
+    """Return the rows in ``folder / rows``; None if there are none.
+
+    Raises
+    ------
+    StoreError
+        If the folder is damaged.
+    RunFolderError
+        If they were computed from something else than `origin`.
+    """
+    here = folder / "rows"
+    if not (here / "study.json").exists():
+        return None
+    if opened(here).identity["study"].get("origin") != origin:
+        raise RunFolderError(
+            f"'{here}' was computed from another loop than the rest of the run: delete it and "
+            "continue with --resume"
+        )
+    return load(here, design)
 
 
 def load_result(folder: Path) -> Result:
@@ -77,20 +177,23 @@ def load_result(folder: Path) -> Result:
     RunFolderError
         If it holds no results, or files are damaged.
     """
-    content = read_json(folder / "results.json")
+    study, run = load_study(folder), load_run(folder)
+    content = read_json(folder / "results.json", "continue with --resume, which makes it anew")
+    origin = origin_key(run["origin"])
     try:
-        study = from_toml((folder / "study.toml").read_text(encoding="utf-8"))
         quantities = pd.DataFrame(content["quantities"]).set_index("name")
         requirements = pd.DataFrame(content["requirements"]).set_index("key")
         metrics = pd.DataFrame(content["metrics"], columns=METRIC_COLUMNS).set_index("key")
         keys = [finding["key"] for finding in content["findings"]]
-    except (OSError, ValueError, KeyError) as error:
+    except KeyError as error:
         raise RunFolderError(f"'{folder}' holds no results of a study: {error}") from error
-    findings = [load_finding(folder, key) for key in keys]
+    if content["origin"] != origin:
+        raise RunFolderError(f"the results in '{folder}' are those of another run: {ANEW}")
+    findings = [load_finding(folder, key, origin) for key in keys]
     rows = None
-    if study.runs is not None and (folder / "rows" / "study.json").exists():
+    if study.runs is not None:
         design = main_design(study.runs, _space(study, quantities), study.study.seed)
-        rows = load(folder / "rows", design)
+        rows = load_rows(folder, origin, design)
     return Result(
         folder=folder,
         study=study,
@@ -101,6 +204,7 @@ def load_result(folder: Path) -> Result:
         findings=tuple(finding for finding in findings if finding is not None),
         complete=content["complete"],
         notes=tuple(content["notes"]),
+        origin=run["origin"],
     )
 
 
@@ -125,17 +229,32 @@ def _space(study: Study, quantities: pd.DataFrame) -> Space:
     )
 
 
+def origin_differences(first: Path, second: Path) -> str:
+    """Return in words what two runs were computed from that differs; nothing if nothing does.
+
+    Raises
+    ------
+    RunFolderError
+        If a folder holds no run.
+    """
+    one, other = (load_run(folder)["origin"] for folder in (first, second))
+    told = [loop_differences(one, other), version_differences(one, other)]
+    return "; ".join(filter(None, told))
+
+
 def run_differences(first: Path, second: Path) -> list[str]:
     """Return what differs between what two runs have found, one text for each number.
 
     Raises
     ------
     RunFolderError
-        If a folder holds no results.
+        If a folder holds no results, or what does not belong together.
     """
     found = []
     for folder in (first, second):
+        load_result(folder)
         content = read_json(folder / "results.json")
+        del content["origin"]
         for name, key in (("findings", "key"), ("quantities", "name"), ("requirements", "key")):
             content[name] = {part.pop(key): part for part in content[name]}
         found.append(content)

@@ -21,6 +21,7 @@ from nlctl._names import unknown
 from nlctl.paper import named_example
 
 from .schema import Law
+from .trust import check_function, check_loop_function, check_place
 
 __all__ = ["DEFAULT", "loop_function", "named_function", "option", "uncertain"]
 
@@ -29,9 +30,17 @@ DEFAULT = "default"
 
 
 def loop_function(name: str, folder: Path) -> Callable[..., Any]:
-    """Return the function that builds the loop, see `paper.named_example`, `named_function`."""
+    """Return the function that builds the loop, see `paper.named_example`, `named_function`.
+
+    Raises
+    ------
+    ParameterError
+        If nothing shows that it returns a diagram, see `trust.check_loop_function`.
+    """
     if ":" in name:
-        return named_function(name, folder)
+        function = named_function(name, folder)
+        check_loop_function(function, name)
+        return function
     try:
         return named_example(name)
     except UnknownNameError as error:
@@ -46,20 +55,19 @@ def named_function(name: str, folder: Path) -> Callable[..., Any]:
     Raises
     ------
     ParameterError
-        If there is no such file or module.
+        If there is no such file or module, or what is named is of the standard library.
     UnknownNameError
         If it has no such function.
     """
-    source, colon, attribute = name.rpartition(":")
-    if not (source and colon and attribute):
-        raise ParameterError(
-            f"a function is 'path/to/file.py:function' or 'module:function', got '{name}'"
-        )
+    check_place(name)
+    source, _, attribute = name.rpartition(":")
     module = _from_file(folder / source) if source.endswith(".py") else _from_module(source)
     functions = [key for key, value in vars(module).items() if callable(value)]
     if attribute not in functions:
         raise unknown("function", attribute, functions, f"in '{source}'")
-    return getattr(module, attribute)
+    function = getattr(module, attribute)
+    check_function(function, name)
+    return function
 
 
 def _from_file(path: Path) -> Any:

@@ -1,8 +1,10 @@
-"""JSON files of a run folder; numbers that JSON lacks are kept as text."""
+"""JSON files of a run folder, sealed; numbers that JSON lacks are kept as text."""
 
 from __future__ import annotations
 
+import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,19 @@ from analysis.json_values import as_json, from_json
 from nlctl._errors import UsageError
 from nlctl._files import replace_file
 
-__all__ = ["RunFolderError", "as_json", "read_json", "write_json"]
+__all__ = [
+    "ANEW",
+    "RunFolderError",
+    "as_json",
+    "digest_of",
+    "file_digest",
+    "origin_key",
+    "read_json",
+    "write_json",
+]
+
+SEAL = "sha256"
+ANEW = "restore it, or run the study in another folder with --out"
 
 
 class RunFolderError(UsageError):
@@ -18,22 +32,60 @@ class RunFolderError(UsageError):
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write a file of JSON in one step."""
-    text = json.dumps(as_json(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    """Write a file of JSON in one step, with a key of its content in it."""
+    plain = as_json(content)
+    sealed = plain | {SEAL: digest_of(plain)}
+    text = json.dumps(sealed, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     replace_file(path, lambda file: file.write(text.encode()))
 
 
-def read_json(path: Path) -> Any:
+def read_json(path: Path, remedy: str = ANEW) -> Any:
     """Read a file of a run folder that `write_json` has written.
+
+    Parameters
+    ----------
+    path : Path
+    remedy : str, optional
+        What is to be done where the file is not what was written.
 
     Raises
     ------
     RunFolderError
-        If it is missing or damaged.
+        If it is missing, damaged or edited.
     """
     try:
-        return from_json(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError) as error:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
         raise RunFolderError(
-            f"'{path.parent}' holds no run of a study, or a damaged one: {error}"
-        ) from error
+            f"'{path.parent}' holds no run of a study, or one that has not come so far: there is "
+            f"no '{path.name}'"
+        ) from None
+    except (OSError, ValueError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is no JSON"
+        raise RunFolderError(f"'{path}' is damaged ({reason}): {remedy}") from error
+    if not isinstance(content, dict) or content.pop(SEAL, None) != digest_of(content):
+        raise RunFolderError(f"'{path}' is not as it was written: {remedy}")
+    return from_json(content)
+
+
+def digest_of(content: Any) -> str:
+    """Return a key of what `as_json` has returned."""
+    text = json.dumps(content, sort_keys=True, ensure_ascii=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """Return a key of a file's bytes.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def origin_key(origin: Mapping[str, Any]) -> str:
+    """Return a key of what `origin.origin_of` returns, without values, which rounding changes."""
+    return digest_of(as_json({key: part for key, part in origin.items() if key != "values"}))

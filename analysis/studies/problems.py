@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -12,9 +12,21 @@ from pydantic import BaseModel, ValidationError
 from nlctl._errors import UsageError
 from nlctl._names import unknown
 
-__all__ = ["Place", "Problem", "StudyError", "line_numbers", "place_text", "schema_problems"]
+from .toml import statements
+
+__all__ = [
+    "Place",
+    "Problem",
+    "StudyError",
+    "line_numbers",
+    "located",
+    "place_text",
+    "schema_problems",
+]
 
 Place = tuple[str | int, ...]
+LONGEST = 600  # characters of a mistake
+LARGEST = 10**40  # integers beyond are not printed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,22 +40,35 @@ class Problem:
     message : str
     line : int, optional
         Line of the file, from 1; None for what is not in the file.
+    settings : tuple of str
+        Of the command line, ``key=value``, that are mistaken or have a part in it.
     """
 
     place: Place
     message: str
     line: int | None = None
+    settings: tuple[str, ...] = ()
 
     def plain(self) -> dict[str, Any]:
         """Return it as JSON can hold it."""
         place = list(self.place)
         return {"place": place, "text": place_text(self.place), "line": self.line} | {
-            "message": self.message
+            "message": self.message,
+            "settings": list(self.settings),
         }
 
     def __str__(self) -> str:
+        given = " ".join(f"--set {_short(setting)}" for setting in self.settings)
+        if self.line is None and given:
+            return f"{given}: {_short(self.message)}"
         line = "" if self.line is None else f"line {self.line}, "
-        return f"{line}{place_text(self.place)}: {self.message}"
+        given = f" (with {given})" if given else ""
+        return f"{line}{_short(place_text(self.place))}: {_short(self.message)}{given}"
+
+
+def _short(text: str) -> str:
+    """Leave out the middle of a text that quotes too much of a file."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
 
 class StudyError(UsageError):
@@ -74,28 +99,20 @@ def place_text(place: Place) -> str:
 
 
 def line_numbers(text: str) -> dict[Place, int]:
-    """Return the line of every key that a line of a TOML file begins with.
-
-    A statement is the least number of lines that TOML can read by themselves: a header, or a key
-    with its value.
-    """
-    lines = text.splitlines()
+    """Return the line of every key that a statement of a TOML file begins with."""
     found: dict[Place, int] = {}
     counts: dict[Place, int] = {}
     table: Place = ()
-    i = 0
-    while i < len(lines):
-        end, statement = _statement(lines, i)
-        path = _path(statement)
-        if lines[i].lstrip().startswith("["):
-            if lines[i].lstrip().startswith("[["):
+    for line, statement in statements(text):
+        path = _path(_parsed(statement))
+        if statement.startswith("["):
+            if statement.startswith("[["):
                 counts[path] = counts.get(path, -1) + 1
             path = table = _indexed(path, counts)
         else:
             path = (*table, *path)
         for depth in range(1, len(path) + 1):
-            found.setdefault(path[:depth], i + 1)
-        i = end
+            found.setdefault(path[:depth], line + 1)
     return found
 
 
@@ -109,13 +126,11 @@ def _indexed(path: Place, counts: Mapping[Place, int]) -> Place:
     return tuple(place)
 
 
-def _statement(lines: Sequence[str], start: int) -> tuple[int, dict[str, Any]]:
-    for end in range(start + 1, len(lines) + 1):
-        try:
-            return end, tomllib.loads("\n".join(lines[start:end]))
-        except tomllib.TOMLDecodeError:
-            continue
-    return start + 1, {}
+def _parsed(statement: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(statement)
+    except tomllib.TOMLDecodeError:  # a comment
+        return {}
 
 
 def _path(statement: Any) -> Place:
@@ -149,9 +164,16 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
             tags = context["expected_tags"].replace("'", "").split(", ")
             place, message = (*place, "kind"), str(unknown("kind", str(context["tag"]), tags))
         elif "input" in one and not isinstance(one["input"], dict | list):
-            message = f"{message}, got {one['input']!r}"
+            message = f"{message}, got {_text(one['input'])}"
         found.append(Problem(place=place, message=message))
     return found
+
+
+def _text(value: Any) -> str:
+    """Return a value as it stands in the file; not an integer of thousands of digits."""
+    if isinstance(value, int) and abs(value) > LARGEST:
+        return f"an integer of {value.bit_length()} bits"
+    return repr(value)
 
 
 def _in_file(loc: Place, data: Any, absent: bool) -> Place:
@@ -193,6 +215,25 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
         yield annotation
     for part in get_args(annotation):
         yield from _models(part)
+
+
+def located(problem: Problem, lines: Mapping[Place, int], settings: Mapping[Place, str]) -> Problem:
+    """Return a mistake with its line, or with the settings of the command line that made it.
+
+    Parameters
+    ----------
+    problem : Problem
+    lines : mapping
+        See `line_numbers`.
+    settings : mapping
+        Place and text of each setting.
+    """
+    place = problem.place
+    own = tuple(text for at, text in settings.items() if place[: len(at)] == at)
+    if own:
+        return replace(problem, settings=own)
+    inside = tuple(text for at, text in settings.items() if at[: len(place)] == place)
+    return replace(problem, line=nearest_line(lines, place), settings=inside if place else ())
 
 
 def nearest_line(lines: Mapping[Place, int], place: Place) -> int | None:

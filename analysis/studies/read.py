@@ -21,11 +21,13 @@ from .problems import (
     Problem,
     StudyError,
     line_numbers,
-    nearest_line,
+    located,
     place_text,
     schema_problems,
 )
 from .schema import Study
+from .toml import check_depth, read_toml
+from .trust import untrusted
 
 __all__ = ["StudyFile", "read_study"]
 
@@ -57,9 +59,15 @@ class StudyFile:
 
 
 def read_study(
-    path: Path, settings: Sequence[str] = (), *, folder: Path | None = None
+    path: Path,
+    settings: Sequence[str] = (),
+    *,
+    folder: Path | None = None,
+    trust: bool = False,
 ) -> StudyFile:
     """Read a study file, and hold every name in it against the loop.
+
+    The files and modules that it names are run, see `trust`.
 
     Parameters
     ----------
@@ -69,6 +77,8 @@ def read_study(
         ``space."actuator.b_r".uniform=[0.3, 0.6]``, ``analysis.0.confidence=0.9``.
     folder : Path, optional
         What paths in the study are relative to; by default the file's folder.
+    trust : bool, optional
+        Whether code may be run from outside of that folder and of installed packages.
 
     Raises
     ------
@@ -82,21 +92,24 @@ def read_study(
     text = path.read_bytes().decode("utf-8-sig", errors="replace")
     folder = path.parent if folder is None else folder
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        message = f"is no TOML: {error}"
-        raise StudyError(str(path), [Problem(place=(), message=message)]) from None
-    lines = line_numbers(text)
-    for setting in settings:
-        place = _set(data, setting)
-        lines = {key: line for key, line in lines.items() if key[: len(place)] != place}
+        data = read_toml(text)
+        lines = line_numbers(text)
+        given = {_set(data, setting): setting for setting in settings}
+        check_depth(data)
+    except ParameterError:
+        raise
+    except ValueError as error:
+        raise StudyError(str(path), [Problem(place=(), message=str(error))]) from None
     study, problems, entries = _validated(data)
     experiment = None
     if study is not None:
-        experiment, more = bound(study, folder)
-        problems += [replace(p, place=_original(p.place, entries)) for p in more]
+        more = [] if trust else untrusted(study, folder)
+        if not more:
+            experiment, more = bound(study, folder)
+        more = [replace(p, place=_original(p.place, entries)) for p in more]
+        problems += [p for p in more if not follows(p, problems)]
     if problems or study is None or experiment is None:
-        placed = [replace(p, line=nearest_line(lines, p.place)) for p in problems]
+        placed = [located(p, lines, given) for p in problems]
         raise StudyError(str(path), sorted(placed, key=lambda p: p.line or 0))
     return StudyFile(path=folder / path.name, study=study, experiment=experiment)
 
@@ -119,12 +132,19 @@ def _validated(data: dict[str, Any]) -> tuple[Study | None, list[Problem], list[
         except ValidationError as error:
             found = schema_problems(error, Study, whole)
         found = [replace(p, place=_original(p.place, entries)) for p in found]
-        problems = found if problems is None else problems
+        told = problems or []  # what takes out a mistaken part lets others come to light
+        problems = told + [p for p in found if not follows(p, told)]
         for problem in reversed(found):
             _remove(rest, problem.place)
         if any(problem.place[:1] == ("study",) for problem in found):
             rest["study"] = NAMELESS
     return None, problems or [], entries
+
+
+def follows(problem: Problem, told: Sequence[Problem]) -> bool:
+    """Whether a mistake may follow from parts that were taken out because of others."""
+    place = problem.place
+    return any(place and one.place[: len(place)] == place for one in told)
 
 
 def _original(place: Place, entries: Sequence[int]) -> Place:
@@ -161,14 +181,15 @@ def _set(data: dict[str, Any], setting: str) -> Place:
     """Put one setting into the data; return its place."""
     name, equals, value = setting.partition("=")
     try:
-        parsed = tomllib.loads(setting)
-    except tomllib.TOMLDecodeError:
+        parsed = read_toml(setting)
+    except ValueError:
         try:  # a text without its quotes
-            parsed = tomllib.loads(f"{name} = {json.dumps(value.strip())}")
-        except tomllib.TOMLDecodeError:
+            parsed = read_toml(f"{name} = {json.dumps(value.strip())}")
+        except ValueError:
             parsed = {}
     if not (equals and parsed):
-        raise ParameterError(f"--set needs KEY=VALUE with a key as in TOML, got '{setting}'")
+        told = setting if len(setting) < 200 else f"{setting[:100]} ..."
+        raise ParameterError(f"--set needs KEY=VALUE with a key as in TOML, got '{told}'")
     place: list[str | int] = []
     target: Any = data
     depth = len(_keys(name))

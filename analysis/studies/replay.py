@@ -15,14 +15,14 @@ from analysis.figures.axes import BLUE, ORANGE, TIME, stacked_axes
 from analysis.robustness import Experiment, Prepared, evaluate, prepare
 from analysis.robustness.experiment import by_diagram, simulate
 from analysis.robustness.formula import Band, parts_of
-from analysis.robustness.sweep import load
 from nlctl._errors import ParameterError
 
 from .analyses import Compare
 from .comparison import alternatives, widened
-from .plain import RunFolderError, as_json
+from .folder import load_finding, load_rows, load_run
+from .plain import RunFolderError, as_json, origin_key
 from .read import StudyFile
-from .run import rerun_file
+from .run import reopened
 from .schema import keyed
 
 __all__ = ["Replay", "replay", "replay_figure"]
@@ -45,6 +45,8 @@ class Replay:
     time : ndarray of shape (m,)
     signals : dict of ndarray of shape (m,)
         All outputs; NaN after the end of a run that diverged.
+    versions : str
+        Which versions differ from those of the run, in words.
     """
 
     row: int
@@ -54,6 +56,7 @@ class Replay:
     experiment: Experiment
     time: np.ndarray
     signals: Mapping[str, np.ndarray]
+    versions: str = ""
 
     def plain(self) -> dict[str, Any]:
         """Return the two rows and whether they are the same, as JSON can hold them."""
@@ -71,12 +74,12 @@ class Replay:
         first = self.differences[0]
         return (
             f"{told} {len(self.differences)} columns differ from the folder, the first is "
-            f"'{first}', {self.stored[first]!r} there and {self.again[first]!r} now: another "
-            "version of a library, or another processor?"
+            f"'{first}', {self.stored[first]!r} there and {self.again[first]!r} now. The loop is "
+            f"the same; {self.versions or 'so are all versions: another processor?'}"
         )
 
 
-def replay(folder: Path, row: int, part: str = "") -> Replay:
+def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Replay:
     """Run one row of a run folder again.
 
     Parameters
@@ -85,20 +88,23 @@ def replay(folder: Path, row: int, part: str = "") -> Replay:
     row : int
     part : str, optional
         Key of an analysis that keeps rows of its own; by default the main table.
+    trust : bool, optional
+        As in `read_study`.
 
     Raises
     ------
     RunFolderError, StudyError
-        If the folder holds no run, or the loop no longer fits the study.
+        If the folder holds no run, or one of another loop, or the loop no longer fits the study.
     ParameterError
         If the row is not there.
     """
-    file = rerun_file(folder)
+    run = reopened(folder, trust=trust)
     table = _table(folder, part)
     if row not in table.index:
         where = f"of '{part}'" if part else "of the main table"
         raise ParameterError(f"row {row} {where} is not there: it has {len(table)} rows")
-    prepared = prepare(_experiment(file, part))
+    wide = _widened(run.file, part)
+    prepared = run.prepared if wide is None else prepare(wide)
     chosen = table.loc[[row], prepared.experiment.space.names]
     stored = table.loc[row].to_dict()
     again = evaluate(prepared, chosen).iloc[0].to_dict()
@@ -111,25 +117,28 @@ def replay(folder: Path, row: int, part: str = "") -> Replay:
         experiment=prepared.experiment,
         time=time,
         signals=signals,
+        versions=run.versions,
     )
 
 
 def _table(folder: Path, part: str) -> pd.DataFrame:
-    here = folder / part / "rows"
-    if here.with_suffix(".parquet").exists():
-        return pd.read_parquet(here.with_suffix(".parquet"))
-    if (here / "study.json").exists():
-        return load(here).table
-    raise RunFolderError(f"'{folder / part}' keeps no rows")
+    origin = origin_key(load_run(folder)["origin"])
+    found = load_finding(folder, part, origin) if part else None
+    if found is not None and "rows" in found.tables:
+        return found.tables["rows"]
+    rows = load_rows(folder / part, origin)
+    if rows is None:
+        raise RunFolderError(f"'{folder / part}' keeps no rows")
+    return rows.table
 
 
-def _experiment(file: StudyFile, part: str) -> Experiment:
-    """Return what the rows of a part were run with."""
+def _widened(file: StudyFile, part: str) -> Experiment | None:
+    """Return what the rows of a comparison were run with; None for another part."""
     asked = keyed(file.study).get(part)
-    if isinstance(asked, Compare):
-        options = alternatives(asked, file.experiment.build, file.folder)
-        return widened(file.experiment, asked, options, file.study, file.folder)
-    return file.experiment
+    if not isinstance(asked, Compare):
+        return None
+    options = alternatives(asked, file.experiment.build, file.folder)
+    return widened(file.experiment, asked, options, file.study, file.folder)
 
 
 def _same(one: Any, other: Any) -> bool:

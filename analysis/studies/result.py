@@ -12,7 +12,7 @@ import pandas as pd
 from analysis.robustness.sweep import Sweep
 from nlctl._names import unknown
 
-from .plain import as_json
+from .plain import as_json, origin_key
 from .schema import Study, keyed
 
 __all__ = ["Finding", "Result"]
@@ -30,8 +30,10 @@ class Finding:
         What was found, with what it rests on.
     claim : str
         What the study claimed; empty without a claim.
-    holds : bool or None
-        Whether the claim holds; None without a claim.
+    answer : {"shown", "refuted", "not shown yet", ""}
+        What was found of the claim; empty without a claim.
+    needs : str
+        What it takes to show the claim, where it is not shown yet.
     runs : int
         Number of simulations that it rests on.
     numbers : mapping
@@ -48,11 +50,22 @@ class Finding:
     title: str
     sentence: str
     claim: str = ""
-    holds: bool | None = None
+    answer: str = ""
+    needs: str = ""
     runs: int = 0
     numbers: Mapping[str, Any] = field(default_factory=dict)
     tables: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     is_answered: bool = True
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether the claim is shown; None without a claim."""
+        return self.answer == "shown" if self.answer else None
+
+    @property
+    def told(self) -> str:
+        """The answer in words, ``not shown yet (needs ...)``."""
+        return f"{self.answer} (needs {self.needs})" if self.needs else self.answer
 
     def plain(self) -> dict[str, Any]:
         """Return everything but the tables, as JSON can hold it."""
@@ -85,6 +98,8 @@ class Result:
         Whether Ctrl-C was pressed in the run that returned this; not kept in the folder.
     notes : tuple of str
         What the user has to know, such as lost workers.
+    origin : mapping
+        What all of it was computed from, see `origin.origin_of`.
     """
 
     folder: Path
@@ -97,6 +112,14 @@ class Result:
     complete: bool
     interrupted: bool = False
     notes: tuple[str, ...] = ()
+    origin: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def made_with(self) -> dict[str, str]:
+        """Versions that the numbers were computed with, and a key of all they follow from."""
+        if not self.origin:
+            return {}
+        return {**self.origin["versions"], "computed from": origin_key(self.origin)}
 
     @property
     def asked(self) -> dict[str, Any]:
@@ -111,8 +134,14 @@ class Result:
 
     @property
     def holds(self) -> bool:
-        """Whether no claim fails; True without claims."""
+        """Whether every claim is shown; True without claims."""
         return all(finding.holds for finding in self.claims)
+
+    @property
+    def answer(self) -> str:
+        """Of all claims together: refuted if one is, or else not shown yet if one is not."""
+        given = {finding.answer for finding in self.claims}
+        return next((a for a in ("refuted", "not shown yet", "shown") if a in given), "")
 
     @property
     def verdict(self) -> str:
@@ -122,12 +151,17 @@ class Result:
             return f"Incomplete: {count}."
         if not self.claims:
             return "The study makes no claims."
-        failing = [finding.key for finding in self.claims if not finding.holds]
-        if failing:
-            return f"{len(failing)} of {len(self.claims)} claims fail: {', '.join(failing)}."
-        return (
-            f"All {len(self.claims)} claims hold." if len(self.claims) > 1 else "The claim holds."
-        )
+        count = len(self.claims)
+        if self.holds:
+            return f"All {count} claims are shown." if count > 1 else "The claim is shown."
+        told = []
+        for answer in ("refuted", "not shown yet"):
+            these = [finding for finding in self.claims if finding.answer == answer]
+            names = [f.key + (f" (needs {f.needs})" if f.needs else "") for f in these]
+            verb = "is" if len(these) == 1 else "are"
+            if these:
+                told.append(f"{len(these)} of {count} claims {verb} {answer}: {', '.join(names)}.")
+        return " ".join(told)
 
     def __getitem__(self, key: str) -> Finding:
         """Return the finding with this key.
@@ -155,6 +189,7 @@ class Result:
                 "question": self.study.study.question,
                 "verdict": self.verdict,
                 "holds": self.holds,
+                "answer": self.answer,
                 "complete": self.complete,
                 "notes": self.notes,
                 "rows": rows,

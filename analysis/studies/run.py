@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
@@ -22,15 +22,28 @@ from nlctl._files import replace_file
 from .answers import answer, unanswered
 from .build import main_design
 from .check import NEED_ROWS
-from .folder import METRIC_COLUMNS, load_finding, save_finding
+from .folder import METRIC_COLUMNS, load_finding, load_run, load_study, save_finding
 from .ground import Ground
-from .plain import RunFolderError, read_json, write_json
+from .origin import (
+    compared_differences,
+    loop_differences,
+    origin_of,
+    version_differences,
+)
+from .plain import RunFolderError, origin_key, write_json
 from .read import StudyFile, read_study
 from .result import Finding, Result
 from .schema import Study, keyed
-from .written import from_toml, to_toml
+from .written import to_toml
 
-__all__ = ["Watch", "rerun_file", "run"]
+__all__ = ["Reopened", "Watch", "reopened", "rerun_file", "run"]
+
+OWN = (
+    ".lock",
+    ".owner",
+    "..owner.",
+    ".study.toml.",
+)  # what `locked` makes, and a killed run leaves
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], object] | None]]
 """``watch(title)`` is entered around every sweep and gives its `progress`."""
@@ -42,11 +55,16 @@ def _unwatched(title: str) -> AbstractContextManager[None]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Way:
-    """How rows are run."""
+    """How rows are run, and what they are computed from."""
 
     executor: Executor | None
     threads: int | None
     watch: Watch
+    origin: Mapping[str, Any]
+
+    @property
+    def key(self) -> str:
+        return origin_key(self.origin)
 
 
 def run(
@@ -54,6 +72,7 @@ def run(
     folder: Path,
     *,
     resume: bool = False,
+    force: bool = False,
     executor: Executor | None = None,
     threads: int | None = None,
     watch: Watch = _unwatched,
@@ -69,7 +88,9 @@ def run(
     folder : Path
         See `folder` for what is in it.
     resume : bool, optional
-        Whether to take up what the folder holds.
+        Whether to take up what the folder holds.  It must be of the same study, loop and versions.
+    force : bool, optional
+        Whether a folder may be used that holds other files.
     executor : concurrent.futures.Executor, optional
         Where rows are run whose number is known in advance; searches run here.
     threads : int, optional
@@ -86,19 +107,20 @@ def run(
     Raises
     ------
     RunFolderError
-        If the folder holds a run and `resume` is False, or one of another study, or another
-        process works in it.
+        If the folder holds a run and `resume` is False, or one that was computed from something
+        else, or files that no run has made; or another process works in it.
     StoreError
         If a file cannot be written.
     KeyboardInterrupt
         If Ctrl-C comes before the first row, while diagrams are compiled.
     """
     with locked(folder, RunFolderError):
-        _identify(file, folder, resume)
+        _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)
-        way = _Way(executor=executor, threads=threads, watch=watch)
-        result = _through(file, prepared, folder, way)
-        write_json(folder / "results.json", result.plain())
+        origin = _stamped(file, prepared, folder)
+        way = _Way(executor=executor, threads=threads, watch=watch, origin=origin)
+        result = replace(_through(file, prepared, folder, way), origin=origin)
+        write_json(folder / "results.json", result.plain() | {"origin": way.key})
     return result
 
 
@@ -112,7 +134,7 @@ def _through(file: StudyFile, prepared: Prepared, folder: Path, way: _Way) -> Re
         notes += rows.notes
         complete, interrupted = rows.complete or bool(rows.decided), rows.interrupted
     for key, asked in keyed(study).items() if complete else ():
-        finding, own = load_finding(folder, key), []
+        finding, own = load_finding(folder, key, way.key), []
         if finding is None and not interrupted:
             ground = _ground(file, prepared, rows, folder / key, way, own)
             try:
@@ -122,7 +144,7 @@ def _through(file: StudyFile, prepared: Prepared, folder: Path, way: _Way) -> Re
             notes += [note for done in own for note in done.notes]
             interrupted = interrupted or any(done.interrupted for done in own)
             if finding is not None:
-                save_finding(folder, finding)
+                save_finding(folder, finding, way.key)
         if finding is None:
             complete = False
             break
@@ -134,7 +156,7 @@ def _answered(key: str, asked: Any, ground: Ground, own: Sequence[Sweep]) -> Fin
     """Run one analysis; what it may not be made of costs it alone, not what others have found."""
     try:
         return answer(key, asked, ground)
-    except StoreError:
+    except (StoreError, RunFolderError):
         raise
     except UsageError as error:
         return unanswered(key, asked, error, sum(done.done for done in own))
@@ -146,7 +168,7 @@ def _main_rows(study: Study, prepared: Prepared, folder: Path, way: _Way) -> Swe
     design = main_design(study.runs, prepared.experiment.space, study.study.seed)
     users = {key: a for key, a in keyed(study).items() if a.kind in NEED_ROWS}
     if len(users) == 1 and (found := next(iter(users.values()))).kind == "sequential":
-        if load_finding(folder, next(iter(users))) is not None:
+        if load_finding(folder, next(iter(users)), way.key) is not None:
             return replace(load(folder / "rows", design), decided=True)
         stop = until_decided(design, found.limit, found.confidence)
         return _swept(prepared, design, folder / "rows", way, "rows", stop=stop)
@@ -168,6 +190,11 @@ def _ground(
         return evaluate(prepared, table.assign(**fixed), threads=way.threads)
 
     def run_design(design: Design, of: Prepared | None = None) -> Sweep:
+        if of is not None and (told := compared_differences(way.origin, folder.name, of)):
+            raise RunFolderError(
+                f"the loops of '{folder.name}' have changed since the run began ({told}): put them "
+                "back as they were and continue with --resume"
+            )
         own.append(_swept(of or prepared, design, folder / "rows", way, folder.name))
         return own[-1]
 
@@ -199,10 +226,11 @@ def _swept(
             progress=progress,
             resume=True,
             stop=stop,
+            identity={"origin": way.key},
         )
 
 
-def _identify(file: StudyFile, folder: Path, resume: bool) -> None:
+def _claim(file: StudyFile, folder: Path, resume: bool, force: bool) -> None:
     """Write which study a folder belongs to, or compare."""
     path = folder / "study.toml"
     if path.exists():
@@ -211,15 +239,21 @@ def _identify(file: StudyFile, folder: Path, resume: bool) -> None:
                 f"'{folder}' holds a run already: continue it with --resume, or take another "
                 "folder with --out"
             )
-        changed = _changed(from_toml(path.read_text(encoding="utf-8")), file.study)
+        changed = _changed(load_study(folder), file.study)
         if changed:
             raise RunFolderError(
                 f"'{folder}' holds a run of another study ({', '.join(changed)} differ): take "
                 "another folder with --out"
             )
         return
-    origin = os.path.relpath(file.folder.resolve(), folder.resolve())
-    write_json(folder / "run.json", {"format": 1, "study_folder": Path(origin).as_posix()})
+    others = sorted(p.name for p in folder.iterdir() if not p.name.startswith(OWN))
+    if others and not force:
+        told = ", ".join(others[:3]) + (", ..." if len(others) > 3 else "")
+        raise RunFolderError(
+            f"'{folder}' holds files that no run has made ({told}): take another folder with "
+            "--out, or this one with --force"
+        )
+    (folder / "run.json").unlink(missing_ok=True)  # of a run whose study is gone
     replace_file(path, lambda out: out.write(to_toml(file.study).encode()))
 
 
@@ -227,8 +261,34 @@ def _changed(before: Study, now: Study) -> list[str]:
     return [name for name in type(now).model_fields if getattr(before, name) != getattr(now, name)]
 
 
-def rerun_file(folder: Path) -> StudyFile:
-    """Return the study of a run folder, held against its loop again.
+def _stamped(file: StudyFile, prepared: Prepared, folder: Path) -> dict[str, Any]:
+    """Write what a run is computed from, or compare; return it."""
+    origin = origin_of(file, prepared)
+    if (folder / "run.json").exists():
+        before = load_run(folder)["origin"]
+        _refuse_another_loop(folder, before, origin)
+        if told := version_differences(before, origin):
+            raise RunFolderError(
+                f"'{folder}' was computed with other versions ({told}): continue it with those, "
+                "or run the study in another folder with --out"
+            )
+        return before
+    place = os.path.relpath(file.folder.resolve(), folder.resolve())
+    content = {"format": 2, "study_folder": Path(place).as_posix(), "origin": origin}
+    write_json(folder / "run.json", content)
+    return origin
+
+
+def _refuse_another_loop(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+    if told := loop_differences(before, now):
+        raise RunFolderError(
+            f"'{folder}' was computed from another loop than today's ({told}): put the loop back "
+            "as it was, or run the study in another folder with --out"
+        )
+
+
+def rerun_file(folder: Path, *, trust: bool = False) -> StudyFile:
+    """Return the study of a run folder, held against the loop of today; see `reopened`.
 
     Raises
     ------
@@ -237,8 +297,50 @@ def rerun_file(folder: Path) -> StudyFile:
     StudyError
         If the loop has changed so that the study no longer fits.
     """
-    content = read_json(folder / "run.json")
-    return read_study(folder / "study.toml", folder=folder / content["study_folder"])
+    place = load_run(folder)["study_folder"]
+    load_study(folder)
+    return read_study(folder / "study.toml", folder=folder / place, trust=trust)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reopened:
+    """A run whose loop is the one that its results were computed from.
+
+    Attributes
+    ----------
+    file : StudyFile
+    prepared : Prepared
+        Its experiment.
+    versions : str
+        Which versions differ from those of the run, in words; empty if none does.
+    """
+
+    file: StudyFile
+    prepared: Prepared
+    versions: str
+
+
+def reopened(folder: Path, *, trust: bool = False) -> Reopened:
+    """Return the study of a run with its loop, to draw from it.
+
+    Parameters
+    ----------
+    folder : Path
+    trust : bool, optional
+        As in `read_study`.
+
+    Raises
+    ------
+    StudyError
+        If the loop has changed so that the study no longer fits.
+    RunFolderError
+        If the folder holds no run, or one that was computed from another loop.
+    """
+    file, before = rerun_file(folder, trust=trust), load_run(folder)["origin"]
+    prepared = prepare(file.experiment)
+    now = origin_of(file, prepared)
+    _refuse_another_loop(folder, before, now)
+    return Reopened(file=file, prepared=prepared, versions=version_differences(before, now))
 
 
 def _result(

@@ -99,7 +99,9 @@ class Solver(Strict):
 
     rtol: Number = Field(1e-6, gt=0, description="Relative tolerance.")
     atol: Number = Field(1e-8, gt=0, description="Absolute tolerance.")
-    max_steps: Whole = Field(1_000_000, ge=1, description="A run that needs more has failed.")
+    max_steps: Whole = Field(
+        1_000_000, ge=1, le=10**15, description="A run that needs more has failed."
+    )
     method: str = Field("auto", description="As in nlctl.input_output_response.")
 
 

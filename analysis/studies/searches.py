@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.robustness import Space, independent, nominal
+from analysis.robustness import Space, bound_verdict, independent, nominal
 from analysis.robustness.confirm import confirm
 from analysis.robustness.degradation import degradation_curve
 from analysis.robustness.failure_map import boundary, failure_map
-from analysis.robustness.guarantee import assumptions
+from analysis.robustness.guarantee import assumptions, rounded_down, rounded_up
 from analysis.robustness.largest_scale import largest_scale
 from analysis.robustness.radius import robustness_radius
 from analysis.robustness.shrink import shrink
@@ -52,12 +52,27 @@ def lowest_margin(asked: WorstCase, ground: Ground) -> Finding:
     return made(
         asked,
         " ".join(told),
-        claim="" if asked.limit is None else f"no margin is {asked.limit:g} or lower",
-        holds=None if asked.limit is None else bool(found.margin > asked.limit),
+        **_no_low_margin(asked.limit, found.margin, bool(numbers.get("is_confirmed", True))),
         runs=count,
         numbers=numbers,
         tables=tables,
     )
+
+
+def _no_low_margin(limit: float | None, margin: float, is_confirmed: bool) -> dict[str, str]:
+    """Return the claim about the lowest margin that was found, and the answer."""
+    if limit is None:
+        return {}
+    claim = f"no margin of {limit:g} or lower is found"
+    if margin > limit:
+        return {"claim": claim, "answer": "shown"}
+    if is_confirmed:
+        return {"claim": claim, "answer": "refuted"}
+    return {
+        "claim": claim,
+        "answer": "not shown yet",
+        "needs": "integrators that agree about the lowest margin",
+    }
 
 
 def degradation(asked: Degradation, ground: Ground) -> Finding:
@@ -74,21 +89,21 @@ def degradation(asked: Degradation, ground: Ground) -> Finding:
     )
     bounds = dict(zip(found.factors, found.statements, strict=True))
     told = "; ".join(
-        f"at {factor:g} {one.violations} of {one.runs} (at most {one.upper:.2g})"
+        f"at {factor:g} {one.violations} of {one.runs} ({rounded_down(one.lower)} to "
+        f"{rounded_up(one.upper)})"
         for factor, one in bounds.items()
     )
     together = "together" if asked.simultaneous else "each by itself"
-    claim, holds = "", None
+    claimed: dict[str, Any] = {}
     if asked.limit is not None:
         claim = f"a violation has at most probability {asked.limit:g} at the size {asked.at:g}"
-        holds = bounds[asked.at].upper <= asked.limit
+        claimed = {"claim": claim, **vars(bound_verdict(bounds[asked.at], asked.limit))}
     return made(
         asked,
         f"Violations with all deviations scaled: {told}. The bounds hold with confidence "
         f"{100 * asked.confidence:g} %, {together}. Assumed: "
         f"at each size {'; '.join(assumptions(independent(space, asked.runs, ground.seed)))}.",
-        claim=claim,
-        holds=holds,
+        **claimed,
         runs=sum(one.runs for one in found.statements),
         numbers={"confidence": asked.confidence, "simultaneous": asked.simultaneous},
         tables={"curve": found.table},
@@ -117,12 +132,24 @@ def radius(asked: Radius, ground: Ground) -> Finding:
     return made(
         asked,
         str(found),
-        claim="" if asked.limit is None else f"no violation is found below size {asked.limit:g}",
-        holds=None if asked.limit is None else found.upper >= asked.limit,
+        **_no_small_violation(asked.limit, found.upper, found.largest),
         runs=found.runs + (0 if found.statement is None else found.statement.runs),
         numbers=numbers,
         tables={"steps": found.steps},
     )
+
+
+def _no_small_violation(limit: float | None, upper: float, largest: float) -> dict[str, str]:
+    """Return the claim about the smallest size with a violation, and the answer."""
+    if limit is None:
+        return {}
+    claim = f"no violation is found below size {limit:g}"
+    if upper < limit:
+        return {"claim": claim, "answer": "refuted"}
+    if min(upper, largest) >= limit:
+        return {"claim": claim, "answer": "shown"}
+    needs = f"a search up to that size: this one ended at {largest:.4g}"
+    return {"claim": claim, "answer": "not shown yet", "needs": needs}
 
 
 def failures(asked: Map, ground: Ground) -> Finding:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
-
 import tomli_w
 
 from .schema import Study
+from .toml import read_toml
 
 __all__ = ["from_toml", "to_toml"]
 
@@ -24,4 +23,4 @@ def from_toml(text: str) -> Study:
     ValueError
         If it is none.
     """
-    return Study.model_validate(tomllib.loads(text))
+    return Study.model_validate(read_toml(text))

@@ -6,6 +6,7 @@ from typing import Any
 
 import control as ct
 
+from .._arguments import of_type
 from .._equation import equation
 from .._param import param, record
 from .adaptive import Zero, adaptive_neural
@@ -54,6 +55,7 @@ def replaced(controller: ct.InterconnectedSystem, **pieces: Any) -> ct.Interconn
     ParameterError, DiagramError
         As in `adaptive_neural`.
     """
+    of_type("replaced", "controller", controller, ct.InterconnectedSystem, "adaptive_neural(2)")
     own = {s.name: getattr(s, "spec", None) or s.copy(name=s.name) for s in controller.syslist}
     order = sum(label.startswith("x") for label in controller.input_labels)
     return adaptive_neural(order, **(own | pieces), name=controller.name)

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .._arguments import number, tuple_of, whole_number
 from .._equation import equation
 from .._errors import ParameterError
-from .._param import param, record, whole_number
+from .._param import param, record
 from ..functions import gaussian
 from ..plants import coordinate_names
 
@@ -28,11 +29,24 @@ def _rows(array: np.ndarray) -> Matrix:
     return tuple(tuple(map(float, row)) for row in array)
 
 
+def _checked(who: str, count: int, inputs: int, low: float, high: float) -> int:
+    whole_number(who, "inputs", inputs, at_least=1)
+    number(who, "low", low)
+    number(who, "high", high)
+    return whole_number(who, "count", count, at_least=1)
+
+
 def diagonal_centres(count: int, inputs: int, low: float = -10, high: float = 10) -> Matrix:
     """Return `count` centres evenly spaced on the diagonal of [low, high]^inputs.
 
     The usual reading of "27 centres evenly distributed in [-10, 10] x [-10, 10]".
+
+    Raises
+    ------
+    ParameterError
+        If `count` or `inputs` is no integer >= 1, or an end is not finite.
     """
+    count = _checked("diagonal_centres", count, inputs, low, high)
     return _rows(np.tile(np.linspace(low, high, count)[:, None], (1, inputs)))
 
 
@@ -40,7 +54,14 @@ def grid_centres(counts: Sequence[int], low: float = -10, high: float = 10) -> M
     """Return a full grid on [low, high]^n with ``counts[i]`` points along axis i.
 
     The last axis varies fastest.
+
+    Raises
+    ------
+    ParameterError
+        If a count is no integer >= 1, or an end is not finite.
     """
+    for i, count in enumerate(tuple_of("grid_centres", "counts", counts, int)):
+        _checked("grid_centres", count, i + 1, low, high)
     axes = [np.linspace(low, high, count) for count in counts]
     return _rows(np.array(list(itertools.product(*axes))))
 
@@ -48,7 +69,15 @@ def grid_centres(counts: Sequence[int], low: float = -10, high: float = 10) -> M
 def latin_hypercube_centres(
     count: int, inputs: int, low: float = -10, high: float = 10, *, seed: int
 ) -> Matrix:
-    """Return `count` centres of a Latin hypercube on [low, high]^inputs (scipy.stats.qmc)."""
+    """Return `count` centres of a Latin hypercube on [low, high]^inputs (scipy.stats.qmc).
+
+    Raises
+    ------
+    ParameterError
+        As `diagonal_centres`, and if the seed is no integer >= 0.
+    """
+    count = _checked("latin_hypercube_centres", count, inputs, low, high)
+    whole_number("latin_hypercube_centres", "seed", seed, at_least=0)
     from scipy.stats import qmc
 
     unit = qmc.LatinHypercube(inputs, rng=seed).random(count)
@@ -64,9 +93,11 @@ class GaussianBasis:
     The number of columns of `centres` is the number of inputs x1, ..., xn.
     """
 
-    centres: Matrix = param(diagonal_centres(27, 2), unit="1", meaning="centres mu_i, one per row")
+    centres: Matrix = param(
+        diagonal_centres(27, 2), unit="1", meaning="centres mu_i, one per row", symbol="mu"
+    )
     widths: tuple[float, ...] = param(
-        (2.0,), unit="1", meaning="widths nu_i: one for all, or one each", above=0
+        (2.0,), unit="1", meaning="widths nu_i: one for all, or one each", above=0, symbol="nu"
     )
 
     states = ()

@@ -37,6 +37,8 @@ class Tracer:
         Where in the origin a part of one dimension lies.
     version : int
         How often a long array has been assigned to.
+    watched : (ndarray of Expr, tuple of Expr) or None
+        Elements of which this long array was made as another shape, and what they were then.
     """
 
     graph: Graph
@@ -46,6 +48,7 @@ class Tracer:
     origin: tuple[Tracer, int] | None = None
     place: range | None = None
     version: int = 0
+    watched: tuple[np.ndarray, tuple[Expr, ...]] | None = None
 
     __array_ufunc__ = None  # NumPy's arrays leave arithmetic with tracers to these
     __hash__ = None  # type: ignore[assignment]
@@ -55,6 +58,8 @@ class Tracer:
         """The expressions."""
         if self.origin is not None and self.origin[0].version != self.origin[1]:
             raise Untraceable("part of an array that has been assigned to since")
+        if self.watched is not None and tuple(self.watched[0].flat) != self.watched[1]:
+            raise Untraceable("another shape of an array that has been assigned to since")
         return self.values
 
     @property
@@ -175,12 +180,36 @@ class Tracer:
         """Return the array in another shape."""
         wanted = shape[0] if len(shape) == 1 and not isinstance(shape[0], int) else shape
         wanted = tuple(operator.index(n) for n in wanted)
-        if self.axis is None:
-            place = self.place if self.ndim == len(wanted) == 1 else None
-            return self._part(self.cells.reshape(wanted), None, 1, place)
-        if self.ndim == 1 and wanted in ((-1,), (self.length,)):
+        if self.ndim == 1 and wanted in ((-1,), (self.size,)):
             return self
-        raise Untraceable("reshaping a long array")
+        if self.axis is not None:
+            return self._in_rows(wanted)
+        place = self.place if self.ndim == len(wanted) == 1 else None
+        found = self._part(self.cells.reshape(wanted), None, 1, place)
+        return found._as_long() if max(found.shape, default=0) > SMALL else found
+
+    def _in_rows(self, shape: tuple[int, ...]) -> Tracer:
+        """Return a long array as a small matrix."""
+        places = np.arange(self.size).reshape(shape)
+        if self.ndim != 1 or max(places.shape, default=0) > SMALL:
+            raise Untraceable("reshaping a long array")
+        cells = mapped(lambda k: self.graph.item(self.only, int(k)), places)
+        return self._part(cells, None, 1)
+
+    def _as_long(self) -> Tracer:
+        """Return elements of a small matrix as a long array of one dimension."""
+        if self.ndim != 1:
+            raise Untraceable("a large matrix")
+        pieces = [(e, 1) for e in self.cells.flat]
+        made = Tracer(self.graph, boxed(self.graph.joined(pieces)), 0, self.size)
+        made.watched = (self.values, tuple(self.values.flat))
+        return made
+
+    def pieces(self) -> list[tuple[Expr, int]]:
+        """Return the elements in order, each expression with its number of elements."""
+        if self.axis is not None:
+            return [(self.only, self.length)]
+        return [(self.graph.number(e), 1) for e in self.cells.flat]
 
     @property
     def only(self) -> Expr:

@@ -7,7 +7,7 @@ constants.  It never changes the order of a sum.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,6 +69,18 @@ class Expr:
     index: int
     varies: bool
     value: int | None
+
+
+def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
+    """Return all that expressions are made of, parts first; nothing behind what is known."""
+    found: dict[Expr, None] = {}
+    waiting = list(exprs)
+    while waiting:
+        expr = waiting.pop()
+        if expr not in found:
+            found[expr] = None
+            waiting.extend(expr.args if expr not in known else ())
+    return tuple(sorted(found, key=lambda e: e.index))
 
 
 class Undecided(BaseException):  # (what is traced may catch exceptions)

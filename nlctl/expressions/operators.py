@@ -65,6 +65,8 @@ def _assign(self: Tracer, key: Any, value: Any) -> None:
     """Assign to items; what is assigned to a part of a long array goes into that."""
     value = traced(self.graph, value)
     _check_kinds(self, value)
+    if self.watched is not None:
+        raise Untraceable("assignment to another shape of an array")
     if self.origin is not None:
         _assign_to_part(self, key, value)
     elif self.axis is None:

@@ -22,12 +22,14 @@ from ._lane import Status
 from ._response import Response, uninterrupted
 from ._schedule import AlgebraicLoopError
 from ._simulate import Settings, Statistics
+from ._typeset import BlockEquations, typeset
 from .audit import AuditError
 from .codegen.store import CacheWarning
 
 __all__ = [
     "AlgebraicLoopError",
     "AuditError",
+    "BlockEquations",
     "CacheWarning",
     "CompileError",
     "Compiled",
@@ -39,5 +41,6 @@ __all__ = [
     "compile",
     "compile_ahead",
     "ensemble_response",
+    "typeset",
     "uninterrupted",
 ]

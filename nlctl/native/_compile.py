@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -13,10 +13,12 @@ import cloudpickle
 import control as ct
 import numpy as np
 
-from .._errors import ParameterError, UsageError
+from .._errors import CompileError, ParameterError, UsageError
 from .._names import unknown
+from .._run_arguments import checked_params
 from ._describe import described
 from ._emit import Program, emit
+from ._jacobians import Tangent, linearize, parameter_jacobian, tangent
 from ._lower import Lowered, lower
 from ._lower_blocks import Equations, equations
 from ._machine import evaluations
@@ -40,6 +42,12 @@ class Compiled:
         What was read from the diagram.
     program : Program
         What was written for it.
+
+    Notes
+    -----
+    It is no python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
+    run it, ``compiled.linearize(x0)`` linearizes it with exact derivatives, and for every other
+    function of python-control there is ``compiled.system``.
     """
 
     schedule: Schedule
@@ -120,6 +128,75 @@ class Compiled:
         """Return the outputs, as ``system.output`` does."""
         return self._call(self.native[1], self.system.noutputs, t, x, u, params)
 
+    @cached_property
+    def tangent(self) -> Tangent:
+        """The derivatives of the equations along a direction of states, inputs and parameters."""
+        return tangent(self)
+
+    def linearize(
+        self, x0: Any, u0: Any = None, t: float = 0.0, params: Mapping[str, Any] | None = None
+    ) -> ct.StateSpace:
+        """Return the linearization at a point, with exact derivatives.
+
+        Parameters
+        ----------
+        x0 : mapping, array_like or control.OperatingPoint
+            State, as `initial_state` of `nlctl.input_output_response`.
+        u0 : array_like, optional
+            Inputs, of shape (ninputs,); a number for all of them; 0 if left out.
+        t : float, optional
+            Time in s.
+        params : mapping, optional
+            Parameters that are overridden.
+
+        Returns
+        -------
+        control.StateSpace
+            With the diagram's names.  At a kink it has the slopes of the side that the point
+            belongs to.
+
+        Raises
+        ------
+        CompileError
+            If a function is called as it stands, or there are algebraic loops.
+        ParameterError, UsageError
+            If an argument is refused.
+
+        Notes
+        -----
+        Forward mode on the expressions, so nothing is lost to a step width.
+        """
+        return linearize(self, x0, u0, t, params)
+
+    def parameter_jacobian(
+        self,
+        parameters: Sequence[str],
+        x0: Any,
+        u0: Any = None,
+        t: float = 0.0,
+        params: Mapping[str, Any] | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return how the right-hand side and the outputs change with parameters.
+
+        Parameters
+        ----------
+        parameters : sequence of str
+            Qualified names, such as ``"actuator.b_r"``; with an index for entries of arrays.
+        x0, u0, t, params
+            The point, as in `linearize`.
+
+        Returns
+        -------
+        tuple of ndarray
+            Of shapes (nstates, k) and (noutputs, k) for k parameters.
+
+        Raises
+        ------
+        CompileError, UnknownNameError, ParameterError
+            As `linearize`, and if there is no such parameter.
+        """
+        return parameter_jacobian(self, parameters, x0, u0, t, params)
+
     def _call(
         self, function: Rhs, size: int | None, t: float, x: Any, u: Any, params: Any, *more: Any
     ):
@@ -180,7 +257,12 @@ def compile(  # noqa: A001 (what it does)
     """
     if isinstance(system, ct.TransferFunction):
         system = ct.ss(system)
-    system._update_params(params)
+    if not isinstance(system, ct.InputOutputSystem):
+        raise CompileError(
+            f"compile needs a diagram or a block, got {type(system).__name__}: nlctl.block makes "
+            "a block of a record"
+        )
+    system._update_params(checked_params(params))  # type: ignore[attr-defined]
     if algebraic_loops not in LOOPS:
         raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
     read = schedule(system, solve_loops=algebraic_loops == "solve")

@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 import control as ct
 import numpy as np
 
+from .._errors import ParameterError
 from .._names import unknown
-from .._param import checked_times
-from .._run_arguments import input_array
+from .._param import checked_times, whole_number
+from .._run_arguments import checked_params, input_array
 from ._ahead import compile_for
 from ._compile import Compiled
+from ._compile import compile as compile_diagram
 from ._lane import RUNNING, STIFF, Status
 from ._machine import WIDTH
 from ._members import Members, members
@@ -47,7 +49,11 @@ class MetricLike(Protocol):
     def function(self) -> Callable[..., float]: ...  # (t, samples of the first signal, ...)
 
 
-@dataclass(frozen=True, kw_only=True)
+ROWS = 8
+"""Rows of its table that an ensemble prints."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Ensemble:
     """Runs of one diagram.
 
@@ -65,9 +71,19 @@ class Ensemble:
     time: np.ndarray
     signals: Mapping[str, np.ndarray]
 
+    def __repr__(self) -> str:
+        ended = self.table["status"].value_counts() if len(self.table) else {}
+        how = ", ".join(f"{count} {status}" for status, count in ended.items()) or "none finished"
+        kept = f"; kept: {', '.join(self.signals)}" if self.signals else ""
+        return (
+            f"Ensemble of {len(self.table)} members: {how}; {self.time.size} times from "
+            f"{self.time[0]:g} to {self.time[-1]:g} s{kept}\n{self.table.head(ROWS)}"
+            + (f"\n... {len(self.table) - ROWS} more in .table" * (len(self.table) > ROWS))
+        )
+
 
 def ensemble_response(
-    compiled: Compiled,
+    compiled: Compiled | ct.InputOutputSystem,
     timepts: Any,
     inputs: Any = 0.0,
     initial_state: Mapping[str, Any] | None = None,
@@ -95,7 +111,8 @@ def ensemble_response(
 
     Parameters
     ----------
-    compiled : Compiled
+    compiled : Compiled or control.InputOutputSystem
+        A diagram that is not compiled yet is compiled first.
     timepts : array_like of shape (m,)
         Times in s at which signals are sampled.
     inputs : array_like, list or float, optional
@@ -136,7 +153,17 @@ def ensemble_response(
         If a parameter, state or signal does not exist.
     """
     times = checked_times(timepts)
-    every = members(compiled, params or {}, {} if initial_state is None else initial_state)
+    if not isinstance(compiled, Compiled):
+        compiled = compile_diagram(compiled)
+    if threads is not None:
+        threads = whole_number("ensemble_response", "threads", threads, at_least=1)
+    for metric in metrics:
+        if not (hasattr(metric, "signals") and hasattr(metric, "function")):
+            raise ParameterError(
+                f"ensemble_response needs metrics such as analysis.metrics.Metric, got {metric!r}"
+            )
+    states = {} if initial_state is None else initial_state
+    every = members(compiled, checked_params(params) or {}, states)
     labels = compiled.system.output_labels
     for signal in (*keep, *(s for m in metrics for s in m.signals)):
         if signal not in labels:

@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from ..expressions.graph import Expr
+from ..expressions.graph import Expr, needed
 from ._emit import Program
 from ._lower_blocks import Equations, equations, whole
 from ._parameters import length
 from ._schedule import Schedule
 from .codegen.calls import Calls
 from .codegen.ir.program import program_text
-from .codegen.plan import Function, Store, needed, plan, split
+from .codegen.plan import Function, Store, plan, split
 from .codegen.rewrite import rewritten
 
 ARGUMENTS = {

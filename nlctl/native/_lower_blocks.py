@@ -11,7 +11,7 @@ import numpy as np
 
 from .._errors import CompileError
 from ..expressions.arrays import Tracer, boxed, concatenated, full, number, traced, vector
-from ..expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable
+from ..expressions.graph import SMALL, Ambiguous, Graph, Untraceable
 from ..expressions.operators import elementwise
 from ..expressions.trace import trace
 from ._code import Code, code
@@ -110,7 +110,7 @@ def whole(schedule: Schedule, program: Program) -> Equations:
 def _results(graph: Graph, call: Call, given: Sequence[Tracer]) -> Tracer:
     """Return what a call with these arguments results in."""
     count = call.lengths[-1]
-    pieces = [piece for g in given for piece in _pieces(g)]
+    pieces = [piece for g in given for piece in g.pieces()]
     args, sizes = [e for e, _ in pieces], tuple(n for _, n in pieces)
     if not count:
         return concatenated(graph, [given[0][:0]])
@@ -275,12 +275,6 @@ def _is_next(one: Combination | None, other: Combination | None) -> bool:
         return one is other
     shifted = {Signal(s.block, s.index + 1): gain for s, gain in one.items()}
     return bool(one) and shifted == other
-
-
-def _pieces(array: Tracer) -> list[tuple[Expr, int]]:
-    if array.axis is not None:
-        return [(array.only, array.length)]
-    return [(array.graph.number(e), 1) for e in array.cells.flat]
 
 
 def _lines_of_one(i: int, node: Node, slots: Any, start: int, kind: str, count: int) -> list[str]:

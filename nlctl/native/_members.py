@@ -170,6 +170,10 @@ def members(compiled: Compiled, params: Mapping[str, Any], states: Mapping[str, 
     if len(set(sizes.values())) > 1:
         raise ParameterError(f"an ensemble needs arrays of one length, got {sizes}")
     size = next(iter(sizes.values()), 1)
+    if size == 0:
+        raise ParameterError(
+            f"an ensemble needs at least one member, got no values of '{next(iter(sizes))}'"
+        )
     return Members(compiled=compiled, params=values, states=initial, size=size)
 
 

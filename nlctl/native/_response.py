@@ -10,17 +10,12 @@ import numpy as np
 
 from .._errors import DivergedError
 from .._run_arguments import evaluation_array, input_array, interpolated, state_array
+from .._time_response import Response
 from ._compile import Compiled
 from ._lane import Status
 from ._simulate import Settings, Statistics, Trajectory, trajectory
 from .audit import Audit, Trial
 from .audit import audit as compare
-
-
-class Response(ct.TimeResponseData):
-    """A `control.TimeResponseData` that also keeps how the run went, in `statistics`."""
-
-    statistics: Statistics
 
 
 def respond(

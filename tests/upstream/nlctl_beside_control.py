@@ -25,6 +25,13 @@ SIGNATURE = inspect.signature(ORIGINAL)
 TIGHT = {"rtol": 1e-9, "atol": 1e-11}
 CLOSE = 1e-6  # of the largest number of the response
 TAKEN = {"sys", "timepts", "inputs", "initial_state", "params", "squeeze"}
+ALIASES = {
+    "T": "timepts",
+    "U": "inputs",
+    "X0": "initial_state",
+    "u": "inputs",
+    "x0": "initial_state",
+}
 _running = {"test": "", "inside": False}
 
 
@@ -43,7 +50,8 @@ def verdict(args: tuple, kwargs: dict) -> tuple[str, str]:
     """Compare a tight run of python-control with one in machine code."""
     try:
         given = SIGNATURE.bind(*args, **kwargs).arguments
-        given.update(given.pop("kwargs", {}))
+        more = given.pop("kwargs", {})
+        given.update({ALIASES.get(key, key): value for key, value in more.items()})
     except TypeError as error:
         return "not compared", str(error)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -77,10 +85,9 @@ def native(given: dict) -> Any:
     for key in given:
         if key not in known:
             raise UsageError(f"this comparison does not know the argument {key}")
-    compiled = nlctl.compile(given["sys"], params=given.get("params"))
     inputs, start = given.get("inputs", 0.0), given.get("initial_state", 0.0)
     return nlctl.input_output_response(
-        compiled, given["timepts"], inputs, start, params=given.get("params")
+        given["sys"], given["timepts"], inputs, start, params=given.get("params"), engine="native"
     )
 
 

@@ -288,3 +288,58 @@ def laplacian_loop(n):
         return dx
 
     return pieces(update, states=n)
+
+
+@entry
+def matrix_of_states(n):
+    """A covariance as a matrix, as in python-control's estimators."""
+    m = int(np.sqrt(n))
+    A = np.arange(m * m, dtype=float).reshape(m, m) / (m * m) - np.eye(m)
+
+    def update(t, x, u, params):
+        P = x[: m * m].reshape(m, m)
+        dP = A @ P + P @ A.T + u[0] * np.eye(m) - P @ P
+        rest = -x[m * m :]
+        return np.hstack([dP.reshape(-1), rest])
+
+    return pieces(update, states=n)
+
+
+@entry
+def assignment_through_another_shape(n):
+    """P is a view of x, so that x changes with it."""
+    m = int(np.sqrt(n))
+
+    def update(t, x, u, params):
+        y = 1.0 * x
+        P = y[: m * m].reshape(m, m)
+        P[0, 0] = u[0]
+        return -y
+
+    return pieces(update, states=n)
+
+
+@entry
+def flat_view_of_a_matrix_that_changes(n):
+    m = int(np.sqrt(n))
+
+    def update(t, x, u, params):
+        P = np.outer(np.ones(m), np.ones(m)) * u[0]
+        flat = P.reshape(-1)
+        P[0, 0] = x[0]
+        return np.hstack([-flat, -x[m * m :]])
+
+    return pieces(update, states=n)
+
+
+@entry
+def flat_copy_of_a_matrix_that_changes(n):
+    m = int(np.sqrt(n))
+
+    def update(t, x, u, params):
+        P = x[: m * m].reshape(m, m) * 1.0
+        flat = P.flatten()
+        P[0, 0] = u[0]
+        return np.hstack([-flat + P.ravel(), -x[m * m :]])
+
+    return pieces(update, states=n)

@@ -48,16 +48,48 @@ for (const table of document.querySelectorAll("table.data")) {
     count.setAttribute("role", "status");
     table.parentElement.before(bar);
     input.addEventListener("input", () => {
-      const words = input.value.toLowerCase().split(/\s+/).filter(Boolean);
+      const words = input.value.toLowerCase().replaceAll("\u2212", "-").split(/\s+/).filter(Boolean);
       const rows = [...body.rows];
       for (const row of rows) {
-        const text = row.textContent.toLowerCase();
+        const text = row.textContent.toLowerCase().replaceAll("\u2212", "-");
         row.hidden = !words.every((word) => text.includes(word));
       }
       const left = rows.filter((row) => !row.hidden).length;
       count.textContent = words.length ? `${left} of ${rows.length} rows` : "";
     });
   }
+}
+
+// What is folded opens for a link to it or into it, and for paper.
+const unfold = () => {
+  let element = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  if (!element?.closest("details:not([open])")) return;
+  for (let at = element; (at = at.closest("details")); at = at.parentElement) at.open = true;
+  element.scrollIntoView();
+};
+unfold();
+window.addEventListener("hashchange", unfold);
+document.addEventListener("click", (event) => {
+  if (event.target.closest?.('a[href^="#"]')) setTimeout(unfold); // also where the hash stays
+});
+let opened = [];
+window.addEventListener("beforeprint", () => {
+  opened = [...document.querySelectorAll("details:not([open])")];
+  for (const details of opened) details.open = true;
+});
+window.addEventListener("afterprint", () => {
+  for (const details of opened) details.open = false;
+});
+const folds = [...document.querySelectorAll("details")];
+const contents = document.getElementById("contents");
+if (folds.length && contents) {
+  const button = make("button", "Unfold all", contents);
+  button.className = "unfold";
+  button.addEventListener("click", () => {
+    const open = folds.some((details) => !details.open);
+    for (const details of folds) details.open = open;
+    button.textContent = open ? "Fold all" : "Unfold all";
+  });
 }
 
 const dialog = make("dialog", "", document.body);
@@ -68,11 +100,16 @@ let home = null;
 const enlarge = (drawing) => {
   if (home) return;
   home = drawing.parentElement;
-  dialog.append(drawing);
+  const caption = make("p", "", dialog);
+  const told = home.querySelector("figcaption").cloneNode(true);
+  told.querySelector("button").remove();
+  caption.append(...told.childNodes);
+  dialog.insertBefore(drawing, caption);
   dialog.showModal();
 };
 dialog.addEventListener("close", () => {
   home.prepend(dialog.querySelector(".drawing"));
+  dialog.querySelector("p").remove();
   home = null;
 });
 for (const drawing of document.querySelectorAll("figure > .drawing")) {

@@ -23,6 +23,9 @@ import numba
 import numpy as np
 
 LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"}  # their versions stand for them
+MODULE = "\1of "  # begins a text that names a module and nothing of its content
+HEAP_TYPE = 1 << 9  # Py_TPFLAGS_HEAPTYPE: made by a class statement
+CONSTANTS = (int, float, complex, str, bytes, tuple, list, dict, np.ndarray, np.generic)
 STANDARD = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
 
 
@@ -44,6 +47,16 @@ def program_key(program: Sourced) -> str:
 def function_key(*things: Any) -> str:
     """Return a key of functions, and of other things that their machine code depends on."""
     return _digest(*things)
+
+
+def content_key(*things: Any) -> str:
+    """Return a key of what functions compute: the same wherever their files are.
+
+    Unlike `function_key` it does not tell functions of the same content in different modules.
+    """
+    seen: set[int] = set()
+    texts = (text for thing in things for text in _fingerprint(thing, seen))
+    return _digest_of(text for text in texts if not text.startswith(MODULE))
 
 
 def module_key(*modules: types.ModuleType) -> str:
@@ -76,6 +89,16 @@ def _fingerprint(thing: Any, seen: set[int], names: Iterable[str] = ()) -> Itera
     elif isinstance(function := _plain(thing), types.FunctionType):
         yield _constant(sorted(getattr(thing, "targetoptions", {}).items()))
         yield from _of_function(function, seen)
+    elif isinstance(thing, functools.partial):
+        yield "partial"
+        yield from _fingerprint((thing.func, thing.args, thing.keywords), seen)
+    elif isinstance(thing, types.MethodType):
+        yield from _fingerprint(thing.__func__, seen)
+        yield from _fingerprint(thing.__self__, seen, names)
+    elif isinstance(thing, type):
+        yield from _of_class(thing, seen)
+    elif _is_users(type(thing)):
+        yield from _of_object(thing, seen)
     else:
         yield _constant(thing)
 
@@ -104,7 +127,7 @@ def _of_function(function: types.FunctionType, seen: set[int]) -> Iterator[str]:
     if id(function) in seen:
         return
     seen.add(id(function))
-    yield f"of {function.__module__}"  # what is on disk refers to it by this name
+    yield f"{MODULE}{function.__module__}"  # what is on disk refers to it by this name
     yield from _code_text(function.__code__)
     for given in (function.__defaults__, function.__kwdefaults__):
         yield from _fingerprint(given, seen)
@@ -115,6 +138,44 @@ def _of_function(function: types.FunctionType, seen: set[int]) -> Iterator[str]:
         if name in function.__globals__:
             yield name
             yield from _fingerprint(function.__globals__[name], seen, names)
+
+
+def _of_class(kind: type, seen: set[int]) -> Iterator[str]:
+    """Yield text for a class: a user's own for its functions and constants, and its bases."""
+    yield _constant(kind)
+    if not _is_users(kind) or id(kind) in seen:
+        return
+    seen.add(id(kind))
+    for name, part in sorted(vars(kind).items()):
+        functions = [getattr(part, key, None) for key in ("__func__", "func", "fget")]
+        function = next(filter(None, functions), part)  # of a method, a property
+        if isinstance(_plain(function), types.FunctionType):
+            yield name
+            yield from _fingerprint(function, seen)
+        elif not name.startswith("__") and isinstance(part, CONSTANTS):
+            yield name
+            yield from _fingerprint(part, seen)
+    for base in kind.__bases__:
+        yield from _of_class(base, seen)
+
+
+def _is_users(kind: type) -> bool:
+    """Whether somebody has written a class in Python; one in text that was run is of no module."""
+    in_text = kind.__module__ == "builtins"
+    return kind.__flags__ & HEAP_TYPE != 0 and (in_text or not _is_library(kind.__module__))
+
+
+def _of_object(thing: Any, seen: set[int]) -> Iterator[str]:
+    """Yield text for an object: its class, and what its attributes are."""
+    if id(thing) in seen:
+        return
+    seen.add(id(thing))
+    yield from _of_class(type(thing), seen)
+    slots = [name for kind in type(thing).__mro__ for name in getattr(kind, "__slots__", ())]
+    held = {name: getattr(thing, name) for name in slots if hasattr(thing, name)}
+    for name, value in sorted({**held, **getattr(thing, "__dict__", {})}.items()):
+        yield name
+        yield from _fingerprint(value, seen)
 
 
 def _content(cell: types.CellType) -> Any:

@@ -74,8 +74,8 @@ def finished(
             store.write(key, code)
         for name, address in symbols.items():
             llvm.add_symbol(name, address)
-        _check_symbols(text)
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        _check_symbols(text)  # now LLVM looks into this process too
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
         addresses = {name: engine.get_function_address(name) for name in names}

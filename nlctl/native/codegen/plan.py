@@ -8,11 +8,11 @@ in one loop; one that is used in several, or element by element, lies in memory.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from ...expressions.graph import Expr
+from ...expressions.graph import Expr, needed
 
 Loop = tuple[int, int]  # level and length
 STORED = ("concat", "call")  # vectors that are made in memory
@@ -149,18 +149,6 @@ class Function:
     arguments: tuple[str, ...]
     plan: Plan
     copied: int = 0
-
-
-def needed(exprs: Iterable[Expr], known: Collection[Expr]) -> tuple[Expr, ...]:
-    """Return all that expressions are made of, parts first; nothing behind what is known."""
-    found: dict[Expr, None] = {}
-    waiting = list(exprs)
-    while waiting:
-        expr = waiting.pop()
-        if expr not in found:
-            found[expr] = None
-            waiting.extend(expr.args if expr not in known else ())
-    return tuple(sorted(found, key=lambda e: e.index))
 
 
 def split(store: Store, known: Collection[Expr] = ()) -> list[Store]:

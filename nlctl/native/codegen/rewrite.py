@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from ...expressions.graph import COMPARISONS, Expr, Graph
-from .plan import Store, needed
+from ...expressions.graph import COMPARISONS, Expr, Graph, needed
+from .plan import Store
 
 JUMPS = (*COMPARISONS, "floor", "ceil", "trunc", "rint", "sign", "remainder", "fmod", "copysign")
 ALGEBRAIC = ("add", "sub", "mul", "div", "neg", "select", "absolute", "minimum", "maximum")

@@ -78,7 +78,7 @@ def _functions(system: Any) -> Iterator[tuple[str, Any]]:
         return
     if system.nstates:
         yield "update", system.updfcn
-    if system.noutputs and system.outfcn is not None:
+    if system.noutputs != 0 and system.outfcn is not None:
         yield "output", system.outfcn
     if isinstance(system, Block):
         for name in ("corners", "commit"):

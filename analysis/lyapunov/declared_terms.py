@@ -1,0 +1,63 @@
+"""Whether a plant's update is, as expressions, the chain (1) of the f and d that it declares.
+
+What is proved of f and d over a box is about the plant only if its runs integrate them.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from nlctl._diagram import Place
+from nlctl._equation import equation
+from nlctl.expressions.arrays import vector
+from nlctl.expressions.graph import Ambiguous, Graph, Untraceable
+from nlctl.expressions.trace import trace
+from nlctl.native._parameters import slots_of
+from nlctl.native._trace_block import parameters, time
+from nlctl.plants import PureFeedback, integrator_chain
+
+__all__ = ["terms_with_parameters", "update_is_declared"]
+
+
+def terms_with_parameters(plant: Any) -> tuple[Callable, Callable]:
+    """Return ``f(x, v, p)`` and ``d(x, t, p)`` as equations that machine code can call."""
+    if not isinstance(plant, PureFeedback):
+        return plant.f, plant.d
+    own_f, own_d = equation(plant.f), equation(plant.d)  # the user's functions, without parameters
+
+    @equation
+    def f(x, v, p):
+        return own_f(x, v)
+
+    @equation
+    def d(x, t, p):
+        return own_d(x, t)
+
+    return f, d
+
+
+@functools.lru_cache(maxsize=32)
+def update_is_declared(plant: Place) -> bool:
+    """Whether the update function and the chain of f and d are the same expressions.
+
+    False where they differ, and where that cannot be told: expressions that are equal but written
+    in another way count as different.
+    """
+    system, graph = plant.system, Graph()
+    declared = integrator_chain(*terms_with_parameters(system.current_spec))
+
+    def arguments() -> tuple[Any, ...]:
+        x, u = vector(graph, "x", 0, (system.nstates,)), vector(graph, "u", 0, (system.ninputs,))
+        return time(graph), x, u, parameters(graph, system, slots_of(system))
+
+    try:
+        with np.errstate(all="ignore"):
+            one, other = (trace(graph, f, arguments) for f in (system.updfcn, declared))
+    except (Untraceable, Ambiguous):
+        return False
+    pairs = zip(one.cells.flat, other.cells.flat, strict=False)
+    return one.shape == other.shape and all(a is b for a, b in pairs)

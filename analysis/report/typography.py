@@ -1,0 +1,84 @@
+"""Text as it is set in print: minus signs, powers, units that stay with their number, formulas.
+
+Whatever a report says is plain text; a formula inside it is written as LaTeX between ``\\(`` and
+``\\)``.  `pieces` says what the page shows of it, `plain` how it reads where only text can stand.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from .formula import spoken
+
+__all__ = ["Piece", "pieces", "plain", "typeset"]
+
+NO_BREAK = "\u00a0"
+UNITS = (
+    "%|‰|°C|°|s|ms|µs|min|h|m|mm|cm|µm|km|g|kg|N|kN|Nm|rad|mrad|deg|Hz|kHz|V|mV|A|mA|W|kW|K|Pa|kPa"
+    "|J|kJ|kB|MB|GB"
+)
+FORMULA = re.compile(r"\\\((.+?)\\\)", re.DOTALL)
+DOI = re.compile(r"(?:\bdoi:?\s*|https://doi\.org/)(10\.\d{4,9}/[\w.()/:-]*\w)", re.IGNORECASE)
+RAISED = str.maketrans("-+0123456789", "⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+_POWER_OF_TEN = re.compile(r"(?<![\w.·])(\d+(?:\.\d+)?)e([+-]?)0*(\d{1,3})(?![\w.]*\w)")
+_POWER = re.compile(r"(?<=[A-Za-zα-ω)])\^(-?\d+)(?![\w.])")
+_MINUS = re.compile(r"(?:^|(?<=[\s(\[{=,;:|<>≤≥±…·]))-(?=[\d∞]|\.\d)")
+_SIGNS = ((" <= ", " ≤ "), (" >= ", " ≥ "), (")-(", ")–("))
+_UNIT = re.compile(
+    rf"(?<=[\d∞⁰¹²³⁴⁵⁶⁷⁸⁹\]]) (?=(?:{UNITS}|1/[A-Za-z]+|/ [A-Za-z])(?![A-Za-z0-9_]))"
+)
+_NUMBERED = re.compile(r"\b(Example|Lemma|row|size) (?=\d)")
+_SLASH = re.compile(rf"(?<=\d{NO_BREAK}/) (?=[A-Za-z])")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Piece:
+    """A stretch of text: plain, or a formula (LaTeX), or a DOI."""
+
+    text: str = ""
+    latex: str = ""
+    doi: str = ""
+
+
+def typeset(text: str) -> str:
+    """Return plain text with the signs of print; what is no number, power or unit stays.
+
+    1e-06 becomes 10⁻⁶, 1/s^4 becomes 1/s⁴, -0.5 has a minus sign, and the spaces of 10 s,
+    99 % and Example 1 do not break.
+    """
+    text = _POWER_OF_TEN.sub(_scientific, text)
+    text = _POWER.sub(lambda found: found[1].translate(RAISED), text)
+    text = _MINUS.sub("−", text)
+    for typed, sign in _SIGNS:
+        text = text.replace(typed, sign)
+    text = _UNIT.sub(NO_BREAK, text)
+    text = _SLASH.sub(NO_BREAK, text)
+    return _NUMBERED.sub(rf"\1{NO_BREAK}", text)
+
+
+def _scientific(number: re.Match[str]) -> str:
+    mantissa, sign, exponent = number.groups()
+    power = f"10{(sign.strip('+') + exponent).translate(RAISED)}"
+    return power if mantissa == "1" else f"{mantissa}·{power}"
+
+
+def pieces(text: str) -> list[Piece]:
+    """Split a text at its formulas and DOIs; what is between them is set as in print."""
+    found = []
+    for number, part in enumerate(FORMULA.split(text)):
+        if number % 2:
+            found.append(Piece(latex=part))
+            continue
+        words, *rest = DOI.split(part)
+        for doi, after in zip(rest[0::2], rest[1::2], strict=True):
+            found += [Piece(text=f"{typeset(words)}doi "), Piece(doi=doi)]
+            words = after
+        found.append(Piece(text=typeset(words)))
+    return [piece for piece in found if piece != Piece()]
+
+
+def plain(text: str) -> str:
+    """Return a text whose formulas are written in letters, for titles and descriptions."""
+    return typeset(FORMULA.sub(lambda found: spoken(found[1]), text))

@@ -1,0 +1,176 @@
+"""What a diagram computes, as data that can be kept and compared: another loop has another record.
+
+Each block is told by a key of its functions and of all that these reach (`nlctl.native.codegen.
+fingerprint`), connections and values stand beside.  Independently of any code that is read,
+python-control's own rates and outputs are evaluated at a few points: they tell a loop from another
+one where a key cannot, such as a function of another language.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+import warnings
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+import control as ct
+import numpy as np
+
+from nlctl._block import Block
+from nlctl._diagram import all_parameter_rows, initial_state, leaves, places, state_names
+from nlctl._param import declared_params
+from nlctl.native.codegen.fingerprint import content_key
+
+__all__ = ["array_text", "loop_facts", "loop_values", "short_key", "values_differ"]
+
+T = TypeVar("T")
+EQUATIONS = ("update", "output", "corners", "commit")
+SHAPE = ("inputs", "outputs", "states", "feedthrough", "vector", "memory", "initial")
+POINTS = 6
+GOLDEN = (math.sqrt(5) - 1) / 2
+GIVEN = re.compile(r"sys\[\d+\]")  # by python-control
+RTOL, ATOL = 1e-6, 1e-9  # what processors and versions of libraries may differ by
+
+
+def loop_facts(system: ct.InputOutputSystem) -> dict[str, dict[str, str]]:
+    """Return what a diagram consists of.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        As it stands; it need not compile.
+
+    Returns
+    -------
+    dict
+        ``blocks`` (a key by path), ``wiring`` (a key by diagram), ``parameters`` (text by name)
+        and ``initial_state`` (text by name, where it is not 0).
+    """
+    start = zip(state_names(system), initial_state(system).tolist(), strict=True)
+    wired = [p for p in places(system) if isinstance(p.system, ct.InterconnectedSystem)]
+    found = {
+        "blocks": {p.path or p.system.name: _block(p.system) for p in leaves(system)},
+        "wiring": {p.path or "diagram": _wiring(p.system) for p in wired},
+        "parameters": _parameters(system),
+        "initial_state": {name: repr(value) for name, value in start if value},
+    }
+    return {part: _steady(system, content) for part, content in found.items()}
+
+
+def _steady(system: ct.InputOutputSystem, content: Mapping[str, T]) -> dict[str, T]:
+    """Number the names that python-control gives, ``sys[7]``, by where they stand.
+
+    It counts the systems of a process.
+    """
+    every = " ".join(place.system.name for place in places(system))
+    numbers = {name: f"sys {i}" for i, name in enumerate(dict.fromkeys(GIVEN.findall(every)))}
+    return {GIVEN.sub(lambda m: numbers.get(m[0], m[0]), k): v for k, v in content.items()}
+
+
+def short_key(*things: Any) -> str:
+    """Return a key of functions, and of all that they reach, short enough to be read."""
+    return content_key(*things)[:16]
+
+
+def _block(system: Any) -> str:
+    """Return a key of a block's equations; its parameters' values are told by themselves."""
+    timebase = repr(system.dt)
+    if isinstance(system, Block):
+        spec, known = system.spec, declared_params(system.spec)
+        held = {k: v for k, v in getattr(spec, "__dict__", {}).items() if k not in known}
+        parts = [getattr(spec, name, None) for name in (*EQUATIONS, *SHAPE)]
+        return short_key(type(spec), held, parts, timebase)
+    if isinstance(system, ct.StateSpace):
+        return short_key([system.A, system.B, system.C, system.D], timebase)
+    if isinstance(system, ct.TransferFunction):
+        return short_key(*(_numbers_of(a) for a in (system.num_array, system.den_array)), timebase)
+    functions = [getattr(system, name, None) for name in ("updfcn", "outfcn")]
+    signals = [system.input_labels, system.output_labels, system.state_labels]
+    return short_key(type(system).__qualname__, functions, signals, timebase)
+
+
+def _numbers_of(polynomials: Any) -> list[Any]:
+    """Return the coefficients of an array of polynomials."""
+    return [np.asarray(p).tolist() for p in np.ravel(polynomials)]
+
+
+def _wiring(diagram: Any) -> str:
+    maps = [np.asarray(m) for m in (diagram.connect_map, diagram.input_map, diagram.output_map)]
+    parts = [[s.input_labels, s.output_labels] for s in diagram.syslist]
+    return short_key(maps, parts, diagram.input_labels, diagram.output_labels, repr(diagram.dt))
+
+
+def _parameters(system: Any) -> dict[str, str]:
+    """Return all values, of blocks of any kind."""
+    found = {
+        f"{place.path or place.system.name}.{name}": value
+        for place in leaves(system)
+        if not isinstance(place.system, Block)
+        for name, value in dict(place.system.params or {}).items()
+    }
+    found |= dict(system.params or {})
+    found |= {row.name: row.value for row in all_parameter_rows(system)}
+    return {name: _value_text(value) for name, value in found.items()}
+
+
+def _value_text(value: Any) -> str:
+    if isinstance(value, bool | int | float | str | np.generic):
+        return repr(value.item() if isinstance(value, np.generic) else value)
+    try:
+        return array_text(value)
+    except (TypeError, ValueError):  # no numbers
+        return short_key(value)
+
+
+def array_text(values: Any) -> str:
+    """Return what tells an array of numbers from another one."""
+    array = np.asarray(values, dtype="<f8")
+    return f"{hashlib.sha256(array.tobytes()).hexdigest()[:16]} of shape {array.shape}"
+
+
+def loop_values(system: Any, end: float) -> dict[str, float | str]:
+    """Return rates of states and outputs, each summed with weights over some points.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+    end : float
+        Values are taken at times from 0 to this (s).
+
+    Returns
+    -------
+    dict
+        By name, a rate with a prime; ``{"raises": name}`` where a function of a block fails.
+    """
+    start, width = initial_state(system), system.ninputs or 0
+    reach = np.maximum(1.0, abs(start)) / 4
+    rates, outputs = np.zeros(start.size), np.zeros(system.noutputs or 0)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        for k in range(POINTS):
+            spread = (GOLDEN * np.arange(1, start.size + width + 1) * (k + 1)) % 1 - 0.5
+            x = start + reach * spread[: start.size] * (k > 0)
+            t, u = end * k / (POINTS - 1), spread[start.size :]
+            try:
+                rates += (1 + k % 3) * np.ravel(system.dynamics(t, x, u, params={}))
+                outputs += (1 + k % 3) * np.ravel(system.output(t, x, u, params={}))
+            except Exception as error:  # whatever a function of the user's raises
+                return {"raises": type(error).__name__}
+    names = [*(f"{name}'" for name in state_names(system)), *system.output_labels]
+    values = dict(zip(names, [*rates.tolist(), *outputs.tolist()], strict=True))
+    return _steady(system, values)
+
+
+def values_differ(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """Return the names of values in two records that rounding does not explain."""
+    names = dict.fromkeys([*before, *now])
+    return [name for name in names if not _close(before.get(name), now.get(name))]
+
+
+def _close(one: Any, other: Any) -> bool:
+    if isinstance(one, float) and isinstance(other, float):
+        both_nan = math.isnan(one) and math.isnan(other)
+        return both_nan or math.isclose(one, other, rel_tol=RTOL, abs_tol=ATOL)
+    return one == other

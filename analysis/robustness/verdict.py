@@ -1,0 +1,128 @@
+"""Three answers to a claim: it is shown, it is refuted, or what was run tells neither."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy import stats
+
+from nlctl._arguments import fraction
+from nlctl._errors import ParameterError
+
+from .guarantee import MOST_RUNS, Violation, runs_needed
+from .sequential import SequentialTest, log_evidence
+
+__all__ = ["Answer", "Verdict", "better_verdict", "bound_verdict", "test_verdict"]
+
+Answer = Literal["shown", "refuted", "not shown yet"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What runs say of a claim; printed, ``not shown yet (needs at least 132 more runs ...)``.
+
+    Attributes
+    ----------
+    answer : {"shown", "refuted", "not shown yet"}
+        Shown and refuted with the confidence of the statement that the claim is about.
+    needs : str
+        What it takes to show it; empty where that is no question.
+    """
+
+    answer: Answer
+    needs: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.answer} (needs {self.needs})" if self.needs else self.answer
+
+
+def bound_verdict(statement: Violation, limit: float) -> Verdict:
+    """Judge the claim that the probability of a violation is at most a limit.
+
+    It is shown if the upper bound is at most the limit, and refuted if the lower bound lies above
+    it.  Of the two only the wrong one is an error, whatever the probability is, so that each
+    bound may use up the confidence by itself: the verdict is wrong with probability at most
+    1 - confidence.
+
+    Parameters
+    ----------
+    statement : Violation
+        From `guarantee.violation_probability`.
+    limit : float
+
+    Raises
+    ------
+    ParameterError
+        If the limit is not between 0 and 1.
+    """
+    limit = fraction("a verdict", "limit", limit)
+    low, high = statement.singly
+    if high <= limit:
+        return Verdict(answer="shown")
+    if low > limit:
+        return Verdict(answer="refuted")
+    confidence = (1 + statement.confidence) / 2 if statement.side == "both" else None
+    try:
+        planned = runs_needed(limit, confidence or statement.confidence, statement.violations)
+    except ParameterError:
+        return Verdict(answer="not shown yet", needs=f"more than {MOST_RUNS:.0e} runs")
+    return Verdict(answer="not shown yet", needs=_more(planned - statement.runs))
+
+
+def test_verdict(test: SequentialTest) -> Verdict:
+    """Judge the claim that the probability of a violation is below the threshold of a test."""
+    if test.decision != "undecided":
+        return Verdict(answer="shown" if test.decision == "below" else "refuted")
+    k, n = test.statement.violations, test.statement.runs
+    evidence = -np.log(1 - test.statement.confidence)
+
+    def decides(runs: int) -> bool:
+        below = k / runs < test.threshold
+        return bool(below and log_evidence(k, runs, test.threshold) >= evidence)
+
+    few, enough = n, 2 * n
+    while not decides(enough):
+        few, enough = enough, 2 * enough
+        if few > MOST_RUNS:
+            return Verdict(answer="not shown yet", needs=f"more than {MOST_RUNS:.0e} runs")
+    while enough - few > 1:
+        middle = (few + enough) // 2
+        few, enough = (few, middle) if decides(middle) else (middle, enough)
+    return Verdict(answer="not shown yet", needs=_more(enough - n))
+
+
+def _more(runs: int) -> str:
+    return f"at least {runs} more run{'s' * (runs != 1)} without a violation"
+
+
+def better_verdict(wins: int, losses: int, p: float, level: float, tests: float = 1.0) -> Verdict:
+    """Judge the claim that one option is better than another, by the sign test.
+
+    Parameters
+    ----------
+    wins, losses : int
+        Samples in which it is better, and worse.
+    p : float
+        Of the sign test, adjusted for the number of tests.
+    level : float
+        The largest p that shows or refutes it.
+    tests : float, optional
+        Factor by which p was adjusted.
+    """
+    if p <= level:
+        return Verdict(answer="shown" if wins > losses else "refuted")
+
+    def decides(more: int) -> bool:
+        one, all_ = wins + more, wins + losses + more
+        return 2 * one > all_ and bool(stats.binomtest(one, all_).pvalue * tests <= level)
+
+    few, enough = 0, 1
+    while not decides(enough):
+        few, enough = enough, 2 * enough
+    while enough - few > 1:
+        middle = (few + enough) // 2
+        few, enough = (few, middle) if decides(middle) else (middle, enough)
+    needs = f"at least {enough} more sample{'s' * (enough != 1)}, won in every one"
+    return Verdict(answer="not shown yet", needs=needs)

@@ -1,0 +1,149 @@
+"""What results are computed from: study, equations, wiring, values, versions.
+
+The record is kept with a run (``run.json``), a key of it with every finding and all rows.  Whatever
+adds to a run or draws from it compares first: nothing is said of one loop beside the numbers of
+another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from analysis.json_values import as_json, from_json
+from analysis.robustness import Prepared
+from analysis.robustness.identity import differences_of, experiment_facts, labels_text
+from analysis.robustness.loop_record import loop_facts, loop_values, values_differ
+
+from .analyses import Compare
+from .comparison import compared
+from .read import StudyFile
+from .schema import Study, keyed
+
+__all__ = [
+    "compared_differences",
+    "loop_differences",
+    "origin_of",
+    "plain_study",
+    "version_differences",
+]
+
+MOST = 4  # differences that a sentence names
+
+
+def origin_of(file: StudyFile, prepared: Prepared) -> dict[str, Any]:
+    """Return what the results of a study follow from, as data for a JSON file.
+
+    Parameters
+    ----------
+    file : StudyFile
+    prepared : Prepared
+        Its experiment.
+
+    Raises
+    ------
+    UsageError
+        If what a comparison compares cannot be made.
+    """
+    end = float(file.experiment.timepts[-1])
+    facts = experiment_facts(prepared)
+    values = {labels_text(labels): loop_values(p.system, end) for labels, p in prepared.loops}
+    for key, asked in keyed(file.study).items():
+        if isinstance(asked, Compare):
+            for labels, diagram in compared(file.experiment, asked, file.folder):
+                name = _compared_name(key, labels)
+                facts["diagrams"][name] = loop_facts(diagram)
+                values[name] = loop_values(diagram, end)
+    content = {**facts, "study": plain_study(file.study), "values": values}
+    return from_json(as_json(content))  # as it is read from a file
+
+
+def _compared_name(key: str, labels: Mapping[str, str]) -> str:
+    return f"{key}: {labels_text(labels)}"
+
+
+def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared) -> str:
+    """Return in words how the loops of a comparison differ from those of a record.
+
+    They are made anew when the comparison begins, hours later: what they read may have changed.
+    """
+    end = float(prepared.experiment.timepts[-1])
+    names = {_compared_name(key, labels): loop.system for labels, loop in prepared.loops}
+    before = {part: {n: origin[part].get(n) for n in names} for part in ("diagrams", "values")}
+    now = {
+        "diagrams": {name: loop_facts(system) for name, system in names.items()},
+        "values": {name: loop_values(system, end) for name, system in names.items()},
+    }
+    return _listed(list(dict.fromkeys(_diagrams(before, from_json(as_json(now))))))
+
+
+def plain_study(study: Study) -> dict[str, Any]:
+    """Return a study as it stands in a record."""
+    return from_json(as_json(study.model_dump(mode="json", exclude_unset=True, exclude_none=True)))
+
+
+def version_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Return which versions differ, in words; nothing if none does."""
+    old, new = before["versions"], now["versions"]
+    return _listed(
+        [
+            f"{name} {old.get(name, 'absent')} then, {new.get(name, 'absent')} now"
+            for name in dict.fromkeys([*old, *new])
+            if old.get(name) != new.get(name)
+        ]
+    )
+
+
+def loop_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Return what else differs, in words; nothing if nothing does."""
+    found = list(dict.fromkeys([*_settings(before, now), *_diagrams(before, now)]))
+    return _listed(found)
+
+
+def _listed(texts: Sequence[str]) -> str:
+    more = f"; and {len(texts) - MOST} more" if len(texts) > MOST else ""
+    return "; ".join(texts[:MOST]) + more
+
+
+def _settings(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what differs beside the diagrams."""
+    keys = dict.fromkeys([*before["study"], *now["study"]])
+    changed = [key for key in keys if before["study"].get(key) != now["study"].get(key)]
+    if changed:
+        yield f"{', '.join(f'[{key}]' for key in changed)} of the study"
+        return  # the rest follows
+    others = [k for k in before if k not in ("study", "diagrams", "versions", "values")]
+    yield from differences_of(*({k: part[k] for k in others} for part in (before, now)))
+
+
+def _diagrams(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what differs in diagrams; what several have in common comes several times."""
+    old, new = before["diagrams"], now["diagrams"]
+    for name in dict.fromkeys([*old, *new]):
+        if name not in old or name not in new:
+            yield f"the diagram '{name}' is {'new' if name in new else 'gone'}"
+            continue
+        found = list(_parts(old[name], new[name]))
+        moved = values_differ(before["values"][name], now["values"][name])
+        if moved and not found:
+            found = [f"the value of {moved[0]} at the same point"]
+        if not found and old[name] != new[name]:
+            found = ["the compiled program"]
+        yield from found
+
+
+def _parts(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what differs between two records of one diagram."""
+    for part, words in (("blocks", "the equations of '{}'"), ("wiring", "the wiring of '{}'")):
+        for name in _changed(old[part], new[part]):
+            here, there = name in old[part], name in new[part]
+            told = words.format(name) if here and there else f"'{name}'"
+            yield told + ("" if here and there else " is gone" if here else " is new")
+    for part, words, default in (("parameters", "{}", "absent"), ("initial_state", "{}(0)", "0.0")):
+        for name in _changed(old[part], new[part]):
+            was, now = (content.get(name, default) for content in (old[part], new[part]))
+            yield f"{words.format(name)} was {was}, now {now}"
+
+
+def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    return [name for name in dict.fromkeys([*old, *new]) if old.get(name) != new.get(name)]

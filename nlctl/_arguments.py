@@ -1,0 +1,195 @@
+"""Arguments of functions, checked in one way; each check returns the value that it let through.
+
+Every message names who asked, the argument, the rule and the value.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ._errors import ParameterError
+from ._param import as_numbers, whole_number
+
+__all__ = [
+    "a_function",
+    "flag",
+    "fraction",
+    "number",
+    "of_type",
+    "one_of",
+    "text",
+    "tuple_of",
+    "vector",
+    "whole_number",
+]
+
+T = TypeVar("T")
+
+
+def one_of(who: str, name: str, value: Any, options: Iterable[str]) -> Any:
+    """Return an option that is one of a few words.
+
+    Raises
+    ------
+    ParameterError
+        If it is another; the nearest one is named.
+    """
+    options = list(options)
+    if isinstance(value, str) and value in options:
+        return value
+    text = value.lower() if isinstance(value, str) else ""
+    near = difflib.get_close_matches(text, options, n=1, cutoff=0.6)
+    hint = f"; nearest: '{near[0]}'" if near else ""
+    rule = " or ".join(f"'{option}'" for option in options)
+    raise ParameterError(f"{who} needs {name} to be {rule}, got {value!r}{hint}")
+
+
+def number(
+    who: str,
+    name: str,
+    value: Any,
+    *,
+    above: float = -np.inf,
+    below: float = np.inf,
+    at_least: float = -np.inf,
+    at_most: float = np.inf,
+) -> float:
+    """Return a finite number as a float.
+
+    Raises
+    ------
+    ParameterError
+        If it is no real number, NaN, infinite, or breaks a bound.
+    """
+    is_number = isinstance(value, int | float | np.integer | np.floating)
+    if not is_number or isinstance(value, bool):
+        raise ParameterError(f"{who} needs a number for {name}, got {value!r}")
+    try:
+        converted = float(value)
+    except OverflowError:  # an integer beyond the largest number
+        converted = np.inf
+    holds = above < converted < below and at_least <= converted <= at_most
+    if not (holds and np.isfinite(converted)):
+        rule = _rule(name, (above, at_least), (below, at_most))
+        raise ParameterError(f"{who} needs {rule}, got {value}")
+    return converted
+
+
+def _rule(name: str, low: tuple[float, float], high: tuple[float, float]) -> str:
+    """Return bounds as ``0 < name < 1``, ``name >= 2`` or ``a finite name``."""
+    lows = [f"{b:g} {sign} " for sign, b in zip(("<", "<="), low, strict=True) if np.isfinite(b)]
+    highs = [f" {sign} {b:g}" for sign, b in zip(("<", "<="), high, strict=True) if np.isfinite(b)]
+    if lows and not highs:
+        limit, sign = lows[0].split()
+        return f"a finite {name} {sign.replace('<', '>')} {limit}"
+    return f"{lows[0]}{name}{highs[0]}" if lows else f"a finite {name}{''.join(highs)}"
+
+
+def vector(who: str, name: str, value: Any) -> np.ndarray:
+    """Return finite numbers as a float array of shape (m,).
+
+    Raises
+    ------
+    ParameterError
+        If they are no real numbers, not in one row, or one is NaN or infinite.
+    """
+    array = as_numbers(value)
+    if array is None or (array.ndim != 1 and array.size):
+        given = repr(value) if array is None else f"shape {array.shape}"
+        raise ParameterError(f"{who} needs a list of numbers for {name}, got {given}")
+    bad = np.nonzero(~np.isfinite(array))[0]
+    if bad.size:
+        raise ParameterError(f"{who} needs finite {name}, got {array[bad[0]]} as number {bad[0]}")
+    return array.reshape(-1)
+
+
+def fraction(who: str, name: str, value: Any) -> float:
+    """Return a number between 0 and 1, both excluded.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    return number(who, name, value, above=0, below=1)
+
+
+def flag(who: str, name: str, value: Any) -> bool:
+    """Return True or False.
+
+    Raises
+    ------
+    ParameterError
+        If it is anything else, such as the text "no".
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")
+    return bool(value)
+
+
+def of_type(who: str, name: str, value: Any, kind: type[T], how: str = "") -> T:
+    """Return a value of the kind that a function works on.
+
+    Parameters
+    ----------
+    how : str, optional
+        How such a value is made.
+
+    Raises
+    ------
+    ParameterError
+        If it is of another type.
+    """
+    if not isinstance(value, kind):
+        made = f" ({how})" if how else ""
+        raise ParameterError(
+            f"{who} needs {name} to be of type {kind.__name__}{made}, got {type(value).__name__}"
+        )
+    return value
+
+
+def tuple_of(who: str, name: str, values: Any, kind: type[T]) -> tuple[T, ...]:
+    """Return a sequence of values of one kind as a tuple.
+
+    Raises
+    ------
+    ParameterError
+        If it is no list or tuple, or an entry is of another type.
+    """
+    if not isinstance(values, list | tuple):
+        raise ParameterError(
+            f"{who} needs {name} to be a tuple of {kind.__name__}, got {type(values).__name__}"
+        )
+    for place, value in enumerate(values):
+        of_type(who, f"{name}[{place}]", value, kind)
+    return tuple(values)
+
+
+def text(who: str, name: str, value: Any) -> str:
+    """Return a text that is not empty.
+
+    Raises
+    ------
+    ParameterError
+        If it is empty, or no text.
+    """
+    if not (isinstance(value, str) and value):
+        raise ParameterError(f"{who} needs a name for {name}, got {value!r}")
+    return value
+
+
+def a_function(who: str, name: str, value: Any) -> Any:
+    """Return what can be called.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot.
+    """
+    if not callable(value):
+        raise ParameterError(f"{who} needs a function for {name}, got {type(value).__name__}")
+    return value

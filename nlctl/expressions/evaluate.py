@@ -1,0 +1,68 @@
+"""The values of expressions, by NumPy: for single points, and as the reference of other readers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from .graph import NUMPY, Expr, Untraceable, needed
+
+__all__ = ["evaluate"]
+
+
+def evaluate(results: Iterable[Expr], arrays: Mapping[str, np.ndarray]) -> list[np.ndarray]:
+    """Return the values of expressions.
+
+    Parameters
+    ----------
+    results : iterable of Expr
+    arrays : mapping
+        What is read, by name: ``"t"``, ``"x"``, ``"u"``, ``"p"``, of shape (rows, points).
+
+    Returns
+    -------
+    list of ndarray
+        Of shape (points,) for numbers, (size, points) for vectors; without the last axis, or with
+        1 in its place, where nothing depends on the point.
+
+    Raises
+    ------
+    Untraceable
+        If an opaque function, which has no expressions, is among what results are made of.
+    """
+    values: dict[Expr, np.ndarray] = {}
+    results = list(results)
+    with np.errstate(all="ignore"):  # infinity and NaN travel, as they do in machine code
+        for node in needed(results):
+            values[node] = _value(node, [values[arg] for arg in node.args], arrays)
+    return [values[expr] for expr in results]
+
+
+def _value(node: Expr, parts: list[np.ndarray], arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    if node.op == "const":
+        return np.asarray(node.data)
+    if node.op == "table":
+        return np.asarray(node.data)[:, None]
+    if node.op == "leaf":
+        array, start, step = node.data
+        rows = [start + step * i for i in range(node.size)] if node.size else start
+        return arrays[array][rows]
+    if node.op == "item":
+        return parts[0][node.data]
+    if node.op == "slice":
+        start, step = node.data
+        return parts[0][[start + step * i for i in range(node.size or 1)]]
+    if node.op == "concat":
+        return _joined(node, parts)
+    if node.op == "sum":
+        return parts[0].sum(axis=0)
+    if node.op == "call":
+        raise Untraceable(f"{node.data[0]} is opaque: it has no expressions")
+    return getattr(np, NUMPY.get(node.op, node.op))(*parts)
+
+
+def _joined(node: Expr, parts: list[np.ndarray]) -> np.ndarray:
+    points = np.broadcast_shapes((1,), *(part.shape[-1:] for part in parts))
+    rows = [np.broadcast_to(p, (n, *points)) for p, n in zip(parts, node.data, strict=True)]
+    return np.concatenate(rows)

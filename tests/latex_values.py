@@ -1,0 +1,209 @@
+"""The value of a formula: a reader of the LaTeX that nlctl writes, with its own rules."""
+
+import math
+import re
+
+import numpy as np
+
+FUNCTIONS = {
+    "sin": np.sin, "cos": np.cos, "tan": np.tan, "tanh": np.tanh, "sinh": np.sinh,
+    "cosh": np.cosh, "ln": np.log, "arcsin": np.arcsin, "arccos": np.arccos,
+    "arctan": np.arctan, "exp": np.exp,
+}  # fmt: skip
+NAMED = {"sgn": np.sign, "arsinh": np.arcsinh, "arcosh": np.arccosh, "artanh": np.arctanh,
+         "trunc": np.trunc, "round": np.rint, "atan2": np.arctan2, "fmod": np.fmod}  # fmt: skip
+RELATIONS = {"<": "__lt__", r"\le": "__le__", ">": "__gt__", r"\ge": "__ge__",
+             "=": "__eq__", r"\ne": "__ne__"}  # fmt: skip
+
+
+class Reader:
+    """Reads one formula from left to right; `symbols` are the values of symbols."""
+
+    def __init__(self, text, symbols):
+        self.text, self.symbols = text.strip(), symbols
+        self.order = sorted(symbols, key=len, reverse=True)
+
+    def skip(self):
+        self.text = re.sub(r"^(\s|\\,)+", "", self.text)
+
+    def take(self, start):
+        self.skip()
+        if self.text.startswith(start):
+            self.text = self.text[len(start) :]
+            return True
+        return False
+
+    def need(self, start):
+        assert self.take(start), f"expected {start} before {self.text!r}"
+
+    def total(self):
+        """A sum of products."""
+        sign = -1.0 if self.take("-") else 1.0
+        value = sign * self.product()
+        while True:
+            if self.take("+"):
+                value = value + self.product()
+            elif self.take("-"):
+                value = value - self.product()
+            else:
+                return value
+
+    def product(self):
+        value = self.power()
+        while True:
+            self.skip()
+            if self.take(r"\cdot"):
+                value = value * self.power()
+            elif self.take(r"\bmod"):
+                value = np.remainder(value, self.power())
+            elif self.begins():
+                value = value * self.power()
+            else:
+                return value
+
+    def begins(self):
+        closing = (r"\right", r"\end", r"\\", r"\le", r"\ge", r"\ne", r"\text", r"\quad")
+        if self.text.startswith((r"\left", r"\ln")):
+            return True
+        return bool(self.text) and not self.text.startswith((*closing, *"+-,)}&<>=|"))
+
+    def power(self):
+        base = self.atom()
+        return np.power(base, self.braced()) if self.take("^") else base
+
+    def braced(self):
+        self.need("{")
+        value = self.total()
+        self.need("}")
+        return value
+
+    def atom(self):
+        self.skip()
+        for name in self.order:
+            rest = self.text[len(name) :]
+            if self.text.startswith(name) and not re.match(r"_|[a-zA-Z]", rest):
+                self.text = rest
+                return self.symbols[name]
+        number = re.match(r"\d+(\.\d+)?", self.text)
+        if number:
+            self.text = self.text[number.end() :]
+            return float(number[0])
+        if self.take(r"\frac"):
+            return self.braced() / self.braced()
+        if self.take(r"\sqrt[3]"):
+            return np.cbrt(self.braced())
+        if self.take(r"\sqrt"):
+            return np.sqrt(self.braced())
+        for opening, closing, function in (
+            ("(", ")", float), ("|", "|", abs),
+            (r"\lfloor", r"\rfloor", np.floor), (r"\lceil", r"\rceil", np.ceil),
+        ):  # fmt: skip
+            if self.take(rf"\left{opening}"):
+                value = self.total()
+                self.need(rf"\right{closing}")
+                return function(value)
+        if self.take(r"\begin{cases}"):
+            return self.cases()
+        if self.take(r"\infty"):
+            return math.inf
+        if self.take(r"\mathrm{NaN}"):
+            return math.nan
+        if self.take(r"\pi"):
+            return math.pi
+        if re.match(r"e\^", self.text):
+            self.text = self.text[1:]
+            return math.e
+        return self.function()
+
+    def function(self):
+        for name, extreme in ((r"\min", min), (r"\max", max)):
+            if self.take(name):
+                return extreme(self.arguments())
+        for base in ("2", "{10}"):
+            if self.take(rf"\log_{base}"):
+                return np.log(self.atom()) / np.log(float(base.strip("{}")))
+        found = re.match(r"\\operatorname\{(\w+)\}", self.text)
+        if found:
+            self.text = self.text[found.end() :].lstrip()
+            two = found[1] in ("atan2", "fmod")
+            return NAMED[found[1]](*(self.arguments() if two else [self.atom()]))
+        found = re.match(r"\\([a-z]+)", self.text)
+        assert found is not None, self.text
+        assert found[1] in FUNCTIONS, self.text
+        self.text = self.text[found.end() :]
+        return FUNCTIONS[found[1]](self.atom())
+
+    def arguments(self):
+        self.need(r"\left(")
+        first = self.total()
+        self.need(",")
+        second = self.total()
+        self.need(r"\right)")
+        return first, second
+
+    def cases(self):
+        chosen = None
+        while not self.take(r"\end{cases}"):
+            with np.errstate(all="ignore"):
+                value = self.total()
+            self.need("&")
+            holds = self.take(r"\text{otherwise}") or self.condition()
+            chosen = value if chosen is None and holds else chosen
+            self.take(r"\\")
+        return chosen
+
+    def condition(self):
+        value = self.comparison()
+        while True:
+            if self.take(r"\text{ and }"):
+                value = self.comparison() and value
+            elif self.take(r"\text{ or }"):
+                value = self.comparison() or value
+            elif self.take(r"\text{ xor }"):
+                value = self.comparison() != value
+            else:
+                return value
+
+    def comparison(self):
+        if self.take(r"\text{not }"):
+            return not self.comparison()
+        if self.take(r"\left("):
+            before = self.text
+            try:
+                value = self.condition()
+                self.need(r"\right)")
+                if not self.text.lstrip().startswith(tuple(RELATIONS)) and value in (True, False):
+                    return value
+            except AssertionError:
+                pass
+            self.text = rf"\left({before}"
+        low, holds = self.total(), True
+        for _ in range(2):
+            self.skip()
+            sign = next((r for r in RELATIONS if self.text.startswith(r)), None)
+            if sign is None:
+                break
+            self.need(sign)
+            high = self.total()
+            holds = holds and bool(getattr(np.float64(low), RELATIONS[sign])(high))
+            low = high
+        return holds
+
+
+def value(text, symbols):
+    """Return the value of a formula."""
+    reader = Reader(text, symbols)
+    found = reader.total()
+    reader.skip()
+    assert not reader.text, f"left over: {reader.text!r} of {text!r}"
+    return float(found)
+
+
+def values(equations, where, symbols):
+    """Return the values of the left sides of equations, by symbol."""
+    symbols = dict(symbols)
+    for line in reversed(where):  # what is used comes later
+        name, _, right = line.partition(" = ")
+        symbols[name] = value(right, symbols)
+    pairs = [line.partition(" = ") for line in equations]
+    return {name: value(right, symbols) for name, _, right in pairs}

@@ -1,0 +1,186 @@
+"""Exact derivatives: each row of the table, users' functions, both examples; Richardson's rule
+and closed forms are the other way to the same numbers."""
+
+import math
+from functools import partial
+from itertools import pairwise
+
+import control as ct
+import numpy as np
+import pytest
+import user_functions
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from user_function_checks import quiet
+
+import nlctl
+from nlctl._errors import UsageError
+from nlctl.expressions.functions import FUNCTIONS, MATH
+from nlctl.native import CompileError
+
+ROWS = sorted(FUNCTIONS)
+DOMAIN = {"arccosh": (1.1, 4.0), "arcsin": (-0.9, 0.9), "arccos": (-0.9, 0.9)}
+DOMAIN |= {"arctanh": (-0.9, 0.9), "log1p": (-0.9, 4.0)}
+DOMAIN |= dict.fromkeys(("log", "log2", "log10", "sqrt", "power"), (0.1, 4.0))
+
+
+def extrapolated(function, h):
+    """Return f'(0) of Richardson's rule over central differences with h, h/2, h/4 and h/8."""
+    table = [(function(s) - function(-s)) / (2 * s) for s in h / 2.0 ** np.arange(4)]
+    for order in (4, 16, 64):
+        table = [(order * b - a) / (order - 1) for a, b in pairwise(table)]
+    return table[0]
+
+
+def differences(function, x, h=0.05):
+    """Return the Jacobian of a function by `extrapolated`, column by column."""
+    columns = [
+        extrapolated(lambda s, e=e: function(x + s * e), h * max(1.0, abs(x[i])))
+        for i, e in enumerate(np.eye(x.size))
+    ]
+    return np.stack(columns, axis=-1) if columns else np.zeros((function(x).size, 0))
+
+
+def points_of(name):
+    low, high = DOMAIN.get(name, (-4.0, 4.0))
+    number = st.floats(low, high).filter(lambda v: abs(2 * v - np.rint(2 * v)) > 0.1)
+    return st.lists(number, min_size=2, max_size=2, unique_by=lambda v: round(abs(v), 1))
+
+
+@pytest.mark.parametrize("name", ROWS)
+@given(data=st.data())
+def test_each_partial_derivative_of_the_table(name, data):
+    """They agree with Richardson's rule away from kinks and jumps."""
+    row, function = FUNCTIONS[name], getattr(np, name)
+    x = np.array(data.draw(points_of(name))[: row.count])
+    if name in ("remainder", "fmod"):
+        assume(abs(x[1]) > 0.5 and abs(x[0] / x[1] - np.rint(x[0] / x[1])) > 0.1)
+    for i, derivative in enumerate(row.derivative):
+        along = np.eye(row.count)[i]
+        wanted = extrapolated(lambda s, a=along: function(*(x + s * a)), 0.01)
+        assert derivative(*x) == pytest.approx(wanted, rel=1e-8, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", [name for name in ROWS if FUNCTIONS[name].enclosure])
+@given(data=st.data())
+def test_each_enclosure_of_the_table(name, data):
+    """python-flint's ball of a number holds what NumPy computes, up to its rounding."""
+    flint = pytest.importorskip("flint")
+    x = data.draw(points_of(name))[0]
+    ball = FUNCTIONS[name].enclosure(flint.arb(x))
+    value = float(getattr(np, name)(x))
+    assert (ball + flint.arb(0, 4e-15 * max(1.0, abs(value)))).contains(flint.arb(value))
+
+
+def test_names_of_math_are_the_same_functions():
+    for short, name in MATH.items():
+        x = [1.5 if name == "arccosh" else 0.4, 0.7][: FUNCTIONS[name].count]
+        assert getattr(math, short)(*x) == pytest.approx(float(getattr(np, name)(*x)), rel=1e-14)
+
+
+def corpus():
+    """Yield compiled entries of nine states that have expressions, with their systems."""
+    for entry in user_functions.ENTRIES:
+        try:
+            with quiet():
+                made = user_functions.system(entry.make(9), entry.name)
+                compiled = nlctl.compile(made)
+                _ = compiled.tangent
+        except UsageError:
+            continue
+        yield entry.name, made, compiled
+
+
+def apart(found, function, point):
+    """Return how far a Jacobian is from Richardson's, relatively, where that is sure of itself."""
+    near, wide = (differences(function, point, h) for h in (0.01, 0.02))
+    smooth = np.abs(near - wide) <= 1e-8 * np.maximum(1.0, np.abs(near))
+    return np.where(smooth, np.abs(found - near) / np.maximum(1.0, np.abs(near)), 0.0), smooth
+
+
+def test_users_functions_against_richardson():
+    """Wherever python-control's own function is smooth, its Jacobian is found to 1e-7."""
+    rng, judged = np.random.default_rng(5), 0
+    for name, system, compiled in corpus():
+        x, u = rng.uniform(0.3, 0.9, system.nstates), rng.uniform(0.3, 0.9, system.ninputs)
+        with quiet():
+            found = compiled.linearize(x, u, t=0.31)
+            by_x = partial(lambda system, u, v: system.dynamics(0.31, v, u), system, u)
+            by_u = partial(lambda system, x, v: system.dynamics(0.31, x, v), system, x)
+            for matrix, function, point in ((found.A, by_x, x), (found.B, by_u, u)):
+                error, smooth = apart(matrix, function, point)
+                assert error.max(initial=0.0) < 1e-7, (name, matrix)
+                judged += bool(smooth.size and smooth.all())
+    assert judged > 250
+
+
+@pytest.mark.parametrize("example", [nlctl.paper.example_1, nlctl.paper.example_2])
+def test_both_examples_against_richardson(example):
+    """The Jacobian of 31 and 33 states by forward mode, and along each parameter."""
+    loop = example()
+    compiled, rng = nlctl.compile(loop), np.random.default_rng(2)
+    x = 0.3 * rng.normal(size=loop.nstates)
+    found = compiled.linearize(x, t=1.3)
+    wanted = differences(lambda v: loop.dynamics(1.3, v, []), x, 0.02)
+    np.testing.assert_allclose(found.A, wanted, rtol=1e-9, atol=1e-9)
+    outputs = differences(lambda v: loop.output(1.3, v, []), x, 0.02)
+    np.testing.assert_allclose(found.C, outputs, rtol=1e-9, atol=1e-9)
+    assert found.state_labels == loop.state_labels
+
+
+def test_along_parameters():
+    """Columns for qualified names, entries of arrays included."""
+    loop = nlctl.paper.example_1()
+    compiled = nlctl.compile(loop)
+    x = 0.3 * np.random.default_rng(2).normal(size=loop.nstates)
+    names = ["plant.p1", "controller.weights.Gamma", "plant.gain_x"]
+    found, outputs = compiled.parameter_jacobian(names, x, t=0.7)
+    values = nlctl.parameters(loop)["value"]
+    for k, name in enumerate(names):
+        at = lambda s, n=name: loop.dynamics(0.7, x, [], {n: values[n] + s})  # noqa: E731
+        wanted = extrapolated(at, 0.05)
+        np.testing.assert_allclose(found[:, k], wanted, rtol=1e-9, atol=1e-9)
+    assert outputs.shape == (loop.noutputs, 3)
+    with pytest.raises(nlctl.UnknownNameError, match=r"plant\.p1"):
+        compiled.parameter_jacobian(["plant.p11"], x)
+
+
+def test_linear_systems_are_their_own_linearization():
+    """A chain of linear blocks gives the product's matrices, to rounding."""
+    rng = np.random.default_rng(1)
+    one = ct.rss(3, 2, 2, name="one")
+    two = ct.ss(rng.normal(size=(2, 2)), np.eye(2), np.ones((1, 2)), 0, name="two")
+    diagram = ct.interconnect(
+        [one, two],
+        connections=[["two.u[0]", "one.y[0]"], ["two.u[1]", "-one.y[1]"]],
+        inplist=["one.u[0]", "one.u[1]"], outlist=["two.y[0]"],
+    )  # fmt: skip
+    found = nlctl.compile(diagram).linearize(np.zeros(5), 0.0)
+    both = two * ct.ss([], [], [], np.diag([1.0, -1.0])) * one
+    w = 1j * np.logspace(-1, 1, 5)
+    np.testing.assert_allclose(found(w), both(w), rtol=1e-9)
+    assert found.input_labels == diagram.input_labels
+
+
+def test_what_has_no_exact_derivatives_is_refused():
+    """Opaque functions and algebraic loops, with advice; an operating point is taken."""
+    decay = ct.nlsys(
+        lambda t, x, u, p: [-float(np.linalg.norm(x)) * x[0]], states=1, inputs=0, name="decay"
+    )
+    with pytest.raises(CompileError, match=r"no exact derivatives.*ct\.linearize"):
+        nlctl.compile(decay).linearize([1.0])
+    ring = ct.interconnect(
+        [ct.nlsys(None, lambda t, x, u, p: [0.5 * u[0]], name="gain", inputs="u", outputs="y")],
+        connections=[["gain.u", "gain.y"]], outlist=["gain.y"],
+    )  # fmt: skip
+    with pytest.raises(CompileError, match="algebraic loops"):
+        nlctl.compile(ring, algebraic_loops="solve").linearize([])
+    pendulum = ct.nlsys(
+        lambda t, x, u, p: [x[1], u[0] - np.sin(x[0])], states=2, inputs=1, name="pendulum"
+    )
+    point = ct.OperatingPoint(np.array([np.pi / 6, 0.0]), np.array([0.5]))
+    np.testing.assert_allclose(
+        nlctl.compile(pendulum).linearize(point).A, [[0, 1], [-np.cos(np.pi / 6), 0]], rtol=1e-15
+    )
+    with pytest.raises(nlctl.ParameterError, match="u0 needs 1 finite"):
+        nlctl.compile(pendulum).linearize([0.0, 0.0], [1.0, 2.0])

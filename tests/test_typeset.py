@@ -1,0 +1,158 @@
+"""Formulas are what is run: they are read back as numbers, and converted to MathML."""
+
+import control as ct
+import numpy as np
+import pytest
+import user_functions
+from latex_values import values
+from test_derivatives import quiet
+
+import nlctl
+from analysis.report.document import Equation
+from analysis.report.formula import mathml
+from nlctl._errors import UsageError
+from nlctl.expressions.latex import number_text, symbol
+from nlctl.native._typeset import _dotted
+
+
+def test_symbols():
+    """Names become the symbols of the field."""
+    table = {
+        "x1": "x_{1}", "b_r": "b_{r}", "zeta": r"\zeta", "W_hat": r"\hat{W}",
+        "delta_hat": r"\hat{\delta}", "W_hat[0]": r"\hat{W}_{1}", "sigma_1": r"\sigma_{1}",
+        "p_mean": r"p_{\mathrm{mean}}", "yd2": "y_{d,2}", "lambdas": r"\lambda",
+        "speed": r"\mathrm{speed}", "x_1[2]": "x_{1,3}", "Gamma": r"\Gamma",
+    }  # fmt: skip
+    assert {name: symbol(name) for name in table} == table
+
+
+def test_numbers():
+    """All digits, parts of pi, powers of ten; nothing that is only nearly a part of pi."""
+    table = {
+        0.1: "0.1", 2.0: "2", -3.5: "-3.5", 1e-6: "10^{-6}", 2.5e21: r"2.5 \cdot 10^{21}",
+        np.pi / 2: r"\frac{\pi}{2}", -np.pi: r"-\pi", 3 * np.pi: r"3 \pi", 3.1415926: "3.1415926",
+        np.inf: r"\infty", 0.0: "0",
+    }  # fmt: skip
+    assert {number: number_text(number) for number in table} == table
+
+
+def scalars(system, t, x, u):
+    """Return the values of the symbols of a block with few states, for `latex_values`."""
+    known = {"t": t}
+    known |= {symbol(name): v for name, v in zip(system.state_labels, x, strict=True)}
+    known |= {symbol(name): v for name, v in zip(system.input_labels, u, strict=True)}
+    for name, given in system.params.items():
+        for place, v in np.ndenumerate(given) if np.asarray(given).dtype.kind in "fib" else ():
+            index = ",".join(str(k + 1) for k in place)
+            known[f"{symbol(name)}_{{{index}}}" if place else symbol(name)] = v
+    return known
+
+
+def judged(system, t, x, u):
+    """Compare a block's formulas with python-control; return the number of equations."""
+    (made,) = nlctl.typeset(system)
+    try:
+        dx, y = system.dynamics(t, x, u), system.output(t, x, u)
+    except (ValueError, ArithmeticError):  # what math refuses has a formula all the same
+        return 0
+    found = values(made.equations, made.where, scalars(system, t, x, u))
+    wanted = {_dotted(symbol(n)): v for n, v in zip(system.state_labels, dx, strict=True)}
+    wanted |= {symbol(n): v for n, v in zip(system.output_labels, y, strict=True)}
+    for name, value in found.items():
+        assert value == pytest.approx(wanted[name], rel=1e-12, abs=1e-12, nan_ok=True), (
+            made.latex,
+            name,
+        )
+    return len(found)
+
+
+def test_users_functions_read_back():
+    """The formulas of the corpus, with two states, have the values of its functions."""
+    rng, count, formulas = np.random.default_rng(3), 0, 0
+    for entry in user_functions.ENTRIES:
+        if entry.name == "negative_zero":
+            continue  # on paper there is one zero
+        with quiet():
+            try:
+                system = user_functions.system(entry.make(2), entry.name)
+                lines = nlctl.typeset(system)[0]
+            except UsageError:
+                continue
+            texts = [*lines.equations, *lines.where]
+            if any("_{i}" in text or r"\sum" in text for text in texts):
+                continue  # vectors: below
+            for scale in (0.5, 3.0):
+                x, u = (scale * rng.normal(size=n) for n in (system.nstates, system.ninputs))
+                formulas += judged(system, float(rng.uniform(0, 3)), x, u)
+        assert not any("<code" in mathml(Equation(latex=text)) for text in texts), texts
+        count += 1
+    assert count > 150
+    assert formulas > 600
+
+
+@pytest.mark.parametrize("example", [nlctl.paper.example_1, nlctl.paper.example_2])
+@pytest.mark.parametrize("values_shown", [False, True])
+def test_both_examples_are_shown_as_formulas(example, values_shown):
+    """Every block has equations, and every line of them is MathML."""
+    blocks = nlctl.typeset(example(), values=values_shown)
+    assert [b.block for b in blocks][:2] == ["reference", "plant"]
+    for block in blocks:
+        assert block.equations
+        for text in (*block.equations, *block.where, *block.inputs):
+            assert "<code" not in mathml(Equation(latex=text)), text
+
+
+def test_a_changed_parameter_or_sign_is_another_formula():
+    """Values are those of the run; a vector's equation has its index, a sum its bounds."""
+    block = nlctl.block(nlctl.controllers.AdaptiveWeights(nodes=27), "weights")
+    (plain,) = nlctl.typeset(block)
+    index = r", \quad i = 1, \dots, 27"
+    left, _, right = plain.equations[0].partition(" = ")
+    assert left == r"\dot{\hat{W}}_{i}"
+    assert right == r"\Gamma \left(r \psi_{i} - \sigma_{1} \hat{W}_{i}\right)" + index
+    assert plain.equations[1] == r"W_{\psi} = \sum_{j=1}^{27} \hat{W}_{j} \psi_{j}"
+    (first,) = nlctl.typeset(block, values=True)
+    (second,) = nlctl.typeset(block, values=True, params={"weights.Gamma": 0.75})
+    assert r"= 0.5 \left(" in first.equations[0]
+    assert r"= 0.75 \left(" in second.equations[0]
+
+
+def test_diagrams_show_what_inputs_are_connected_to():
+    """Gains, signs and sums of connections; linear blocks by their matrices."""
+    plant = ct.ss([[0.0, 1.0], [-2.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], 0, name="plant")
+    law = ct.nlsys(None, lambda t, x, u, p: [-p["k"] * u[0]], inputs=["e"], outputs=["u"],
+                   params={"k": 3.0}, name="law")  # fmt: skip
+    loop = ct.interconnect(
+        [plant, law],
+        connections=[["law.e", (0, 0, 1.5)], ["plant.u[0]", "-law.u"]],
+        inplist=["plant.u[0]"], outlist=["plant.y[0]"], inputs=["w"], outputs=["y"],
+    )  # fmt: skip
+    one, two = nlctl.typeset(loop)
+    assert one.equations[1] == r"\dot{x}_{2} = -2 x_{1} + u_{1}"
+    assert one.inputs == ("u_{1} = -u + w",)
+    assert two.inputs == ("e = 1.5 y_{1}",)
+    assert two.equations == ("u = -k e",)
+    assert two.latex == "\\begin{aligned}\ne &= 1.5 y_{1} \\\\\nu &= -k e\n\\end{aligned}"
+
+
+def test_local_names_are_kept():
+    """What a function calls its intermediate results, its formula calls them, too."""
+
+    def update(t, x, u, params):
+        speed = x[1]
+        drag = params["c"] * speed * abs(speed)
+        return [speed, u[0] - drag]
+
+    cart = ct.nlsys(update, states=2, inputs=1, params={"c": 0.3}, name="cart")
+    (made,) = nlctl.typeset(cart)
+    assert made.equations[1] == r"\dot{x}_{2} = u_{1} - \mathrm{drag}"
+    assert made.where == (r"\mathrm{drag} = c x_{2} \left|x_{2}\right|",)
+
+
+def test_what_has_no_formula_is_refused():
+    """An opaque function is named with its reason."""
+    odd = ct.nlsys(
+        lambda t, x, u, p: [-float(np.linalg.norm(x)) * x[0]], states=1, inputs=0, name="odd"
+    )
+    with pytest.raises(nlctl.CompileError, match="block 'odd' has no formula"):
+        nlctl.typeset(odd)
