@@ -305,3 +305,32 @@ class TestWorkPrecision:
         loop = nlctl.compile(nlctl.paper.example_1())
         run_of = run(loop, [0, 0.5 if interpreted else 20.0], rtol=1e-8).statistics
         assert run_of.rejected < 6 * run_of.events + 0.2 * run_of.accepted
+
+
+def raising(t, x, u, params):
+    """It cannot be traced, and raises an error from a certain time on."""
+    value = x[0]
+    while value > 2.0:
+        value = value - 1.0
+    if t > 0.5:
+        raise ValueError("too late")
+    return [-value]
+
+
+BEYOND = {
+    "run": lambda made: nlctl.input_output_response(made, [0, 1.0], 0, [1.0]),
+    "ensemble": lambda made: nlctl.ensemble_response(
+        made, [0, 1.0], initial_state={"late.x[0]": [1.0, 2.0]}
+    ),
+    "evaluation": lambda made: made.dynamics(0.7, [1.0]),
+}
+
+
+@pytest.mark.parametrize("kind", BEYOND)
+def test_what_an_opaque_function_raises_is_passed_on(kind):
+    """Through machine code, which knows no exceptions; before that time all is well."""
+    made = nlctl.compile(ct.nlsys(raising, None, inputs=0, outputs=1, states=1, name="late"))
+    early = nlctl.input_output_response(made, [0, 0.4], 0, [1.0])
+    np.testing.assert_allclose(early.states[0, -1], np.exp(-0.4), rtol=1e-6)
+    with pytest.raises(ValueError, match="too late"):
+        BEYOND[kind](made)

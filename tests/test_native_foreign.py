@@ -145,9 +145,18 @@ def test_the_cache_tells_objects_apart():
     assert found == [[1.0, 1.0], [2.0, 2.0]]
 
 
-def test_a_function_that_calls_itself_is_refused_in_words():
+def test_a_function_that_calls_itself_is_written_out():
+    """As far as it goes."""
+    compare(system(recursive), native=True)
+
+
+def halved(v):
+    return v if v < 1.0 else halved(0.5 * v)
+
+
+def test_a_function_that_calls_itself_until_its_value_is_small_is_refused_in_words():
     """numba has no recursion across functions; python-control still runs it."""
-    block = system(recursive)
+    block = system(lambda t, x, u, params: [halved(x[0]), x[1]])
     compare(block)
     if not getattr(config, "DISABLE_JIT", False):
         with pytest.raises(CompileError, match="'b'"):

@@ -119,7 +119,7 @@ class TestAccuracy:
         settings = {"params": {"law.beta": 4.0, "actuator.b_r": 0.7}, "rtol": 1e-9, "atol": 1e-11}
         start = {"plant.x1": 0.9, "zeta": 1.1}
         ours = nlctl.input_output_response(nlctl.compile(loop), t, 0, start, **settings)
-        plain = nlctl.input_output_response(loop, t, 0, start, **settings)
+        plain = nlctl.input_output_response(loop, t, 0, start, engine="python-control", **settings)
         np.testing.assert_allclose(ours.y, plain.y, rtol=1e-6, atol=1e-7)
         assert ours.output_labels == plain.output_labels
         assert ours.params["law.beta"] == 4.0
@@ -229,11 +229,11 @@ class TestCache:
 
     SCRIPT = (
         "import sys, nlctl, numpy as np\n"
-        "from numba.core import event\n"
+        "from nlctl.native.codegen import finish\n"
+        "made, right = [], finish._object_code\n"
+        "finish._object_code = lambda text: made.append(text) or right(text)\n"
         "compiled = nlctl.compile(nlctl.block(nlctl.DeadZone(slope_r=float(sys.argv[1])), 'z'))\n"
-        "with event.install_recorder('numba:compile') as recorder:\n"
-        "    value = compiled.output(0.0, [], [2.0])[0]\n"
-        "print(value, len([e for _, e in recorder.buffer if e.is_start]))\n"
+        "print(compiled.output(0.0, [], [2.0])[0], len(made))\n"
     )
 
     def start(self, folder, slope):

@@ -27,10 +27,10 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 
 import nlctl
-from nlctl.native._compile import TAUGHT
+from nlctl.native import CompileError
 from nlctl.native._integrate import integrator_key
-from nlctl.native._lower import VECTORS
-from nlctl.native.codegen import store
+from nlctl.native._jitted import TAUGHT
+from nlctl.native.codegen import finish, store
 from nlctl.native.codegen.fingerprint import function_key, module_key, program_key
 from nlctl.native.codegen.machine_code import SETTINGS, Wanted, kept, machine_code
 from nlctl.native.codegen.module import loaded
@@ -313,6 +313,67 @@ class TestMachineCode:
         assert line in program.source
 
 
+@with_jit
+class TestPrograms:
+    """Object code of what was traced."""
+
+    def run(self, sign=1.0):
+        """The right-hand side of a block, and how often object code was made for it."""
+        made, right = [], finish._object_code
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(finish, "_object_code", lambda text: made.append(text) or right(text))
+            system = ct.nlsys(lambda t, x, u, params: sign * np.exp(x), None, inputs=0, outputs=1,
+                              states=1, name="e")  # fmt: skip
+            found = nlctl.compile(system).dynamics(0.0, [1.0])
+        np.testing.assert_allclose(found, sign * np.e, rtol=1e-15)
+        return len(made)
+
+    def test_it_is_made_once(self, folder):
+        """Found again in this folder; another sign is another program."""
+        assert [self.run(), self.run(), self.run(-1.0), self.run(-1.0)] == [1, 0, 1, 0]
+        assert len(list(folder.iterdir())) == 2
+
+    @pytest.mark.parametrize("damage", ["flip", "truncate", "empty", "random", "rename"])
+    def test_a_damaged_entry_is_made_anew_without_a_word(self, folder, damage):
+        """The code of another program under this one's name is not run either."""
+        self.run()
+        file = only(folder)
+        content = file.read_bytes()
+        if damage == "rename":
+            self.run(-1.0)
+            os.replace(next(f for f in folder.iterdir() if f != file), file)
+        else:
+            flipped = bytearray(content)
+            flipped[len(content) // 2] ^= 1
+            changed = {"flip": bytes(flipped), "truncate": content[:-1], "empty": b""}
+            file.write_bytes(changed.get(damage, np.random.default_rng(0).bytes(1000)))
+        assert [self.run(), self.run()] == [1, 0]
+        assert file.read_bytes() == content
+
+    def test_another_processor_or_llvm_has_its_own_entry(self, monkeypatch):
+        """The key has both in it, and the passes."""
+        text = "define void @f() { ret void }"
+        keys = {finish._key(text), finish._key(text + " ")}
+        with monkeypatch.context() as patch:
+            patch.setattr(finish, "_processor", lambda: ("x86_64-linux-gnu", "generic", ""))
+            keys.add(finish._key(text))
+        with monkeypatch.context() as patch:
+            patch.setattr(finish.llvmlite, "__version__", "0.0")
+            keys.add(finish._key(text))
+        monkeypatch.setattr(finish, "PASSES", ())
+        keys.add(finish._key(text))
+        assert len(keys) == 5
+
+    def test_what_is_nowhere_is_an_error(self):
+        """Not the end of the process."""
+        text = (
+            "declare void @no_such_function()\n"
+            "define void @f() {\n  call void @no_such_function()\n  ret void\n}\n"
+        )
+        with pytest.raises(CompileError, match="'no_such_function'"):
+            finish.finished(text, ["f"], {})
+
+
 def total(x):
     s = 0.0
     for value in x:
@@ -365,13 +426,14 @@ class TestKeys:
     def test_a_key_is_the_same_in_every_process(self):
         """Whatever the order of sets and the addresses of objects there are."""
         script = (
-            "import nlctl\n"
+            "import hashlib, nlctl\n"
             "from nlctl.native._lower import lower\n"
             "from nlctl.native.codegen.fingerprint import program_key\n"
             "for make in (nlctl.paper.example_1, nlctl.paper.example_2):\n"
             "    compiled = nlctl.compile(make())\n"
             "    lowered = lower(compiled.schedule, compiled.program)\n"
-            "    print(program_key(compiled.program), program_key(lowered))\n"
+            "    text = hashlib.sha256(lowered.text.encode()).hexdigest()\n"
+            "    print(program_key(compiled.program), text)\n"
         )
         keys = [
             subprocess.run(
@@ -405,6 +467,7 @@ EDITS = {  # module -> what is edited there
     "_tsit5.py": ("STABLE = 3.3", "STABLE = 3.2"),
     "_pointed.py": ("_ENTRY = 4", "_ENTRY = 5"),
     "_lane.py": ('"error_model": "numpy"', '"error_model": "python"'),
+    "_address.py": ("ir.VoidType()", "ir.IntType(32)"),
 }
 
 
@@ -421,8 +484,9 @@ def keys_of_copy(path, edits):
         module.write_text(source.replace(before, after), encoding="utf-8")
     script = (
         "import nlctl; from nlctl.native._integrate import integrator_key\n"
-        "from nlctl.native._lower import TAUGHT, VECTORS, module_key\n"
-        "print(nlctl.__file__, integrator_key(), module_key(*TAUGHT, *VECTORS))"
+        "from nlctl.native._jitted import TAUGHT\n"
+        "from nlctl.native.codegen.fingerprint import module_key\n"
+        "print(nlctl.__file__, integrator_key(), module_key(*TAUGHT))"
     )
     run = subprocess.run(
         [sys.executable, "-c", script], cwd=path, env=os.environ | {"PYTHONPATH": str(path)},
@@ -439,7 +503,7 @@ class TestSources:
 
     def test_a_copy_has_the_same_keys(self, tmp_path):
         """Paths and processes do not count."""
-        assert keys_of_copy(tmp_path, {}) == [integrator_key(), module_key(*TAUGHT, *VECTORS)]
+        assert keys_of_copy(tmp_path, {}) == [integrator_key(), module_key(*TAUGHT)]
 
     @pytest.mark.parametrize("name", EDITS)
     def test_an_edit_of_any_module_of_the_integrators(self, tmp_path, name):
@@ -448,7 +512,7 @@ class TestSources:
 
     def test_use_does_not_change_a_key(self):
         """What a code generator remembers is no part of it."""
-        before = module_key(*TAUGHT, *VECTORS), integrator_key()
+        before = module_key(*TAUGHT), integrator_key()
         for k in range(3):
             scope = source_text.run(
                 f"def helper(v):\n    return {k} * v\n\n\n"
@@ -456,15 +520,15 @@ class TestSources:
             )
             system = ct.nlsys(scope["function"], None, inputs=0, outputs=1, states=1, name="used")
             nlctl.compile(system).native  # noqa: B018
-        assert (module_key(*TAUGHT, *VECTORS), integrator_key()) == before
+        assert (module_key(*TAUGHT), integrator_key()) == before
 
     def test_an_edit_of_a_code_generator(self, tmp_path):
         """Machine code of programs: nothing in them names what generates it."""
         first = "from __future__ import annotations\n"
-        edits = {"_vector_memory.py": (first, f"{first}\nEDITED = True\n")}
+        edits = {"_values.py": (first, f"{first}\nEDITED = True\n")}
         integrators, taught = keys_of_copy(tmp_path, edits)
         assert integrators == integrator_key()
-        assert taught != module_key(*TAUGHT, *VECTORS)
+        assert taught != module_key(*TAUGHT)
 
 
 @with_jit

@@ -17,7 +17,8 @@ import user_functions
 
 import nlctl
 from nlctl._errors import UsageError
-from nlctl.native._lower import lower, plain_functions
+from nlctl.native._lower import lower
+from nlctl.native._routine import plain_functions
 
 LANES = 20
 SCALES = (0.1, 1.0, 10.0, 100.0)

@@ -98,7 +98,7 @@ _ROWS = (
          ball=lambda x: x.log1p()),
     _row("expm1", "expm1", r"\left(e^{{{0}}} - 1\right)", lambda x: np.exp(x),
          ball=lambda x: x.expm1()),
-    _row("exp2", "exp2", r"2^{{{0}}}", lambda x: _log_of(2.0, x) * np.exp2(x),
+    _row("exp2", "own", r"2^{{{0}}}", lambda x: _log_of(2.0, x) * np.exp2(x),
          ball=lambda x: (x * type(x)(2).log()).exp()),
     _row("tan", "tan", r"\tan {0}", lambda x: 1.0 + np.tan(x) ** 2, ball=lambda x: x.tan()),
     _row("sinh", "sinh", r"\sinh {0}", lambda x: np.cosh(x), ball=lambda x: x.sinh()),

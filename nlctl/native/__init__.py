@@ -1,10 +1,11 @@
 """The native engine: any python-control diagram as machine code, and ensembles of it.
 
-`compile` reads a diagram (`_schedule`, `_wiring`, `_feedthrough`) and writes readable source of its
-right-hand side that calls the blocks' own functions (`_code`, `_emit`); rings without a state in
-them are refused or solved (`_tearing`, `_algebraic`).  For simulation the same functions are run
-once on symbols (`_trace*`) and written out for several members at a time (`_lower*`,
-`_vector_*`); both kinds of source are kept on disk as machine code (`codegen`).
+`compile` reads a diagram (`_schedule`, `_wiring`, `_feedthrough`).  The blocks' functions are run
+once on symbols (`_lower_blocks`), and what they compute is planned for one member or several
+(`_lower`); one generator writes LLVM IR from the plan, and its object code is kept on disk
+(`codegen`).  What cannot be traced is called as it stands, through source that numba compiles
+(`_code`, `_emit`); rings without a state in them are refused or solved in such source (`_tearing`,
+`_algebraic`).  `_machine` holds the functions that come out of it, `_routine` calls them.
 
 `_integrate` moves members side by side through time, each with its own steps: an explicit pair
 (`_tsit5`), a stiff method (`_rodas5p`, `_stiff`), decisions (`_control`), corners and memories
@@ -14,10 +15,10 @@ sampled systems.
 """
 
 from .._errors import CompileError
+from ._ahead import compile_ahead
 from ._compile import Compiled, compile  # noqa: A004 (what it does)
 from ._ensemble import Ensemble, ensemble_response
 from ._lane import Status
-from ._machine import compile_ahead
 from ._response import Response, uninterrupted
 from ._schedule import AlgebraicLoopError
 from ._simulate import Settings, Statistics

@@ -4,47 +4,32 @@ from __future__ import annotations
 
 import pickle
 import threading
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from types import FunctionType
 from typing import Any, Literal
 
 import cloudpickle
 import control as ct
-import numba
 import numpy as np
-from numba.core import config
-from numba.core.errors import NumbaWarning
-from numba.core.registry import CPUDispatcher
 
 from .._errors import CompileError, ParameterError, UsageError
 from .._names import unknown
 from .._run_arguments import checked_params
-from . import _numpy, _values
 from ._describe import described
 from ._emit import Program, emit
 from ._jacobians import Tangent, linearize, parameter_jacobian, tangent
+from ._lower import Lowered, lower
 from ._lower_blocks import Equations, equations
+from ._machine import evaluations
 from ._parameters import packed
 from ._schedule import Schedule, schedule
-from .codegen.fingerprint import module_key
-from .codegen.machine_code import Wanted, machine_code
-from .codegen.module import loaded
-from .thirdparty import dicts
 from .thirdparty.captured import changed
 from .thirdparty.checks import check_sizes
-from .thirdparty.dicts import make_callable
-from .thirdparty.errors import explained
 
 _RESOLVING = threading.Lock()
-TAUGHT = (dicts, _numpy, _values)  # modules that teach numba what functions of others use
 LOOPS = ("error", "solve")  # what may be done with algebraic loops
 Rhs = Callable[..., None]
-VECTOR = numba.float64[::1]
-RHS = numba.void(numba.float64, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR)
-OUT = numba.void(numba.float64, VECTOR, VECTOR, VECTOR, VECTOR)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,8 +65,16 @@ class Compiled:
 
     @property
     def source(self) -> str:
-        """The emitted source of the right-hand side."""
-        return self.program.source
+        """What runs for one member: LLVM IR, and the source of the functions that it calls.
+
+        Comments in it say what each value is.  With algebraic loops all is in that source.
+        """
+        return self.lowered.source
+
+    @cached_property
+    def lowered(self) -> Lowered:
+        """The plan of a program for one member."""
+        return lower(self.schedule, self.program, 1, self.equations)
 
     @cached_property
     def equations(self) -> Equations | None:
@@ -91,33 +84,18 @@ class Compiled:
 
     @cached_property
     def interpreted(self) -> tuple[Rhs, Rhs]:
-        """``(rhs, out)`` of the emitted source as plain Python."""
+        """``(rhs, out)`` of `Program.source`, which calls the blocks, as plain Python."""
         namespace = self.program.namespace(native=False)
-        exec(self.source, namespace)
+        exec(self.program.source, namespace)
         return namespace["rhs"], namespace["out"]
 
     @cached_property
     def native(self) -> tuple[Rhs, Rhs]:
-        """``(rhs, out)`` as machine code; compiled when first used, or found in the cache.
+        """``(rhs, out)`` as machine code, made when it is first needed or found in the cache.
 
-        With NUMBA_DISABLE_JIT=1 the same source runs as plain Python.
+        With NUMBA_DISABLE_JIT=1 the plan that it is made from is carried out in plain Python.
         """
-        if getattr(config, "DISABLE_JIT", False):
-            return self.interpreted
-        ready = {name: _jitted(f) for name, f in self.program.functions.items()}
-        module = loaded(self.program, ready)
-        options = {"error_model": "numpy", "nogil": True}
-        wanted = [
-            Wanted(function=module.rhs, signature=RHS, options=options),
-            Wanted(function=module.out, signature=OUT, options=options),
-        ]
-        try:
-            with warnings.catch_warnings():  # of what the user need not know
-                warnings.simplefilter("ignore", NumbaWarning)
-                rhs, out = machine_code(f"{module.__name__} {module_key(*TAUGHT)}", wanted)
-                return rhs, out
-        except Exception as error:  # numba passes on whatever typing raises
-            raise explained(error, self.program) from error
+        return evaluations(self)
 
     def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
         """Return the flat vector `p` that the program takes.
@@ -305,15 +283,3 @@ def _restored(content: bytes) -> Compiled:
     """Make a compiled diagram of what `Compiled.__reduce__` has written."""
     read, program = pickle.loads(content)
     return Compiled(schedule=read, program=program)
-
-
-def _jitted(function: Any) -> Any:
-    """Make a block's function callable from machine code; equations already are."""
-    if isinstance(function, CPUDispatcher):
-        return function
-    if not isinstance(function, FunctionType):
-        raise CompileError(
-            f"{function!r} is no plain function: give the block a function made with def"
-        )
-    make_callable(function)
-    return numba.njit(function, error_model="numpy", nogil=True, boundscheck=True)

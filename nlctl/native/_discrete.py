@@ -10,15 +10,17 @@ import numba
 import numpy as np
 
 from .._errors import ParameterError
-from ._compile import OUT, RHS, VECTOR, Compiled
-from .codegen.fingerprint import function_key
+from . import _address
+from ._address import call_out, call_rhs
+from ._compile import Compiled
+from ._machine import prepared_parameters
+from .codegen.fingerprint import function_key, module_key
 from .codegen.machine_code import Wanted, machine_code
 
-MATRIX = numba.float64[:, ::1]
+MATRIX, COLUMNS = numba.float64[:, ::1], numba.float64[:, :, ::1]
 LOOP = numba.int64(
-    *(numba.types.FunctionType(signature) for signature in (RHS, OUT)),
-    *(VECTOR, MATRIX, VECTOR, MATRIX, MATRIX, VECTOR),
-)
+    numba.intp, numba.intp, MATRIX, COLUMNS, MATRIX, COLUMNS, COLUMNS, MATRIX
+)  # fmt: skip
 
 
 def simulate_discrete(
@@ -48,22 +50,24 @@ def simulate_discrete(
     ParameterError
         If `times` are not one sampling time apart.
     """
-    system = compiled.system
+    system, count = compiled.system, times.size
     _check_times(system, times)
-    outputs = np.empty((times.size, system.noutputs or 0))
-    states = np.empty((times.size, system.nstates or 0))
-    g = np.empty(compiled.program.events)
-    columns = np.array(inputs.T, dtype=float, order="C")  # one that may be written to
-    p = np.ascontiguousarray(p)
-    states[:1] = x0
+    code, c = prepared_parameters(compiled, p)
+    outputs = np.empty((count, system.noutputs or 0, 1))
+    states = np.empty((count, system.nstates or 0, 1))
+    g = np.empty((compiled.program.events, 1))
+    columns = np.array(inputs.T, dtype=float, order="C")[:, :, None]  # may be written to
+    states[:1, :, 0] = x0
+    each = np.array(times, dtype=float)[:, None]
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the result says
-        n = _loop()(*compiled.native, times, columns, p, states, outputs, g)
-    return outputs[:n].T, states[:n].T
+        n = _loop()(*code.entries, each, columns, c, states, outputs, g)
+    code.check(c)
+    return outputs[:n, :, 0].T, states[:n, :, 0].T
 
 
-def compile_discrete(compiled: Compiled) -> None:
-    """Make the machine code that `simulate_discrete` needs."""
-    _ = compiled.native, _loop()
+def compile_discrete() -> None:
+    """Make the machine code of `simulate_discrete` that all diagrams share."""
+    _loop()
 
 
 def _check_times(system: Any, times: np.ndarray) -> None:
@@ -83,19 +87,19 @@ def _loop() -> Any:
     """Return the loop as machine code; without JIT as it stands."""
     options = {"error_model": "numpy", "nogil": True}
     wanted = Wanted(function=_iterate, signature=LOOP, options=options)
-    (loop,) = machine_code(function_key(_iterate), [wanted])
+    (loop,) = machine_code(function_key(_iterate, module_key(_address)), [wanted])
     return loop
 
 
-def _iterate(rhs, out, times, inputs, p, states, outputs, g):
+def _iterate(rhs, out, times, inputs, c, states, outputs, g):
     """Fill states (from the first on) and outputs; return how many samples are finite."""
-    last = times.size - 1
-    for k in range(times.size):
+    last = len(times) - 1
+    for k in range(len(times)):
         if not np.isfinite(states[k]).all():
             return k
-        out(times[k], states[k], inputs[k], p, outputs[k])
+        call_out(out, times[k], states[k], inputs[k], c, outputs[k])
         if not np.isfinite(outputs[k]).all():
             return k
         if k < last:
-            rhs(times[k], states[k], inputs[k], p, states[k + 1], g)
-    return times.size
+            call_rhs(rhs, times[k], states[k], inputs[k], c, states[k + 1], g)
+    return len(times)

@@ -16,10 +16,11 @@ from .._errors import ParameterError
 from .._names import unknown
 from .._param import checked_times, whole_number
 from .._run_arguments import checked_params, input_array
+from ._ahead import compile_for
 from ._compile import Compiled
 from ._compile import compile as compile_diagram
 from ._lane import RUNNING, STIFF, Status
-from ._machine import WIDTH, compile_for, machine
+from ._machine import WIDTH
 from ._members import Members, members
 from ._simulate import Settings, Trajectory, begin, finish, go_on, made, prepared, trajectory
 from .audit import Audit, Trial
@@ -218,7 +219,7 @@ def _group(
     """Run up to WIDTH members side by side; yield them in their order."""
     compiled, (x0, p) = every.compiled, every.batch(numbers, WIDTH)
     alone = settings.method == "rodas5p" or not ct.isctime(compiled.system)
-    if alone or machine(compiled, p, WIDTH).width == 1:
+    if alone:
         for j in range(len(numbers)):
             if not stop.wanted:
                 return

@@ -15,14 +15,15 @@ from collections.abc import Callable
 import numba
 import numpy as np
 
-from . import _rodas5p, _tsit5
+from . import _address, _rodas5p, _tsit5
+from ._address import call_rhs
 from ._control import choose_method, choose_step, next_step, rejected
 from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
 from ._lane import INNER, LANES, RUNNING
 from ._restart import memory_rates, restart, start
 from ._stiff import stiff_attempt
 from ._work import AUTO, OUT, RESTART, RHS, STIFF_ATTEMPT, TASK, WORK, inputs_at, outputs
-from .codegen.fingerprint import function_key
+from .codegen.fingerprint import function_key, module_key
 from .codegen.machine_code import Wanted
 from .codegen.machine_code import machine_code as stored_code
 
@@ -45,10 +46,10 @@ def _explicit_attempt(rhs, task, lanes, w):
             inputs_at(w.t, task.times, task.inputs, lanes, w.u)
         if s < 6:
             _tsit5.combined(x, hh, k, s, w.x_stage_flat)
-            rhs(w.t, w.x_stage, w.u, task.p, w.k[s], w.g)
+            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.g)
         else:
             _tsit5.combined(x, hh, k, s, w.x_new_flat)
-            rhs(w.t, w.x_new, w.u, task.p, w.k[s], w.g)
+            call_rhs(rhs, w.t, w.x_new, w.u, task.p, w.k[s], w.g)
         for i in task.memory:
             for j in range(count):
                 w.k[s, i, j] = 0.0
@@ -195,7 +196,8 @@ def machine_code() -> dict[str, Callable[..., None]]:
 
 def integrator_key() -> str:
     """Return a key that changes with whatever the integrators' machine code is made of."""
-    return function_key(*((each.function, each.signature.args) for each in _wanted()))
+    wanted = ((each.function, each.signature.args) for each in _wanted())
+    return function_key(module_key(_address), *wanted)
 
 
 def _wanted() -> list[Wanted]:

@@ -15,30 +15,11 @@ from ..expressions.graph import SMALL, Ambiguous, Graph, Untraceable
 from ..expressions.operators import elementwise
 from ..expressions.trace import trace
 from ._code import Code, code
+from ._emit import Program
 from ._parameters import length
 from ._schedule import Combination, Node, Schedule, Signal
 from ._trace_block import parameters, time
-
-
-@dataclass(frozen=True, kw_only=True)
-class Call:
-    """A function that is called for one member at a time.
-
-    Attributes
-    ----------
-    name : str
-    lines : tuple of str
-        Its source in terms of t, x, u and p of its block alone, which fills y.
-    lengths : tuple of int
-        Sizes of t, x, u, p and y.
-    reason : str
-        Why it could not be traced.
-    """
-
-    name: str
-    lines: tuple[str, ...]
-    lengths: tuple[int, ...]
-    reason: str
+from .codegen.calls import Call
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,11 +33,14 @@ class Equations:
         For ``"dx"``, ``"g"`` and ``"y"`` pairs of a row and the array that is to be written there.
     calls : dict
         Opaque functions by name.
+    before : str
+        Source that these need.
     """
 
     graph: Graph
     results: dict[str, list[tuple[int, Tracer]]]
     calls: dict[str, Call]
+    before: str = ""
 
 
 def equations(schedule: Schedule, layout: Any) -> Equations:
@@ -84,6 +68,57 @@ def equations(schedule: Schedule, layout: Any) -> Equations:
             "y": [(0, reader.wired(schedule.outputs))],
         }
     return Equations(graph=reader.graph, results=results, calls=reader.calls)
+
+
+def whole(schedule: Schedule, program: Program) -> Equations:
+    """Return a program that is called as it stands: what cannot be written out as a whole.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    program : Program
+    """
+    system = schedule.system
+    n, size = system.nstates or 0, length(program.layout)
+    graph = Graph({"t": 1, "x": n, "u": system.ninputs or 0, "p": size})
+    given = [
+        time(graph).reshape(1),
+        *(vector(graph, name, 0, (graph.lengths[name],)) for name in "xup"),
+    ]
+    why = "it has algebraic loops to be solved" if schedule.loops else "an integer has changed"
+    calls = {}
+    found = []
+    for name, count, line in (
+        ("rhs", n + program.events, f"program_rhs(t, x, u, p, y[:{n}], y[{n}:])"),
+        ("out", len(schedule.outputs), "program_out(t, x, u, p, y)"),
+    ):
+        lengths = (*(g.size for g in given), count)
+        call = Call(name=f"{name}_of_one", lines=(line,), lengths=lengths, reason=why)
+        if count:
+            calls[call.name] = call
+        found.append(_results(graph, call, given))
+    dx, y = found
+    source = program.source.replace("def rhs(", "@equation\ndef program_rhs(")
+    return Equations(
+        graph=graph,
+        results={"dx": [(0, dx[:n])], "g": [(0, dx[n:])], "y": [(0, y)]},
+        calls=calls,
+        before=source.replace("def out(", "@equation\ndef program_out("),
+    )
+
+
+def _results(graph: Graph, call: Call, given: Sequence[Tracer]) -> Tracer:
+    """Return what a call with these arguments results in."""
+    count = call.lengths[-1]
+    pieces = [piece for g in given for piece in g.pieces()]
+    args, sizes = [e for e, _ in pieces], tuple(n for _, n in pieces)
+    if not count:
+        return concatenated(graph, [given[0][:0]])
+    node = graph.node("call", *args, data=(call.name, sizes), size=count, varies=True)
+    if count > SMALL:
+        return Tracer(graph, boxed(node), 0, count)
+    items = [number(graph, graph.item(node, k)).reshape(1) for k in range(count)]
+    return concatenated(graph, items)
 
 
 def _events(reader: _Reader) -> list[tuple[int, Tracer]]:
@@ -231,13 +266,7 @@ class _Reader:
         lengths = (*(g.size for g in given), count)
         lines = tuple(_lines_of_one(i, node, slots, start, kind, count))
         self.calls[name] = Call(name=name, lines=lines, lengths=lengths, reason=reason)
-        pieces = [piece for g in given for piece in g.pieces()]
-        args, sizes = [e for e, _ in pieces], tuple(n for _, n in pieces)
-        call = self.graph.node("call", *args, data=(name, sizes), size=count, varies=True)
-        if count > SMALL:
-            return Tracer(self.graph, boxed(call), 0, count)
-        items = [number(self.graph, self.graph.item(call, k)).reshape(1) for k in range(count)]
-        return concatenated(self.graph, items)
+        return _results(self.graph, self.calls[name], given)
 
 
 def _is_next(one: Combination | None, other: Combination | None) -> bool:

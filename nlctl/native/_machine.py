@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import control as ct
-import numba
 import numpy as np
-from numba.core import config
 
-from ._compile import Compiled
-from ._discrete import compile_discrete
-from ._lower import lower, lowered_code
-from ._parameters import length
-from ._work import OUT, RHS
+from .._errors import CompileError
+from ._lower import Lowered, lower
+from ._lower_blocks import Equations, whole
+from ._routine import check, entry, lowered_code
 from .thirdparty.errors import explained
+
+if TYPE_CHECKING:
+    from ._compile import Compiled
 
 WIDTH = 8  # members side by side in ensembles: one AVX-512 register
 
@@ -42,76 +41,70 @@ class Machine:
     rhs: Any
     out: Any
 
+    @property
+    def entries(self) -> tuple[Any, Any]:
+        """What integrators take of `rhs` and `out`."""
+        return entry(self.rhs), entry(self.out)
+
+    def check(self, c: np.ndarray) -> None:
+        """Raise what an opaque function has raised, with `c` as the parameters."""
+        check((self.rhs, self.out), c)
+
 
 def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:
     """Return machine code that holds for parameter vectors `p` of shape (parameters, members).
 
-    The lowered program computes each expression once.  Where it does not hold, because a whole
-    number that steers an equation has another value, the program itself is taken, one by one.
+    The lowered program computes each expression once.  Where it does not hold, because an integer
+    that steers an equation has another value, the blocks' functions are called as they stand.
     """
     known: dict[Any, Any] = compiled.__dict__.setdefault("_machines", {})
     if width not in known:
-        lowered = lower(compiled.schedule, compiled.program, width, compiled.equations)
-        try:
-            prepare, rhs, out = lowered_code(lowered)
-        except Exception as error:  # numba passes on whatever typing raises
-            raise explained(error, compiled.program) from error
-        known[width] = (
-            lowered,
-            Machine(width=width, rows=lowered.size, prepare=prepare, rhs=rhs, out=out),
-        )
+        known[width] = _made(compiled, width, compiled.equations)
     lowered, made = known[width]
     if lowered.holds_for(p):
         return made
-    if "plain" not in known:
-        known["plain"] = _plain(compiled)
-    return known["plain"]
+    if ("as it stands", width) not in known:
+        found = whole(compiled.schedule, compiled.program)
+        known["as it stands", width] = _made(compiled, width, found)
+    return known["as it stands", width][1]
 
 
-def compile_ahead(compiled: Compiled, *, ensemble: bool = False) -> None:
-    """Make a diagram's machine code now, instead of with its first run; it stays in the cache.
-
-    The integrators, which all diagrams share, are not included.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    ensemble : bool, optional
-        Make that of `nlctl.ensemble_response`, instead of that of single runs.
-
-    Raises
-    ------
-    CompileError
-        If a block's function cannot be machine code.
-    """
-    width = WIDTH if ensemble else 1
-    compile_for(compiled, np.repeat(compiled.parameter_vector()[:, None], width, axis=1), width)
+def _made(compiled: Compiled, width: int, found: Equations | None) -> tuple[Lowered, Machine]:
+    lowered = lower(compiled.schedule, compiled.program, width, found)
+    try:
+        prepare, rhs, out = lowered_code(lowered)
+    except CompileError:
+        raise
+    except Exception as error:  # numba passes on whatever typing raises
+        raise explained(error, compiled.program) from error
+    return lowered, Machine(width=width, rows=lowered.size, prepare=prepare, rhs=rhs, out=out)
 
 
-def compile_for(compiled: Compiled, p: np.ndarray, width: int) -> None:
-    """Make the machine code that runs with parameters `p` need, as `machine` takes them."""
-    if ct.isctime(compiled.system):
-        machine(compiled, p, width)
-    else:
-        compile_discrete(compiled)
+def evaluations(compiled: Compiled) -> tuple[Callable[..., None], Callable[..., None]]:
+    """Return ``rhs(t, x, u, p, dx, g)`` and ``out(t, x, u, p, y)`` of numbers and flat vectors."""
+    machine(compiled, compiled.parameter_vector()[:, None])
+
+    def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: np.ndarray, g: np.ndarray) -> None:
+        code, c = prepared_parameters(compiled, p)
+        code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], g[:, None])
+
+    def out(t: float, x: Any, u: Any, p: np.ndarray, y: np.ndarray) -> None:
+        code, c = prepared_parameters(compiled, p)
+        code.out(np.array([t]), _column(x), _column(u), c, y[:, None])
+
+    return rhs, out
 
 
-def _plain(compiled: Compiled) -> Machine:
-    """The program as it stands, for one member."""
-    one_rhs, one_out = compiled.native
-
-    def rhs(t, x, u, p, dx, g):
-        one_rhs(t[0], x.reshape(-1), u.reshape(-1), p.reshape(-1), dx.reshape(-1), g.reshape(-1))
-
-    def out(t, x, u, p, y):
-        one_out(t[0], x.reshape(-1), u.reshape(-1), p.reshape(-1), y.reshape(-1))
-
-    if not getattr(config, "DISABLE_JIT", False):
-        rhs = numba.njit(RHS.signature, error_model="numpy", nogil=True)(rhs)
-        out = numba.njit(OUT.signature, error_model="numpy", nogil=True)(out)
-    rows = length(compiled.program.layout)
-    return Machine(width=1, rows=rows, prepare=_copied, rhs=rhs, out=out)
+def prepared_parameters(
+    compiled: Compiled, p: np.ndarray, width: int = 1
+) -> tuple[Machine, np.ndarray]:
+    """Return machine code for a parameter vector, and what its functions take of that."""
+    each = np.repeat(p[:, None], width, axis=1)
+    code = machine(compiled, each, width)
+    c = np.zeros((code.rows, width))
+    code.prepare(each, c)
+    return code, c
 
 
-def _copied(p: np.ndarray, c: np.ndarray) -> None:
-    c[:] = p
+def _column(values: Any) -> np.ndarray:
+    return np.ascontiguousarray(values, dtype=float).reshape(-1, 1)

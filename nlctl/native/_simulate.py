@@ -164,19 +164,24 @@ class Run:
 
 def begin(run: Run) -> None:
     """Commit the memories and propose first steps."""
-    machine_code()["start"](run.machine.rhs, run.task, run.lanes, run.work)
+    rhs, _ = run.machine.entries
+    machine_code()["start"](rhs, run.task, run.lanes, run.work)
+    run.machine.check(run.task.p)
     run.states[0] = run.work.x
 
 
 def go_on(run: Run, rounds: int = ROUNDS) -> None:
     """Try up to `rounds` steps in every lane that is still running."""
-    machine_code()["advance"](run.machine.rhs, run.task, run.lanes, run.work, run.states, rounds)
+    rhs, _ = run.machine.entries
+    machine_code()["advance"](rhs, run.task, run.lanes, run.work, run.states, rounds)
+    run.machine.check(run.task.p)
 
 
 def finish(run: Run) -> np.ndarray:
     """Return the outputs, shape (m, outputs, members); memories get their values in the samples."""
     y = np.full((run.task.times.size, run.signals, run.lanes.size), np.nan)
-    machine_code()["outputs"](run.machine.rhs, run.machine.out, run.task, run.work, run.states, y)
+    machine_code()["outputs"](*run.machine.entries, run.task, run.work, run.states, y)
+    run.machine.check(run.task.p)
     return y
 
 

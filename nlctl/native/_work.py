@@ -1,9 +1,8 @@
 """What an integration works on: the task, arrays for all members, and the right-hand side.
 
-The right-hand side is an argument of one fixed type: what calls it is compiled once and not once
-per diagram.  Here and in what works on these arrays elements are assigned in loops: assigning a
-slice compiles to the same loop and to the text of errors that cannot happen, and takes ten times
-as long to compile.
+The right-hand side is an address: what calls it is compiled once and not once per diagram.  Here
+and in what works on these arrays elements are assigned in loops: assigning a slice compiles to the
+same loop and to the text of errors that cannot happen, and takes ten times as long to compile.
 """
 
 from __future__ import annotations
@@ -14,13 +13,11 @@ import numba
 import numpy as np
 
 from . import _rodas5p, _tsit5
+from ._address import call_out, call_rhs
 from ._lane import INNER, LANES
 from ._pointed import pointed, with_table
 
-VECTOR = numba.float64[::1]
-MATRIX = numba.float64[:, ::1]
-RHS = numba.types.FunctionType(numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX))
-OUT = numba.types.FunctionType(numba.void(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX))
+RHS = OUT = numba.intp  # addresses
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
 
@@ -132,7 +129,7 @@ def evaluate(rhs, task, lanes, w, x, dx, g):
     """Evaluate the right-hand side at the times w.t; memory stands still within a step."""
     if w.u.shape[0]:
         inputs_at(w.t, task.times, task.inputs, lanes, w.u)
-    rhs(w.t, x, w.u, task.p, dx, g)
+    call_rhs(rhs, w.t, x, w.u, task.p, dx, g)
     for i in task.memory:
         for j in range(lanes.size):
             dx[i, j] = 0.0
@@ -149,8 +146,8 @@ def outputs(rhs, out, task, w, states, y):
             for i in range(w.u.shape[0]):
                 w.u[i, j] = task.inputs[i, m]
         if task.memory.size:
-            rhs(w.t, states[m], w.u, task.p, w.dx_ahead, w.g)
+            call_rhs(rhs, w.t, states[m], w.u, task.p, w.dx_ahead, w.g)
             for i in range(task.memory.size):
                 for j in range(w.t.size):
                     states[m, task.memory[i], j] = w.g[task.corners + i, j]
-        out(w.t, states[m], w.u, task.p, y[m])
+        call_out(out, w.t, states[m], w.u, task.p, y[m])

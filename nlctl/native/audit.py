@@ -19,14 +19,14 @@ import numpy as np
 from .._errors import ParameterError, UsageError
 from ._compile import Compiled
 from ._emit import emit
-from ._lower import lower, lowered_code
-from ._machine import Machine, machine
+from ._lower import lower
+from ._machine import Machine, prepared_parameters
+from ._routine import lowered_code
 from ._schedule import Signal
 from .thirdparty.python_control import block_inputs, block_outputs, block_rates
 
 POINTS = 5  # of a trajectory, its start and end among them
-EQUAL = 1e-12  # relative difference that rounding explains without a closer look
-ROUNDING = 1e-10  # the same where values are sums of larger ones
+ROUNDING = 1e-10  # relative difference that rounding explains without a closer look
 SHAKEN = 1e-13  # relative change of states and inputs that shows what rounding does to a value
 _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
 
@@ -85,7 +85,8 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
     if not wanted:
         return
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
-        code = _code(compiled, trial)
+        width = trial.width if ct.isctime(compiled.system) else 1
+        code, _ = prepared_parameters(compiled, trial.p, width)
         done = compiled.__dict__.setdefault("_audited", [])
         if wanted is True and any(known is code for known in done):
             return
@@ -101,28 +102,10 @@ def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
         yield float(trial.time[m]), trial.states[:, m].copy(), trial.inputs[:, m].copy()
 
 
-def _code(compiled: Compiled, trial: Trial) -> Any:
-    """Return the machine code of a run."""
-    if not ct.isctime(compiled.system):
-        return compiled.native
-    return machine(compiled, np.repeat(trial.p[:, None], trial.width, axis=1), trial.width)
-
-
-def _evaluated(compiled: Compiled, trial: Trial, code: Any) -> Evaluated:
+def _evaluated(compiled: Compiled, trial: Trial, code: Machine) -> Evaluated:
     """Return what machine code computes at a point."""
     system, events = compiled.system, compiled.program.events
-    if not isinstance(code, Machine):
-        rhs, out = code
-
-        def one(t: float, x: np.ndarray, u: np.ndarray) -> Values:
-            dx, y = np.empty(x.size), np.empty(system.noutputs or 0)
-            rhs(t, x, u, trial.p, dx, np.empty(events))
-            out(t, x, u, trial.p, y)
-            return dx, y
-
-        return one
-    c = np.zeros((code.rows, code.width))
-    code.prepare(np.repeat(trial.p[:, None], code.width, axis=1), c)
+    _, c = prepared_parameters(compiled, trial.p, code.width)
 
     def several(t: float, x: np.ndarray, u: np.ndarray) -> Values:
         tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), code.width, axis=1) for v in (t, x, u))
@@ -163,14 +146,14 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
         return
     shaken = _shaken(system, point, trial.params)
     for what, a, b, moved in zip(("state", "output"), ours, theirs, shaken, strict=True):
-        wrong = np.flatnonzero(~_close(a, b, ROUNDING, 100 * moved))
+        wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
         if wrong.size:
             _compare_blocks(compiled, trial, ours, point)  # it names the block, if it finds one
             labels = system.state_labels if what == "state" else system.output_labels
             raise _difference(labels[wrong[0]], system.name, (a[wrong[0]], b[wrong[0]]), point[0])
 
 
-def _close(a: np.ndarray, b: np.ndarray, relative: float = EQUAL, absolute: Any = 0.0) -> Any:
+def _close(a: np.ndarray, b: np.ndarray, relative: float = ROUNDING, absolute: Any = 0.0) -> Any:
     """Whether values are equal to rounding; NaN equals nothing."""
     return (a == b) | (np.abs(a - b) <= relative * np.maximum(np.abs(a), np.abs(b)) + absolute)
 
@@ -215,7 +198,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
         for a, function, labels in pairs if block.noutputs else pairs[1:]:
             b = function(block, t, x[own], inputs)
             moved = np.abs(function(block, t, x[own] * (1 + SHAKEN), inputs * (1 - SHAKEN)) - b)
-            wrong = np.flatnonzero(~_close(a, b, ROUNDING, 100 * moved))
+            wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
             if wrong.size:
                 raise _difference(labels[wrong[0]], node.path, (a[wrong[0]], b[wrong[0]]), t)
 
@@ -228,7 +211,7 @@ def _signals(compiled: Compiled, trial: Trial, point: Any) -> np.ndarray:
     schedule = replace(compiled.schedule, outputs=every)
     t, x, u = point
     y = np.empty((len(every), 1))
-    if schedule.loops or not ct.isctime(compiled.system):
+    if schedule.loops:
         _, out = Compiled(schedule=schedule, program=emit(schedule)).interpreted
         out(t, x, u, trial.p, y[:, 0])
         return y[:, 0]

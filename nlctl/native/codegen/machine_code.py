@@ -9,6 +9,7 @@ held by a test each, are
 - ``CompileResult._reduce`` and ``_rebuild``: compiled code as plain data;
 - ``library.has_dynamic_globals`` and ``lifted``: code that holds addresses of this process;
 - ``codegen().magic_tuple()``: the processor that code is made for;
+- ``overloads``, ``fndesc.llvm_cfunc_wrapper_name``, ``get_pointer_to_function``: addresses;
 - ``global_compiler_lock``: several threads may ask at the same time;
 - the names in `SETTINGS`, of `numba.core.config`.
 """
@@ -181,3 +182,9 @@ def _rebuilt(data: Any, target_context: Any) -> CompileResult | None:
         return CompileResult._rebuild(target_context, *data)
     except Exception:  # LLVM does not find here what the code calls: it is compiled again
         return None
+
+
+def address_of(code: Any, signature: Any) -> int:
+    """Return the address of a compiled function as a C function; it holds as long as the code."""
+    made = code.overloads[signature.args]
+    return made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name)

@@ -1,5 +1,6 @@
 """When each expression of a function is computed: numbers, loops, and what lies in memory.
 
+The generator of machine code and the interpreter both walk a plan; neither decides anything else.
 A function is a sequence of levels.  In each, numbers come first, then one loop for every length of
 vectors; the sums of a loop are numbers of the next level.  A vector is computed where it is used,
 in one loop; one that is used in several, or element by element, lies in memory.
@@ -7,10 +8,11 @@ in one loop; one that is used in several, or element by element, lies in memory.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
-from ..expressions.graph import Expr, needed
+from ...expressions.graph import Expr, needed
 
 Loop = tuple[int, int]  # level and length
 STORED = ("concat", "call")  # vectors that are made in memory
@@ -33,6 +35,8 @@ class Plan:
 
     Attributes
     ----------
+    known : mapping
+        Expressions that lie in memory when the function begins, and where: (array, row).
     nodes : tuple of Expr
         Everything that is needed, in an order in which it can be computed.
     level : dict
@@ -47,12 +51,104 @@ class Plan:
         Rows of memory that are taken, those before included.
     """
 
+    known: Mapping[Expr, tuple[str, int]]
     nodes: tuple[Expr, ...]
     level: dict[Expr, int]
     stored: dict[Expr, tuple[str, int]]
     loops: dict[Loop, list[Expr]]
     stores: tuple[Store, ...]
     rows: int
+
+    @cached_property
+    def levels(self) -> tuple[Level, ...]:
+        """The levels, in order."""
+        inner: dict[Loop, list[Store]] = {}
+        for store in self.stores:
+            if store.size > 1:
+                inner.setdefault((self.level[store.expr], store.size), []).append(store)
+        numbers: dict[int, list[Expr]] = {}
+        for node in self.nodes:
+            called = node.op == "call" and node not in self.known
+            if (node.size is None and not self.summed(node)) or called:
+                numbers.setdefault(self.level[node], []).append(node)
+        loops: dict[int, list[LoopOfLevel]] = {}
+        for loop, nodes in sorted(self.loops.items(), key=lambda item: item[0]):
+            made = LoopOfLevel(size=loop[1], nodes=tuple(nodes), stores=tuple(inner.get(loop, ())))
+            loops.setdefault(loop[0], []).append(made)
+        count = max(self.level.values(), default=-1) + 1
+        return tuple(
+            Level(numbers=tuple(numbers.get(i, ())), loops=tuple(loops.get(i, ())))
+            for i in range(count)
+        )
+
+    @cached_property
+    def places(self) -> dict[Expr, list[tuple[str, int]]]:
+        """Where each number is to be written: (array, row)."""
+        found: dict[Expr, list[tuple[str, int]]] = {}
+        for store in self.stores:
+            if store.size == 1:
+                found.setdefault(store.expr, []).append((store.array, store.row))
+        return found
+
+    def summed(self, node: Expr) -> bool:
+        """Whether a number comes out of a loop of this function."""
+        return node.op == "sum" and node not in self.known
+
+    def place(self, node: Expr) -> tuple[str, int] | None:
+        """Return where a number is read from memory, None if it is computed."""
+        if node in self.known:
+            return self.known[node]
+        if node.op == "leaf":
+            return node.data[0], node.data[1]
+        if node.op == "item":
+            array, row, _ = self.elements(node.args[0])
+            return array, row + node.data
+        return None
+
+    def elements(self, vector: Expr) -> tuple[str, int, int]:
+        """Return where the elements of a vector in memory are: array, first row, distance."""
+        if vector in self.stored:
+            array, row = self.stored[vector]
+            return array, row + (sum(vector.data[1]) if vector.op == "call" else 0), 1
+        if vector.op == "slice":
+            array, row, step = self.elements(vector.args[0])
+            return array, row + step * vector.data[0], step * vector.data[1]
+        return vector.data
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopOfLevel:
+    """A loop: vectors and sums that are computed element by element, and what is written."""
+
+    size: int
+    nodes: tuple[Expr, ...]
+    stores: tuple[Store, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Level:
+    """Numbers (and calls of opaque functions), then loops, whose sums are numbers afterwards."""
+
+    numbers: tuple[Expr, ...]
+    loops: tuple[LoopOfLevel, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Function:
+    """One function of a program.
+
+    Attributes
+    ----------
+    arguments : tuple of str
+        The arrays that it reads and writes.
+    plan : Plan
+    copied : int
+        So many rows of the first array are copied to the second before anything else.
+    """
+
+    arguments: tuple[str, ...]
+    plan: Plan
+    copied: int = 0
 
 
 def split(store: Store, known: Collection[Expr] = ()) -> list[Store]:
@@ -109,13 +205,23 @@ def plan(wanted: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int)
         if store.size > 1:
             loops.setdefault((level[store.expr], store.size), [])
     return Plan(
-        nodes=nodes, level=level, stored=stored, loops=loops, stores=tuple(written), rows=rows
+        known=known,
+        nodes=nodes,
+        level=level,
+        stored=stored,
+        loops=loops,
+        stores=tuple(written),
+        rows=rows,
     )
 
 
 def _rows(node: Expr) -> int:
-    """Rows in memory: a call has its arguments there as well, before its results."""
-    return (node.size or 1) + (sum(node.data[1]) if node.op == "call" else 0)
+    """Rows in memory: a call has its arguments there as well, before its results.
+
+    Behind these are whether it has failed, and with which arguments.
+    """
+    size = node.size or 1
+    return size + 1 + 2 * sum(node.data[1]) if node.op == "call" else size
 
 
 def _in_memory(nodes: Sequence[Expr], known: Collection[Expr]) -> list[Expr]:

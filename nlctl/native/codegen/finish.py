@@ -1,0 +1,124 @@
+"""From LLVM IR to code that can be called: optimised, made for this processor, kept on disk.
+
+Seven passes are enough: what O2 does beyond them takes five times as long and gains nothing on
+straight arithmetic.  The object code is kept under a key of all that it is made from.
+
+Relied on in llvmlite: text is parsed by `parse_assembly`, which reads what other versions of LLVM
+write; symbols that are added to the process are found by MCJIT before those of libraries.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import re
+import threading
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import llvmlite
+import llvmlite.binding as llvm
+
+from ..._errors import CompileError
+from . import store
+
+PASSES = (
+    "always_inliner", "sroa", "instruction_combine", "simplify_cfg", "new_gvn",
+    "dead_code_elimination", "global_dead_code_eliminate",
+)  # fmt: skip
+_ONE_AT_A_TIME = threading.Lock()  # symbols are the process's
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loaded:
+    """Code in memory.
+
+    Attributes
+    ----------
+    addresses : mapping
+        Of its functions, by name.
+    owners : tuple
+        What must not be forgotten while these are used.
+    """
+
+    addresses: Mapping[str, int]
+    owners: tuple[Any, ...]
+
+
+def finished(
+    text: str, names: Iterable[str], symbols: Mapping[str, int], owners: Iterable[Any] = ()
+) -> Loaded:
+    """Return the functions of some IR, ready to be called.
+
+    Parameters
+    ----------
+    text : str
+    names : iterable of str
+        Functions whose addresses are wanted.
+    symbols : mapping
+        Addresses of what it calls, by name.
+    owners : iterable
+        What these addresses belong to.
+
+    Raises
+    ------
+    CompileError
+        If it calls what is nowhere.
+    """
+    with _ONE_AT_A_TIME:
+        key = _key(text)
+        code = store.read(key)
+        if code is None:
+            code = _object_code(text)
+            store.write(key, code)
+        for name, address in symbols.items():
+            llvm.add_symbol(name, address)
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        _check_symbols(text)  # now LLVM looks into this process too
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        addresses = {name: engine.get_function_address(name) for name in names}
+    return Loaded(addresses=addresses, owners=(engine, *owners))
+
+
+def _check_symbols(text: str) -> None:
+    """Check that all that is called is there: LLVM would end the process."""
+    for name in re.findall(r"^declare .*?@(\w+)\(", text, re.MULTILINE):  # LLVM's have a dot
+        if not llvm.address_of_symbol(name):
+            raise CompileError(f"this machine's C library has no function '{name}'")
+
+
+def _object_code(text: str) -> bytes:
+    machine = _machine()
+    module = llvm.parse_assembly(text)
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    module.verify()
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options())
+    passes = llvm.create_new_module_pass_manager()
+    for name in PASSES:
+        getattr(passes, f"add_{name}_pass")()
+    passes.run(module, builder)
+    return machine.emit_object(module)
+
+
+def _key(text: str) -> str:
+    """Return a key of IR and of what object code is made of besides."""
+    parts = (text, *_processor(), llvmlite.__version__, llvm.llvm_version_info, PASSES)
+    return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+@functools.cache
+def _processor() -> tuple[str, str, str]:
+    """Return the triple of this process, and the processor's name and features."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    features = llvm.get_host_cpu_features().flatten()
+    return llvm.get_process_triple(), llvm.get_host_cpu_name(), features
+
+
+def _machine() -> Any:
+    triple, name, features = _processor()
+    return llvm.Target.from_triple(triple).create_target_machine(
+        cpu=name, features=features, opt=2, reloc="default", codemodel="jitdefault", jit=True
+    )

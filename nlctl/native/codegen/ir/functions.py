@@ -1,0 +1,305 @@
+"""exp, sin, cos, tanh and others, of numbers and of vectors, as arithmetic.
+
+The C library's functions take one number at a time; these cost the same for a vector.  Each is the
+textbook's: reduce the argument by a multiple of a constant that is a sum of floats, each product
+rounded once; take a polynomial by Estrin's scheme; put the power of two, or the sign, back.
+tests/test_ir_functions.py measures the errors (exp, exp2 1.5, sin, cos and tanh 2.1 units in the
+last place) and derives the polynomials: interpolation at the Chebyshev nodes of the reduced range.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from ....expressions.functions import FUNCTIONS
+from .text import RARELY, Body, Value, type_of
+
+LOG2_E, LN2 = 1.4426950408889634, (0.6931471805599453, 2.3190468138462996e-17)
+TWO_OVER_PI, HALF_PI = 0.6366197723675814, (
+    1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33
+)  # fmt: skip
+PI = tuple(2 * part for part in HALF_PI)
+# (e^r - 1 - r) / r^2 for |r| <= ln(2) / 2
+EXP = (
+    0.5000000000000001, 0.16666666666666669, 0.04166666666662413, 0.008333333333330062,
+    0.0013888888917213717, 0.00019841269863053618, 2.4801521295954376e-05,
+    2.7557268459997064e-06, 2.7620088445409746e-07, 2.510038549551032e-08,
+)  # fmt: skip
+# (2^r - 1) / r for |r| <= 1 / 2
+EXP2 = (
+    0.6931471805599453, 0.24022650695910097, 0.0555041086648216, 0.009618129107606888,
+    0.0013333558146416936, 0.0001540353044173605, 1.525273382983612e-05, 1.321544258792169e-06,
+    1.0178062445845774e-07, 7.072585949269223e-09, 4.4549605981865186e-10,
+)  # fmt: skip
+# (sin(r) / r - 1) / z and (cos(r) - 1 + z / 2) / z^2 in z = r^2 for |r| <= pi / 4
+SIN = (
+    -0.16666666666666666, 0.008333333333330936, -0.00019841269836740532, 2.7557316093198404e-06,
+    -2.5051129896450185e-08, 1.5917988979397435e-10,
+)  # fmt: skip
+COS = (
+    0.041666666666666664, -0.0013888888888887389, 2.48015872987544e-05, -2.755731726587808e-07,
+    2.087614504941318e-09, -1.138254464534925e-11,
+)  # fmt: skip
+# the first for |r| <= pi / 2
+SIN_WIDE = (
+    -0.16666666666666666, 0.008333333333333316, -0.00019841269841254885, 2.7557319219139183e-06,
+    -2.505210761393476e-08, 1.6058977114074673e-10, -7.643963965925357e-13, 2.731365867494017e-15,
+)  # fmt: skip
+LARGEST_ANGLE = 1e6  # beyond it three parts of pi are too few
+ROUND = 1.5 * 2.0**52  # added, it leaves the nearest integer, which the last bits are
+SMALLEST, STEP = -707.0, 64  # below e^-707 powers of two are made in two steps
+
+
+def applied(b: Body, name: str, *args: Value) -> Value:
+    """Return a function of the table of functions, written out or called.
+
+    Parameters
+    ----------
+    b : Body
+        Where it is written.
+    name : str
+        NumPy's name.
+    *args : Value
+    """
+    code = FUNCTIONS[name].code
+    if name in ("sin", "cos"):
+        return sin_cos(b, args[0], {name})[name]
+    if name in CALLED:
+        return _call(b, name, CALLED[name], *args)[0]
+    if code == "own":
+        return INLINE[name](b, *args)
+    if code.startswith("llvm."):
+        return b.intrinsic(code.removeprefix("llvm."), *args)
+    return b.each(code, *args)
+
+
+def sin_cos(b: Body, x: Value, wanted: set[str]) -> dict[str, Value]:
+    """Return sine, cosine or both of one angle."""
+    if len(wanted) == 2:
+        return dict(zip(("sin", "cos"), _call(b, "sincos", _sin_and_cos, x), strict=True))
+    (name,) = wanted
+    make = _sin if name == "sin" else _cos
+    return {name: _call(b, name, make, x)[0]}
+
+
+Results = tuple[Value, ...]
+
+
+def _call(b: Body, name: str, make: Callable[..., Results], *args: Value) -> Results:
+    """Call a function of this module; it is written when it is first needed."""
+    values = b.same(*args)
+    width, count = values[0].width, 2 if make is _sin_and_cos else 1
+    kind = type_of(width)
+    kind = f"{{{kind}, {kind}}}" if count == 2 else kind
+    full = f"@nlctl.{name}.{width or 1}"
+    if full not in b.module.functions:
+        b.module.functions[full] = ""  # before those that it calls
+        b.module.functions[full] = _defined(b, full, kind, make, values)
+    found = b.new(f"call {kind} {full}({', '.join(map(str, values))})", width)
+    if count == 1:
+        return (found,)
+    return tuple(b.new(f"extractvalue {kind} {found.text}, {i}", width) for i in range(count))
+
+
+def _defined(b: Body, full: str, kind: str, make: Callable[..., Results], values: list[Value]):
+    """Return the text of a function."""
+    inner = Body(b.module)
+    args = [Value(f"%x{i}", v.width, v.kind) for i, v in enumerate(values)]
+    results = make(inner, *args)
+    last = str(results[0])
+    if len(results) > 1:
+        last = f"{kind} poison"
+        for i, v in enumerate(results):
+            last = f"{kind} {inner.new(f'insertvalue {last}, {v}, {i}').text}"
+    inner.write(f"ret {last}")
+    how = "alwaysinline" if b.module.inlined else "noinline"
+    given = ", ".join(map(str, args))
+    return f"define internal {kind} {full}({given}) {how} nounwind {{\nentry:\n{inner.text()}}}\n"
+
+
+def _polynomial(b: Body, coefficients: Sequence[float], x: Value) -> Value:
+    """Evaluate a polynomial by Estrin's scheme: pairs, pairs of pairs, ..."""
+    terms: list[Value | float] = list(coefficients)
+    while True:
+        terms = [
+            b.muladd(terms[i + 1], x, terms[i]) if i + 1 < len(terms) else terms[i]
+            for i in range(0, len(terms), 2)
+        ]
+        if len(terms) == 1:
+            return b.wide(terms[0], x.width)
+        x = b.mul(x, x)
+
+
+# -- powers ----------------------------------------------------------------------------------------
+
+
+def _clamped(b: Body, x: Value, low: float, high: float) -> Value:
+    """Return x between two bounds; NaN stays."""
+    x = b.select(b.compare("ogt", x, high), high, x)
+    return b.select(b.compare("olt", x, low), low, x)
+
+
+def _reduced(b: Body, x: Value, shift: float) -> tuple[Value, Value]:
+    """Return r and m with e^x = 2^n e^r, where n + shift is in the last bits of m."""
+    m = b.fma(x, LOG2_E, ROUND + shift)
+    n = b.sub(m, ROUND + shift, exact=True)
+    return b.fma(n, -LN2[1], b.fma(n, -LN2[0], x)), m
+
+
+def _scaled(b: Body, y: Value, m: Value, small: Value) -> Value:
+    """Return y 2^k, where k + 1023 is in the last bits of m.
+
+    Where the result may be small it is made in two steps, so that it underflows gradually.
+    """
+    bits = b.bits(m)
+    more = b.integer("and", b.new(f"sext {small} to {type_of(y.width, 'i')}", y.width, "i"), STEP)
+    bits = b.new(f"add {bits}, {more.text}", y.width, "i")
+    y = b.mul(y, b.real(b.integer("shl", bits, 52)), exact=True)
+    return b.mul(y, b.select(small, 2.0**-STEP, 1.0), exact=True)
+
+
+def _exp(b: Body, x: Value) -> Results:
+    """e^x = 2 e^r 2^(n-1): overflows to infinity, underflows gradually to 0."""
+    x = _clamped(b, x, -746.0, 710.0)
+    r, m = _reduced(b, x, 1022)
+    tail = _polynomial(b, [2 * c for c in EXP], r)
+    y = b.muladd(tail, b.mul(r, r), b.muladd(r, 2.0, 2.0))
+    return (_scaled(b, y, m, b.compare("olt", x, SMALLEST)),)
+
+
+def _exp2(b: Body, x: Value) -> Results:
+    x = _clamped(b, x, -1077.0, 1024.5)
+    m = b.add(x, ROUND + 1022, exact=True)
+    r = b.sub(x, b.sub(m, ROUND + 1022, exact=True), exact=True)
+    y = b.muladd(_polynomial(b, [2 * c for c in EXP2], r), r, 2.0)
+    return (_scaled(b, y, m, b.compare("olt", x, SMALLEST * LOG2_E)),)
+
+
+def _tanh(b: Body, x: Value) -> Results:
+    """(e^2y - 1) / (e^2y + 1), relatively accurate near 0."""
+    y = b.intrinsic("fabs", x)
+    y = b.select(b.compare("ogt", y, 22.0), 22.0, y)
+    r, m = _reduced(b, b.add(y, y), 1023)
+    e = b.muladd(_polynomial(b, EXP, r), b.mul(r, r), r)
+    scale = b.real(b.integer("shl", b.bits(m), 52))
+    e = b.muladd(scale, e, b.sub(scale, 1.0))
+    return (b.intrinsic("copysign", b.op("fdiv", e, b.add(e, 2.0)), x),)
+
+
+# -- angles ----------------------------------------------------------------------------------------
+
+
+def _less(b: Body, x: Value, n: Value, parts: Sequence[float]) -> Value:
+    """Return x - n (a + b + c)."""
+    for part in parts:
+        x = b.fma(n, -part, x)
+    return x
+
+
+def _sin_and_cos(b: Body, x: Value) -> Results:
+    """Both, from what is left of multiples of pi / 2; the last bits say which is which."""
+    m = b.fma(x, TWO_OVER_PI, ROUND)
+    r = _less(b, x, b.sub(m, ROUND, exact=True), HALF_PI)
+    z = b.mul(r, r)
+    sine = b.muladd(b.mul(r, z), _polynomial(b, SIN, z), r)
+    cosine = b.muladd(b.mul(z, z), _polynomial(b, COS, z), b.muladd(z, -0.5, 1.0))
+    bits = b.bits(m)
+    odd = b.new(f"icmp slt {b.integer('shl', bits, 63)}, {_zero(x.width).text}", x.width, "b")
+    sign = -(2**63)
+    in_sine = b.integer("and", b.integer("shl", bits, 62), sign)
+    in_cosine = b.integer("and", b.integer("shl", b.integer("add", bits, 1), 62), sign)
+    s = b.real(b.logic("xor", b.bits(b.select(odd, cosine, sine)), in_sine))
+    c = b.real(b.logic("xor", b.bits(b.select(odd, sine, cosine)), in_cosine))
+    return _exact_if_far(b, x, {"sin": s, "cos": c})
+
+
+def _zero(width: int) -> Value:
+    return Value("zeroinitializer" if width else "0", width, "i")
+
+
+def _sin(b: Body, x: Value) -> Results:
+    """An odd polynomial of what is left of the nearest multiple of pi."""
+    m = b.fma(x, 1 / math.pi, ROUND)
+    return _exact_if_far(b, x, {"sin": _half_turn(b, x, m, 0.0, b.bits(m))})
+
+
+def _cos(b: Body, x: Value) -> Results:
+    """A sine from the nearest odd multiple of pi / 2 on."""
+    m = b.add(b.fma(x, 1 / math.pi, -0.5), ROUND, exact=True)
+    return _exact_if_far(b, x, {"cos": _half_turn(b, x, m, 0.5, b.integer("xor", b.bits(m), 1))})
+
+
+def _half_turn(b: Body, x: Value, m: Value, shift: float, sign: Value) -> Value:
+    n = b.sub(m, ROUND, exact=True)
+    n = b.add(n, shift, exact=True) if shift else n
+    r = _less(b, x, n, PI)
+    z = b.mul(r, r)
+    y = b.muladd(b.mul(r, z), _polynomial(b, SIN_WIDE, z), r)
+    return b.real(b.logic("xor", b.bits(y), b.integer("shl", sign, 63)))
+
+
+def _exact_if_far(b: Body, x: Value, near: dict[str, Value]) -> Results:
+    """Return what is near, but the C library's values for the elements that are too large."""
+    far = b.any(b.compare("ogt", b.intrinsic("fabs", x), LARGEST_ANGLE))
+    here, rare, done = b.block, b.label("far"), b.label("near")
+    b.write(f"br {far}, label %{rare}, label %{done}, {RARELY}")
+    b.begin(rare)
+    exact = [_far(b, name, x, y) for name, y in near.items()]
+    b.write(f"br label %{done}")
+    b.begin(done)
+    return tuple(
+        b.new(f"phi {y.type} [{y.text}, %{here}], [{e.text}, %{rare}]", y.width)
+        for y, e in zip(near.values(), exact, strict=True)
+    )
+
+
+def _far(b: Body, name: str, x: Value, y: Value) -> Value:
+    """Call a function that is seldom called: it leaves all registers as they were."""
+    full, kind = f"@nlctl.far.{name}.{x.width or 1}", type_of(x.width)
+    if full not in b.module.functions:
+        inner, (given, known) = Body(b.module), (Value("%x", x.width), Value("%y", x.width))
+        is_far = inner.compare("ogt", inner.intrinsic("fabs", given), LARGEST_ANGLE)
+        found = inner.select(is_far, inner.each(name, given), known)
+        b.module.functions[full] = (
+            f"define internal preserve_allcc {kind} {full}({given}, {known}) "
+            f"noinline cold nounwind {{\nentry:\n{inner.text()}  ret {found}\n}}\n"
+        )
+    return b.new(f"call preserve_allcc {kind} {full}({x}, {y})", x.width)
+
+
+# -- choices ---------------------------------------------------------------------------------------
+
+
+def _extreme(how: str) -> Callable[[Body, Value, Value], Value]:
+    def write(b: Body, x: Value, y: Value) -> Value:
+        """The first if it is beyond the second, or NaN."""
+        first = b.logic("or", b.compare(how, x, y), b.compare("uno", x, x))
+        return b.select(first, x, y)
+
+    return write
+
+
+def _sign(b: Body, x: Value) -> Value:
+    """-1, 0 or 1; NaN for NaN."""
+    below = b.select(b.compare("olt", x, 0.0), -1.0, b.add(x, 0.0, exact=True))
+    return b.select(b.compare("ogt", x, 0.0), 1.0, below)
+
+
+def _remainder(b: Body, x: Value, y: Value) -> Value:
+    """NumPy's: it has the sign of the divisor, as Python's ``%``."""
+    x, y = b.same(x, y)
+    rest = b.each("fmod", x, y)
+    signs = b.logic("xor", b.compare("olt", y, 0.0), b.compare("olt", rest, 0.0))
+    other = b.logic("and", b.compare("one", rest, 0.0), signs)
+    rest = b.select(other, b.add(rest, y), rest)
+    return b.select(b.compare("oeq", rest, 0.0), b.intrinsic("copysign", 0.0, y), rest)
+
+
+CALLED = {"exp": _exp, "exp2": _exp2, "tanh": _tanh, "sin": _sin, "cos": _cos}
+INLINE = {
+    "minimum": _extreme("olt"),
+    "maximum": _extreme("ogt"),
+    "sign": _sign,
+    "remainder": _remainder,
+}

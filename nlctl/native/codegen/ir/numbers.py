@@ -1,0 +1,169 @@
+"""Numbers of a function: each expression is one value."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from ....expressions.graph import COMPARISONS, LOGIC, Expr
+from ..plan import Plan
+from .functions import CALLED, applied, sin_cos
+from .memory import load, place, store
+from .text import Body, Value, constant
+
+COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
+ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
+PACKED = 4  # numbers of one member whose sines, powers, ... are computed side by side
+
+
+class Writer:
+    """Writes one function; `names` says what each expression is called so far.
+
+    Attributes
+    ----------
+    b : Body
+    plan : Plan
+    lanes : int
+        Number of members.
+    exact : set of Expr
+        Operations that are rounded one by one.
+    both : set of Expr
+        Angles of which sine and cosine are needed.
+    pairs : dict
+        Sines and cosines of those that have been computed, by the angle's name.
+    """
+
+    def __init__(self, b: Body, plan: Plan, lanes: int, exact: Any) -> None:
+        self.b, self.plan, self.lanes, self.exact = b, plan, lanes, exact
+        self.width = 0 if lanes == 1 else lanes
+        self.names: dict[Expr, Value] = {}
+        self.pairs: dict[str, dict[str, Value]] = {}
+        kinds = Counter(
+            a for n in plan.nodes for a in n.args if n.op in ("sin", "cos") and n not in plan.known
+        )
+        self.both = {angle for angle, count in kinds.items() if count == 2}
+
+    def number(self, node: Expr) -> None:
+        """Compute or read a number, and write it where it is to lie."""
+        if node.op == "call" and node not in self.plan.known:
+            self._call(node)
+            return
+        if node not in self.names:
+            where = self.plan.place(node)
+            if where is None:
+                self.b.note(shown(node))
+                self.names[node] = self.operation(node)
+            else:
+                array, row = where
+                self.names[node] = load(self.b, place(self.b, array, row * self.lanes), self.width)
+        self.stored(node)
+
+    def stored(self, node: Expr) -> None:
+        """Write a number where it is to lie."""
+        for array, row in self.plan.places.get(node, ()):
+            value = self.b.wide(self.names[node], self.width) if self.width else self.names[node]
+            store(self.b, value, place(self.b, array, row * self.lanes))
+
+    def _call(self, node: Expr) -> None:
+        """Call an opaque function, member by member; arguments and results are in memory."""
+        name, _ = node.data
+        self.b.module.declared[f"declare void @{name}(ptr, i64, i64)"] = None
+        _, row = self.plan.stored[node]
+        for lane in range(self.lanes):
+            self.b.write(f"call void @{name}(ptr %c, i64 {row}, i64 {lane})")
+
+    def operation(self, node: Expr) -> Value:
+        """Return an operation on what has names already."""
+        b, args = self.b, [self.names[a] for a in node.args]
+        if node.op == "const":
+            return constant(node.data, self.width, "b" if node.kind == "b" else "f")
+        if node.op in ARITHMETIC:
+            return b.op(ARITHMETIC[node.op], *args, exact=node in self.exact)
+        if node.op in COMPARISONS:
+            return b.compare(COMPARE[node.op], *args)
+        if node.op == "not":
+            return b.logic("xor", args[0], constant(True, args[0].width, "b"))
+        if node.op in LOGIC:
+            return b.logic(node.op, *args)
+        if node.op == "neg":
+            return b.neg(args[0])
+        if node.op == "select":
+            return b.select(*args)
+        if node.op in ("sin", "cos"):
+            return self.angle(args[0], node.args[0] in self.both, node.op)
+        return applied(b, node.op, *args)
+
+    def angle(self, x: Value, both: bool, name: str) -> Value:
+        """Return sine or cosine; where both are needed they are computed together."""
+        if not both:
+            return sin_cos(self.b, x, {name})[name]
+        if x.text not in self.pairs:
+            self.pairs[x.text] = sin_cos(self.b, x, {"sin", "cos"})
+        return self.pairs[x.text][name]
+
+    # -- functions of several numbers side by side
+
+    def numbers(self, nodes: tuple[Expr, ...]) -> None:
+        """Compute the numbers of a level; those of one member four at a time where that pays."""
+        if self.lanes > 1:
+            for node in nodes:
+                self.number(node)
+            return
+        depths = _depths(nodes, self._is_packable)
+        for depth in sorted(set(depths.values())):
+            here = [node for node in nodes if depths[node] == depth]
+            waiting = [node for node in here if self._is_packable(node)]
+            for node in here:
+                if node not in waiting:
+                    self.number(node)
+            self._pack(waiting)
+
+    def _is_packable(self, node: Expr) -> bool:
+        return node.op in CALLED and node.size is None and node not in self.plan.known
+
+    def _pack(self, nodes: list[Expr]) -> None:
+        families: dict[str, list[Expr]] = {}
+        for node in nodes:
+            families.setdefault("angle" if node.op in ("sin", "cos") else node.op, []).append(node)
+        for members in families.values():
+            angles = list(dict.fromkeys(node.args[0] for node in members))
+            for at in range(0, len(angles), PACKED):
+                part = angles[at : at + PACKED]
+                mine = [node for node in members if node.args[0] in part]
+                if len(part) > 1:
+                    self._side_by_side(mine, part)
+                for node in mine:
+                    self.number(node)
+
+    def _side_by_side(self, nodes: list[Expr], angles: list[Expr]) -> None:
+        """Compute functions of up to four numbers as functions of one vector."""
+        b = self.b
+        for node in nodes:
+            b.note(shown(node))
+        x = b.gathered([self.names[a] for a in angles], 2 if len(angles) == 2 else PACKED)
+        kinds = {node.op for node in nodes}
+        if kinds <= {"sin", "cos"}:
+            found = sin_cos(b, x, kinds)
+        else:
+            found = {kind: applied(b, kind, x) for kind in kinds}
+        for node in nodes:
+            self.names[node] = b.element(found[node.op], angles.index(node.args[0]))
+
+
+def _depths(nodes: tuple[Expr, ...], is_packable: Any) -> dict[Expr, int]:
+    """Return how many functions stand one behind the other before each number of a level."""
+    found: dict[Expr, int] = {}
+    for node in nodes:
+        found[node] = max((found[a] + is_packable(a) for a in node.args if a in found), default=0)
+    return found
+
+
+def shown(node: Expr) -> str:
+    """Return an expression in a line."""
+    if node.op == "const":
+        return f"{node.data:g}"
+    if node.op == "leaf":
+        array, start, step = node.data
+        return f"{array}[{start}]" if node.size is None else f"{array}[{start}::{step}]"
+    inside = ", ".join(shown(a) if a.op in ("const", "leaf") else f"e{a.index}" for a in node.args)
+    return f"e{node.index} = {node.op}({inside})"

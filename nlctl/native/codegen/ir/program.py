@@ -1,0 +1,55 @@
+"""A program as LLVM IR: C functions of addresses of numbers.
+
+    void prepare(double *p, double *c)
+    void rhs(double *t, double *x, double *u, double *c, double *dx, double *g)
+    void out(double *t, double *x, double *u, double *c, double *y)
+
+No two arrays overlap.  Each has a row per number and an entry per member in each row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from ....expressions.graph import Expr
+from ..plan import Function
+from .loops import written
+from .numbers import Writer
+from .text import Body, Module
+
+
+def program_text(functions: Mapping[str, Function], lanes: int, exact: Collection[Expr]) -> str:
+    """Return the IR of some functions.
+
+    Parameters
+    ----------
+    functions : mapping
+        By name.
+    lanes : int
+        Number of members.  Functions such as exp become part of those that call them only with
+        one: with several a call costs nothing, and there would be much more to compile.
+    exact : collection of Expr
+        Operations that are rounded one by one; of others a product and a sum may be one.
+    """
+    module = Module(inlined=lanes == 1)
+    texts = [_function(module, name, f, lanes, exact) for name, f in functions.items()]
+    return "\n".join([module.text(), *texts])
+
+
+def _function(
+    module: Module, name: str, function: Function, lanes: int, exact: Collection[Expr]
+) -> str:
+    b = Body(module)
+    if function.copied:
+        module.declared["declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"] = None
+        source, target = function.arguments[:2]
+        size = 8 * function.copied * lanes
+        b.write(f"call void @llvm.memcpy.p0.p0.i64(ptr %{target}, ptr %{source}, i64 {size}, i1 0)")
+    writer = Writer(b, function.plan, lanes, exact)
+    for level in function.plan.levels:
+        writer.numbers(level.numbers)
+        for loop in level.loops:
+            written(writer, loop)
+    b.write("ret void")
+    given = ", ".join(f"ptr noalias %{argument}" for argument in function.arguments)
+    return f"define void @{name}({given}) nounwind {{\nentry:\n{b.text()}}}\n"

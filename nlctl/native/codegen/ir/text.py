@@ -1,0 +1,259 @@
+"""LLVM IR as text: values with their types, and the instructions that make new ones.
+
+Every number of a diagram is one value: a ``double``, or a vector of as many as there are members
+side by side or elements in a turn of a loop.  Text is written directly: objects for each
+instruction would take ten times as long as all the rest.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+KINDS = {"f": "double", "b": "i1", "i": "i64"}
+RARELY = "!prof !0"  # the first way of a branch is all but never taken
+
+
+@dataclass(frozen=True)
+class Value:
+    """A value of a function.
+
+    Attributes
+    ----------
+    text : str
+        Its name, or a constant.
+    width : int
+        Number of elements, 0 for what is no vector.
+    kind : str
+        ``"f"`` float, ``"b"`` truth value, ``"i"`` integer.
+    """
+
+    text: str
+    width: int
+    kind: str = "f"
+
+    @property
+    def type(self) -> str:
+        """LLVM's name of its type."""
+        return type_of(self.width, self.kind)
+
+    def __str__(self) -> str:
+        return f"{self.type} {self.text}"
+
+
+def type_of(width: int, kind: str = "f") -> str:
+    """Return LLVM's name of a type."""
+    return f"<{width} x {KINDS[kind]}>" if width else KINDS[kind]
+
+
+def float_text(x: float) -> str:
+    """Return a float bit by bit."""
+    return "0x" + struct.pack(">d", x).hex().upper()
+
+
+def constant(x: float | bool | int, width: int = 0, kind: str = "f") -> Value:
+    """Return a constant, repeated in every element."""
+    text = {"f": float_text, "b": lambda v: str(v).lower(), "i": str}[kind](x)
+    one = Value(text, 0, kind)
+    return Value(f"splat ({one})", width, kind) if width else one
+
+
+@dataclass(kw_only=True)
+class Module:
+    """Functions that are compiled together.
+
+    Attributes
+    ----------
+    inlined : bool
+        Whether small functions become part of those that call them.
+    declared, tables, functions : dict
+        Text of what is declared, constants by name, and text of functions by name, in the order
+        in which they were needed.
+    """
+
+    inlined: bool
+    declared: dict[str, None] = field(default_factory=dict)
+    tables: dict[tuple[float, ...], str] = field(default_factory=dict)
+    functions: dict[str, str] = field(default_factory=dict)
+
+    def table(self, values: tuple[float, ...]) -> str:
+        """Return the name of an array of constants."""
+        return self.tables.setdefault(values, f"@table{len(self.tables)}")
+
+    def text(self) -> str:
+        """Return all of it."""
+        tables = []
+        for values, name in self.tables.items():
+            inside = ", ".join(f"double {float_text(v)}" for v in values)
+            tables.append(
+                f"{name} = private constant [{len(values)} x double] [{inside}], align 32"
+            )
+        weights = '!0 = !{!"branch_weights", i32 1, i32 100000}\n'
+        return "\n".join([*self.declared, *tables, "", *self.functions.values(), weights])
+
+
+Operand = Value | float
+
+
+class Body:
+    """The instructions of one function, and what writes the next one.
+
+    Arithmetic may be contracted: a product and a sum become one instruction that rounds once.
+    Where ``exact`` is given it is not.  A float beside a vector is meant in every element.
+    """
+
+    def __init__(self, module: Module) -> None:
+        self.module = module
+        self.lines: list[str] = []
+        self.block = "entry"
+        self._count = self._labels = 0
+
+    def text(self) -> str:
+        """Return the instructions, one a line."""
+        return "".join(f"{line}\n" if line.endswith(":") else f"  {line}\n" for line in self.lines)
+
+    def write(self, text: str) -> None:
+        """Add an instruction without a result."""
+        self.lines.append(text)
+
+    def note(self, text: str) -> None:
+        """Add a comment."""
+        self.lines.append(f"; {text}")
+
+    def new(self, text: str, width: int = 0, kind: str = "f") -> Value:
+        """Add an instruction, and return its result."""
+        self._count += 1
+        name = f"%v{self._count}"
+        self.lines.append(f"{name} = {text}")
+        return Value(name, width, kind)
+
+    # -- elements
+
+    def wide(self, v: Operand, width: int) -> Value:
+        """Repeat a number in every element."""
+        if not isinstance(v, Value):
+            return constant(v, width)
+        if v.width == width:
+            return v
+        one, whole = type_of(width, v.kind), f"<{width} x i32> zeroinitializer"
+        first = self.new(f"insertelement {one} poison, {v}, i64 0")
+        return self.new(f"shufflevector {one} {first.text}, {one} poison, {whole}", width, v.kind)
+
+    def same(self, *values: Operand) -> list[Value]:
+        """Return values as vectors of one width."""
+        width = max(v.width for v in values if isinstance(v, Value))
+        return [self.wide(v, width) for v in values]
+
+    def element(self, v: Value, i: int) -> Value:
+        """Return one element."""
+        return self.new(f"extractelement {v}, i64 {i}", 0, v.kind)
+
+    def gathered(self, values: Sequence[Value], width: int) -> Value:
+        """Return numbers as one vector; the last is repeated where there are too few."""
+        kind = values[0].kind
+        last = Value("poison", width, kind)
+        for i in range(width):
+            one = values[min(i, len(values) - 1)]
+            last = self.new(f"insertelement {last}, {one}, i64 {i}", width, kind)
+        return last
+
+    def shuffled(self, a: Value, b: Value, order: Sequence[int]) -> Value:
+        """Return a vector of elements of two others."""
+        mask = ", ".join(f"i32 {i}" for i in order)
+        width = len(order)
+        return self.new(f"shufflevector {a}, {b}, <{width} x i32> <{mask}>", width, a.kind)
+
+    # -- arithmetic
+
+    def op(self, name: str, a: Operand, b: Operand, *, exact: bool = False) -> Value:
+        """Return ``fadd``, ``fsub``, ``fmul`` or ``fdiv`` of two values."""
+        x, y = self.same(a, b)
+        return self.new(f"{name} {'' if exact else 'contract '}{x}, {y.text}", x.width)
+
+    def add(self, a: Operand, b: Operand, *, exact: bool = False) -> Value:
+        return self.op("fadd", a, b, exact=exact)
+
+    def sub(self, a: Operand, b: Operand, *, exact: bool = False) -> Value:
+        return self.op("fsub", a, b, exact=exact)
+
+    def mul(self, a: Operand, b: Operand, *, exact: bool = False) -> Value:
+        return self.op("fmul", a, b, exact=exact)
+
+    def neg(self, a: Value) -> Value:
+        return self.new(f"fneg {a}", a.width)
+
+    def fma(self, a: Operand, b: Operand, c: Operand) -> Value:
+        """Return a b + c, rounded once on every processor."""
+        return self.intrinsic("fma", a, b, c)
+
+    def muladd(self, a: Operand, b: Operand, c: Operand) -> Value:
+        """Return a b + c, rounded once where that is fast."""
+        return self.intrinsic("fmuladd", a, b, c)
+
+    def intrinsic(self, name: str, *values: Operand) -> Value:
+        """Call one of LLVM's own functions of floats."""
+        args = self.same(*values)
+        kind, width = args[0].type, args[0].width
+        full = f"@llvm.{name}.{f'v{width}f64' if width else 'f64'}"
+        self.module.declared[f"declare {kind} {full}({', '.join([kind] * len(args))})"] = None
+        return self.new(f"call {kind} {full}({', '.join(map(str, args))})", width)
+
+    def each(self, name: str, *values: Value) -> Value:
+        """Call a function of the C library for every element."""
+        args = self.same(*values)
+        width = args[0].width
+        self.module.declared[f"declare double @{name}({', '.join(['double'] * len(args))})"] = None
+
+        def one(parts: Sequence[Value]) -> Value:
+            return self.new(f"call double @{name}({', '.join(map(str, parts))})")
+
+        if not width:
+            return one(args)
+        return self.gathered([one([self.element(a, i) for a in args]) for i in range(width)], width)
+
+    # -- truth values and bits
+
+    def compare(self, how: str, a: Operand, b: Operand) -> Value:
+        x, y = self.same(a, b)
+        return self.new(f"fcmp {how} {x}, {y.text}", x.width, "b")
+
+    def select(self, condition: Value, a: Operand, b: Operand) -> Value:
+        """Return `a` where a condition holds, otherwise `b`."""
+        width = max(v.width for v in (condition, a, b) if isinstance(v, Value))
+        c, x, y = (self.wide(v, width) for v in (condition, a, b))
+        return self.new(f"select {c}, {x}, {y}", width, x.kind)
+
+    def logic(self, name: str, a: Value, b: Value) -> Value:
+        """Return ``and``, ``or`` or ``xor``, bit by bit."""
+        x, y = self.same(a, b)
+        return self.new(f"{name} {x}, {y.text}", x.width, x.kind)
+
+    def integer(self, name: str, a: Value, b: int) -> Value:
+        """Return an operation on integers and a constant one."""
+        return self.new(f"{name} {a}, {constant(b, a.width, 'i').text}", a.width, "i")
+
+    def bits(self, a: Value) -> Value:
+        return self.new(f"bitcast {a} to {type_of(a.width, 'i')}", a.width, "i")
+
+    def real(self, a: Value) -> Value:
+        return self.new(f"bitcast {a} to {type_of(a.width)}", a.width)
+
+    def any(self, c: Value) -> Value:
+        """Return whether a condition holds for any element."""
+        if not c.width:
+            return c
+        bits = self.new(f"bitcast {c} to i{c.width}")
+        return self.new(f"icmp ne i{c.width} {bits.text}, 0", 0, "b")
+
+    # -- control
+
+    def label(self, what: str) -> str:
+        """Return a new name of a block."""
+        self._labels += 1
+        return f"{what}{self._labels}"
+
+    def begin(self, block: str) -> None:
+        """Begin a block."""
+        self.lines.append(f"{block}:")
+        self.block = block
