@@ -211,9 +211,9 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("settings", "message"),
         [
-            ({"rtol": 0}, "rtol must be > 0, got 0"),
-            ({"rtol": np.nan}, "rtol must be > 0, got nan"),
-            ({"atol": -1.0}, "atol must be > 0"),
+            ({"rtol": 0}, "finite rtol > 0, got 0"),
+            ({"rtol": np.nan}, "finite rtol > 0, got nan"),
+            ({"atol": -1.0}, "finite atol > 0"),
             ({"step": -0.1}, "step must be > 0"),
             ({"step": np.nan}, "step must be > 0"),
             ({"max_steps": 0}, "max_steps must be >= 1"),
