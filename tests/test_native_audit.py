@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from numba.core import config
 
 import nlctl
 from nlctl._errors import ParameterError, UsageError
@@ -194,6 +195,7 @@ CANCELLING = {
 }
 
 
+@pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="millions of steps without JIT")
 @pytest.mark.parametrize("kind", CANCELLING)
 def test_rounding_is_no_difference(kind):
     """What python-control's own value moves when the state is rounded is not held against it."""
