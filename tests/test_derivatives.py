@@ -55,6 +55,8 @@ def test_each_partial_derivative_of_the_table(name, data):
     x = np.array(data.draw(points_of(name))[: row.count])
     if name in ("remainder", "fmod"):
         assume(abs(x[1]) > 0.5 and abs(x[0] / x[1] - np.rint(x[0] / x[1])) > 0.1)
+    if name == "tan":
+        assume(abs(np.cos(x[0])) > 0.1)  # Richardson's steps would reach across the pole
     for i, derivative in enumerate(row.derivative):
         along = np.eye(row.count)[i]
         wanted = extrapolated(lambda s, a=along: function(*(x + s * a)), 0.01)

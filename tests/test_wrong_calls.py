@@ -5,12 +5,13 @@ import warnings
 from pathlib import Path
 
 import pytest
-import wrong_calls
 from wrong_calls import GROUPS
 
+import analysis
+import nlctl
 from nlctl._errors import UsageError
 
-OWN = [Path(wrong_calls.__file__).parents[1] / name for name in ("nlctl", "analysis")]
+OWN = [Path(package.__file__).parent for package in (nlctl, analysis)]  # wherever it is installed
 
 
 def refusal(call):
