@@ -125,8 +125,8 @@ class PureFeedback:
         return ("y", *self.states)
 
     @cached_property
-    def update(self) -> Callable:
-        """The update equation, with the user's functions in their places."""
+    def terms(self) -> tuple[Callable, Callable]:
+        """The user's functions as equations ``f(x, v, p)`` and ``d(x, t, p)``."""
         f, d = equation(self.f), equation(self.d)
 
         @equation
@@ -137,7 +137,12 @@ class PureFeedback:
         def d_alone(x, t, p):
             return d(x, t)
 
-        return integrator_chain(f_alone, d_alone)
+        return f_alone, d_alone
+
+    @cached_property
+    def update(self) -> Callable:
+        """The update equation, with the user's functions in their places."""
+        return integrator_chain(*self.terms)
 
 
 @equation

@@ -12,7 +12,7 @@ import control as ct
 
 from ._arguments import number
 from ._errors import ParameterError
-from ._interpreted import interpreted
+from ._interpreted import METHODS, interpreted
 from ._names import unknown
 from ._param import checked_times
 from ._run_arguments import Run, checked_params, unified, with_aliases
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 __all__ = ["EngineWarning", "input_output_response"]
 
 ENGINES = ("python-control", "native", "auto")
-SCIPY_METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 NATIVE_ONLY = ("max_steps", "step")  # settings that python-control does not know
 
 
@@ -218,7 +217,7 @@ def _takes_machine_code(run: Run, engine: str, interpretable: bool) -> bool:
 def _asks_for_scipy(run: Run) -> bool:
     """Whether a run is given what only python-control's integrator knows."""
     method, keywords = run.solver["method"], run.solver["solve_ivp_kwargs"] or {}
-    named = run.solver["solve_ivp_method"] is not None or method in SCIPY_METHODS
+    named = run.solver["solve_ivp_method"] is not None or method in METHODS
     return named or run.evaluation_times is None or bool(set(keywords) - {"rtol", "atol"})
 
 

@@ -7,9 +7,9 @@ from numba.core import config
 
 import nlctl
 from nlctl._errors import ParameterError, UsageError
-from nlctl.expressions.graph import NUMPY, Graph
+from nlctl.expressions.graph import Graph
 from nlctl.native import AuditError
-from nlctl.native._lower_blocks import _Reader
+from nlctl.native._lower_blocks import Reader
 from nlctl.native.codegen import interpret
 from nlctl.native.codegen.ir import numbers
 from nlctl.response import EngineWarning
@@ -51,7 +51,8 @@ X0 = np.linspace(0.2, 1.0, N)
 
 def swapped_operator(patch):
     patch.setitem(numbers.ARITHMETIC, "sub", "fadd")
-    patch.setattr(interpret, "NUMPY", NUMPY | {"sub": "add"})  # without JIT
+    right = interpret.numpy_function  # without JIT
+    patch.setattr(interpret, "numpy_function", lambda op: right("add" if op == "sub" else op))
 
 
 def swapped_choice(patch):
@@ -82,9 +83,9 @@ def sum_without_its_last(patch):
 
 
 def lost_sign(patch):
-    right = _Reader._combined
+    right = Reader._combined
     patch.setattr(
-        _Reader, "_combined",
+        Reader, "_combined",
         lambda self, combination, count: right(
             self, combination and {s: abs(g) for s, g in combination.items()}, count),
     )  # fmt: skip

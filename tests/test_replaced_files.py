@@ -20,6 +20,18 @@ def folder(tmp_path_factory):
     return here
 
 
+def in_the_way(folder, tmp_path, command, file, content):
+    """Write a study and a file where a command would write; return the command and the file."""
+    write(tmp_path, HEAD, SMALL)
+    command = [str(folder / "out") if word == "out" else word for word in command]
+    if command[0] == "gallery":
+        assert nlctl_here("report", folder / "out", "--out", "one", cwd=tmp_path).returncode == 0
+    path = tmp_path / file
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(content, encoding="utf-8")
+    return command, path
+
+
 @pytest.mark.parametrize(
     ("command", "file", "content"),
     [
@@ -37,13 +49,7 @@ def folder(tmp_path_factory):
 )
 def test_what_others_have_made_stays(folder, tmp_path, command, file, content):
     """One sentence names it and --force; the file is untouched, and no file has come."""
-    write(tmp_path, HEAD, SMALL)
-    command = [str(folder / "out") if word == "out" else word for word in command]
-    if command[0] == "gallery":
-        assert nlctl_here("report", folder / "out", "--out", "one", cwd=tmp_path).returncode == 0
-    path = tmp_path / file
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(content, encoding="utf-8")
+    command, path = in_the_way(folder, tmp_path, command, file, content)
     before = sorted(p for p in tmp_path.rglob("*") if p.name not in (".lock", ".owner"))
     told = nlctl_here(*command, cwd=tmp_path)
     assert (told.returncode, told.stdout) == (2, ""), told
@@ -67,13 +73,7 @@ def test_what_others_have_made_stays(folder, tmp_path, command, file, content):
 )
 def test_force_goes_on(folder, tmp_path, command, file):
     """Pages are replaced, a run is kept beside what was there; the second time nothing is asked."""
-    write(tmp_path, HEAD, SMALL)
-    command = [str(folder / "out") if word == "out" else word for word in command]
-    if command[0] == "gallery":
-        assert nlctl_here("report", folder / "out", "--out", "one", cwd=tmp_path).returncode == 0
-    path = tmp_path / file
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(MINE, encoding="utf-8")
+    command, path = in_the_way(folder, tmp_path, command, file, MINE)
     told = nlctl_here(*command, "--force", cwd=tmp_path)
     assert told.returncode == 0, told
     assert (path.read_text(encoding="utf-8") == MINE) == (command[0] == "run")

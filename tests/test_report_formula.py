@@ -18,7 +18,8 @@ from analysis.report.math_font import CHARACTERS, FAMILY, font_face, italic, sub
 
 EXAMPLES = (nlctl.paper.example_1(), nlctl.paper.example_2())
 FORMULAS = [text.PLANT_CLASS, *text.CONTROLLER]
-FORMULAS += [e for made in EXAMPLES for e in equations_of(made, ("plant", "actuator"))]
+SHOWN = [e for made in EXAMPLES for e in equations_of(made, ("plant", "actuator"))]
+FORMULAS += [item for item in SHOWN if isinstance(item, Equation)]
 HARMFUL = [
     r"\href{javascript:alert(1)}{x}",
     r"\href{https://example.org}{x}",

@@ -10,7 +10,7 @@ from test_report_page import HOSTILE
 
 from analysis.report.formula import inline, spoken
 from analysis.report.notation import formulas
-from analysis.report.typography import FORMULA, NO_BREAK, pieces, plain, typeset
+from analysis.report.typography import FORMULA, NO_BREAK, in_print, pieces, plain
 
 
 @each_row(
@@ -34,14 +34,14 @@ from analysis.report.typography import FORMULA, NO_BREAK, pieces, plain, typeset
 )
 def test_text_is_set_as_in_print(typed, printed):
     """Numbers, powers and units, and nothing else; _ stands for a space that does not break."""
-    assert typeset(typed) == printed.replace("_", NO_BREAK)
+    assert in_print(typed) == printed.replace("_", NO_BREAK)
 
 
 @given(st.text())
 def test_setting_a_text_loses_nothing_and_is_done_once(text):
     """Every letter and digit stays in its order, and set text does not change again."""
-    once = typeset(text)
-    assert typeset(once) == once
+    once = in_print(text)
+    assert in_print(once) == once
     apart = r"[\W_e⁰¹²³⁴⁵⁶⁷⁸⁹]|\d"
     assert re.sub(apart, "", once) == re.sub(apart, "", text)
 

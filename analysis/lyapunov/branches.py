@@ -8,7 +8,9 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Decisions", "Undecided", "branch", "every_way", "take"]
+from nlctl._errors import DiagramError, UsageError
+
+__all__ = ["Decisions", "Undecided", "branch", "every_way", "on_balls", "take"]
 
 BRANCHES = 64  # ways through an equation on one box, beyond which the box is split first
 
@@ -82,3 +84,33 @@ def every_way(call: Callable[[], Any]) -> Iterator[Any]:
         scripts += [taken[:i] + (False,) for i in range(len(given), len(taken))]
         if count + len(scripts) > BRANCHES:
             raise Undecided(f"more than {BRANCHES} ways through an equation")
+
+
+def on_balls(
+    function: Callable[..., Any], refusal: Callable[[str], UsageError]
+) -> Callable[..., Any]:
+    """Return a function of a user's for balls: where it fails on them, `refusal` says so.
+
+    Parameters
+    ----------
+    function : callable
+    refusal : callable
+        Takes what has gone wrong, and returns the error to be raised.
+
+    Raises
+    ------
+    Undecided
+        When the function that is returned compares balls that decide nothing.
+    UsageError
+        The refusal, when it fails otherwise.
+    """
+
+    def called(*arguments: Any) -> Any:
+        try:
+            return function(*arguments)
+        except (Undecided, DiagramError):
+            raise
+        except Exception as error:  # a user's function may raise whatever it likes
+            raise refusal(f"{type(error).__name__}: {error}") from error
+
+    return called

@@ -12,12 +12,10 @@ from typing import Any
 import numpy as np
 
 from nlctl._diagram import Place
-from nlctl._equation import equation
-from nlctl.expressions.arrays import vector
 from nlctl.expressions.graph import Ambiguous, Graph, Untraceable
 from nlctl.expressions.trace import trace
 from nlctl.native._parameters import slots_of
-from nlctl.native._trace_block import parameters, time
+from nlctl.native._trace_block import arguments
 from nlctl.plants import PureFeedback, integrator_chain
 
 __all__ = ["terms_with_parameters", "update_is_declared"]
@@ -25,19 +23,7 @@ __all__ = ["terms_with_parameters", "update_is_declared"]
 
 def terms_with_parameters(plant: Any) -> tuple[Callable, Callable]:
     """Return ``f(x, v, p)`` and ``d(x, t, p)`` as equations that machine code can call."""
-    if not isinstance(plant, PureFeedback):
-        return plant.f, plant.d
-    own_f, own_d = equation(plant.f), equation(plant.d)  # the user's functions, without parameters
-
-    @equation
-    def f(x, v, p):
-        return own_f(x, v)
-
-    @equation
-    def d(x, t, p):
-        return own_d(x, t)
-
-    return f, d
+    return plant.terms if isinstance(plant, PureFeedback) else (plant.f, plant.d)
 
 
 @functools.lru_cache(maxsize=32)
@@ -50,13 +36,10 @@ def update_is_declared(plant: Place) -> bool:
     system, graph = plant.system, Graph()
     declared = integrator_chain(*terms_with_parameters(system.current_spec))
 
-    def arguments() -> tuple[Any, ...]:
-        x, u = vector(graph, "x", 0, (system.nstates,)), vector(graph, "u", 0, (system.ninputs,))
-        return time(graph), x, u, parameters(graph, system, slots_of(system))
-
+    given = functools.partial(arguments, graph, system, slots_of(system))
     try:
         with np.errstate(all="ignore"):
-            one, other = (trace(graph, f, arguments) for f in (system.updfcn, declared))
+            one, other = (trace(graph, f, given) for f in (system.updfcn, declared))
     except (Untraceable, Ambiguous):
         return False
     pairs = zip(one.cells.flat, other.cells.flat, strict=False)

@@ -22,6 +22,7 @@ from nlctl.functions import clip
 
 from .ball import Ball, as_ball, common
 from .balls import Box, Range, Undecided, enclose
+from .branches import on_balls
 from .slope import slope_in
 from .time_dependence import UNREAD, reads_time
 
@@ -298,18 +299,13 @@ def _edges(actuator: Any) -> tuple[Edge, Edge]:
             "decomposition(u_max)"
         )
 
-    def output(u: Any, t: Any) -> Any:
-        try:
-            return actuator.output(t, (), (u,), p)[0]
-        except Undecided:
-            raise
-        except Exception as error:  # a user's function may raise whatever it likes
-            raise DecompositionError(
-                f"the output of {type(actuator).__name__} cannot be evaluated on intervals of u "
-                f"and t ({type(error).__name__}: {error}): write it with arithmetic and NumPy "
-                "functions of numbers"
-            ) from error
+    def refusal(why: str) -> DecompositionError:
+        return DecompositionError(
+            f"the output of {type(actuator).__name__} cannot be evaluated on intervals of u "
+            f"and t ({why}): write it with arithmetic and NumPy functions of numbers"
+        )
 
+    output = on_balls(lambda u, t: actuator.output(t, (), (u,), p)[0], refusal)
     return output, output
 
 

@@ -17,7 +17,7 @@ from nlctl._errors import DiagramError
 from nlctl.plants import coordinate_names
 
 from .ball import Ball, as_ball
-from .branches import Undecided, every_way
+from .branches import Undecided, every_way, on_balls
 
 __all__ = ["Acceleration", "acceleration", "check_chain", "on_intervals"]
 
@@ -33,19 +33,13 @@ def on_intervals(path: str, function: Callable[..., Any]) -> Callable[..., Any]:
         When the function that is returned fails.
     """
 
-    def called(*arguments: Any) -> Any:
-        try:
-            return function(*arguments)
-        except (Undecided, DiagramError):
-            raise
-        except Exception as error:  # a user's function may raise whatever it likes
-            raise DiagramError(
-                f"the equations of block '{path}' cannot be evaluated on intervals, which the "
-                f"proof needs ({type(error).__name__}: {error}): write them with arithmetic and "
-                "NumPy functions of numbers"
-            ) from error
+    def refusal(why: str) -> DiagramError:
+        return DiagramError(
+            f"the equations of block '{path}' cannot be evaluated on intervals, which the "
+            f"proof needs ({why}): write them with arithmetic and NumPy functions of numbers"
+        )
 
-    return called
+    return on_balls(function, refusal)
 
 
 def acceleration(plant: Place) -> Acceleration:

@@ -1,19 +1,19 @@
-"""The equations of blocks as they were run, with their values: nothing is typed by hand."""
+"""The equations of blocks as they were run, read from their functions: nothing is typed by hand."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Any
 
 from nlctl import native
 
-from .document import Equation
+from .document import Equation, Item, Paragraph
 
-__all__ = ["equations_of"]
+__all__ = ["block_items", "equations_of"]
 
 
-def equations_of(diagram: Any, blocks: Collection[str], number: str = "") -> list[Equation]:
-    """Return the equations of some blocks of a diagram.
+def equations_of(diagram: Any, blocks: Collection[str], number: str = "") -> list[Item]:
+    """Return the equations of some blocks of a diagram, with values in the places of parameters.
 
     Parameters
     ----------
@@ -23,21 +23,23 @@ def equations_of(diagram: Any, blocks: Collection[str], number: str = "") -> lis
     number : str, optional
         Printed beside the first equation of each block.
 
-    Returns
-    -------
-    list of Equation
-        Of each block its states, its outputs, and what their symbols stand for.
-
     Raises
     ------
     CompileError
         If a block has no formula.
     """
-    found: list[Equation] = []
-    for block in native.typeset(diagram, values=True):
-        if block.block in blocks:
-            lines = [*block.equations, *block.where]
-            found += [
-                Equation(latex=line, number="" if i else number) for i, line in enumerate(lines)
-            ]
-    return found
+    return [
+        item
+        for block in native.typeset(diagram, values=True)
+        if block.block in blocks
+        for item in block_items(block, number)
+    ]
+
+
+def block_items(block: native.BlockEquations, number: str = "") -> Iterator[Item]:
+    """Yield a block's equations, and what their symbols stand for."""
+    for i, line in enumerate((*block.inputs, *block.equations)):
+        yield Equation(latex=line, number="" if i else number)
+    if block.where:
+        yield Paragraph(text="where")
+        yield from (Equation(latex=line) for line in block.where)

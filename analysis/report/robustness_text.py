@@ -10,7 +10,7 @@ import numpy as np
 
 from ..robustness.spec import FAILED
 from ..robustness_figures import CLIP
-from .typography import typeset
+from .typography import in_print
 
 SPEC = (
     "What is required of every run. A margin tells by how much a requirement holds, in multiples "
@@ -152,7 +152,7 @@ def clipped(margins: Iterable[float]) -> str:
 
 def unit_text(unit: Any) -> str:
     """Return a unit with its powers raised."""
-    return "" if unit is None else typeset(str(unit))
+    return "" if unit is None else in_print(str(unit))
 
 
 def margin_text(value: float) -> str:

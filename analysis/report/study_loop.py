@@ -21,7 +21,8 @@ from nlctl.native import typeset
 
 from ..robustness.experiment import Prepared
 from . import robustness_text as text
-from .document import Equation, Figure, Item, Paragraph, Section, Table
+from .document import Figure, Item, Paragraph, Section, Table
+from .equations import block_items
 
 if TYPE_CHECKING:
     from analysis.studies.result import Result
@@ -149,10 +150,7 @@ def _equations(loop: Loop) -> Iterator[Item]:
     yield Paragraph(text=text.EQUATIONS)
     for block in blocks:
         yield Paragraph(text=f"Block {block.block}:")
-        yield from (Equation(latex=line) for line in (*block.inputs, *block.equations))
-        if block.where:
-            yield Paragraph(text="where")
-            yield from (Equation(latex=line) for line in block.where)
+        yield from block_items(block)
 
 
 def _value(value: Any) -> Any:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from .formula import spoken
 
-__all__ = ["Piece", "pieces", "plain", "typeset"]
+__all__ = ["Piece", "in_print", "pieces", "plain"]
 
 NO_BREAK = "\u00a0"
 UNITS = (
@@ -42,7 +42,7 @@ class Piece:
     doi: str = ""
 
 
-def typeset(text: str) -> str:
+def in_print(text: str) -> str:
     """Return plain text with the signs of print; what is no number, power or unit stays.
 
     1e-06 becomes 10⁻⁶, 1/s^4 becomes 1/s⁴, -0.5 has a minus sign, and the spaces of 10 s,
@@ -73,12 +73,12 @@ def pieces(text: str) -> list[Piece]:
             continue
         words, *rest = DOI.split(part)
         for doi, after in zip(rest[0::2], rest[1::2], strict=True):
-            found += [Piece(text=f"{typeset(words)}doi "), Piece(doi=doi)]
+            found += [Piece(text=f"{in_print(words)}doi "), Piece(doi=doi)]
             words = after
-        found.append(Piece(text=typeset(words)))
+        found.append(Piece(text=in_print(words)))
     return [piece for piece in found if piece != Piece()]
 
 
 def plain(text: str) -> str:
     """Return a text whose formulas are written in letters, for titles and descriptions."""
-    return typeset(FORMULA.sub(lambda found: spoken(found[1]), text))
+    return in_print(FORMULA.sub(lambda found: spoken(found[1]), text))

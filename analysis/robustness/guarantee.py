@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -25,6 +25,7 @@ __all__ = [
     "check_iid",
     "checked_confidence",
     "clopper_pearson",
+    "least_count",
     "rounded_down",
     "rounded_up",
     "runs_needed",
@@ -195,21 +196,41 @@ def runs_needed(probability: float, confidence: float = 0.99, violations: int = 
     k = whole_number("a plan", "violations", violations, at_least=0)
     a = 1 - checked_confidence(confidence)
     probability = fraction("a plan", "probability", probability)
-    too_few, enough = k, k + 1
-    while stats.binom.cdf(k, enough, probability) > a:
-        too_few, enough = enough, 2 * enough
-        if too_few > MOST_RUNS:
-            raise ParameterError(
-                f"a plan for the probability {probability:g} needs more than {MOST_RUNS:.0e} runs, "
-                "which nobody counts: take a larger probability"
-            )
-    while enough - too_few > 1:
-        middle = (too_few + enough) // 2
-        if stats.binom.cdf(k, middle, probability) > a:
-            too_few = middle
-        else:
-            enough = middle
+
+    def enough_of(n: int) -> bool:
+        return not stats.binom.cdf(k, n, probability) > a
+
+    enough = least_count(enough_of, k, k + 1, MOST_RUNS)
+    if enough is None:
+        raise ParameterError(
+            f"a plan for the probability {probability:g} needs more than {MOST_RUNS:.0e} runs, "
+            "which nobody counts: take a larger probability"
+        )
     return enough
+
+
+def least_count(
+    holds: Callable[[int], bool], few: int, more: int, most: float = np.inf
+) -> int | None:
+    """Return the least count from which on something holds.
+
+    Parameters
+    ----------
+    holds : callable
+        Whether it does for a count; where it does, it does for all larger ones.
+    few, more : int
+        A count for which it does not hold, and the next one that is tried; then twice as many.
+    most : float, optional
+        None is returned if it does not hold for a count beyond this.
+    """
+    while not holds(more):
+        few, more = more, 2 * more
+        if few > most:
+            return None
+    while more - few > 1:
+        middle = (few + more) // 2
+        few, more = (few, middle) if holds(middle) else (middle, more)
+    return more
 
 
 def violation_probability(

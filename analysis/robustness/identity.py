@@ -99,7 +99,7 @@ def experiment_facts(prepared: Prepared, space: Space | None = None) -> dict[str
 def _program(loop: Compiled) -> str:
     """Return a key of the program that was written for a diagram."""
     parts = loop.program.namespace(native=True)
-    return short_key(loop.source, *((name, parts[name]) for name in sorted(parts)))
+    return short_key(loop.program.source, *((name, parts[name]) for name in sorted(parts)))
 
 
 def labels_text(labels: Mapping[str, str]) -> str:

@@ -11,7 +11,7 @@ from scipy import stats
 from nlctl._arguments import fraction
 from nlctl._errors import ParameterError
 
-from .guarantee import MOST_RUNS, Violation, runs_needed
+from .guarantee import MOST_RUNS, Violation, least_count, runs_needed
 from .sequential import SequentialTest, log_evidence
 
 __all__ = ["Answer", "Verdict", "better_verdict", "bound_verdict", "test_verdict"]
@@ -82,15 +82,9 @@ def test_verdict(test: SequentialTest) -> Verdict:
         below = k / runs < test.threshold
         return bool(below and log_evidence(k, runs, test.threshold) >= evidence)
 
-    few, enough = n, 2 * n
-    while not decides(enough):
-        few, enough = enough, 2 * enough
-        if few > MOST_RUNS:
-            return Verdict(answer="not shown yet", needs=f"more than {MOST_RUNS:.0e} runs")
-    while enough - few > 1:
-        middle = (few + enough) // 2
-        few, enough = (few, middle) if decides(middle) else (middle, enough)
-    return Verdict(answer="not shown yet", needs=_more(enough - n))
+    enough = least_count(decides, n, 2 * n, MOST_RUNS)
+    needs = f"more than {MOST_RUNS:.0e} runs" if enough is None else _more(enough - n)
+    return Verdict(answer="not shown yet", needs=needs)
 
 
 def _more(runs: int) -> str:
@@ -118,11 +112,6 @@ def better_verdict(wins: int, losses: int, p: float, level: float, tests: float 
         one, all_ = wins + more, wins + losses + more
         return 2 * one > all_ and bool(stats.binomtest(one, all_).pvalue * tests <= level)
 
-    few, enough = 0, 1
-    while not decides(enough):
-        few, enough = enough, 2 * enough
-    while enough - few > 1:
-        middle = (few + enough) // 2
-        few, enough = (few, middle) if decides(middle) else (middle, enough)
+    enough = least_count(decides, 0, 1)
     needs = f"at least {enough} more sample{'s' * (enough != 1)}, won in every one"
     return Verdict(answer="not shown yet", needs=needs)

@@ -208,7 +208,7 @@ class Tracer:
     def pieces(self) -> list[tuple[Expr, int]]:
         """Return the elements in order, each expression with its number of elements."""
         if self.axis is not None:
-            return [(self.only, self.length)]
+            return [(self.graph.number(self.only), self.length)]
         return [(self.graph.number(e), 1) for e in self.cells.flat]
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from .graph import NUMPY, Expr, Untraceable, needed
+from .graph import Expr, Untraceable, needed, numpy_function
 
 __all__ = ["evaluate"]
 
@@ -59,7 +59,7 @@ def _value(node: Expr, parts: list[np.ndarray], arrays: Mapping[str, np.ndarray]
         return parts[0].sum(axis=0)
     if node.op == "call":
         raise Untraceable(f"{node.data[0]} is opaque: it has no expressions")
-    return getattr(np, NUMPY.get(node.op, node.op))(*parts)
+    return numpy_function(node.op)(*parts)
 
 
 def _joined(node: Expr, parts: list[np.ndarray]) -> np.ndarray:

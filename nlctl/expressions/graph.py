@@ -71,6 +71,11 @@ class Expr:
     value: int | None
 
 
+def numpy_function(op: str) -> Any:
+    """Return NumPy's function of an operation."""
+    return getattr(np, NUMPY.get(op, op))
+
+
 def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
     """Return all that expressions are made of, parts first; nothing behind what is known."""
     found: dict[Expr, None] = {}
@@ -197,7 +202,7 @@ class Graph:
     def op(self, name: str, *args: Expr) -> Expr:
         """Return an operation on numbers, or on the elements of vectors."""
         if name in INTEGER and all(a.kind == "i" for a in args):
-            value = int(getattr(np, NUMPY[name])(*(a.value for a in args)))
+            value = int(numpy_function(name)(*(a.value for a in args)))
             if all(a.op == "const" for a in args):
                 return self.const(value)
             return self.node(name, *args, kind="i", value=value)
@@ -209,7 +214,7 @@ class Graph:
             raise Untraceable(f"{name} of vectors of sizes {sizes}")
         if all(a.op == "const" for a in args):
             with np.errstate(all="ignore"):
-                return self.const(getattr(np, NUMPY.get(name, name))(*(a.data for a in args))[()])
+                return self.const(numpy_function(name)(*(a.data for a in args))[()])
         simple = self._simplified(name, *args)
         return simple or self.node(name, *args, size=max(sizes, default=None), kind=kind)
 

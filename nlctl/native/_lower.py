@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..expressions.arrays import Tracer
 from ..expressions.graph import Expr, needed
 from ._emit import Program
 from ._lower_blocks import Equations, equations, whole
@@ -155,14 +156,12 @@ def _planned(stores: Mapping[str, list[Store]], parameters: int) -> tuple[dict[s
     return functions, size
 
 
-def _stores(name: str, row: int, array: Any) -> list[Store]:
-    graph = array.graph
-    if array.axis is not None:
-        return split(Store(array=name, row=row, expr=graph.number(array.only), size=array.length))
-    return [
-        Store(array=name, row=row + k, expr=graph.number(e), size=1)
-        for k, e in enumerate(array.cells.flat)
-    ]
+def _stores(name: str, row: int, array: Tracer) -> list[Store]:
+    found: list[Store] = []
+    for expr, size in array.pieces():
+        found += split(Store(array=name, row=row, expr=expr, size=size))
+        row += size
+    return found
 
 
 def _parameters_alone(results: list[Expr], rows: int) -> dict[Expr, tuple[str, int]]:

@@ -58,7 +58,7 @@ def equations(schedule: Schedule, layout: Any) -> Equations:
     """
     system = schedule.system
     sizes = {"t": 1, "x": system.nstates or 0, "u": system.ninputs or 0, "p": length(layout)}
-    reader = _Reader(graph=Graph(sizes), layout=layout, blocks=schedule.nodes)
+    reader = Reader(graph=Graph(sizes), layout=layout, blocks=schedule.nodes)
     with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
         for i, unknown in zip(schedule.order, schedule.unknown, strict=True):
             reader.signals[i] = reader.outputs(i, unknown)
@@ -121,7 +121,7 @@ def _results(graph: Graph, call: Call, given: Sequence[Tracer]) -> Tracer:
     return concatenated(graph, items)
 
 
-def _events(reader: _Reader) -> list[tuple[int, Tracer]]:
+def _events(reader: Reader) -> list[tuple[int, Tracer]]:
     """Return switching functions of all blocks, then what memories are committed to."""
     blocks = [reader.code(i) for i in range(len(reader.blocks))]
     corner, memory, found = 0, sum(own.corners for own in blocks), []
@@ -134,7 +134,7 @@ def _events(reader: _Reader) -> list[tuple[int, Tracer]]:
 
 
 @dataclass(kw_only=True)
-class _Reader:
+class Reader:
     """Reads blocks one after the other; `signals` are the outputs of those that have been read."""
 
     graph: Graph

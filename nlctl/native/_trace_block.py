@@ -29,6 +29,13 @@ def parameters(graph: Graph, system: Any, slots: Mapping[str, Slot]) -> Any:
     return type(system._current_params)(**values) if isinstance(system, Block) else values
 
 
+def arguments(graph: Graph, system: Any, slots: Mapping[str, Slot]) -> tuple[Any, ...]:
+    """Return what a block's functions take: its time, states, inputs and parameters."""
+    x = vector(graph, "x", 0, (system.nstates or 0,))
+    u = vector(graph, "u", 0, (system.ninputs or 0,))
+    return time(graph), x, u, parameters(graph, system, slots)
+
+
 def _parameter(graph: Graph, slot: Slot, value: Any) -> Tracer:
     if slot.kind in "ib" and not slot.shape:  # Python's True is an integer, too
         leaf = graph.leaf("p", slot.offset, None, kind="i", value=int(value))
@@ -49,14 +56,9 @@ def dependence(system: Any, function: Callable[..., Any], slots: Mapping[str, Sl
     found = np.ones((system.noutputs or 0, system.ninputs or 0), dtype=bool)
     graph = Graph()
 
-    def arguments() -> tuple[Any, ...]:
-        x = vector(graph, "x", 0, (system.nstates or 0,))
-        u = vector(graph, "u", 0, (system.ninputs or 0,))
-        return time(graph), x, u, parameters(graph, system, slots)
-
     try:
         with np.errstate(all="ignore"):
-            result = trace(graph, function, arguments)
+            result = trace(graph, function, lambda: arguments(graph, system, slots))
     except Untraceable:
         return found
     if result.size != system.noutputs or graph.assumptions:

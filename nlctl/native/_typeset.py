@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -19,7 +20,7 @@ from .._param import declared_params
 from ..expressions.arrays import Tracer
 from ..expressions.graph import Expr, Graph, needed
 from ..expressions.latex import Index, Writer, index_text, number_text, symbol
-from ._lower_blocks import _Reader
+from ._lower_blocks import Reader
 from ._parameters import Slot, slots_of
 from ._schedule import Node, Schedule, Signal, schedule
 
@@ -103,7 +104,7 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     slots = {name: slot for name, slot in every.items() if slot.kind == "f"}  # others steer
     inputs = tuple({Signal(None, j): 1.0} for j in range(len(node.inputs)))
     alone = replace(node, state_offset=0, inputs=inputs)
-    reader = _Reader(graph=Graph(), layout={0: slots}, blocks=[alone])
+    reader = Reader(graph=Graph(), layout={0: slots}, blocks=[alone])
     with np.errstate(all="ignore"), _local_names() as names:
         found = {"x": reader.derivatives(0), "y": reader.outputs(0, ())}
     for call in reader.calls.values():
@@ -248,7 +249,7 @@ def _known(
     for expr in exprs:
         heavy = uses.get(expr, 0) > 1 and len(needed([expr], known)) > WORTH
         if heavy and expr not in known and expr.op not in plain and expr.kind != "b":
-            known[expr] = next(s for k in range(1, 999) if (s := f"s_{{{k}}}") not in taken)
+            known[expr] = next(s for k in itertools.count(1) if (s := f"s_{{{k}}}") not in taken)
             taken.add(known[expr])
     return known
 

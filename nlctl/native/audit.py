@@ -86,13 +86,14 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
         return
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
         width = trial.width if ct.isctime(compiled.system) else 1
-        code, _ = prepared_parameters(compiled, trial.p, width)
+        code, c = prepared_parameters(compiled, trial.p, width)
         done = compiled.__dict__.setdefault("_audited", [])
         if wanted is True and any(known is code for known in done):
             return
         done.append(code)
+        evaluated = _evaluated(compiled, code, c)
         for point in _points(trial):
-            _compare(compiled, trial, _evaluated(compiled, trial, code), point)
+            _compare(compiled, trial, evaluated, point)
 
 
 def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
@@ -102,10 +103,9 @@ def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
         yield float(trial.time[m]), trial.states[:, m].copy(), trial.inputs[:, m].copy()
 
 
-def _evaluated(compiled: Compiled, trial: Trial, code: Machine) -> Evaluated:
+def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
     """Return what machine code computes at a point."""
     system, events = compiled.system, compiled.program.events
-    _, c = prepared_parameters(compiled, trial.p, code.width)
 
     def several(t: float, x: np.ndarray, u: np.ndarray) -> Values:
         tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), code.width, axis=1) for v in (t, x, u))

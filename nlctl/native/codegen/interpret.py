@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...expressions.graph import NUMPY, Expr
+from ...expressions.graph import Expr, numpy_function
 from .plan import Function, LoopOfLevel, Plan
 
 Opaque = Callable[[np.ndarray, int, int], None]  # of c, a row of it, and the member
@@ -94,8 +94,7 @@ class _Run:
     def _operation(self, node: Expr) -> Any:
         if node.op == "const":
             return np.bool_(node.data) if node.kind == "b" else np.float64(node.data)
-        function = getattr(np, NUMPY.get(node.op, node.op))
-        return function(*(self.values[a] for a in node.args))
+        return numpy_function(node.op)(*(self.values[a] for a in node.args))
 
     def _reads(self, args: tuple[Expr, ...]) -> None:
         for arg in args:
