@@ -192,6 +192,7 @@ CANCELLING = {
     "large terms that cancel": lambda t, x, u, params: (x + 1e9) - 1e9 - x,
     "a high gain": lambda t, x, u, params: -1e8 * np.tanh(1e6 * (x - np.sin(t))),
     "a jump at the state": lambda t, x, u, params: np.sign(x - 1.0) - 0.0 * x,
+    "half a turn more at t = 0": lambda t, x, u, params: np.sin(t + np.pi) + 0.0 * x,
     "angles of many turns": lambda t, x, u, params: np.sin(1e9 * x) - x,
 }
 

@@ -144,7 +144,7 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
             )
     if all(np.all(_close(a, b)) for a, b in zip(ours, theirs, strict=True)):
         return
-    shaken = _shaken(system, point, trial.params)
+    shaken = _shaken(compiled.system, point, trial)
     for what, a, b, moved in zip(("state", "output"), ours, theirs, shaken, strict=True):
         wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
         if wrong.size:
@@ -166,15 +166,23 @@ def _by_python_control(system: Any, point: Any, params: Any) -> Values:
     return rates, outputs
 
 
-def _shaken(system: Any, point: Any, params: Any) -> Values:
-    """Return how far python-control's values move when states and inputs are rounded."""
+def _rounded(t: float, trial: Trial) -> float:
+    """Return how much later rounding may make it; at t = 0 a step of the run stands for t.
+
+    Never earlier: what begins at t, as a step does, has begun.
+    """
+    return SHAKEN * max(abs(t), float(np.max(np.diff(trial.time), initial=0.0)))
+
+
+def _shaken(system: Any, point: Any, trial: Trial) -> Values:
+    """Return how far python-control's values move when time, states and inputs are rounded."""
     t, x, u = point
     rng = np.random.default_rng(0)
-    base = _by_python_control(system, point, params)
+    base = _by_python_control(system, point, trial.params)
     moved = [np.zeros_like(values) for values in base]
     for _ in range(4):
         near = [v * (1 + SHAKEN * rng.choice([-1.0, 1.0], size=v.shape)) for v in (x, u)]
-        found = _by_python_control(system, (t * (1 + SHAKEN * rng.choice([-1, 1])), *near), params)
+        found = _by_python_control(system, (t + _rounded(t, trial), *near), trial.params)
         for total, a, b in zip(moved, base, found, strict=True):
             np.maximum(total, np.abs(a - b), out=total)
     return moved[0], moved[1]
@@ -197,7 +205,8 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
         pairs += [(ours[0][own], block_rates, block.state_labels)] if block.nstates else []
         for a, function, labels in pairs if block.noutputs else pairs[1:]:
             b = function(block, t, x[own], inputs)
-            moved = np.abs(function(block, t, x[own] * (1 + SHAKEN), inputs * (1 - SHAKEN)) - b)
+            near = t + _rounded(t, trial), x[own] * (1 + SHAKEN), inputs * (1 - SHAKEN)
+            moved = np.abs(function(block, *near) - b)
             wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
             if wrong.size:
                 raise _difference(labels[wrong[0]], node.path, (a[wrong[0]], b[wrong[0]]), t)
