@@ -18,8 +18,8 @@ import numpy as np
 
 from .._errors import ParameterError, UsageError
 from ._compile import Compiled
-from ._emit import emit
 from ._lower import lower
+from ._lower_blocks import equations
 from ._machine import Machine, prepared_parameters
 from ._routine import lowered_code
 from ._schedule import Signal
@@ -220,11 +220,8 @@ def _signals(compiled: Compiled, trial: Trial, point: Any) -> np.ndarray:
     schedule = replace(compiled.schedule, outputs=every)
     t, x, u = point
     y = np.empty((len(every), 1))
-    if schedule.loops:
-        _, out = Compiled(schedule=schedule, program=emit(schedule)).interpreted
-        out(t, x, u, trial.p, y[:, 0])
-        return y[:, 0]
-    lowered = lower(schedule, compiled.program, 1)
+    found = equations(schedule, compiled.program.layout, trial.p)
+    lowered = lower(schedule, compiled.program, 1, found)
     prepare, _, out = lowered_code(lowered)
     c = np.zeros((lowered.size, 1))
     prepare(np.ascontiguousarray(trial.p[:, None]), c)
