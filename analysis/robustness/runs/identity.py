@@ -15,7 +15,6 @@ import numpy as np
 import pandas as pd
 
 from nlctl import _errors
-from nlctl.native import Compiled
 
 from ...metrics import Metric
 from ..uncertainty.design import Design
@@ -88,17 +87,10 @@ def experiment_facts(prepared: Prepared, space: Space | None = None) -> dict[str
             **{k: getattr(experiment, k) for k in ("rtol", "atol", "max_steps", "method")},
         },
         "diagrams": {
-            labels_text(labels): {"program": _program(loop), **loop_facts(loop.system)}
-            for labels, loop in prepared.loops
+            labels_text(labels): loop_facts(loop.system) for labels, loop in prepared.loops
         },
         "versions": versions(),
     }
-
-
-def _program(loop: Compiled) -> str:
-    """Return a key of the program that was written for a diagram."""
-    parts = loop.program.namespace(native=True)
-    return short_key(loop.program.source, *((name, parts[name]) for name in sorted(parts)))
 
 
 def labels_text(labels: Mapping[str, str]) -> str:
