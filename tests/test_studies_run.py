@@ -30,7 +30,6 @@ from analysis.studies import (
     run,
     run_differences,
 )
-from analysis.studies.build import own_design
 from analysis.studies.file.schema import keyed
 from analysis.studies.folder import load_finding, load_run, save_finding
 from analysis.studies.sealed import origin_key
@@ -403,7 +402,7 @@ def test_failed_rows_count_as_the_least_margin_of_the_others(failing):
     made = {"shares": ("indices", sobol_indices), "effects": ("effects", elementary_effects)}
     for key, (name, analysis) in made.items():
         asked = keyed(file.study)[key]
-        design = own_design(asked, space, file.study.study.seed)
+        design = asked.definition.design(asked, space, file.study.study.seed)
         end = solution(design.table, 2.0)
         margin = (0.5 - np.fmax(solution(design.table, 1.0), end)) / 0.5
         if asked.of == "spec":

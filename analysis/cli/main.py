@@ -156,12 +156,18 @@ def check(
 
 @app.command("list")
 def list_(
-    name: Annotated[str | None, typer.Argument(help="A block, whose parameters are shown.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            help="A block, whose parameters are shown; kinds: the kinds of analysis of a study, or "
+            "one of them; path/to/file.py:NAME: a block or a kind of your own, whose code is run."
+        ),
+    ] = None,
 ) -> None:
     """List the blocks in groups, and the examples; with NAME, its parameters, units and bounds."""
-    from .terminal import show_block, show_groups
+    from .listing import show, show_all
 
-    show_groups() if name is None else show_block(name)
+    show_all() if name is None else show(name)
 
 
 @app.command()

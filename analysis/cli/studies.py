@@ -164,9 +164,9 @@ def replay(
 
 def schema() -> None:
     """Print the JSON schema of study files, for editors."""
-    from analysis.studies import Study
+    from analysis.studies.file.own_kinds import model_of
 
-    print(json_text.dumps(Study.model_json_schema(), indent=1))
+    print(json_text.dumps(model_of({}).model_json_schema(), indent=1))
 
 
 def run_folder(study: Path) -> Path:

@@ -67,7 +67,9 @@ def report_study(
     from analysis.studies.page.report import study_report
 
     result = (
-        _run(path, threads, watch, force, trust) if path.suffix == ".toml" else load_result(path)
+        _run(path, threads, watch, force, trust)
+        if path.suffix == ".toml"
+        else load_result(path, trust=trust)
     )
     command = f"nlctl report {shlex.quote(path.as_posix())}" + " --interactive" * interactive
     prepared = _prepared(result, trust)
@@ -182,8 +184,10 @@ def _histories(result: Result, prepared: Prepared | None, threads: int | None) -
 
     if prepared is None or result.rows is None or not result.rows.done:
         return None
-    searched = [f.numbers for f in result.findings if f.kind == "worst case" and f.is_answered]
-    witness = min(
-        ((n["witness"], n["margin"]) for n in searched), key=lambda pair: pair[1], default=None
-    )
+    told = [
+        look(f)
+        for f in result.findings
+        if (look := result.asked[f.key].definition.witness) is not None and f.is_answered
+    ]
+    witness = min(told, key=lambda pair: pair[1], default=None)
     return histories(prepared, result.rows.table, witness, threads=threads)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import sysconfig
 import tempfile
@@ -16,11 +15,9 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
-from rich.text import Text
 
 from nlctl._errors import ParameterError
 from nlctl._files import replace_file
-from nlctl._param import declared_params
 
 FIGURE_FORMATS = (".svg", ".png", ".pdf")
 
@@ -104,48 +101,6 @@ def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
         numbers = (peak(times, y), peak(*late), rms(*late), final(times, y))
         table.add_row(name, *(f"{v:.6g}" for v in numbers))
     Console().print(table)
-
-
-def show_groups() -> None:
-    """Print the blocks in groups, one line each, and the examples."""
-    from nlctl._catalogue import block_groups
-
-    console = Console()
-    groups = block_groups()
-    width = max(len(name) for group in groups.values() for name in group)
-    for title, group in groups.items():
-        console.print(f"[bold]{title.capitalize()}[/bold]", highlight=False)
-        for name, record in group.items():
-            line = Text(f"  {name:<{width}}  {_summary(record)}")
-            console.print(line, no_wrap=True, overflow="ellipsis")
-    console.print("[bold]Examples[/bold]\n  example-1 (dead zone), example-2 (backlash)")
-    console.print("\nnlctl list NAME shows the parameters of a block.", highlight=False)
-
-
-def show_block(name: str) -> None:
-    """Print the parameter table of a block.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such block.
-    """
-    from nlctl._catalogue import named_block
-
-    record, console = named_block(name), Console()
-    table = Table("parameter", "default", "unit", "bounds", "meaning", title=None)
-    defaults = {f.name: f.default for f in dataclasses.fields(record)}
-    for field, rule in declared_params(record).items():
-        default = np.asarray(defaults[field])
-        text = str(defaults[field]) if default.size <= 4 else f"{default.shape} values"
-        table.add_row(field, text, rule.unit, rule.bounds, rule.meaning)
-    console.print(f"[bold]{name}[/bold]  {_summary(record)}", highlight=False)
-    if table.row_count:
-        console.print(table)
-
-
-def _summary(record: type) -> str:
-    return (record.__doc__ or "").strip().splitlines()[0]
 
 
 def trace_of(error: BaseException) -> str:

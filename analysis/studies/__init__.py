@@ -5,25 +5,35 @@ from .file.parse import StudyFile, read_study
 from .file.schema import Study
 from .file.shipped import shipped
 from .file.written import from_toml, to_toml
+from .finding import Finding
 from .folder import load_result, origin_differences, run_differences
+from .kind import Asked, Ground, Kind, Setup, Varied, made
+from .kinds import KINDS
 from .plan import Plan, plan
 from .replay import Replay, replay, replay_figure
-from .result import Finding, Result
+from .result import Result
 from .run import run
 from .sealed import RunFolderError
 
 __all__ = [
+    "KINDS",
+    "Asked",
     "Finding",
+    "Ground",
+    "Kind",
     "Plan",
     "Problem",
     "Replay",
     "Result",
     "RunFolderError",
+    "Setup",
     "Study",
     "StudyError",
     "StudyFile",
+    "Varied",
     "from_toml",
     "load_result",
+    "made",
     "origin_differences",
     "plan",
     "read_study",

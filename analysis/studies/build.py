@@ -24,9 +24,7 @@ from analysis.robustness import (
     grid,
     independent,
     latin_hypercube,
-    morris,
     one_at_a_time,
-    saltelli,
     sobol,
     tracking_metrics,
 )
@@ -36,7 +34,6 @@ from nlctl._names import unknown
 from ..robustness.stl.text import parse_formula
 from .file.resolve import DEFAULT, loop_function, option, uncertain
 from .file.schema import Choices, Rows, Study
-from .kinds.analyses import Morris, Sobol
 
 __all__ = [
     "choice",
@@ -46,7 +43,6 @@ __all__ = [
     "loop",
     "main_design",
     "metrics_of",
-    "own_design",
     "requirement",
     "times",
 ]
@@ -258,16 +254,3 @@ def main_design(rows: Rows, space: Space, seed: int) -> Design:
     if rows.levels is not None:
         return grid(space, rows.levels, seed)
     return corners(space, seed) if rows.design == "corners" else one_at_a_time(space, entropy=seed)
-
-
-def own_design(asked: Any, space: Space, seed: int) -> Design | None:
-    """Return the rows that an analysis runs itself, where they are known in advance.
-
-    Raises
-    ------
-    ParameterError
-        If the analysis does not suit the space.
-    """
-    if isinstance(asked, Morris):
-        return morris(space, asked.trajectories, asked.levels, seed)
-    return saltelli(space, asked.size, seed) if isinstance(asked, Sobol) else None

@@ -14,6 +14,7 @@ was edited or belongs to another loop is refused, not shown.
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,11 +28,15 @@ from analysis.robustness.runs.sweep import Sweep, load
 from nlctl._files import replace_file
 
 from .build import labels, main_design
+from .file.own_kinds import own_kinds, stand_ins
 from .file.resolve import uncertain
 from .file.schema import Study, keyed
+from .file.toml import read_toml
 from .file.written import from_toml
+from .finding import Finding
+from .kind import Kind
 from .origin import loop_differences, plain_study, version_differences
-from .result import Finding, Result
+from .result import Result
 from .sealed import ANEW, RunFolderError, file_digest, origin_key, read_json, write_json
 
 __all__ = [
@@ -128,8 +133,15 @@ def remove_run(folder: Path, *, force: bool = False) -> None:
     shutil.rmtree(folder)
 
 
-def load_study(folder: Path) -> Study:
+def load_study(folder: Path, own: Mapping[str, Kind] | None = None) -> Study:
     """Return the study of a run, as it was begun.
+
+    Parameters
+    ----------
+    folder : Path
+    own : mapping of str to Kind, optional
+        Kinds of analysis of one's own, as the study calls them; any others that it has take the
+        tables as they stand, and cannot be run.
 
     Raises
     ------
@@ -138,7 +150,9 @@ def load_study(folder: Path) -> Study:
     """
     path = folder / "study.toml"
     try:
-        study = from_toml(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        known = dict(own or {})
+        study = from_toml(text, known | stand_ins(read_toml(text), known))
     except FileNotFoundError:
         raise RunFolderError(f"'{folder}' holds no run of a study") from None
     except (OSError, ValueError, RecursionError) as error:
@@ -169,15 +183,25 @@ def load_rows(folder: Path, origin: str, design: Design | None = None) -> Sweep 
     return load(here, design)
 
 
-def load_result(folder: Path) -> Result:
+def load_result(folder: Path, *, trust: bool = False) -> Result:
     """Return what is in the folder of a run, finished or not.
+
+    Nothing is simulated.  Kinds of analysis of one's own are imported, to draw what they found; a
+    note tells of those that have gone.
+
+    Parameters
+    ----------
+    folder : Path
+    trust : bool, optional
+        As in `read_study`.
 
     Raises
     ------
     RunFolderError
         If it holds no results, or files are damaged.
     """
-    study, run = load_study(folder), load_run(folder)
+    own, gone = _own_kinds(folder, trust)
+    study, run = load_study(folder, own), load_run(folder)
     content = read_json(folder / "results.json", "continue with --resume, which makes it anew")
     origin = origin_key(run["origin"])
     try:
@@ -203,9 +227,22 @@ def load_result(folder: Path) -> Result:
         rows=rows,
         findings=tuple(finding for finding in findings if finding is not None),
         complete=content["complete"],
-        notes=tuple(content["notes"]),
+        notes=(*content["notes"], *gone),
         origin=run["origin"],
     )
+
+
+def _own_kinds(folder: Path, trust: bool) -> tuple[dict[str, Kind], list[str]]:
+    """Return the kinds of one's own that the study of a run names, and what is said of the others.
+
+    Raises
+    ------
+    RunFolderError
+        If the folder holds no run, or its study is damaged.
+    """
+    home = folder / load_run(folder)["study_folder"]
+    found, problems = own_kinds(plain_study(load_study(folder)), home, trust=trust)
+    return found, [f"what it found is told without its figures: {p}" for p in problems]
 
 
 def _space(study: Study, quantities: pd.DataFrame) -> Space:

@@ -11,14 +11,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from analysis.json_values import as_json, from_json
-from analysis.robustness import Prepared
+from analysis.robustness import Prepared, diagrams
 from analysis.robustness.runs.identity import differences_of, experiment_facts, labels_text
-from analysis.robustness.runs.loop_record import loop_facts, loop_values, values_differ
+from analysis.robustness.runs.loop_record import loop_facts, loop_values, short_key, values_differ
 
 from .file.parse import StudyFile
 from .file.schema import Study, keyed
-from .kinds.analyses import Compare
-from .kinds.comparison import compared
+from .kind import Setup
 
 __all__ = [
     "compared_differences",
@@ -48,12 +47,16 @@ def origin_of(file: StudyFile, prepared: Prepared) -> dict[str, Any]:
     end = float(file.experiment.timepts[-1])
     facts = experiment_facts(prepared)
     values = {labels_text(labels): loop_values(p.system, end) for labels, p in prepared.loops}
+    setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
     for key, asked in keyed(file.study).items():
-        if isinstance(asked, Compare):
-            for labels, diagram in compared(file.experiment, asked, file.folder):
+        if asked.definition.experiment is not None:
+            own = asked.definition.experiment(asked, setup)
+            for labels, diagram in diagrams(own.space, own.build):
                 name = _compared_name(key, labels)
                 facts["diagrams"][name] = loop_facts(diagram)
                 values[name] = loop_values(diagram, end)
+    own_kinds = {a.kind: short_key(a.definition.run) for a in file.study.analysis if ":" in a.kind}
+    facts |= {"kinds": own_kinds} if own_kinds else {}
     content = {**facts, "study": plain_study(file.study), "values": values}
     return from_json(as_json(content))  # as it is read from a file
 

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
 
 import pandas as pd
 
 from analysis.robustness import Prepared, evaluate, independent, prepare
 from analysis.robustness.runs.experiment import columns_of
 
-from .build import main_design, own_design
+from .build import main_design
 from .file.parse import StudyFile
 from .file.schema import keyed
-from .kinds.analyses import Compare, Degradation, Map, Morris, Radius, Sobol, WorstCase
-from .kinds.comparison import alternatives
+from .kind import Setup
 
 __all__ = ["Plan", "plan"]
 
@@ -66,12 +64,13 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
     if study.runs is not None:
         runs["rows"] = main_design(study.runs, space, study.study.seed).size
         kept += runs["rows"]
+    setup = Setup(study=study, folder=file.folder, experiment=prepared.experiment)
     for key, asked in keyed(study).items():
-        count = _runs(asked, file, prepared)
+        count = asked.definition.planned(asked, setup)
         if count:
             runs[key] = count
-            kept += 0 if isinstance(asked, Degradation | Radius | Map) else count
-    at_most = [k for k, a in keyed(study).items() if isinstance(a, WorstCase | Radius | Map)]
+            kept += count if asked.definition.keeps_rows else 0
+    at_most = [key for key, asked in keyed(study).items() if asked.definition.ends_early]
     width = len(columns_of(prepared))
     return Plan(
         runs=runs,
@@ -79,25 +78,6 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
         seconds=sum(runs.values()) * _seconds(prepared, study.study.seed, threads),
         size=float(NUMBER * width * kept),
     )
-
-
-def _runs(asked: Any, file: StudyFile, prepared: Prepared) -> int:
-    """Return how many simulations an analysis makes itself, at most."""
-    if isinstance(asked, Morris | Sobol):
-        design = own_design(asked, prepared.experiment.space, 0)
-        return 0 if design is None else design.size
-    if isinstance(asked, Degradation):
-        return len(asked.factors) * asked.runs
-    if isinstance(asked, Compare):
-        options = alternatives(asked, file.experiment.build, file.folder)
-        return asked.runs * len(options.options)
-    if isinstance(asked, Radius):
-        return SIZES * asked.runs + asked.draws
-    return asked.runs if isinstance(asked, WorstCase | Map) else 0
-
-
-SIZES = 12
-"""Sizes that the search for a radius looks at, roughly."""
 
 
 def _seconds(prepared: Prepared, seed: int, threads: int | None) -> float:

@@ -20,8 +20,7 @@ from nlctl._errors import ParameterError
 from .file.parse import StudyFile
 from .file.schema import keyed
 from .folder import load_finding, load_rows, load_run
-from .kinds.analyses import Compare
-from .kinds.comparison import alternatives, widened
+from .kind import Setup
 from .run import reopened
 from .sealed import RunFolderError, as_json, origin_key
 
@@ -133,12 +132,12 @@ def _table(folder: Path, part: str) -> pd.DataFrame:
 
 
 def _widened(file: StudyFile, part: str) -> Experiment | None:
-    """Return what the rows of a comparison were run with; None for another part."""
+    """Return what the rows of a part were run with, where it is not the study's experiment."""
     asked = keyed(file.study).get(part)
-    if not isinstance(asked, Compare):
+    if asked is None or asked.definition.experiment is None:
         return None
-    options = alternatives(asked, file.experiment.build, file.folder)
-    return widened(file.experiment, asked, options, file.study, file.folder)
+    setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
+    return asked.definition.experiment(asked, setup)
 
 
 def _same(one: Any, other: Any) -> bool:

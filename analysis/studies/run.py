@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.robustness import Design, Prepared, evaluate, nominal, prepare
-from analysis.robustness.runs.progress import Progress, until_decided
+from analysis.robustness.runs.progress import Progress
 from analysis.robustness.runs.store import StoreError, locked
 from analysis.robustness.runs.sweep import Sweep, load, sweep
 from nlctl._errors import UsageError
@@ -22,18 +22,17 @@ from nlctl._files import replace_file
 from .build import main_design
 from .file.parse import StudyFile, read_study
 from .file.schema import Study, keyed
-from .file.validate import NEED_ROWS
 from .file.written import to_toml
+from .finding import Finding
 from .folder import METRIC_COLUMNS, load_finding, load_run, load_study, save_finding
-from .kinds.answers import answer, unanswered
-from .kinds.context import Ground
+from .kind import Ground, answer, unanswered
 from .origin import (
     compared_differences,
     loop_differences,
     origin_of,
     version_differences,
 )
-from .result import Finding, Result
+from .result import Result
 from .sealed import RunFolderError, origin_key, write_json
 
 __all__ = ["Reopened", "Watch", "reopened", "rerun_file", "run"]
@@ -166,11 +165,12 @@ def _main_rows(study: Study, prepared: Prepared, folder: Path, way: _Way) -> Swe
     """Run the main table, or as much of it as the analyses need."""
     assert study.runs is not None
     design = main_design(study.runs, prepared.experiment.space, study.study.seed)
-    users = {key: a for key, a in keyed(study).items() if a.kind in NEED_ROWS}
-    if len(users) == 1 and (found := next(iter(users.values()))).kind == "sequential":
-        if load_finding(folder, next(iter(users)), way.key) is not None:
+    users = [(key, a) for key, a in keyed(study).items() if a.definition.needs_rows]
+    key, only = users[0] if len(users) == 1 else ("", None)
+    if only is not None and only.definition.stop is not None:
+        if load_finding(folder, key, way.key) is not None:
             return replace(load(folder / "rows", design), decided=True)
-        stop = until_decided(design, found.limit, found.confidence)
+        stop = only.definition.stop(only, design)
         return _swept(prepared, design, folder / "rows", way, "rows", stop=stop)
     return _swept(prepared, design, folder / "rows", way, "rows")
 
@@ -239,7 +239,8 @@ def _claim(file: StudyFile, folder: Path, resume: bool, force: bool) -> None:
                 f"'{folder}' holds a run already: continue it with --resume, or take another "
                 "folder with --out"
             )
-        changed = _changed(load_study(folder), file.study)
+        own = {asked.kind: asked.definition for asked in file.study.analysis if ":" in asked.kind}
+        changed = _changed(load_study(folder, own), file.study)
         if changed:
             raise RunFolderError(
                 f"'{folder}' holds a run of another study ({', '.join(changed)} differ): take "

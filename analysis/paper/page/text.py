@@ -6,8 +6,8 @@ Text only.  The numbers in use are filled in from the blocks themselves.
 from __future__ import annotations
 
 from ...report.document import Equation, Paragraph
+from ...studies.kinds.context import CLOPPER
 from ...studies.page.loop import Published
-from ...studies.page.methods import CLOPPER
 
 CITATION = (
     "M. Lv, Y. Wang, S. Baldi, Z. Liu, C. Shi, C. Fu, X. Meng, Y. Qi: Adaptive Neural Control for "

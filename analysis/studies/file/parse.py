@@ -16,6 +16,7 @@ from analysis.robustness import Experiment
 from nlctl._errors import ParameterError
 
 from .errors import Place, Problem, StudyError, line_numbers, located, place_text, schema_problems
+from .own_kinds import model_of, own_kinds
 from .schema import Study
 from .toml import check_depth, read_toml
 from .trust import untrusted
@@ -92,7 +93,8 @@ def read_study(
         raise
     except ValueError as error:
         raise StudyError(str(path), [Problem(place=(), message=str(error))]) from None
-    study, problems, entries = _validated(data)
+    own, mistaken = own_kinds(data, folder, trust=trust)
+    study, problems, entries = _validated(data, model_of(own), mistaken)
     experiment = None
     if study is not None:
         more = [] if trust else untrusted(study, folder)
@@ -106,13 +108,19 @@ def read_study(
     return StudyFile(path=folder / path.name, study=study, experiment=experiment)
 
 
-def _validated(data: dict[str, Any]) -> tuple[Study | None, list[Problem], list[int]]:
+def _validated(
+    data: dict[str, Any], model: type[Study], mistaken: Sequence[Problem] = ()
+) -> tuple[Study | None, list[Problem], list[int]]:
     """Return the study, its mistakes, and which entries of ``analysis`` it has.
+
+    `mistaken` are mistakes that are known already.
 
     Where there are mistakes, it is the study without the mistaken parts, if that is one: so
     mistakes of form and wrong names are found in one go.
     """
-    rest, problems = copy.deepcopy(data), None
+    rest, problems = copy.deepcopy(data), list(mistaken)
+    for problem in mistaken:
+        _remove(rest, problem.place)
     entries: list[int] = []
     for _ in range(ROUNDS):
         whole, listed = rest, rest.get("analysis")
@@ -120,17 +128,17 @@ def _validated(data: dict[str, Any]) -> tuple[Study | None, list[Problem], list[
             entries = [i for i, entry in enumerate(listed) if entry is not None]
             whole = {**rest, "analysis": [listed[i] for i in entries]}
         try:
-            return Study.model_validate(whole), problems or [], entries
+            return model.model_validate(whole), problems, entries
         except ValidationError as error:
-            found = schema_problems(error, Study, whole)
+            found = schema_problems(error, model, whole)
         found = [replace(p, place=_original(p.place, entries)) for p in found]
-        told = problems or []  # what takes out a mistaken part lets others come to light
+        told = problems  # what takes out a mistaken part lets others come to light
         problems = told + [p for p in found if not follows(p, told)]
         for problem in reversed(found):
             _remove(rest, problem.place)
         if any(problem.place[:1] == ("study",) for problem in found):
             rest["study"] = NAMELESS
-    return None, problems or [], entries
+    return None, problems, entries
 
 
 def follows(problem: Problem, told: Sequence[Problem]) -> bool:

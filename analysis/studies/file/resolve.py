@@ -20,10 +20,19 @@ from nlctl._errors import ParameterError, UnknownNameError, UsageError
 from nlctl._names import unknown
 from nlctl.paper import named_example
 
+from ..kind import Kind
 from .schema import Law
 from .trust import check_function, check_loop_function, check_place
 
-__all__ = ["DEFAULT", "loop_function", "named_function", "option", "uncertain"]
+__all__ = [
+    "DEFAULT",
+    "loop_function",
+    "named",
+    "named_function",
+    "named_kind",
+    "option",
+    "uncertain",
+]
 
 DEFAULT = "default"
 """The option that leaves a keyword of the loop as it is."""
@@ -59,15 +68,56 @@ def named_function(name: str, folder: Path) -> Callable[..., Any]:
     UnknownNameError
         If it has no such function.
     """
-    check_place(name)
-    source, _, attribute = name.rpartition(":")
-    module = _from_file(folder / source) if source.endswith(".py") else _from_module(source)
+    module, source, attribute = _place(name, folder)
     functions = [key for key, value in vars(module).items() if callable(value)]
     if attribute not in functions:
         raise unknown("function", attribute, functions, f"in '{source}'")
     function = getattr(module, attribute)
     check_function(function, name)
     return function
+
+
+def named_kind(name: str, folder: Path) -> Kind:
+    """Return the kind of analysis ``"path/to/file.py:name"`` or ``"module:name"``.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such file or module, or what is named is not a `Kind`.
+    UnknownNameError
+        If there is nothing of that name.
+    """
+    found = named(name, folder)
+    if not isinstance(found, Kind):
+        raise ParameterError(
+            f"a kind of analysis is an analysis.studies.Kind, '{name}' is a {type(found).__name__}"
+        )
+    return found
+
+
+def named(name: str, folder: Path) -> Any:
+    """Return whatever ``"path/to/file.py:name"`` or ``"module:name"`` is.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such file or module.
+    UnknownNameError
+        If there is nothing of that name.
+    """
+    module, source, attribute = _place(name, folder)
+    if not hasattr(module, attribute):
+        known = [key for key in vars(module) if not key.startswith("_")]
+        raise unknown("name", attribute, known, f"in '{source}'")
+    return getattr(module, attribute)
+
+
+def _place(name: str, folder: Path) -> tuple[Any, str, str]:
+    """Return the module that a place is in, how the file calls it, and the name in it."""
+    check_place(name)
+    source, _, attribute = name.rpartition(":")
+    module = _from_file(folder / source) if source.endswith(".py") else _from_module(source)
+    return module, source, attribute
 
 
 def _from_file(path: Path) -> Any:

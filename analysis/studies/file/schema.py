@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
+import operator
+import re
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, SerializeAsAny, create_model
 
-from ..kinds.analyses import Analysis
+from ..kind import Asked, Kind, tagged
 from .field_types import Number, Pair, Strict, Whole
 
 __all__ = [
@@ -21,7 +24,11 @@ __all__ = [
     "Study",
     "Times",
     "keyed",
+    "study_model",
 ]
+
+RESERVED = {"rows"}
+"""Keys that no analysis has: the folder of the main table."""
 
 
 class About(Strict):
@@ -116,7 +123,7 @@ class Rows(Strict):
 
 
 class Study(Strict):
-    """A study file."""
+    """A study file; `study_model` adds what its analyses look like."""
 
     loop: str = Field(
         description="'example-1', 'example-2', 'path/to/file.py:function' or 'module:function'."
@@ -135,15 +142,37 @@ class Study(Strict):
     metrics: Measured | None = Field(None, description="Without it only margins are taken.")
     solver: Solver = Solver()  # type: ignore[call-arg]
     runs: Rows | None = Field(None, description="The main table.")
-    analysis: tuple[Analysis, ...] = Field((), description="What is asked.")
+    analysis: tuple[SerializeAsAny[Asked], ...] = Field((), description="What is asked.")
+
+
+@functools.cache
+def study_model(kinds: tuple[tuple[str, Kind], ...]) -> type[Study]:
+    """Return the shape of study files that may ask for these kinds of analysis.
+
+    Parameters
+    ----------
+    kinds : tuple of (str, Kind)
+        What a file calls each of them, and the kind.
+    """
+    schemas: Any = functools.reduce(operator.or_, (tagged(kind, tag) for tag, kind in kinds))
+    one: Any = Annotated[schemas, Field(discriminator="kind")]
+    many: Any = tuple[one, ...]
+    about = Study.model_fields["analysis"].description
+    return create_model(
+        "Study",
+        __base__=Study,
+        __doc__="A study file.",
+        __module__=__name__,
+        analysis=(many, Field((), description=about)),
+    )
 
 
 def keyed(study: Study) -> dict[str, Any]:
     """Return the analyses by key: their own, or their kind, numbered where it is not alone."""
     named: dict[str, Any] = {}
-    taken = {asked.key for asked in study.analysis}
+    taken = {asked.key for asked in study.analysis} | RESERVED
     for asked in study.analysis:
-        plain = asked.kind.replace(" ", "-")
+        plain = re.sub("[^a-z0-9]+", "-", asked.kind.rpartition(":")[2].lower())
         key = asked.key or plain
         numbers = itertools.count(2)
         while key in named or (key in taken and not asked.key):

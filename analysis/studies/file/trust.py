@@ -15,7 +15,7 @@ import json
 import re
 import sys
 import sysconfig
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 from types import CellType, CodeType, FunctionType, ModuleType
@@ -30,7 +30,13 @@ from nlctl._errors import ParameterError
 from .errors import Place, Problem
 from .schema import Study
 
-__all__ = ["check_function", "check_loop_function", "check_place", "untrusted"]
+__all__ = [
+    "check_function",
+    "check_loop_function",
+    "check_place",
+    "untrusted",
+    "untrusted_names",
+]
 
 OWN = (Path(_errors.__file__).parent, Path(__file__).parents[2])  # nlctl, analysis
 MAKERS = ("control", "nlctl")  # whoever makes a diagram calls one of these
@@ -50,10 +56,15 @@ def untrusted(study: Study, folder: Path) -> list[Problem]:
 
     Nothing is imported to find that out.
     """
+    return untrusted_names(_named(study), folder)
+
+
+def untrusted_names(named: Iterable[tuple[Place, str]], folder: Path) -> list[Problem]:
+    """Return which of these functions and kinds, each with its place in the file, need trust."""
     return [
         Problem(place=place, message=f"{reason}: reading this study would run it. Trust it with "
                 "--trust, or put it into the study's folder")
-        for place, name in _named(study)
+        for place, name in named
         if (reason := _reason(name, folder))
     ]  # fmt: skip
 
@@ -68,7 +79,7 @@ def _named(study: Study) -> Iterator[tuple[Place, str]]:
     if study.metrics is not None:
         yield from _inside(study.metrics.more, ("metrics", "more"))
     for i, asked in enumerate(study.analysis):
-        yield from _inside(getattr(asked, "options", {}), ("analysis", i, "options"))
+        yield from _inside(asked.model_dump(), ("analysis", i))
 
 
 def _inside(value: Any, place: Place) -> Iterator[tuple[Place, str]]:

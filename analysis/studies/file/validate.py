@@ -28,22 +28,19 @@ from ..build import (
     loop,
     main_design,
     metrics_of,
-    own_design,
     requirement,
     times,
 )
-from ..kinds.analyses import Compare, Degradation, Map, Morris, Sobol
-from ..kinds.comparison import alternatives, widened
+from ..kind import Asked, Setup
 from .errors import Place, Problem
 from .resolve import loop_function, option, uncertain
-from .schema import Study
+from .schema import RESERVED, Study
 
 __all__ = ["bound"]
 
 T = TypeVar("T")
 MOST_ROWS = 10_000_000  # of a design or a search
 MOST_DIAGRAMS = 1000
-NEED_ROWS = ("probability", "sequential", "regional")
 
 
 class _Notes:
@@ -100,8 +97,10 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
             if refusal := notes.attempt(("space",), refusal_of, space, diagrams):
                 notes.add(("space",), f"boxes do not fit together: {refusal}")
             _check_designs(study, space, large, notes)
+        setup = Setup(study=study, folder=folder, experiment=made)
         for i, asked in _comparable(study, folder, notes):
-            notes.attempt(("analysis", i), _check_options, study, made, asked, folder)
+            if asked.definition.check is not None:
+                notes.attempt(("analysis", i), asked.definition.check, asked, setup)
     return made, _unique(notes.problems)
 
 
@@ -122,18 +121,18 @@ def _stand_in(study: Study, quantities: Mapping[str, Uncertain | None]) -> Space
     )
 
 
-def _comparable(study: Study, folder: Path, notes: _Notes) -> list[tuple[int, Compare]]:
-    """Return the comparisons whose keyword the loop's function takes; the others are noted."""
+def _comparable(study: Study, folder: Path, notes: _Notes) -> list[tuple[int, Asked]]:
+    """Return the analyses whose keywords the loop's function takes; the others are noted."""
     try:
         function = loop_function(study.loop, folder)
     except UsageError:  # noted already
         return []
-    asked = [(i, one) for i, one in enumerate(study.analysis) if isinstance(one, Compare)]
     before = len(notes.problems)
-    for i, one in asked:
-        notes.attempt(("analysis", i, "keyword"), check_keyword, function, one.keyword)
+    for i, asked in enumerate(study.analysis):
+        for key in asked.definition.keywords:
+            notes.attempt(("analysis", i, key), check_keyword, function, getattr(asked, key))
     lost = {problem.place[1] for problem in notes.problems[before:]}
-    return [(i, one) for i, one in asked if i not in lost]
+    return [(i, asked) for i, asked in enumerate(study.analysis) if i not in lost]
 
 
 class _Empty:
@@ -228,17 +227,18 @@ def _check_names(
 def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Notes) -> None:
     """Look at what can be said without the loop; `metrics` are None if they are not known."""
     columns = ("spec", *study.spec, *(metric.key for metric in metrics or ()))
-    seen = {"rows"}
+    seen = set(RESERVED)
     for i, asked in enumerate(study.analysis):
         if asked.key in seen:
             notes.add(("analysis", i, "key"), f"needs a key of its own, '{asked.key}' is taken")
         seen |= {asked.key} - {""}
-        if asked.kind in NEED_ROWS and study.runs is None:
+        if asked.definition.needs_rows and study.runs is None:
             notes.add(("analysis", i), f"'{asked.kind}' looks at the main table: add [runs]")
-        of = getattr(asked, "of", "spec")
-        if metrics is not None and of not in columns:
-            notes.add(("analysis", i, "of"), str(unknown("column", of, columns)))
-        for key, name in _quantities_of(asked):
+        named = _named(asked, asked.definition.columns) if metrics is not None else []
+        for key, name in named:
+            if name not in columns:
+                notes.add(("analysis", i, key), str(unknown("column", name, columns)))
+        for key, name in _named(asked, asked.definition.quantities):
             if name not in study.space:
                 notes.add(("analysis", i, key), str(unknown("quantity", name, study.space)))
 
@@ -247,7 +247,9 @@ def _too_large(study: Study, notes: _Notes) -> set[Place]:
     """Refuse numbers of runs that no machine can make; return where they are asked for."""
     wide, options = len(study.space), math.prod(len(c.options) for c in study.choices.values())
     counts: dict[Place, int] = {
-        ("analysis", i): max(_sizes(asked, wide)) for i, asked in enumerate(study.analysis)
+        ("analysis", i): asked.definition.largest(asked, wide)
+        for i, asked in enumerate(study.analysis)
+        if asked.definition.largest is not None
     }
     if study.runs is not None:
         counts["runs",] = study.runs.size or 1
@@ -260,20 +262,6 @@ def _too_large(study: Study, notes: _Notes) -> set[Place]:
     return set(large)
 
 
-def _sizes(asked: Any, wide: int) -> list[int]:
-    """Return the numbers of runs that an analysis asks for."""
-    sizes = [getattr(asked, key, 0) for key in ("runs", "draws", "levels", "trajectories")]
-    if isinstance(asked, Map):
-        sizes.append((asked.cells + 1) ** 2)
-    if isinstance(asked, Degradation):
-        sizes.append(asked.runs * len(asked.factors))
-    if isinstance(asked, Morris | Sobol):
-        sizes.append((asked.trajectories if isinstance(asked, Morris) else asked.size) * (wide + 2))
-    if isinstance(asked, Compare):
-        sizes.append(asked.runs * len(asked.options))
-    return sizes
-
-
 def _count(rows: int) -> str:
     return f"{rows:,}" if rows < 10**15 else f"about 10^{math.log10(rows):.0f}"
 
@@ -283,23 +271,19 @@ def _check_designs(study: Study, space: Space, large: set[Place], notes: _Notes)
     if study.runs is not None and ("runs",) not in large:
         notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
     for i, asked in enumerate(study.analysis):
-        if asked.kind in ("probability", "sequential") and study.runs is not None:
+        if asked.definition.is_statement and study.runs is not None:
             kind = study.runs.design
             made = Design(space=space, kind=kind, size=1, is_iid=kind == "i.i.d.", entropy=0)
             notes.attempt(("analysis", i), check_iid, made)
-        if ("analysis", i) not in large:
-            notes.attempt(("analysis", i), own_design, asked, space, study.study.seed)
+        design = asked.definition.design
+        if design is not None and ("analysis", i) not in large:
+            notes.attempt(("analysis", i), design, asked, space, study.study.seed)
 
 
-def _quantities_of(asked: Any) -> list[tuple[str, str]]:
-    """Return the quantities that an analysis names, each with the key that it stands under."""
-    named = [("quantities", name) for name in getattr(asked, "quantities", ())]
-    return [("x", asked.x), ("y", asked.y)] if isinstance(asked, Map) else named
-
-
-def _check_options(study: Study, made: Experiment, asked: Compare, folder: Path) -> None:
-    wide = widened(made, asked, alternatives(asked, made.build, folder), study, folder)
-    columns = [metric.key for metric in wide.metrics]
-    for metric in asked.metrics:
-        if metric not in columns:
-            raise unknown("metric", metric, columns, "of all options")
+def _named(asked: Asked, keys: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the names that stand under some keys of an analysis, each with its key."""
+    found = []
+    for key in keys:
+        value = getattr(asked, key)
+        found += [(key, name) for name in ((value,) if isinstance(value, str) else value)]
+    return found

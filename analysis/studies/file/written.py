@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import tomli_w
 
+from ..kind import Kind
+from .own_kinds import model_of
 from .schema import Study
 from .toml import read_toml
 
@@ -15,12 +19,18 @@ def to_toml(study: Study) -> str:
     return tomli_w.dumps(study.model_dump(mode="json", exclude_unset=True, exclude_none=True))
 
 
-def from_toml(text: str) -> Study:
+def from_toml(text: str, own: Mapping[str, Kind] | None = None) -> Study:
     """Return the study in a text that `to_toml` has written.
+
+    Parameters
+    ----------
+    text : str
+    own : mapping of str to Kind, optional
+        Kinds of analysis of one's own, as the text calls them.
 
     Raises
     ------
     ValueError
-        If it is none.
+        If it is not a study.
     """
-    return Study.model_validate(read_toml(text))
+    return model_of(own or {}).model_validate(read_toml(text))

@@ -1,87 +1,88 @@
-"""What every analysis of a study stands on."""
+"""What several kinds of analysis share: numbers of a statement, a response, sources."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-import pandas as pd
 
-from analysis.robustness import Design, Prepared, Space, Violation
+from analysis.robustness import Violation
 from analysis.robustness.runs.sweep import Sweep
+from analysis.robustness.statistics.sensitivity import censored
+from nlctl._errors import ParameterError
+from nlctl.native import Status
 
-from ..file.schema import Study
-from ..result import Finding
+from ..kind import Ground, column
 
-__all__ = ["Ground", "RunDesign", "column", "made", "statement_numbers"]
+__all__ = [
+    "AUGER",
+    "CLOPPER",
+    "HANSEN",
+    "HOLM",
+    "HOWARD",
+    "ROBBINS",
+    "SEARCHED",
+    "response",
+    "statement_numbers",
+]
 
-
-class RunDesign(Protocol):
-    """Runs a design, of the study's own loops by default, into the folder of the analysis."""
-
-    def __call__(self, design: Design, of: Prepared | None = None) -> Sweep: ...
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Ground:
-    """What an analysis stands on.
-
-    Attributes
-    ----------
-    study : Study
-    folder : Path
-        What paths in the study are relative to.
-    prepared : Prepared
-        The study's experiment.
-    rows : Sweep or None
-        The main table, with its design.
-    simulate : callable
-        Runs rows here, see `analysis.robustness.search.evaluation.Evaluate`; what a table leaves
-        out is nominal.
-    run_design : RunDesign
-    """
-
-    study: Study
-    folder: Path
-    prepared: Prepared
-    rows: Sweep | None
-    simulate: Callable[[pd.DataFrame], pd.DataFrame]
-    run_design: RunDesign
-
-    @property
-    def seed(self) -> int:
-        """What all random numbers of the study follow from."""
-        return self.study.study.seed
-
-    @property
-    def main(self) -> tuple[Design, np.ndarray]:
-        """Design and margins of the main table."""
-        assert self.rows is not None
-        assert self.rows.design is not None
-        return self.rows.design, column(self.rows, "spec")
-
-    def space(self, names: Sequence[str] = ()) -> Space:
-        """Return the space, or the part of it with these quantities, named as in the file."""
-        whole = self.prepared.experiment.space
-        if not names:
-            return whole
-        own = dict(zip(self.study.space, whole.quantities, strict=True))
-        return replace(whole, quantities=tuple(own[name] for name in names), choices=())
-
-
-def column(rows: Sweep, name: str) -> np.ndarray:
-    """Return one column of a sweep."""
-    return rows.columns(name)[name].to_numpy()
-
-
-def made(asked: Any, sentence: str, **parts: Any) -> Finding:
-    """Return a finding that `answer` gives its key and title."""
-    return Finding(key="", kind=asked.kind, title="", sentence=sentence, **parts)
+CLOPPER = (
+    "C. J. Clopper, E. S. Pearson: The use of confidence or fiducial limits illustrated in the "
+    "case of the binomial. Biometrika 26 (1934), pp. 404–413. doi 10.1093/biomet/26.4.404."
+)
+ROBBINS = (
+    "H. Robbins: Statistical methods related to the law of the iterated logarithm. Ann. Math. "
+    "Statist. 41 (1970) 1397–1409. doi 10.1214/aoms/1177696786."
+)
+HOWARD = (
+    "S. Howard, A. Ramdas, J. McAuliffe, J. Sekhon: Time-uniform, nonparametric, nonasymptotic "
+    "confidence sequences. Ann. Statist. 49 (2021) 1055–1080. doi 10.1214/20-AOS1991."
+)
+HANSEN = (
+    "N. Hansen: The CMA evolution strategy: a tutorial. arXiv 1604.00772 (2016). "
+    "doi 10.48550/arXiv.1604.00772."
+)
+AUGER = (
+    "A. Auger, N. Hansen: A restart CMA evolution strategy with increasing population size. CEC "
+    "2005, 1769–1776. doi 10.1109/CEC.2005.1554902."
+)
+HOLM = (
+    "S. Holm: A simple sequentially rejective multiple test procedure. Scand. J. Statist. 6 "
+    "(1979) 65–70."
+)
+SEARCHED = (
+    "a portfolio of corners of the box, uniform draws and CMA-ES with restarts and growing "
+    "populations on the margin (Hansen 2016; Auger and Hansen 2005)"
+)
 
 
 def statement_numbers(statement: Violation) -> dict[str, Any]:
     """Return a statement about a probability as numbers and texts."""
     return vars(statement) | {"assumptions": list(statement.assumptions)}
+
+
+def response(of: str, ground: Ground, done: Sweep) -> tuple[np.ndarray, str, dict[str, Any]]:
+    """Return the column that a sensitivity is of, and how failed rows count: text and numbers.
+
+    Raises
+    ------
+    ParameterError
+        If it is a metric that some rows do not have, or no row reached its end.
+    """
+    values = column(done, of)
+    if of in ("spec", *(r.key for r in ground.prepared.experiment.spec.requirements)):
+        values, failed, least = censored(values)
+        if not failed:
+            return values, "", {}
+        text = f" {failed} of them did not reach their end: each counts as a margin of {least:.4g}"
+        text += ", no better than any of the others."
+        return values, text, {"failed": failed, "counted_as": least}
+    lacking = int(np.count_nonzero(~np.isfinite(values)))
+    if lacking:
+        failed = int(np.count_nonzero(column(done, "status") != Status.OK.name))
+        why = "did not reach their end and have" if failed else "have"
+        raise ParameterError(
+            f"{failed or lacking} of {done.done} rows {why} no finite '{of}': take a margin, such "
+            'as of = "spec", which every row has, or a space without such rows'
+        )
+    return values, "", {}

@@ -3,50 +3,32 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from ...report.document import Figure, Item, Paragraph, Report, Section, Table
 from ...report.outline import summary
 from ...report.render import file_hashes
 from ...report.versions import versions
+from ..kind import Varied
+from ..kinds import KINDS
 from . import methods as how
 from . import text as text
-from .claims import STATEMENTS, claims, verdict
+from .claims import claims, verdict
 from .histories import Histories
 from .loop import Loop, Published, loop_sections
-from .rankings import compare, morris, regional, sobol
-from .rows import (
-    fan_items,
-    margin_items,
-    row_items,
-    running,
-    setup_items,
-    statement_items,
-)
-from .searches import degradation, failure_map, radius, worst_case
+from .rows import fan_items, margin_items, row_items, setup_items
+from .running import running
 
 if TYPE_CHECKING:
-    from analysis.studies.result import Finding, Result
+    from analysis.studies.finding import Finding
+    from analysis.studies.result import Result
 
 __all__ = ["study_part", "study_report", "study_sections"]
 
 LISTED = 400  # lines of a table that report.json holds as well; longer ones are files beside it
-Items = Callable[["Finding", "Result", Any, str], Iterator[Item]]
-KINDS: dict[str, Items] = {  # in the order of the report
-    "worst case": worst_case,
-    "radius": radius,
-    "degradation": degradation,
-    "morris": morris,
-    "sobol": sobol,
-    "regional": regional,
-    "failure map": failure_map,
-    "compare": compare,
-}
 OUTCOMES = {  # by the light
     "pass": "shown",
     "caution": "not shown yet",
@@ -143,9 +125,10 @@ def study_sections(
         key = "study_rows"  # no analysis is called that: keys of these have hyphens only
         rows = [*row_items(result, table, f"{prefix}{key}")]
         asked.append(Section(key=key, title="How the runs ended", items=rows))
-        margins = table["spec"].to_numpy(dtype=float)
-        statements = [f for f in _answered(result) if f.kind in STATEMENTS]
-        asked += [_statement(f, result, margins, prefix) for f in statements]
+        asked += [
+            _section(f, result, text.without_assumptions(f.sentence), prefix)
+            for f in _statements(result)
+        ]
     asked += _findings(result, prefix)
     asked += _assumed(result)
     if limits:
@@ -248,53 +231,56 @@ def _brief(
     for made in _assumed(result):
         yield replace(made, key=f"{key}-assumed", level=4, folded=True)
     for finding in result.findings:
-        if finding.kind == "failure map" and finding.is_answered:
-            items = [*failure_map(finding, result, asked[finding.key], f"{key}-{finding.key}")]
+        one = asked[finding.key]
+        if one.definition.in_brief and finding.is_answered:
+            items = [*one.definition.items(finding, result, one, f"{key}-{finding.key}")]
             yield Section(
                 key=f"{key}-map", title=_title(finding, result), items=items, level=4, folded=True
             )
 
 
-def _statement(finding: Finding, result: Result, margins: np.ndarray, prefix: str) -> Section:
-    limit = result.asked[finding.key].limit
-    shown = statement_items(finding, limit, margins, f"{prefix}{finding.key}")
-    told = Paragraph(text=text.without_assumptions(finding.sentence))
-    return Section(key=finding.key, title=_title(finding, result), items=[told, *shown])
-
-
 def _told(finding: Finding, asked: Any) -> str:
     """Return what was found, and what was varied if that is not everything."""
-    some, sentence = getattr(asked, "quantities", ()), text.without_assumptions(finding.sentence)
-    if not some:
+    sentence = text.without_assumptions(finding.sentence)
+    if not (isinstance(asked, Varied) and asked.quantities):
         return sentence
-    return f"{sentence} Here only {', '.join(some)} vary, all others are nominal."
+    return f"{sentence} Here only {', '.join(asked.quantities)} vary, all others are nominal."
 
 
 def _title(finding: Finding, result: Result) -> str:
     """Return the heading that the study file gives an analysis, or one by its kind."""
     asked = result.asked[finding.key]
-    of = getattr(asked, "of", "spec")
-    return asked.title or text.TITLES[finding.kind] + ("" if of == "spec" else f" of {of}")
+    of = (getattr(asked, key) for key in asked.definition.columns)
+    return asked.title or asked.definition.title + "".join(f" of {c}" for c in of if c != "spec")
 
 
 def _findings(result: Result, prefix: str) -> list[Section]:
-    """Return a section for every other analysis, in the order of `KINDS`.
+    """Return a section for every other analysis, in the order of `KINDS`, then one's own.
 
     Those without an answer come last, with the sentence that says why.
     """
     asked = result.asked
-    made = []
-    for kind, items in KINDS.items():
-        for f in _answered(result):
-            if f.kind == kind:
-                shown = items(f, result, asked[f.key], f"{prefix}{f.key}")
-                told = Paragraph(text=_told(f, asked[f.key]))
-                made.append(Section(key=f.key, title=_title(f, result), items=[told, *shown]))
-    return made + [
+    places = {kind: place for place, kind in enumerate(KINDS)}
+    others = [f for f in _answered(result) if not asked[f.key].definition.is_statement]
+    others.sort(key=lambda f: places.get(asked[f.key].definition, len(places)))
+    return [_section(f, result, _told(f, asked[f.key]), prefix) for f in others] + [
         Section(key=f.key, title=_title(f, result), items=[Paragraph(text=f.sentence)])
         for f in result.findings
         if not f.is_answered
     ]
+
+
+def _section(finding: Finding, result: Result, told: str, prefix: str) -> Section:
+    """Return what an analysis found, in words, with figures and tables of its kind."""
+    asked = result.asked[finding.key]
+    shown = asked.definition.items(finding, result, asked, f"{prefix}{finding.key}")
+    items = [Paragraph(text=told), *shown]
+    return Section(key=finding.key, title=_title(finding, result), items=items)
+
+
+def _statements(result: Result) -> list[Finding]:
+    """Return what was answered about the probability of a violation."""
+    return [f for f in _answered(result) if result.asked[f.key].definition.is_statement]
 
 
 def _answered(result: Result) -> list[Finding]:
@@ -314,10 +300,9 @@ def numbers(result: Result) -> dict[str, Any]:
     curves = {}
     if result.rows is not None and result.rows.done:
         margins = result.rows.columns("spec")["spec"].to_numpy(dtype=float)
-        for f in _answered(result):
-            if f.kind in STATEMENTS:
-                curve = running(margins[: f.numbers["runs"]], f.numbers["confidence"])
-                curves[f.key] = curve.reset_index().to_dict("records")
+        for f in _statements(result):
+            curve = running(margins[: f.numbers["runs"]], f.numbers["confidence"])
+            curves[f.key] = curve.reset_index().to_dict("records")
     return {"study": result.plain(), "tables": tables, "running estimate": curves}
 
 

@@ -14,8 +14,6 @@ from nlctl.native import Status
 from ... import figures as figures
 from ...report.document import Figure, History, Item, Paragraph, Table
 from ...robustness.search.evaluation import margins_of
-from ...robustness.statistics.guarantee import rounded_down, rounded_up
-from ...robustness.statistics.sequential import sequence_bounds
 from ...robustness.stl.spec import violates
 from . import text as text
 from .claims import refusal
@@ -23,7 +21,7 @@ from .histories import Histories
 from .text import margin_text
 
 if TYPE_CHECKING:
-    from analysis.studies.result import Finding, Result
+    from analysis.studies.result import Result
 
     from .loop import Published
 
@@ -32,14 +30,11 @@ __all__ = [
     "known",
     "margin_items",
     "row_items",
-    "running",
     "setup_items",
-    "statement_items",
     "status_text",
 ]
 
 WORST = 10  # rows that are listed
-POINTS = 150  # of the running estimate
 PARTS = {0.5: "median", 0.95: "95 %", 1.0: "largest"}  # quantiles of the metrics
 
 
@@ -251,40 +246,3 @@ def _peaks(kept: Histories) -> str:
             f"the worst run {largest[2]:.4g}."
         )
     return " ".join(told)
-
-
-def statement_items(
-    finding: Finding, limit: float | None, margins: np.ndarray, key: str
-) -> Iterator[Item]:
-    """Yield what the estimate did while the rows came in."""
-    confidence = float(finding.numbers["confidence"])
-    curve = running(margins[: int(finding.numbers["runs"])], confidence)
-    last = curve.iloc[-1]
-    caption = text.RUNNING.format(confidence=100 * confidence)
-    fixed = None
-    if finding.kind == "probability":
-        fixed = (float(finding.numbers["singly"][0]), float(finding.numbers["singly"][1]))
-    caption += text.DECIDES_FIXED if fixed else text.DECIDES_SEQUENCE
-    ends = f", exact bounds {rounded_down(fixed[0])} and {rounded_up(fixed[1])}" if fixed else ""
-    yield Figure(
-        key=f"{key}-running",
-        caption=caption,
-        description=f"{caption} After {curve.index[-1]} runs: {last['rate']:.4g}, band from "
-        f"{last['low']:.4g} to {last['high']:.4g}{ends}.",
-        figure=figures.running_estimate(curve, limit, fixed),
-    )
-
-
-def running(margins: np.ndarray, confidence: float) -> pd.DataFrame:
-    """Return the share of violations after n rows with its confidence sequence, for some n.
-
-    Columns violations, rate, low, high; NaN is a violation.
-    """
-    counts = np.cumsum(violates(margins))
-    numbers = np.unique(np.geomspace(1, counts.size, POINTS).round().astype(int))
-    rows = []
-    for n in map(int, numbers):
-        k = int(counts[n - 1])
-        low, high = sequence_bounds(k, n, confidence)
-        rows.append({"violations": k, "rate": k / n, "low": low, "high": high})
-    return pd.DataFrame(rows, index=pd.Index(numbers, name="runs"))

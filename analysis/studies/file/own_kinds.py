@@ -1,0 +1,88 @@
+"""Kinds of analysis of one's own: what a study file means by ``kind = "spread.py:spread"``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ConfigDict
+
+from nlctl._errors import ParameterError, UsageError
+
+from ..finding import Finding
+from ..kind import Asked, Ground, Kind
+from ..kinds import KINDS
+from .errors import Place, Problem
+from .resolve import named_kind
+from .schema import Study, study_model
+from .trust import untrusted_names
+
+__all__ = ["model_of", "own_kinds", "stand_ins"]
+
+
+def model_of(own: Mapping[str, Kind]) -> type[Study]:
+    """Return the shape of study files with nlctl's kinds of analysis and some of one's own."""
+    return study_model((*((kind.name, kind) for kind in KINDS), *own.items()))
+
+
+def own_kinds(
+    data: Mapping[str, Any], folder: Path, *, trust: bool = False
+) -> tuple[dict[str, Kind], list[Problem]]:
+    """Return the kinds that a study file names by their place, and the mistakes among them.
+
+    The files and modules that they stand in are run, see `trust`.
+
+    Parameters
+    ----------
+    data : mapping
+        What stands in the file.
+    folder : Path
+        What paths in the study are relative to.
+    trust : bool, optional
+        As in `parse.read_study`.
+    """
+    named = list(_named(data))
+    problems = [] if trust else untrusted_names(named, folder)
+    refused = {problem.place for problem in problems}
+    found: dict[str, Kind] = {}
+    for place, name in named:
+        if place in refused or name in found:
+            continue
+        try:
+            found[name] = named_kind(name, folder)
+        except UsageError as error:
+            problems.append(Problem(place=place, message=str(error)))
+    return found, problems
+
+
+def _named(data: Mapping[str, Any]) -> Iterator[tuple[Place, str]]:
+    """Yield the places of kinds in a file that may be of any shape."""
+    listed = data.get("analysis")
+    for i, entry in enumerate(listed if isinstance(listed, list) else ()):
+        name = entry.get("kind") if isinstance(entry, Mapping) else None
+        if isinstance(name, str) and ":" in name:
+            yield ("analysis", i, "kind"), name
+
+
+def stand_ins(data: Mapping[str, Any], known: Mapping[str, Kind]) -> dict[str, Kind]:
+    """Return for every kind of one's own that is not known one that takes any table.
+
+    With it a run can be read whose kind has gone: its findings keep what they say.
+    """
+    names = dict.fromkeys(name for _, name in _named(data) if name not in known)
+    return {name: _stand_in(name) for name in names}
+
+
+def _stand_in(name: str) -> Kind:
+    def run(asked: Any, ground: Ground) -> Finding:
+        raise ParameterError(f"the kind of analysis '{name}' has gone: put it back")
+
+    title = name.rpartition(":")[2].replace("_", " ").capitalize()
+    return Kind(name="gone", schema=_AnyTable, run=run, title=title)
+
+
+class _AnyTable(Asked):
+    """A table of a kind that has gone."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)

@@ -1,0 +1,68 @@
+"""What one analysis of a study found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import pandas as pd
+
+from .sealed import as_json
+
+__all__ = ["Finding"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Finding:
+    """What one analysis found.
+
+    Attributes
+    ----------
+    key, kind, title : str
+        Name of its folder, kind of analysis, heading.
+    sentence : str
+        What was found, with what it rests on.
+    claim : str
+        What the study claimed; empty without a claim.
+    answer : {"shown", "refuted", "not shown yet", ""}
+        What was found of the claim; empty without a claim.
+    needs : str
+        What it takes to show the claim, where it is not shown yet.
+    runs : int
+        Number of simulations that it rests on.
+    numbers : mapping
+        Bounds, margins, rows: what the sentence says, as numbers and texts.
+    tables : mapping
+        DataFrames by name.
+    is_answered : bool
+        False where rows or loop did not admit the analysis: the sentence says why, and there are
+        neither numbers nor tables.
+    """
+
+    key: str
+    kind: str
+    title: str
+    sentence: str
+    claim: str = ""
+    answer: str = ""
+    needs: str = ""
+    runs: int = 0
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    tables: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    is_answered: bool = True
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether the claim is shown; None without a claim."""
+        return self.answer == "shown" if self.answer else None
+
+    @property
+    def told(self) -> str:
+        """The answer in words, ``not shown yet (needs ...)``."""
+        return f"{self.answer} (needs {self.needs})" if self.needs else self.answer
+
+    def plain(self) -> dict[str, Any]:
+        """Return everything but the tables, as JSON can hold it."""
+        content = {key: value for key, value in vars(self).items() if key != "tables"}
+        return as_json(content) | {"tables": sorted(self.tables)}

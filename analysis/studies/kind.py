@@ -1,0 +1,348 @@
+"""What a kind of analysis is: one record, from its table in a study file to its part of the page.
+
+nlctl's own kinds are the modules of `analysis.studies.kinds`.  A kind of one's own is a `Kind` in a
+file beside the study, or in an installed package; a study names it as it names its loop::
+
+    [[analysis]]
+    kind = "spread.py:spread"     # or "module:spread"
+    of = "late_rms"
+
+Everything that a study does with an analysis (reading its table, checking it against the loop,
+planning, running, claiming, drawing) it asks of this record and of nothing else.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
+
+import numpy as np
+import pandas as pd
+from pydantic import Field, create_model
+
+from analysis.robustness import Design, Experiment, Prepared, Space
+from analysis.robustness.runs.progress import Progress
+from analysis.robustness.runs.sweep import Sweep
+from nlctl._errors import ParameterError, UsageError
+
+from .file.field_types import Names, Strict
+from .finding import Finding
+
+if TYPE_CHECKING:
+    from ..report.document import Item
+    from .file.schema import Study
+    from .result import Result
+
+__all__ = [
+    "Asked",
+    "Ground",
+    "Kind",
+    "RunDesign",
+    "Setup",
+    "Varied",
+    "answer",
+    "column",
+    "made",
+    "tagged",
+    "unanswered",
+]
+
+NAME = re.compile(r"[a-z][a-z0-9]*([ -][a-z0-9]+)*")
+
+
+class Asked(Strict):
+    """What a study file says of every analysis; the schema of a kind adds its own keys."""
+
+    key: str = Field(
+        "",
+        pattern=r"^[a-z0-9-]*$",
+        description="Name of its folder: lower-case letters, digits, hyphens; by default the kind.",
+    )
+    title: str = Field("", description="Its heading in the report.")
+    kind: str
+    definition: ClassVar[Kind]
+
+
+class Varied(Asked):
+    """An analysis that may vary a part of the quantities."""
+
+    quantities: Names = Field((), description="What is varied, the rest nominal; all by default.")
+
+
+class RunDesign(Protocol):
+    """Runs a design, of the study's own loops by default, into the folder of the analysis."""
+
+    def __call__(self, design: Design, of: Prepared | None = None) -> Sweep: ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Setup:
+    """What is known before anything runs.
+
+    Attributes
+    ----------
+    study : Study
+    folder : Path
+        What paths in the study are relative to.
+    experiment : Experiment
+        What is simulated for each row.
+    """
+
+    study: Study
+    folder: Path
+    experiment: Experiment
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ground:
+    """What an analysis stands on while it runs.
+
+    Attributes
+    ----------
+    study : Study
+    folder : Path
+        What paths in the study are relative to.
+    prepared : Prepared
+        The study's experiment.
+    rows : Sweep or None
+        The main table, with its design.
+    simulate : callable
+        Runs rows here, see `analysis.robustness.search.evaluation.Evaluate`; what a table leaves
+        out is nominal.
+    run_design : RunDesign
+    """
+
+    study: Study
+    folder: Path
+    prepared: Prepared
+    rows: Sweep | None
+    simulate: Callable[[pd.DataFrame], pd.DataFrame]
+    run_design: RunDesign
+
+    @property
+    def setup(self) -> Setup:
+        """What was known before."""
+        return Setup(study=self.study, folder=self.folder, experiment=self.prepared.experiment)
+
+    @property
+    def seed(self) -> int:
+        """What all random numbers of the study follow from."""
+        return self.study.study.seed
+
+    @property
+    def main(self) -> tuple[Design, np.ndarray]:
+        """Design and margins of the main table."""
+        assert self.rows is not None
+        assert self.rows.design is not None
+        return self.rows.design, column(self.rows, "spec")
+
+    def space(self, names: Sequence[str] = ()) -> Space:
+        """Return the space, or the part of it with these quantities, named as in the file."""
+        whole = self.prepared.experiment.space
+        if not names:
+            return whole
+        own = dict(zip(self.study.space, whole.quantities, strict=True))
+        return replace(whole, quantities=tuple(own[name] for name in names), choices=())
+
+
+def _nothing(asked: Any, setup: Setup) -> int:
+    return 0
+
+
+def _no_items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+    yield from ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Kind:
+    """A kind of analysis.
+
+    The first argument ``asked`` of its functions is an instance of `schema`.  What they refuse they
+    refuse with a `nlctl.UsageError`, which costs this analysis and no other one.
+
+    Attributes
+    ----------
+    name : str
+        As in a study file: lower-case words.
+    schema : type of Asked
+        The keys of its table, each with a description, as a pydantic model.
+    run : callable
+        ``run(asked, ground)`` returns a `Finding`, see `made`; None if its rows are incomplete.
+    title : str
+        Its heading in the report.
+    answers, claims : str
+        What it answers, and what it claims under which keys, in Markdown, for the guide.
+    method : str
+        How it is done, for the report; with sources by author and year.
+    sources : tuple of str
+        These sources in full.
+    needs_rows : bool
+        Whether it looks at the main table.
+    is_statement : bool
+        Whether it bounds a probability from the main table, which needs independent draws; its
+        numbers have ``runs`` and ``confidence``.
+    stop : callable, optional
+        ``stop(asked, design)`` returns what ends the main table early, where no other analysis
+        needs it; see `analysis.robustness.runs.sweep`.
+    columns, quantities, keywords : tuple of str
+        Keys of its table that name a column of its rows, quantities of the space, a keyword of the
+        loop: they are checked before anything runs.
+    check : callable, optional
+        ``check(asked, setup)`` raises what else does not fit the loop.
+    design : callable, optional
+        ``design(asked, space, seed)`` returns the rows that it runs itself, where they are known.
+    runs : callable, optional
+        ``runs(asked, setup)`` returns how many simulations it makes itself, at most; with `design`
+        that is the number of its rows.
+    ends_early : bool
+        Whether it may make fewer.
+    keeps_rows : bool
+        Whether they stay on the disk.
+    largest : callable, optional
+        ``largest(asked, quantities)`` returns the largest number that it asks for, from the table
+        alone: what no machine can do is refused.
+    experiment : callable, optional
+        ``experiment(asked, setup)`` returns what its rows are run with, where that is not the
+        study's own experiment.
+    measured : callable, optional
+        ``measured(finding, asked)`` returns ``measured``, ``limit`` and ``margin`` of the table of
+        claims as texts; by default what was found, in a sentence.
+    items : callable, optional
+        ``items(finding, result, asked, key)`` yields figures and tables; keys of figures begin with
+        `key`.
+    in_brief : bool
+        Whether these are also shown where a study is only a part of a report.
+    witness : callable, optional
+        ``witness(finding)`` returns the row with the lowest margin that it found, and that margin.
+
+    Raises
+    ------
+    ParameterError
+        If a name is no name, or the schema no schema.
+    """
+
+    name: str
+    schema: type[Asked]
+    run: Callable[[Any, Ground], Finding | None]
+    title: str
+    answers: str = ""
+    claims: str = ""
+    method: str = ""
+    sources: tuple[str, ...] = ()
+    needs_rows: bool = False
+    is_statement: bool = False
+    stop: Callable[[Any, Design], Callable[[Progress], Any]] | None = None
+    columns: tuple[str, ...] = ()
+    quantities: tuple[str, ...] = ()
+    keywords: tuple[str, ...] = ()
+    check: Callable[[Any, Setup], object] | None = None
+    design: Callable[[Any, Space, int], Design] | None = None
+    runs: Callable[[Any, Setup], int] = _nothing
+    ends_early: bool = False
+    keeps_rows: bool = True
+    largest: Callable[[Any, int], int] | None = None
+    experiment: Callable[[Any, Setup], Experiment] | None = None
+    measured: Callable[[Finding, Any], Mapping[str, str]] | None = None
+    items: Callable[[Finding, Result, Any, str], Iterator[Item]] = _no_items
+    in_brief: bool = False
+    witness: Callable[[Finding], tuple[Mapping[str, Any], float]] | None = None
+
+    def __post_init__(self) -> None:
+        if not NAME.fullmatch(self.name):
+            raise ParameterError(
+                f"Kind needs a name of lower-case words and digits, got {self.name!r}"
+            )
+        if not (isinstance(self.schema, type) and issubclass(self.schema, Asked)):
+            raise ParameterError(
+                f"Kind needs a schema that is a subclass of Asked, got {self.schema!r} "
+                f"(kind '{self.name}')"
+            )
+        for key in (*self.columns, *self.quantities, *self.keywords):
+            if key not in self.schema.model_fields:
+                raise ParameterError(
+                    f"Kind needs columns, quantities and keywords that are keys of its schema, got "
+                    f"'{key}' (kind '{self.name}')"
+                )
+
+    def planned(self, asked: Any, setup: Setup) -> int:
+        """Return how many simulations an analysis makes itself, at most."""
+        if self.design is not None:
+            return self.design(asked, setup.experiment.space, 0).size
+        return self.runs(asked, setup)
+
+
+@functools.cache
+def tagged(kind: Kind, tag: str) -> type[Asked]:
+    """Return the schema of a kind under the name that a study file calls it by."""
+    name: Any = Literal[tag]  # type: ignore[valid-type]
+    model: Any = create_model(
+        kind.schema.__name__,
+        __base__=kind.schema,
+        __doc__=kind.schema.__doc__,
+        __module__=kind.schema.__module__,
+        kind=(name, ...),
+    )
+    model.definition = kind
+    return model
+
+
+def column(rows: Sweep, name: str) -> np.ndarray:
+    """Return one column of a sweep."""
+    return rows.columns(name)[name].to_numpy()
+
+
+def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
+    """Return a finding, whose key and title `answer` fills in.
+
+    Parameters
+    ----------
+    asked : Asked
+    sentence : str
+        What was found.
+    **parts
+        Other fields of `Finding`: ``runs``, ``numbers``, ``tables``, and with a claim ``claim``,
+        ``answer``, ``needs``.
+    """
+    return Finding(key="", kind=asked.kind, title="", sentence=sentence, **parts)
+
+
+def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
+    """Run one analysis.
+
+    Returns
+    -------
+    Finding
+        None if its rows are incomplete.
+
+    Raises
+    ------
+    UsageError
+        If the rows do not admit the analysis, such as a regional one where all rows pass.
+    KeyboardInterrupt
+        If Ctrl-C ended a search.
+    """
+    found = asked.definition.run(asked, ground)
+    if found is None:
+        return None
+    return _headed(key, asked, found)
+
+
+def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Finding:
+    """Return what stands in the place of an analysis that its `runs` or the loop do not admit."""
+    found = made(
+        asked,
+        f"Not answered: {error}.",
+        claim="the analysis can be made",
+        answer="refuted",
+        runs=runs,
+        is_answered=False,
+    )
+    return _headed(key, asked, found)
+
+
+def _headed(key: str, asked: Asked, found: Finding) -> Finding:
+    return replace(found, key=key, title=asked.title or key.replace("-", " ").capitalize())

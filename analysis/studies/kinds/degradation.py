@@ -1,0 +1,153 @@
+"""The probability of a violation against the size of the uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field, model_validator
+
+from analysis.robustness import bound_verdict, independent
+from analysis.robustness.search.degradation import degradation_curve
+from analysis.robustness.statistics.guarantee import assumptions, rounded_down, rounded_up
+
+from ... import figures as figures
+from ...report.document import Figure, Table
+from ..file.field_types import Confidence, Flag, Size, Whole
+from ..finding import Finding
+from ..kind import Ground, Kind, Setup, Varied, made
+from ..page import text as text
+from ..page.text import margin_text
+from .context import CLOPPER
+
+if TYPE_CHECKING:
+    from ...report.document import Item
+    from ..result import Result
+
+__all__ = ["DEGRADATION"]
+
+CAPTION = (
+    "Share of violations with all deviations from nominal scaled by a factor; bars: intervals with "
+    "confidence {confidence:g} %, {together}."
+)
+
+
+class Degradation(Varied):
+    """The probability of a violation against the size of the uncertainty."""
+
+    factors: tuple[Size, ...] = Field(min_length=1, description="Sizes, as factors of the box.")
+    runs: Whole = Field(ge=1, description="Rows at each size.")
+    confidence: Confidence = 0.95
+    simultaneous: Flag = Field(False, description="Whether all intervals hold together.")
+    at: Size = Field(1.0, description="The size that the claim is about, one of the factors.")
+    limit: Confidence | None = Field(None, description="Claim: the upper bound at that size.")
+
+    @model_validator(mode="after")
+    def _at_is_looked_at(self) -> Degradation:
+        if self.limit is not None and self.at not in self.factors:
+            raise ValueError(f"the claim is about size {self.at:g}, which is not among the factors")
+        return self
+
+
+def _run(asked: Degradation, ground: Ground) -> Finding:
+    """Bound the probability of a violation at every size."""
+    space = ground.space(asked.quantities)
+    found = degradation_curve(
+        ground.simulate,
+        space,
+        asked.factors,
+        asked.runs,
+        entropy=ground.seed,
+        confidence=asked.confidence,
+        simultaneous=asked.simultaneous,
+    )
+    bounds = dict(zip(found.factors, found.statements, strict=True))
+    told = "; ".join(
+        f"at {factor:g} {one.violations} of {one.runs} ({rounded_down(one.lower)} to "
+        f"{rounded_up(one.upper)})"
+        for factor, one in bounds.items()
+    )
+    together = "together" if asked.simultaneous else "each by itself"
+    claimed: dict[str, Any] = {}
+    if asked.limit is not None:
+        claim = f"a violation has at most probability {asked.limit:g} at the size {asked.at:g}"
+        claimed = {"claim": claim, **vars(bound_verdict(bounds[asked.at], asked.limit))}
+    return made(
+        asked,
+        f"Violations with all deviations scaled: {told}. The bounds hold with confidence "
+        f"{100 * asked.confidence:g} %, {together}. Assumed: "
+        f"at each size {'; '.join(assumptions(independent(space, asked.runs, ground.seed)))}.",
+        **claimed,
+        runs=sum(one.runs for one in found.statements),
+        numbers={"confidence": asked.confidence, "simultaneous": asked.simultaneous},
+        tables={"curve": found.table},
+    )
+
+
+def _runs(asked: Degradation, setup: Setup) -> int:
+    return len(asked.factors) * asked.runs
+
+
+def _largest(asked: Degradation, quantities: int) -> int:
+    return asked.runs * len(asked.factors)
+
+
+def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+    row = finding.tables["curve"].loc[asked.at]
+    return {
+        "measured": f"{row['violations']:.0f} of {row['runs']:.0f} runs at size {asked.at:g}; "
+        f"{rounded_down(row['lower'])} to {rounded_up(row['upper'])} with confidence "
+        f"{100 * asked.confidence:g} %",
+        "limit": f"≤ {asked.limit:g}",
+        "margin": f"{asked.limit - row['upper']:.3g}",
+    }
+
+
+def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+    """Yield the probability of a violation against the size of the uncertainty."""
+    n, curve = finding.numbers, finding.tables["curve"]
+    together = "all together" if n["simultaneous"] else "each by itself"
+    caption = CAPTION.format(confidence=100 * n["confidence"], together=together)
+    yield Figure(
+        key=f"{key}-curve",
+        caption=caption,
+        description=f"{caption} "
+        + "; ".join(f"{size:g}: {row['rate']:.4g}" for size, row in curve.iterrows()),
+        figure=figures.degradation(curve, asked.at, asked.limit),
+    )
+    yield Table(
+        caption=f"{text.SAME}.",
+        folded=True,
+        columns=("factor", "violations", "runs", "share", "from", "to", "least margin", "median"),
+        rows=[
+            (
+                size,
+                row["violations"],
+                row["runs"],
+                *(f"{row[column]:.4g}" for column in ("rate", "lower", "upper")),
+                *(margin_text(row[column]) for column in ("least_margin", "median_margin")),
+            )
+            for size, row in curve.to_dict("index").items()
+        ],
+    )
+
+
+DEGRADATION = Kind(
+    name="degradation",
+    schema=Degradation,
+    run=_run,
+    title="Degradation with the size of the uncertainty",
+    answers="probability of a violation against the size of the box",
+    claims="the bound at size `at` is at most `limit`",
+    method=(
+        "The intervals along the degradation curve are exact for independent draws (Clopper and "
+        "Pearson 1934); all sizes use the same random numbers."
+    ),
+    sources=(CLOPPER,),
+    quantities=("quantities",),
+    runs=_runs,
+    keeps_rows=False,
+    largest=_largest,
+    measured=_measured,
+    items=_items,
+)

@@ -1,0 +1,153 @@
+"""The margin over the plane of two quantities, refined at the boundary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from analysis.robustness import Space
+from analysis.robustness.search.failure_map import boundary, failure_map
+from analysis.robustness.stl.spec import violates
+
+from ... import figures as figures
+from ...report.document import Figure, Paragraph
+from ..file.field_types import Pair, Whole
+from ..finding import Finding
+from ..kind import Asked, Ground, Kind, Setup, made
+from ..page.rows import known
+
+if TYPE_CHECKING:
+    from ...report.document import Item
+    from ..result import Result
+
+__all__ = ["FAILURE_MAP"]
+
+CAPTION = (
+    "Margin over the plane, the other quantities nominal; between the points that were run, the "
+    "dots, it is interpolated."
+)
+VIOLATED = " Orange: violated."
+BOUNDARY = " Line: margin 0."
+STAR = " Star: nominal."
+BOX = " Dashed: the box of the study."
+
+
+class Map(Asked):
+    """The margin over the plane of two quantities, refined at the boundary."""
+
+    x: str = Field(description="A quantity of [space].")
+    y: str = Field(description="Another one.")
+    x_bounds: Pair | None = Field(None, description="Range of x; its box by default.")
+    y_bounds: Pair | None = Field(None, description="Range of y; its box by default.")
+    cells: Whole = Field(8, ge=1, description="Cells along each axis of the first grid.")
+    levels: Whole = Field(4, ge=0, le=10, description="How often a cell is divided at most.")
+    runs: Whole = Field(4000, ge=1, description="Points at most; the first grid always runs.")
+
+
+def _run(asked: Map, ground: Ground) -> Finding:
+    """Map the margin over the plane of two quantities."""
+    x, y = ground.space((asked.x, asked.y)).quantities
+    plane = (
+        x if asked.x_bounds is None else replace(x, bounds=asked.x_bounds),
+        y if asked.y_bounds is None else replace(y, bounds=asked.y_bounds),
+    )
+    found = failure_map(
+        ground.simulate,
+        Space(quantities=plane),
+        x.name,
+        y.name,
+        cells=asked.cells,
+        levels=asked.levels,
+        most=asked.runs,
+    )
+    edge = boundary(found)
+    bad = int(np.count_nonzero(violates(found.table["spec"])))
+    if bad in (0, len(found.table)):
+        which = "every one" if bad else "none"
+        told = f"{which} of {len(found.table)} points violates the spec."
+    else:
+        sides = " and ".join(f"{side:.3g}" for side in found.cell)
+        fine = "" if found.is_finished else "; refinement ended with the number of runs"
+        told = (
+            f"{bad} of {len(found.table)} points violate the spec; cells at the boundary have "
+            f"sides {sides}{fine}. Points were chosen near the boundary, so their share is no "
+            "probability."
+        )
+    return made(
+        asked,
+        f"In the plane of {found.x} and {found.y}, the others nominal, {told}",
+        runs=len(found.table),
+        numbers={"x": found.x, "y": found.y, "cell": list(found.cell)},
+        tables={
+            "points": found.table,
+            "triangles": pd.DataFrame(found.triangles, columns=["a", "b", "c"]),
+            "boundary": edge,
+        },
+    )
+
+
+def _runs(asked: Map, setup: Setup) -> int:
+    return asked.runs
+
+
+def _largest(asked: Map, quantities: int) -> int:
+    return max(asked.runs, (asked.cells + 1) ** 2)
+
+
+def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+    """Yield the map of margins over two quantities."""
+    names = (finding.numbers["x"], finding.numbers["y"])
+    points = finding.tables["points"]
+    about = result.quantities.loc[list(names)]
+    nominal = tuple(map(float, about["nominal"]))
+    labels = tuple(f"{name} ({unit or '1'})" for name, unit in known(about, "unit"))
+    edge, is_nominal = finding.tables["boundary"], bool(np.all(np.isfinite(nominal)))
+    caption = CAPTION + VIOLATED * bool(np.any(violates(points["spec"])))
+    caption += BOUNDARY * bool(len(edge)) + STAR * is_nominal + BOX
+    box = tuple((float(row["low"]), float(row["high"])) for _, row in about.iterrows())
+    yield Figure(
+        key=f"{key}-map",
+        caption=caption,
+        description=f"{caption} {finding.sentence}",
+        figure=figures.failure_map(
+            points,
+            finding.tables["triangles"].to_numpy(),
+            names,
+            labels=labels,  # type: ignore[arg-type]
+            nominal=nominal if is_nominal else None,  # type: ignore[arg-type]
+            box=box,  # type: ignore[arg-type]
+        ),
+    )
+    if len(edge):
+        ranges = (_range(name, edge[name].to_numpy()) for name in names)
+        yield Paragraph(text=f"On the line where the margin is 0: {'; '.join(ranges)}.")
+
+
+def _range(name: str, values: np.ndarray) -> str:
+    low, high = f"{values.min():.4g}", f"{values.max():.4g}"
+    return f"{name} is {low}" if low == high else f"{name} from {low} to {high}"
+
+
+FAILURE_MAP = Kind(
+    name="failure map",
+    schema=Map,
+    run=_run,
+    title="Failure map",
+    answers="the margin over the plane of two quantities",
+    method=(
+        "The failure map starts from a grid and divides cells where the margin changes its sign, "
+        "or may do so between the corners."
+    ),
+    quantities=("x", "y"),
+    runs=_runs,
+    ends_early=True,
+    keeps_rows=False,
+    largest=_largest,
+    items=_items,
+    in_brief=True,
+)

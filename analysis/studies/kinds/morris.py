@@ -1,0 +1,100 @@
+"""Screening: how much a step in each quantity changes a response."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field
+
+from analysis.robustness import Design, Space, elementary_effects, morris
+
+from ... import figures as figures
+from ...report.document import Figure
+from ..file.field_types import Whole
+from ..finding import Finding
+from ..kind import Asked, Ground, Kind, made
+from ..page import text as text
+from ..page.tables import result_table, told
+from .context import response
+
+if TYPE_CHECKING:
+    from ...report.document import Item
+    from ..result import Result
+
+__all__ = ["MORRIS"]
+
+MORRIS_CAPTION = (
+    "Elementary effects on '{of}': μ* is the mean magnitude, with its bootstrap interval; a σ far "
+    "from 0 tells that a quantity does not act linearly, or not on its own."
+)
+MORRIS_1991 = (
+    "M. Morris: Factorial sampling plans for preliminary computational experiments. Technometrics "
+    "33 (1991) 161–174. doi 10.1080/00401706.1991.10484804."
+)
+
+
+class Morris(Asked):
+    """Screening: how much a step in each quantity changes a response."""
+
+    trajectories: Whole = Field(20, ge=2)
+    levels: Whole = Field(4, ge=2)
+    of: str = Field("spec", description="Column: a margin, or a metric that every row has.")
+
+
+def _design(asked: Morris, space: Space, seed: int) -> Design:
+    return morris(space, asked.trajectories, asked.levels, seed)
+
+
+def _largest(asked: Morris, quantities: int) -> int:
+    return max(asked.levels, asked.trajectories * (quantities + 2))
+
+
+def _run(asked: Morris, ground: Ground) -> Finding | None:
+    design = _design(asked, ground.prepared.experiment.space, ground.seed)
+    done = ground.run_design(design)
+    if not done.complete:
+        return None
+    values, failed, numbers = response(asked.of, ground, done)
+    table = elementary_effects(design, values)
+    order = ", ".join(table.nlargest(3, "mu_star").index)
+    return made(
+        asked,
+        f"Largest mean effects on '{asked.of}': {order} ({done.done} runs of a Morris design, "
+        f"which screens and proves nothing).{failed}",
+        runs=done.done,
+        numbers={"of": asked.of, "trajectories": asked.trajectories, **numbers},
+        tables={"effects": table},
+    )
+
+
+def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+    """Yield the elementary effects."""
+    table = finding.tables["effects"]
+    caption = MORRIS_CAPTION.format(of=finding.numbers["of"])
+    yield Figure(
+        key=f"{key}-effects",
+        caption=caption,
+        description=f"{caption} μ*: {told(table['mu_star'])}.",
+        figure=figures.screening(table),
+    )
+    yield result_table(
+        table.sort_values("mu_star", ascending=False, kind="stable"),
+        f"{text.SAME}; μ: mean effect with its sign.",
+        {"mu": "μ", "mu_star": "μ*", "low": "from", "high": "to", "sigma": "σ"},
+    )
+
+
+MORRIS = Kind(
+    name="morris",
+    schema=Morris,
+    run=_run,
+    title="Sensitivity: screening",
+    answers="screening: which quantity matters at all",
+    method=("Screening walks through the box, one quantity a step (Morris 1991)."),
+    sources=(MORRIS_1991,),
+    columns=("of",),
+    design=_design,
+    largest=_largest,
+    items=_items,
+)

@@ -1,0 +1,154 @@
+"""The smallest size of the uncertainty at which a violation is found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import Field
+
+from analysis.robustness.search.largest_scale import largest_scale
+from analysis.robustness.search.radius import robustness_radius
+
+from ... import figures as figures
+from ...report.document import Figure
+from ..file.field_types import Confidence, Size, Whole
+from ..finding import Finding
+from ..kind import Ground, Kind, Setup, Varied, made
+from ..page import text as text
+from ..page.deviations import found_rows
+from ..page.text import margin_text
+from .context import AUGER, CLOPPER, HANSEN, SEARCHED, statement_numbers
+
+if TYPE_CHECKING:
+    from ...report.document import Item
+    from ..result import Result
+
+__all__ = ["RADIUS"]
+
+SIZES = 12  # that the search looks at, roughly
+CAPTION = "Sizes that were looked at, as factors of the box, with the lowest margin found there."
+SMALLEST = " Dashed: the smallest size with a violation."
+
+
+class Radius(Varied):
+    """The smallest size of the uncertainty at which a violation is found."""
+
+    largest: Size = Field(4.0, gt=0, description="Largest size, as a factor of the box.")
+    runs: Whole = Field(500, ge=1, description="Rows of the search at each size, at most.")
+    tolerance: Confidence = Field(0.02, description="Relative width at which the search ends.")
+    draws: Whole = Field(459, ge=0, description="Independent draws for the statement.")
+    confidence: Confidence = 0.99
+    limit: Size | None = Field(None, description="Claim: none is found below this size.")
+
+
+def _run(asked: Radius, ground: Ground) -> Finding:
+    """Search for the smallest size with a violation."""
+    space = ground.space(asked.quantities)
+    largest, why = largest_scale(ground.prepared, asked.largest, space.names)
+    found = robustness_radius(
+        ground.simulate,
+        space,
+        largest,
+        limit=why,
+        runs=asked.runs,
+        tolerance=asked.tolerance,
+        draws=asked.draws,
+        confidence=asked.confidence,
+        entropy=ground.seed,
+    )
+    numbers: dict[str, Any] = {"upper": found.upper, "searched": found.searched}
+    numbers |= {"largest": found.largest, "margin": found.margin, "witness": found.witness}
+    if found.statement is not None:
+        numbers["statement"] = statement_numbers(found.statement)
+    return made(
+        asked,
+        str(found),
+        **_no_small_violation(asked.limit, found.upper, found.largest),
+        runs=found.runs + (0 if found.statement is None else found.statement.runs),
+        numbers=numbers,
+        tables={"steps": found.steps},
+    )
+
+
+def _no_small_violation(limit: float | None, upper: float, largest: float) -> dict[str, str]:
+    """Return the claim about the smallest size with a violation, and the answer."""
+    if limit is None:
+        return {}
+    claim = f"no violation is found below size {limit:g}"
+    if upper < limit:
+        return {"claim": claim, "answer": "refuted"}
+    if min(upper, largest) >= limit:
+        return {"claim": claim, "answer": "shown"}
+    needs = f"a search up to that size: this one ended at {largest:.4g}"
+    return {"claim": claim, "answer": "not shown yet", "needs": needs}
+
+
+def _runs(asked: Radius, setup: Setup) -> int:
+    return SIZES * asked.runs + asked.draws
+
+
+def _largest(asked: Radius, quantities: int) -> int:
+    return max(asked.runs, asked.draws)
+
+
+def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+    n = finding.numbers
+    found = f"violation at size {n['upper']:.4g}"
+    if n["upper"] == 0:
+        found = f"the nominal values violate, margin {margin_text(n['margin'])}"
+    elif n["witness"] is None:
+        found = f"no violation found up to size {n['largest']:.4g}"
+    return {
+        "measured": found,
+        "limit": f"≥ {asked.limit:g}",
+        "margin": f"{min(n['upper'], n['largest']) - asked.limit:.3g}",
+    }
+
+
+def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+    """Yield which sizes were looked at, and the row at the edge of the smallest violation."""
+    n, steps = finding.numbers, finding.tables["steps"]
+    if n["upper"] == 0:  # the nominal values violate: no other size was looked at
+        yield from found_rows({"violating row": n["witness"]}, result.quantities, key)
+        return
+    told = ", ".join(
+        f"{step['size']:.4g}: {margin_text(float(step['margin']))}"
+        for step in steps.to_dict("records")
+    )
+    caption = CAPTION + SMALLEST * bool(np.isfinite(n["upper"])) + text.clipped(steps["margin"])
+    yield Figure(
+        key=f"{key}-sizes",
+        caption=caption,
+        description=f"{caption} Lowest margin by size: {told}.",
+        figure=figures.radius_steps(steps, float(n["upper"])),
+    )
+    if n["witness"] is not None:
+        yield from found_rows({"violating row": n["witness"]}, result.quantities, key)
+
+
+RADIUS = Kind(
+    name="radius",
+    schema=Radius,
+    run=_run,
+    title="Robustness radius",
+    answers="the smallest factor of the box at which a violation is found",
+    claims="none below `limit`",
+    method=(
+        f"At each size of the radius the box was searched by {SEARCHED}, with the same random "
+        "numbers; each violation is moved towards nominal along its ray."
+    ),
+    sources=(
+        HANSEN,
+        AUGER,
+        CLOPPER,
+    ),
+    quantities=("quantities",),
+    runs=_runs,
+    ends_early=True,
+    keeps_rows=False,
+    largest=_largest,
+    measured=_measured,
+    items=_items,
+)

@@ -1,0 +1,95 @@
+"""How far values in failing rows differ from those in passing ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from analysis.robustness import regional
+
+from ... import figures as figures
+from ...report.document import Figure
+from ..finding import Finding
+from ..kind import Asked, Ground, Kind, made
+from ..page import text as text
+from ..page.tables import result_table, told
+from .context import HOLM
+
+if TYPE_CHECKING:
+    from ...report.document import Item
+    from ..result import Result
+
+__all__ = ["REGIONAL"]
+
+CAPTION = (
+    "Distance between the distributions in failing and in passing runs; for choices Cramér's V. 0: "
+    "alike, 1: apart. p: of the test that they are alike; Holm: adjusted for the number of lines."
+)
+SPEAR = (
+    "R. Spear, G. Hornberger: Eutrophication in Peel Inlet, II: identification of critical "
+    "uncertainties via generalized sensitivity analysis. Water Research 14 (1980) 43–49. "
+    "doi 10.1016/0043-1354(80)90040-8."
+)
+
+
+class Regional(Asked):
+    """How far values in failing rows differ from those in passing ones."""
+
+
+def _run(asked: Regional, ground: Ground) -> Finding:
+    design, margins = ground.main
+    passed = int(np.count_nonzero(margins > 0))
+    if passed in (0, margins.size):
+        which = "passes" if passed else "fails"
+        sentence = f"Every one of {margins.size} rows {which}: nothing sets failures apart."
+        return made(asked, sentence, runs=margins.size)
+    table = regional(design, margins)
+    largest = table.nlargest(3, "statistic")["statistic"].to_dict()
+    largest_first = ", ".join(f"{name} ({value:.2g})" for name, value in largest.items())
+    return made(
+        asked,
+        f"What sets {margins.size - passed} failing rows most apart from {passed} passing ones "
+        f"(distance of the two distributions, 0 to 1): {largest_first}.",
+        runs=margins.size,
+        tables={"differences": table},
+    )
+
+
+def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+    """Yield what sets failing rows apart; nothing if all rows pass or all fail."""
+    if "differences" not in finding.tables:
+        return
+    table = finding.tables["differences"]
+    yield Figure(
+        key=f"{key}-distances",
+        caption=CAPTION,
+        description=f"{CAPTION} {told(table['statistic'])}.",
+        figure=figures.set_apart(table),
+    )
+    columns = {"statistic": "distance"}
+    if np.isfinite(table["p"].to_numpy()).any():  # rows are independent draws
+        columns |= {"p": "p", "p_holm": "p (Holm)"}
+    ordered = table.sort_values("statistic", ascending=False, kind="stable")
+    yield result_table(ordered, f"{text.SAME}.", columns)
+
+
+REGIONAL = Kind(
+    name="regional",
+    schema=Regional,
+    run=_run,
+    title="Sensitivity: what sets failing runs apart",
+    answers="how failing rows differ from passing ones",
+    method=(
+        "Regional sensitivity compares the values in failing and in passing runs (Spear and "
+        "Hornberger 1980) by the test of Kolmogorov and Smirnov, choices by chi-square; p-values "
+        "are adjusted for their number (Holm 1979)."
+    ),
+    sources=(
+        SPEAR,
+        HOLM,
+    ),
+    needs_rows=True,
+    items=_items,
+)

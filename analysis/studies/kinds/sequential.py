@@ -1,0 +1,89 @@
+"""Whether a probability is below a limit, looked at while the rows come in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field
+
+from analysis.robustness import Design, decide, test_verdict
+from analysis.robustness.runs.progress import Progress, until_decided
+from analysis.robustness.statistics.guarantee import rounded_down, rounded_up
+
+from ..file.field_types import Confidence
+from ..finding import Finding
+from ..kind import Asked, Ground, Kind, made
+from ..page.running import running_items
+from .context import HOWARD, ROBBINS, statement_numbers
+
+if TYPE_CHECKING:
+    from ...report.document import Item
+    from ..result import Result
+
+__all__ = ["SEQUENTIAL"]
+
+DECIDES_SEQUENCE = " The verdict rests on the band: it is reached where the limit leaves it."
+
+
+class Sequential(Asked):
+    """Whether the probability of a violation is below a limit; rows stop when it is decided."""
+
+    confidence: Confidence = 0.99
+    limit: Confidence = Field(description="Claim: the probability is below this.")
+
+
+def _run(asked: Sequential, ground: Ground) -> Finding:
+    design, margins = ground.main
+    test = decide(design, margins, asked.limit, asked.confidence)
+    return made(
+        asked,
+        str(test),
+        claim=f"the probability of a violation is below {asked.limit:g}",
+        **vars(test_verdict(test)),
+        runs=test.statement.runs,
+        numbers={"decision": test.decision, **statement_numbers(test.statement)},
+    )
+
+
+def _stop(asked: Sequential, design: Design) -> Callable[[Progress], Any]:
+    """End the rows once it is decided on which side of the limit the probability lies."""
+    return until_decided(design, asked.limit, asked.confidence)
+
+
+def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+    n = finding.numbers
+    return {
+        "measured": f"{n['violations']} of {n['runs']} runs; {rounded_down(n['lower'])} to "
+        f"{rounded_up(n['upper'])} with confidence {100 * n['confidence']:g} %",
+        "limit": f"< {asked.limit:g}",
+        "margin": f"{asked.limit - n['upper']:.3g}",
+    }
+
+
+def _items(finding: Finding, result: Result, asked: Sequential, key: str) -> Iterator[Item]:
+    """Yield the estimate while the rows came in."""
+    yield from running_items(finding, result, asked, key, decides=DECIDES_SEQUENCE)
+
+
+SEQUENTIAL = Kind(
+    name="sequential",
+    schema=Sequential,
+    run=_run,
+    title="Sequential test",
+    answers="the same, and rows end as soon as it is decided",
+    claims="the probability is below `limit`",
+    method=(
+        "The sequential test uses a confidence sequence, valid at every number of runs (Robbins "
+        "1970; Howard et al. 2021)."
+    ),
+    sources=(
+        ROBBINS,
+        HOWARD,
+    ),
+    needs_rows=True,
+    is_statement=True,
+    stop=_stop,
+    measured=_measured,
+    items=_items,
+)

@@ -1,0 +1,114 @@
+"""Shares of the variance of a response."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field
+
+from analysis.robustness import Design, Space, saltelli, sobol_indices
+
+from ... import figures as figures
+from ...report.document import Figure
+from ..file.field_types import Confidence, Whole
+from ..finding import Finding
+from ..kind import Asked, Ground, Kind, made
+from ..page import text as text
+from ..page.tables import result_table, told
+from .context import response
+
+if TYPE_CHECKING:
+    from ...report.document import Item
+    from ..result import Result
+
+__all__ = ["SOBOL"]
+
+SOBOL_CAPTION = (
+    "Shares of the variance of '{of}' with bootstrap intervals, confidence {confidence:g} % each. "
+    "S₁: a quantity by itself; S_T: with all its interactions."
+)
+SALTELLI = (
+    "A. Saltelli, P. Annoni, I. Azzini, F. Campolongo, M. Ratto, S. Tarantola: Variance based "
+    "sensitivity analysis of model output. Comput. Phys. Commun. 181 (2010) 259–270. "
+    "doi 10.1016/j.cpc.2009.09.018."
+)
+SOBOL_2001 = (
+    "I. Sobol': Global sensitivity indices for nonlinear mathematical models and their Monte Carlo "
+    "estimates. Math. Comput. Simul. 55 (2001) 271–280. doi 10.1016/S0378-4754(00)00270-6."
+)
+
+
+class Sobol(Asked):
+    """Shares of the variance of a response, with bootstrap intervals."""
+
+    size: Whole = Field(ge=2, description="A power of 2; it takes size (quantities + 2) rows.")
+    confidence: Confidence = 0.95
+    of: str = Field("spec", description="Column: a margin, or a metric that every row has.")
+
+
+def _design(asked: Sobol, space: Space, seed: int) -> Design:
+    return saltelli(space, asked.size, seed)
+
+
+def _largest(asked: Sobol, quantities: int) -> int:
+    return asked.size * (quantities + 2)
+
+
+def _run(asked: Sobol, ground: Ground) -> Finding | None:
+    design = _design(asked, ground.prepared.experiment.space, ground.seed)
+    done = ground.run_design(design)
+    if not done.complete:
+        return None
+    values, failed, numbers = response(asked.of, ground, done)
+    table = sobol_indices(design, values, asked.confidence)
+    largest = table.nlargest(3, "ST")["ST"].to_dict()
+    shares = ", ".join(f"{name} ({share:.0%})" for name, share in largest.items())
+    return made(
+        asked,
+        f"Largest shares of the variance of '{asked.of}', interactions included: {shares} "
+        f"({done.done} runs; intervals by bootstrap with confidence {100 * asked.confidence:g} % "
+        f"each).{failed}",
+        runs=done.done,
+        numbers={"of": asked.of, "confidence": asked.confidence, **numbers},
+        tables={"indices": table},
+    )
+
+
+def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+    """Yield the shares of the variance."""
+    table = finding.tables["indices"]
+    caption = SOBOL_CAPTION.format(
+        of=finding.numbers["of"], confidence=100 * finding.numbers["confidence"]
+    )
+    yield Figure(
+        key=f"{key}-shares",
+        caption=caption,
+        description=f"{caption} S_T: {told(table['ST'])}.",
+        figure=figures.shares(table),
+    )
+    columns = {"S1": "S₁", "S1_low": "from", "S1_high": "to"}
+    columns |= {"ST": "S_T", "ST_low": "from", "ST_high": "to"}
+    ordered = table.sort_values("ST", ascending=False, kind="stable")
+    yield result_table(ordered, f"{text.SAME}.", columns)
+
+
+SOBOL = Kind(
+    name="sobol",
+    schema=Sobol,
+    run=_run,
+    title="Sensitivity: shares of the variance",
+    answers="shares of the variance, with intervals",
+    method=(
+        "Shares of the variance are estimated from two Sobol' samples and their mixtures (Sobol' "
+        "2001; Saltelli et al. 2010)."
+    ),
+    sources=(
+        SOBOL_2001,
+        SALTELLI,
+    ),
+    columns=("of",),
+    design=_design,
+    largest=_largest,
+    items=_items,
+)

@@ -1,0 +1,195 @@
+"""The row with the lowest margin that a search finds."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from analysis.robustness import nominal
+from analysis.robustness.search.confirmation import confirm
+from analysis.robustness.search.evaluation import margins_of
+from analysis.robustness.search.shrink import shrink
+from analysis.robustness.search.worst_case import worst_case
+
+from ... import figures as figures
+from ...report.document import Figure, Paragraph, Table
+from ..file.field_types import Flag, Number, Whole
+from ..finding import Finding
+from ..kind import Ground, Kind, Setup, Varied, made
+from ..page import text as text
+from ..page.deviations import found_rows
+from ..page.rows import status_text
+from ..page.text import DID_NOT_END, margin_text
+from .context import AUGER, HANSEN, SEARCHED
+
+if TYPE_CHECKING:
+    from ...report.document import Item
+    from ..result import Result
+
+__all__ = ["WORST_CASE"]
+
+SEARCH = "Lowest margin after each run of the search; the background tells what chose the run."
+ZELLER = (
+    "A. Zeller, R. Hildebrandt: Simplifying and isolating failure-inducing input. IEEE Trans. "
+    "Softw. Eng. 28 (2002) 183–200. doi 10.1109/32.988498."
+)
+
+
+class WorstCase(Varied):
+    """The row with the lowest margin that a search finds; a violation is confirmed and shrunk."""
+
+    runs: Whole = Field(1000, ge=1, description="The search runs at most so many rows.")
+    shrink: Flag = Field(True, description="Whether a violation is reduced to few deviations.")
+    python_control: Flag = Field(False, description="Whether python-control confirms it as well.")
+    limit: Number | None = Field(None, description="Claim: no margin found is this low.")
+
+
+def _run(asked: WorstCase, ground: Ground) -> Finding:
+    """Search for the lowest margin; confirm and shrink a violation."""
+    space = ground.space(asked.quantities)
+    found = worst_case(ground.simulate, space, asked.runs, entropy=ground.seed)
+    if not found.is_finished:
+        raise KeyboardInterrupt
+    told = [str(found)]
+    numbers: dict[str, Any] = {"margin": found.margin, "witness": found.witness}
+    numbers |= {"found_by": found.found_by, "runs": found.runs, "all_corners": found.all_corners}
+    results = found.results.assign(searcher=found.searchers)
+    tables = {"rows": results, "best": pd.DataFrame({"margin": found.best_so_far})}
+    count = found.design.size
+    if found.is_violated:
+        row = nominal(ground.space()) | found.witness
+        again = confirm(ground.prepared, row, python_control=asked.python_control)
+        told.append(str(again))
+        numbers |= {"is_confirmed": again.is_confirmed, "spread": again.spread}
+        tables["replays"] = again.replays
+        if asked.shrink:
+            small = shrink(ground.simulate, space, found.witness)
+            told.append(str(small))
+            numbers["shrunk"] = vars(small)
+            count += small.runs
+    return made(
+        asked,
+        " ".join(told),
+        **_no_low_margin(asked.limit, found.margin, bool(numbers.get("is_confirmed", True))),
+        runs=count,
+        numbers=numbers,
+        tables=tables,
+    )
+
+
+def _no_low_margin(limit: float | None, margin: float, is_confirmed: bool) -> dict[str, str]:
+    """Return the claim about the lowest margin that was found, and the answer."""
+    if limit is None:
+        return {}
+    claim = f"no margin of {limit:g} or lower is found"
+    if margin > limit:
+        return {"claim": claim, "answer": "shown"}
+    if is_confirmed:
+        return {"claim": claim, "answer": "refuted"}
+    return {
+        "claim": claim,
+        "answer": "not shown yet",
+        "needs": "integrators that agree about the lowest margin",
+    }
+
+
+def _runs(asked: WorstCase, setup: Setup) -> int:
+    return asked.runs
+
+
+def _largest(asked: WorstCase, quantities: int) -> int:
+    return asked.runs
+
+
+def _witness(finding: Finding) -> tuple[Mapping[str, Any], float]:
+    return finding.numbers["witness"], finding.numbers["margin"]
+
+
+def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+    n = finding.numbers
+    ended = margin_text(n["margin"]) == DID_NOT_END
+    return {
+        "measured": (
+            "a run that did not reach its end"
+            if ended
+            else f"lowest margin found: {margin_text(n['margin'])}"
+        ),
+        "limit": f"> {asked.limit:g}",
+        "margin": "" if ended else f"{n['margin'] - asked.limit:.3g}",
+    }
+
+
+def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+    """Yield how the worst row was found, whether it is confirmed, and what of it is needed."""
+    n = finding.numbers
+    lowest = finding.tables["best"]["margin"].to_numpy(dtype=float)
+    caption = SEARCH + text.clipped(lowest)
+    yield Figure(
+        key=f"{key}-search",
+        caption=caption,
+        description=f"{caption} After {lowest.size} runs it is {margin_text(lowest[-1])}.",
+        figure=figures.search(lowest, list(finding.tables["rows"]["searcher"].astype(str))),
+    )
+    if "replays" in finding.tables:
+        yield _replays(finding.tables["replays"], bool(n["is_confirmed"]))
+    number = int(np.argmin(margins_of(finding.tables["rows"])))
+    folder = shlex.quote(str(result.folder))
+    yield Paragraph(
+        text="The worst row again:", code=f"nlctl replay {folder} {number} --part {finding.key}"
+    )
+    rows = {"worst row": n["witness"]}
+    if "shrunk" in n:
+        rows["shrunk"] = n["shrunk"]["row"]
+    yield from found_rows(rows, result.quantities, key)
+
+
+def _replays(replays: pd.DataFrame, is_confirmed: bool) -> Table:
+    told = "Confirmed" if is_confirmed else "Not confirmed"
+    return Table(
+        caption=f"{told}: the worst row run again in other ways.",
+        columns=("engine", "method", "rtol", "atol", "status", "reached (s)", "margin"),
+        rows=[
+            (
+                run["engine"],
+                run["method"],
+                f"{run['rtol']:.1g}",
+                f"{run['atol']:.1g}",
+                status_text(run["status"]),
+                run["time"],
+                margin_text(float(run["margin"])),
+            )
+            for run in replays.to_dict("records")
+        ],
+    )
+
+
+WORST_CASE = Kind(
+    name="worst case",
+    schema=WorstCase,
+    run=_run,
+    title="Worst case",
+    answers="the lowest margin in the box; a violation is confirmed and shrunk",
+    claims="no margin is `limit` or lower",
+    method=(
+        f"The worst case was searched for by {SEARCHED}. A violation is run again at a hundredth "
+        "of the tolerances with an explicit and a stiff integrator before it is called confirmed, "
+        "and shrunk to few deviations (Zeller and Hildebrandt 2002)."
+    ),
+    sources=(
+        HANSEN,
+        AUGER,
+        ZELLER,
+    ),
+    quantities=("quantities",),
+    runs=_runs,
+    ends_early=True,
+    largest=_largest,
+    measured=_measured,
+    items=_items,
+    witness=_witness,
+)

@@ -1,0 +1,35 @@
+"""Tables of results on a page, and what a figure tells of a column."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from ...report.document import Table
+from . import text as text
+
+__all__ = ["result_table", "told"]
+
+
+def told(column: Any) -> str:
+    """Return a column of numbers in words, for the description of a figure."""
+    return "; ".join(f"{name}: {value:.4g}" for name, value in column.items())
+
+
+def result_table(table: pd.DataFrame, caption: str, columns: Mapping[str, str]) -> Table:
+    """Return a table of results."""
+    flat = table.reset_index()
+    names = [str(name) for name in flat.columns[: table.index.nlevels]]
+    chosen = flat[[*names, *columns]]
+    return Table(
+        caption=caption,
+        columns=(*names, *columns.values()),
+        rows=[tuple(map(_cell, row)) for row in chosen.itertuples(index=False, name=None)],
+        folded=caption.startswith(text.SAME),
+    )
+
+
+def _cell(value: Any) -> Any:
+    return f"{value:.4g}" if isinstance(value, float) else value
