@@ -55,11 +55,15 @@ def in_metrics(name):
     return (f'{HEAD}more = [{{ function = "{name}" }}]\n', SMALL)
 
 
+def in_kind(name):
+    return (HEAD, SMALL, f'[[analysis]]\nkind = "{name}"\n')
+
+
 def nested(name):
     return (HEAD.replace("[study]", f'options.lag = {{ block = "DeadZone", b_r = {{ function = "{name}" }} }}\n[study]'), SMALL)  # fmt: skip  # noqa: E501
 
 
-PLACES = [in_loop, in_options, in_choices, in_comparison, in_metrics, nested]
+PLACES = [in_loop, in_options, in_choices, in_comparison, in_metrics, in_kind, nested]
 
 
 @pytest.mark.parametrize("where", PLACES)
@@ -101,7 +105,7 @@ def test_who_trusts_it_may_run_it(place, monkeypatch, name):
 
 
 @pytest.mark.parametrize("trust", [False, True])
-@pytest.mark.parametrize("where", [in_loop, in_options])
+@pytest.mark.parametrize("where", [in_loop, in_options, in_kind])
 @pytest.mark.parametrize(
     "name",
     ["subprocess:run", "os:system", "os.path:exists", "builtins:eval", "antigravity:geohash",

@@ -74,7 +74,7 @@ def _measured(finding: Finding, asked: Asked) -> dict[str, str]:
     if not finding.is_answered:
         return {"measured": finding.sentence, "limit": "an answer"}
     if asked.definition.measured is None:
-        told = {"measured": without_assumptions(finding.sentence)}
+        told = {"measured": without_assumptions(finding.sentence), "limit": ""}
     else:
         told = dict(asked.definition.measured(finding, asked))
     needs = f"; needs {finding.needs}" if finding.needs else ""
