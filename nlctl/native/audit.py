@@ -16,7 +16,7 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from .._errors import ParameterError, UsageError
+from ..errors import ParameterError, UsageError
 from ._compile import Compiled
 from ._lower import lower
 from ._lower_blocks import equations
