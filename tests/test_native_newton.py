@@ -185,7 +185,7 @@ def test_a_loop_is_audited():
 
 @pytest.mark.parametrize("n", [MOST, MOST + 1])
 def test_many_signals_in_a_loop(n):
-    """Each is the cosine of its right neighbour and of itself: all are equal; one more is refused."""
+    """Each is the cosine of its right neighbour and of itself: all are equal."""
 
     def output(t, x, u, params):
         return [np.cos(0.5 * u[i] + 0.5 * u[(i + 1) % n]) for i in range(n)]
@@ -204,6 +204,7 @@ def test_many_signals_in_a_loop(n):
     assert y == pytest.approx(brentq(lambda v: np.cos(v) - v, 0, 1, xtol=1e-15), rel=1e-14)
 
 
+@pytest.mark.slow
 def test_a_program_is_the_same_in_every_process():
     """What a search is given goes by the order of the expressions, not by addresses."""
     script = (
@@ -216,7 +217,7 @@ def test_a_program_is_the_same_in_every_process():
             [sys.executable, "-c", script], cwd=Path(__file__).parent, check=True, text=True,
             env=os.environ | {"PYTHONHASHSEED": seed}, capture_output=True,
         ).stdout
-        for seed in ("1", "2", "3")
+        for seed in ("1", "2")
     }  # fmt: skip
     assert len(texts) == 1
 

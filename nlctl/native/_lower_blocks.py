@@ -327,9 +327,12 @@ def _opaque(guesses: Sequence[Expr], found: Sequence[Expr], calls: Mapping[str, 
     """Return which opaque functions are in a loop, in words; nothing if there are none."""
     nodes = inside(needed(found), guesses)
     names = [n.data[0] for n in sorted(nodes, key=lambda n: n.index) if n.op == "call"]
-    texts = [f"the {calls[n].kind} function of block '{calls[n].block}' is called as it stands "
-             f"({calls[n].reason}) and has no derivatives" for n in dict.fromkeys(names)]  # fmt: skip
-    return ", ".join(texts)
+    used = [calls[name] for name in dict.fromkeys(names)]
+    return ", ".join(
+        f"the {call.kind} function of block '{call.block}' is called as it stands ({call.reason}) "
+        "and has no derivatives"
+        for call in used
+    )
 
 
 def _is_next(one: Combination | None, other: Combination | None) -> bool:
