@@ -10,7 +10,7 @@ import numpy as np
 
 from ._parameters import Slot
 from ._program import Program, corners, memory
-from ._schedule import Node
+from ._schedule import Node, signal_name
 
 if TYPE_CHECKING:
     from ._compile import Compiled
@@ -34,10 +34,7 @@ def described(compiled: Compiled) -> str:
         f"  order        {' -> '.join(nodes[i].path for i in schedule.order)}",
     ]
     for loop in schedule.loops:
-        torn = ", ".join(
-            f"{nodes[s.block or 0].path}.{nodes[s.block or 0].system.output_labels[s.index]}"
-            for s in loop.torn
-        )
+        torn = ", ".join(signal_name(nodes, s) for s in loop.torn)
         lines.append(f"  solved for   {torn}")
     lines += [f"  as it stands {line}" for line in called(compiled)]
     for i in dict.fromkeys(schedule.order):
