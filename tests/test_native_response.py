@@ -11,7 +11,7 @@ import source_text
 from numba.core import config
 
 import nlctl
-from analysis.reproduction import CASES, checks, measured, sample_times
+from analysis.paper import CASES, checks, measured, sample_times
 from nlctl.native import Status
 from nlctl.native._tsit5 import A, B, C, E
 from nlctl.native.codegen.fingerprint import program_key
