@@ -144,7 +144,7 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
             )
     if all(np.all(_close(a, b)) for a, b in zip(ours, theirs, strict=True)):
         return
-    shaken = _shaken(compiled.system, point, trial)
+    shaken = _shaken(compiled.system, point, trial, theirs)
     for what, a, b, moved in zip(("state", "output"), ours, theirs, shaken, strict=True):
         wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
         if wrong.size:
@@ -174,11 +174,10 @@ def _rounded(t: float, trial: Trial) -> float:
     return SHAKEN * max(abs(t), float(np.max(np.diff(trial.time), initial=0.0)))
 
 
-def _shaken(system: Any, point: Any, trial: Trial) -> Values:
-    """Return how far python-control's values move when time, states and inputs are rounded."""
+def _shaken(system: Any, point: Any, trial: Trial, base: Values) -> Values:
+    """Return how far python-control's values move from `base` when all is rounded."""
     t, x, u = point
     rng = np.random.default_rng(0)
-    base = _by_python_control(system, point, trial.params)
     moved = [np.zeros_like(values) for values in base]
     for _ in range(4):
         near = [v * (1 + SHAKEN * rng.choice([-1.0, 1.0], size=v.shape)) for v in (x, u)]
