@@ -144,7 +144,7 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
             )
     if all(np.all(_close(a, b)) for a, b in zip(ours, theirs, strict=True)):
         return
-    shaken = _shaken(compiled.system, point, trial)
+    shaken = _shaken(compiled.system, point, trial, theirs)
     for what, a, b, moved in zip(("state", "output"), ours, theirs, shaken, strict=True):
         wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
         if wrong.size:
@@ -174,21 +174,8 @@ def _rounded(t: float, trial: Trial) -> float:
     return SHAKEN * max(abs(t), float(np.max(np.diff(trial.time), initial=0.0)))
 
 
-def _near(point: Any, trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
-    """Yield points as far as rounding may move them.
-
-    Sums may cancel: any two numbers are moved apart at one of the points, all alike at another.
-    """
-    t, x, u = point
-    places = np.arange(x.size + u.size)
-    for bit in range(int(places.size).bit_length() + 1):
-        factors = 1 + SHAKEN * (1 - 2 * (places >> bit & 1))
-        yield t + _rounded(t, trial), x * factors[: x.size], u * factors[x.size :]
-
-
-def _shaken(system: Any, point: Any, trial: Trial) -> Values:
-    """Return how far python-control's values move when time, states and inputs are rounded."""
-    base = _by_python_control(system, point, trial.params)
+def _shaken(system: Any, point: Any, trial: Trial, base: Values) -> Values:
+    """Return how far python-control's values move from `base` when all is rounded."""
     moved = [np.zeros_like(values) for values in base]
     for near in _near(point, trial):
         found = _by_python_control(system, near, trial.params)
