@@ -19,16 +19,6 @@ def block_records() -> dict[str, type]:
     return found
 
 
-def block_groups() -> dict[str, dict[str, type]]:
-    """Return the block records by what they are for: plants, actuators, ..."""
-    records = block_records()
-    groups: dict[str, dict[str, type]] = {}
-    for module in (plants, actuators, references, controllers):
-        title = module.__name__.rpartition(".")[2]
-        groups[title] = {name: records[name] for name in module.__all__ if name in records}
-    return groups
-
-
 def named_block(name: str) -> type:
     """Return the block record of that name.
 

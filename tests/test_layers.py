@@ -26,7 +26,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ]
     + ["nlctl._layout", "nlctl.drawing"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers"],
-    ["nlctl._catalogue", "nlctl.paper"],
+    ["nlctl._catalogue", "nlctl._block_list", "nlctl.paper"],
     ["nlctl.expressions"],
     ["nlctl.native", "nlctl._interpreted", "nlctl.response"],
     ["analysis.metrics", "analysis.lyapunov", "analysis.robustness", "analysis.reproduction"]

@@ -13,6 +13,10 @@ from ._emit import Program
 from ._parameters import Slot
 from ._schedule import Node, Schedule
 
+USE = (
+    "nlctl.input_output_response, nlctl.ensemble_response, .linearize(x0, u0); "
+    "python-control's functions take .system"
+)
 SHOWN = 8  # names that are listed before the rest is only counted
 
 
@@ -31,6 +35,7 @@ def described(schedule: Schedule, program: Program, p: np.ndarray) -> str:
         f"Compiled '{system.name}', {_timebase(system)}: {_count(len(nodes), 'block')}, "
         f"{_count(system.ninputs, 'input')}, {_count(system.nstates, 'state')}, "
         f"{_count(system.noutputs, 'output')}",
+        f"  run it       {USE}",
         f"  order        {' -> '.join(nodes[i].path for i in schedule.order)}",
     ]
     for loop in schedule.loops:

@@ -1,0 +1,46 @@
+"""The blocks that come with nlctl, read from their sources: to import them takes seconds."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+HERE = Path(__file__).parent
+GROUPS = ("plants", "actuators", "references", "controllers")
+
+
+def block_summaries() -> dict[str, dict[str, str]]:
+    """Return the first line of each block record's docstring: ``{group: {name: line}}``.
+
+    The names are those of `_catalogue.block_records`, in the same order.
+    """
+    return {group: _records(group) for group in GROUPS}
+
+
+def _records(group: str) -> dict[str, str]:
+    """Return the public records of a module or of the modules of a package."""
+    folder = HERE / group
+    own = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
+    found = dict(
+        line
+        for path in (sorted(folder.glob("*.py")) or [own])
+        for line in _lines(ast.parse(path.read_bytes()))
+    )
+    return {name: found[name] for name in _public(ast.parse(own.read_bytes())) if name in found}
+
+
+def _public(module: ast.Module) -> list[str]:
+    """Return ``__all__``."""
+    return next(
+        ast.literal_eval(node.value)
+        for node in module.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+    )
+
+
+def _lines(module: ast.Module) -> Iterator[tuple[str, str]]:
+    """Yield name and summary of each class under ``@record``."""
+    for node in module.body:
+        if isinstance(node, ast.ClassDef) and "record" in map(ast.unparse, node.decorator_list):
+            yield node.name, (ast.get_docstring(node) or "").partition("\n")[0]
