@@ -35,8 +35,8 @@ def described(schedule: Schedule, program: Program, p: np.ndarray) -> str:
         f"Compiled '{system.name}', {_timebase(system)}: {_count(len(nodes), 'block')}, "
         f"{_count(system.ninputs, 'input')}, {_count(system.nstates, 'state')}, "
         f"{_count(system.noutputs, 'output')}",
-        f"  run it       {USE}",
         f"  order        {' -> '.join(nodes[i].path for i in schedule.order)}",
+        f"  run it by    {USE}",
     ]
     for loop in schedule.loops:
         torn = ", ".join(

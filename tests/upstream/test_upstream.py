@@ -12,7 +12,10 @@ import pytest
 from numba.core import config
 
 HERE = Path(__file__).parent
-FILES = ("iosys", "interconnect", "nlsys", "timeresp", "statefbk", "trdata", "response", "stochsys")
+FILES = ("interconnect", "nlsys", "timeresp", "trdata", "response")
+LONG = ("iosys", "statefbk", "stochsys")  # two thirds of the time of all: once a week
+
+WEEKLY = pytest.mark.weekly
 
 
 def upstream_tests():
@@ -22,10 +25,9 @@ def upstream_tests():
 
 
 @pytest.mark.upstream
-@pytest.mark.slow
 @pytest.mark.skipif(upstream_tests() is None, reason="this python-control came without its tests")
 @pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="nothing is compiled without JIT")
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", [*FILES, *(pytest.param(n, marks=WEEKLY) for n in LONG)])
 def test_runs_of_python_controls_own_tests(name, tmp_path):
     """Equal to 1e-6, or refused with a reason; the counts are printed."""
     calls = tmp_path / "calls.jsonl"
