@@ -25,6 +25,7 @@ import numpy as np
 from rich.console import Console
 
 import nlctl
+from analysis.cli.sweep_progress import sweep_bar
 from analysis.robustness import (
     Design,
     Experiment,
@@ -41,8 +42,7 @@ from analysis.robustness import (
     rows,
     tracking_metrics,
 )
-from analysis.robustness.sweep import sweep
-from nlctl._sweep_progress import sweep_bar
+from analysis.robustness.runs.sweep import sweep
 
 BOX = {
     "actuator.b_r": (0.3, 0.7),

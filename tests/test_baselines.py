@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 import nlctl
 from analysis.lyapunov import certify
+from analysis.lyapunov.nussbaum.forecast import BurstForecast
 from analysis.metrics import Metric, absolute_integral, final, peak
-from analysis.robustness import loops
-from analysis.robustness.burst import BurstForecast
-from analysis.robustness.contenders import baselines, contenders, sensor
-from analysis.robustness.tuning import tune
+from analysis.paper import loops
+from analysis.paper.controllers import baselines, contenders, sensor
+from analysis.paper.tuning import tune
 from nlctl._param import equation_arguments
 
 numbers = st.floats(-50, 50)

@@ -15,9 +15,9 @@ import pytest
 from command_line import nlctl, nlctl_here
 from rows import each_row
 
+from analysis.cli.report import _other_process
 from nlctl._block_list import block_summaries
 from nlctl._catalogue import block_records
-from nlctl.cli_report import _other_process
 
 
 def refused(*arguments, cwd=None):
@@ -40,7 +40,7 @@ def test_help_imports_nothing_heavy():
     """Help is instant, since nothing that computes is imported for it."""
     code = (
         "import sys\n"
-        "from nlctl.cli import main\n"
+        "from analysis.cli.main import main\n"
         "sys.argv = ['nlctl', '--help']\n"
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
         "heavy = {'control', 'numba', 'scipy', 'numpy', 'matplotlib', 'pandas'}\n"
@@ -135,7 +135,7 @@ def test_diagram_is_drawn_in_each_format(suffix, tmp_path):
 def test_console_script_points_to_main():
     """pyproject's script is the function that these tests run."""
     text = (Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8")
-    assert 'nlctl = "nlctl.cli:main"' in text
+    assert 'nlctl = "nlctl.__main__:main"' in text
 
 
 def fail_beside(tasks):
@@ -267,7 +267,7 @@ def test_the_list_has_one_line_per_block_in_groups():
 def test_the_list_imports_no_library_of_numbers():
     """It answers at once."""
     program = (
-        "import sys; from nlctl.cli import main; sys.argv = ['nlctl', 'list']\n"
+        "import sys; from nlctl.__main__ import main; sys.argv = ['nlctl', 'list']\n"
         "try: main()\n"
         "except SystemExit as end: assert not end.code\n"
         "heavy = {'numpy', 'scipy', 'numba', 'control', 'matplotlib', 'pandas'}\n"

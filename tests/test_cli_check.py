@@ -12,9 +12,9 @@ from command_line import nlctl_here
 from rich.console import Console
 from rows import each_row
 
+from analysis.cli.check import random_start, replay, show_ledger, summary, worst_lines
 from analysis.lyapunov.ledger import ledger
 from nlctl import paper
-from nlctl._check import random_start, replay, show_ledger, summary, worst_lines
 from nlctl._diagram import initial_state, state_names
 from nlctl._errors import ParameterError, UnknownNameError
 

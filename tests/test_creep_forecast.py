@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nlctl
-from analysis.lyapunov.creep import creep
+from analysis.lyapunov.nussbaum.slow_drift import creep
 from nlctl import DiagramError, ParameterError
 
 NAMES = ("zeta", "r", "u")

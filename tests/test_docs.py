@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from rows import each_row
 
-from analysis.robustness.quantity import QUANTILES
+from analysis.robustness.stl.text import parse_formula
+from analysis.robustness.uncertainty.quantity import QUANTILES
 from analysis.studies import read_study
-from analysis.studies.analyses import Analysis
-from analysis.studies.formula_text import parse_formula
-from analysis.studies.parts import uncertain
-from analysis.studies.schema import Law
+from analysis.studies.file.resolve import uncertain
+from analysis.studies.file.schema import Law
+from analysis.studies.kinds.analyses import Analysis
 
 GUIDE = (Path(__file__).parents[1] / "docs" / "studies.md").read_text(encoding="utf-8")
 

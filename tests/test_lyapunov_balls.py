@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from rows import each_row
 
 import nlctl
-from analysis.lyapunov.ball import JUMPS, Ball, as_ball
-from analysis.lyapunov.balls import Box, Undecided, enclose, prove
+from analysis.intervals.arithmetic import JUMPS, Ball, as_ball
+from analysis.intervals.branch_and_bound import Box, Undecided, enclose, prove
 from nlctl._errors import ParameterError, UnknownNameError
 from nlctl._param import equation_arguments
 from nlctl.expressions.functions import FUNCTIONS as TABLE

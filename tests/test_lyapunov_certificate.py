@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from scipy.signal import lsim, lti
 
 import nlctl
-from analysis.lyapunov.balls import Box
-from analysis.lyapunov.certificate import certify
-from analysis.lyapunov.certificate_design import design
-from analysis.lyapunov.level_set import prove_decrease
-from analysis.lyapunov.tracking import error_bounds, filter_poles, reference_bounds
+from analysis.intervals.branch_and_bound import Box
+from analysis.intervals.level_set import prove_decrease
+from analysis.lyapunov.bounds.error_bounds import error_bounds, filter_poles, reference_bounds
+from analysis.lyapunov.certificate.certify import certify
+from analysis.lyapunov.certificate.gains import design
 from nlctl import DiagramError, ParameterError
 
 TIGHT = (0.6, 1.3)  # split of the dead zone

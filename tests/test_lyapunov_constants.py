@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.lyapunov.balls import Box
-from analysis.lyapunov.constants import constants, disturbance, kappa, visited_box
-from analysis.lyapunov.decomposition import DecompositionError
+from analysis.intervals.branch_and_bound import Box
+from analysis.lyapunov.bounds.constants import constants, disturbance, kappa, visited_box
+from analysis.lyapunov.bounds.decomposition import DecompositionError
 from nlctl._errors import DiagramError, ParameterError, UnknownNameError
 
 BOX_1 = Box.of(x1=(-0.85, 1.0), x2=(-0.55, 1.1), v=(-12, 6))

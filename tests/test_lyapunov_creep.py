@@ -8,9 +8,9 @@ from rows import each_row
 from scipy.integrate import quad, solve_ivp
 
 import nlctl
-from analysis.lyapunov.creep import burst_peak, creep
-from analysis.lyapunov.drift import drift, drift_margin, safe_horizon
-from analysis.lyapunov.nussbaum import Lobe, lobe_around, lobes
+from analysis.lyapunov.nussbaum.energy import drift, drift_margin, safe_horizon
+from analysis.lyapunov.nussbaum.property import Lobe, lobe_around, lobes
+from analysis.lyapunov.nussbaum.slow_drift import burst_peak, creep
 from nlctl import ParameterError, UnknownNameError
 from nlctl.functions import nussbaum, nussbaum_integral
 

@@ -25,8 +25,8 @@ from analysis.lyapunov import (
 )
 from analysis.lyapunov.assumptions import assumptions
 from analysis.lyapunov.inequalities import terms
-from analysis.lyapunov.observed import input_gain
-from analysis.lyapunov.signals import Signals, inequality
+from analysis.lyapunov.loop.instrumented import input_gain
+from analysis.lyapunov.loop.signals import Signals, inequality
 from nlctl import DiagramError
 from nlctl.functions import nussbaum
 from nlctl.plants import duffing_f

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from analysis.lyapunov.nussbaum import (
+from analysis.lyapunov.nussbaum.property import (
     antiderivative,
     lobe_around,
     lobes,

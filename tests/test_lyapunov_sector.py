@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nlctl
-from analysis.lyapunov.ball import Ball
-from analysis.lyapunov.balls import Box, Undecided
-from analysis.lyapunov.sector import plant_terms, sector
-from analysis.lyapunov.slope import slope_in
+from analysis.intervals.arithmetic import Ball
+from analysis.intervals.branch_and_bound import Box, Undecided
+from analysis.intervals.quotient import slope_in
+from analysis.lyapunov.bounds.sector import plant_terms, sector
 from nlctl._errors import DiagramError, UnknownNameError
 
 QUOTIENTS = {  # q(v), and (q(v) - q(0))/v in closed form

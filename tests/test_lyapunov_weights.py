@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.lyapunov.balls import Box
-from analysis.lyapunov.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V
-from analysis.lyapunov.sector import plant_terms
-from analysis.lyapunov.weights import (
+from analysis.intervals.branch_and_bound import Box
+from analysis.lyapunov.bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V
+from analysis.lyapunov.bounds.sector import plant_terms
+from analysis.lyapunov.bounds.weights import (
     Network,
     approximation_error,
     least_squares_weights,

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.integrate import simpson
 
 from analysis import metrics
-from analysis.robustness.tracking import tracking_metrics
+from analysis.metrics import tracking_metrics
 
 
 @given(st.floats(0.5, 3), st.floats(-3, 3), st.floats(0.3, 5))

@@ -21,8 +21,8 @@ from planted_loops import (
 )
 
 import nlctl
-from analysis.lyapunov.certificate import certify
-from analysis.lyapunov.decomposition import Decomposition, DecompositionError
+from analysis.lyapunov.bounds.decomposition import Decomposition, DecompositionError
+from analysis.lyapunov.certificate.certify import certify
 from nlctl import DiagramError
 from nlctl._equation import equation
 

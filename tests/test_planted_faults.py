@@ -6,7 +6,7 @@ from planted_loops import UPDATE, actuator, again, plant, wired
 
 import nlctl
 from analysis.lyapunov import Box, ledger
-from analysis.lyapunov.decomposition import Decomposition, DecompositionError
+from analysis.lyapunov.bounds.decomposition import Decomposition, DecompositionError
 from nlctl import DiagramError
 from nlctl.functions import nussbaum
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.lyapunov.far_record import read_record
-from analysis.lyapunov.long_run import long_run
-from analysis.reproduction import expectations
+from analysis.lyapunov.nussbaum.long_run import long_run
+from analysis.paper import expectations
+from analysis.paper.reference_run import read_record
 from nlctl.native import Status
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as MatplotlibFigure
 
+from analysis.paper import CASES, METRICS, TAIL, Run, expectations
+from analysis.paper.page.report import paper_report
 from analysis.report import (
     Claim,
     Equation,
@@ -24,8 +26,6 @@ from analysis.report import (
     render_json,
     write_report,
 )
-from analysis.report.paper_report import paper_report
-from analysis.reproduction import CASES, METRICS, TAIL, Run, expectations
 from nlctl._files import replace_file
 
 
@@ -162,7 +162,7 @@ def test_report_is_the_same_bytes_in_another_process(runs, tmp_path):
     """Neither hash seeds nor time leave a trace."""
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import test_report as t;"
-        "from analysis.report import write_report; from analysis.report.paper_report import *;"
+        "from analysis.report import write_report; from analysis.paper.page.report import *;"
         "write_report(paper_report(t.made_up_runs()), sys.argv[2])"
     )
     here = str(__import__("pathlib").Path(__file__).parent)

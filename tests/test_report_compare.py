@@ -12,6 +12,12 @@ from hypothesis import strategies as st
 from rows import each_row
 from test_report_page import HOSTILE, Reader
 
+from analysis.cli.report import (
+    check_report_options,
+    compare_reports,
+    finish_report,
+    write_gallery_of,
+)
 from analysis.report import (
     Claim,
     Report,
@@ -24,12 +30,6 @@ from analysis.report import (
 )
 from analysis.report.compare import ABSENT, _row_names, _same
 from nlctl._errors import UsageError
-from nlctl.cli_report import (
-    check_report_options,
-    compare_reports,
-    finish_report,
-    write_gallery_of,
-)
 
 
 def small(**changes):

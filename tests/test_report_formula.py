@@ -10,11 +10,19 @@ from fontTools.ttLib import TTFont
 from rows import each_row
 
 import nlctl
+from analysis.paper.page import text as text
 from analysis.report import Equation
-from analysis.report import paper_text as text
 from analysis.report.equations import equations_of
-from analysis.report.formula import ATTRIBUTES, ELEMENTS, mathml
-from analysis.report.math_font import CHARACTERS, FAMILY, font_face, italic, subset
+from analysis.report.mathml import (
+    ATTRIBUTES,
+    CHARACTERS,
+    ELEMENTS,
+    FAMILY,
+    font_face,
+    italic,
+    mathml,
+    subset,
+)
 
 EXAMPLES = (nlctl.paper.example_1(), nlctl.paper.example_2())
 FORMULAS = [text.PLANT_CLASS, *text.CONTROLLER]

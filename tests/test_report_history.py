@@ -18,13 +18,13 @@ from test_report import made_up_runs
 from test_report_page import HOSTILE, LADDER, Reader
 from typer.testing import CliRunner
 
+from analysis.cli.main import app
+from analysis.paper.page.report import paper_report
 from analysis.report import Figure, History, Report, Section, render_html, write_report
 from analysis.report.history import chart, thinned
-from analysis.report.paper_report import paper_report
-from analysis.report.robustness_histories import Histories
-from analysis.report.robustness_rows import fan_items
+from analysis.studies.page.histories import Histories
+from analysis.studies.page.rows import fan_items
 from nlctl._errors import UsageError
-from nlctl.cli import app
 
 VENDOR = Path(__file__).parents[1] / "analysis" / "report" / "vendor" / "uplot"
 

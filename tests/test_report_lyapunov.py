@@ -11,18 +11,18 @@ from test_report import made_up_runs, outline
 
 import nlctl
 from analysis import figures
-from analysis.lyapunov.far_record import continued, read_record, thinned, write_record
-from analysis.lyapunov.long_run import LongRun, long_run
-from analysis.lyapunov.nussbaum import antiderivative, lobe_around
-from analysis.lyapunov.parts import read_parts
-from analysis.lyapunov.signals import equality, inequality
+from analysis.lyapunov.loop.roles import read_parts
+from analysis.lyapunov.loop.signals import equality, inequality
+from analysis.lyapunov.nussbaum.long_run import LongRun, long_run
+from analysis.lyapunov.nussbaum.property import antiderivative, lobe_around
+from analysis.paper.evidence import far_runs_in_background
+from analysis.paper.page import proof_text as text
+from analysis.paper.page.notation import formulas
+from analysis.paper.page.proof import LONG_RUN, evidence, lyapunov_sections
+from analysis.paper.page.report import paper_report
+from analysis.paper.reference_run import continued, read_record, thinned, write_record
 from analysis.report import Figure, Paragraph, Report, Section, Table, render_html, render_json
-from analysis.report import lyapunov_text as text
-from analysis.report.lyapunov_evidence import far_runs_in_background
-from analysis.report.lyapunov_part import LONG_RUN, evidence, lyapunov_sections
-from analysis.report.notation import formulas
 from analysis.report.outline import claim_status, light, summary
-from analysis.report.paper_report import paper_report
 
 
 @functools.cache

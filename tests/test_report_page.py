@@ -48,8 +48,7 @@ from analysis.report.outline import (
     summary,
 )
 from analysis.report.page import fill
-from analysis.report.svg import draw_ahead, shapes_svg, svg, svg_files
-from analysis.report.svg_compact import short_path
+from analysis.report.svg import draw_ahead, shapes_svg, short_path, svg, svg_files
 from analysis.report.typography import pieces
 from nlctl._errors import UsageError
 

@@ -17,31 +17,26 @@ from matplotlib.text import Text
 from scipy import stats
 from studies_example import LOOP
 
-from analysis import robustness_figures as figures
+from analysis import figures as figures
+from analysis.cli.study_report import report_study
+from analysis.figures.labels import plain
+from analysis.figures.runs import envelope
 from analysis.report import render_html, render_json
 from analysis.report.document import Figure, Paragraph, Section, Table
 from analysis.report.outline import claim_status, place
-from analysis.report.robustness_claims import claims, refusal, verdict
-from analysis.report.robustness_histories import histories
-from analysis.report.robustness_methods import METHODS
-from analysis.report.robustness_part import study_part, study_report, study_sections
-from analysis.report.robustness_rows import margin_items, row_items, running
-from analysis.report.robustness_searches import deviations
-from analysis.report.robustness_text import (
-    TITLES,
-    margin_text,
-    violate,
-    without_assumptions,
-)
 from analysis.robustness import Space, Uncertain, confidence_sequence, independent, prepare
-from analysis.robustness.radius import size_of
-from analysis.robustness.spec import FAILED
-from analysis.robustness_figures.labels import plain
-from analysis.robustness_figures.runs import envelope
+from analysis.robustness.search.radius import size_of
+from analysis.robustness.stl.spec import FAILED
 from analysis.studies import load_result, read_study, run
-from analysis.studies.answers import unanswered
+from analysis.studies.kinds.answers import unanswered
+from analysis.studies.page.claims import claims, refusal, verdict
+from analysis.studies.page.histories import histories
+from analysis.studies.page.methods import METHODS
+from analysis.studies.page.report import study_part, study_report, study_sections
+from analysis.studies.page.rows import margin_items, row_items, running
+from analysis.studies.page.searches import deviations
+from analysis.studies.page.text import TITLES, margin_text, violate, without_assumptions
 from nlctl._errors import UsageError
-from nlctl.cli_study_report import report_study
 
 SPACE = """
 loop = "loop.py:scaled"

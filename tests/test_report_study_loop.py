@@ -9,13 +9,13 @@ import pytest
 from rows import each_row
 from studies_example import HEAD, LOOP, ROWS, write
 
-from analysis import robustness_figures as figures
+from analysis import figures
 from analysis.report import Equation, Figure, Table, render_html
-from analysis.report.robustness_histories import histories, limits
-from analysis.report.robustness_part import study_report
-from analysis.report.study_loop import Loop, loop_of, loop_sections
 from analysis.robustness import Requirement, always, eventually, in_band, prepare
 from analysis.studies import read_study, run
+from analysis.studies.page.histories import histories, limits
+from analysis.studies.page.loop import Loop, loop_of, loop_sections
+from analysis.studies.page.report import study_report
 
 
 @pytest.fixture(scope="module")

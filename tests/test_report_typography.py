@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from rows import each_row
 from test_report_page import HOSTILE
 
-from analysis.report.formula import inline, spoken
-from analysis.report.notation import formulas
+from analysis.paper.page.notation import formulas
+from analysis.report.mathml import inline, spoken
 from analysis.report.typography import FORMULA, NO_BREAK, in_print, pieces, plain
 
 

@@ -6,8 +6,8 @@ import pytest
 
 import nlctl
 from analysis import metrics
-from analysis.reproduction import CASES, METRICS, checks, expectations, measured, run, sample_times
-from analysis.reproduction.run import Run
+from analysis.paper import CASES, METRICS, checks, expectations, measured, run, sample_times
+from analysis.paper.reproduction import Run
 
 CASE = {case.key: case for case in CASES}
 

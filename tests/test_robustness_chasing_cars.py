@@ -14,11 +14,11 @@ import pandas as pd
 import pytest
 
 import nlctl
-from analysis.robustness.formula import always, eventually, in_band
-from analysis.robustness.quantity import Uncertain
-from analysis.robustness.space import Space
-from analysis.robustness.spec import Requirement, Spec, margins
-from analysis.robustness.worst_case import worst_case
+from analysis.robustness.search.worst_case import worst_case
+from analysis.robustness.stl.formula import always, eventually, in_band
+from analysis.robustness.stl.spec import Requirement, Spec, margins
+from analysis.robustness.uncertainty.quantity import Uncertain
+from analysis.robustness.uncertainty.space import Space
 
 DT = 0.01
 T = DT * np.arange(10001)

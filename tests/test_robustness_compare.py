@@ -28,7 +28,7 @@ from analysis.robustness import (
     prepare,
     sobol,
 )
-from analysis.robustness.compare import compare, crossed
+from analysis.robustness.statistics.comparison import compare, crossed
 
 SPACE = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
 CHOICE = Choice(name="controller", options={"one": 1, "two": 2, "three": 3})

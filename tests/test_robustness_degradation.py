@@ -9,10 +9,10 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.degradation import degradation_curve
-from analysis.robustness.guarantee import clopper_pearson
-from analysis.robustness.quantity import Choice, SpaceError, Uncertain
-from analysis.robustness.space import Space
+from analysis.robustness.search.degradation import degradation_curve
+from analysis.robustness.statistics.guarantee import clopper_pearson
+from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
+from analysis.robustness.uncertainty.space import Space
 
 D, BETA = 3, 1.2
 NORMAL = Space(

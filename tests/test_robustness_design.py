@@ -12,10 +12,20 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.design import from_table, independent, row_seed, rows, seed_number
-from analysis.robustness.patterns import corners, grid, latin_hypercube, one_at_a_time, sobol
-from analysis.robustness.quantity import Choice, SpaceError, Uncertain
-from analysis.robustness.space import Space
+from analysis.robustness.uncertainty.design import (
+    corners,
+    from_table,
+    grid,
+    independent,
+    latin_hypercube,
+    one_at_a_time,
+    row_seed,
+    rows,
+    seed_number,
+    sobol,
+)
+from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
+from analysis.robustness.uncertainty.space import Space
 
 A = Uncertain(name="a", bounds=(1.0, 3.0), nominal=1.5)
 B = Uncertain(name="b", law=stats.norm(0, 2), nominal=0.0)

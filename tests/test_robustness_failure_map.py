@@ -10,9 +10,9 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.failure_map import boundary, failure_map
-from analysis.robustness.quantity import Choice, SpaceError, Uncertain
-from analysis.robustness.space import Space
+from analysis.robustness.search.failure_map import boundary, failure_map
+from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
+from analysis.robustness.uncertainty.space import Space
 
 SPACE = Space(
     quantities=(

@@ -11,22 +11,30 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.design import from_table, independent, listed
-from analysis.robustness.guarantee import (
+from analysis.robustness.statistics.guarantee import (
     NoGuaranteeError,
     clopper_pearson,
     runs_needed,
     violation_probability,
 )
-from analysis.robustness.patterns import corners, grid, latin_hypercube, one_at_a_time, sobol
-from analysis.robustness.quantity import Uncertain
-from analysis.robustness.sequential import (
+from analysis.robustness.statistics.sequential import (
     confidence_sequence,
     decide,
     log_evidence,
     sequence_bounds,
 )
-from analysis.robustness.space import Space
+from analysis.robustness.uncertainty.design import (
+    corners,
+    from_table,
+    grid,
+    independent,
+    latin_hypercube,
+    listed,
+    one_at_a_time,
+    sobol,
+)
+from analysis.robustness.uncertainty.quantity import Uncertain
+from analysis.robustness.uncertainty.space import Space
 
 SPACE = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0), nominal=0.5),))
 

@@ -10,7 +10,7 @@ import pytest
 import source_text
 
 import nlctl
-from analysis.robustness.loop_record import loop_facts, loop_values, values_differ
+from analysis.robustness.runs.loop_record import loop_facts, loop_values, values_differ
 
 THIRD_PARTY = """
 import functools
@@ -220,7 +220,7 @@ def test_a_record_is_the_same_in_another_process():
     """Addresses, hash seeds and the order of sets are no part of it."""
     script = (
         "import json, nlctl\n"
-        "from analysis.robustness.loop_record import loop_facts, loop_values\n"
+        "from analysis.robustness.runs.loop_record import loop_facts, loop_values\n"
         "loop = nlctl.paper.example_2()\n"
         "print(json.dumps([loop_facts(loop), loop_values(loop, 20.0)]))\n"
     )

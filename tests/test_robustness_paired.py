@@ -12,13 +12,11 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.design import independent
-from analysis.robustness.guarantee import NoGuaranteeError
-from analysis.robustness.multiplicity import holm
-from analysis.robustness.paired import differences, mcnemar, median_interval, wins
-from analysis.robustness.patterns import sobol
-from analysis.robustness.quantity import Uncertain
-from analysis.robustness.space import Space
+from analysis.robustness.statistics.guarantee import NoGuaranteeError
+from analysis.robustness.statistics.paired import differences, holm, mcnemar, median_interval, wins
+from analysis.robustness.uncertainty.design import independent, sobol
+from analysis.robustness.uncertainty.quantity import Uncertain
+from analysis.robustness.uncertainty.space import Space
 
 SPACE = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
 

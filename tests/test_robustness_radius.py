@@ -13,14 +13,14 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.experiment import Experiment, evaluate, prepare
-from analysis.robustness.formula import always, in_band
-from analysis.robustness.largest_scale import largest_scale
-from analysis.robustness.patterns import corners
-from analysis.robustness.quantity import QUANTILES, Choice, SpaceError, Uncertain
-from analysis.robustness.radius import robustness_radius, size_of
-from analysis.robustness.space import Space, scaled
-from analysis.robustness.spec import Requirement, Spec
+from analysis.robustness.runs.experiment import Experiment, evaluate, prepare
+from analysis.robustness.search.largest_scale import largest_scale
+from analysis.robustness.search.radius import robustness_radius, size_of
+from analysis.robustness.stl.formula import always, in_band
+from analysis.robustness.stl.spec import Requirement, Spec
+from analysis.robustness.uncertainty.design import corners
+from analysis.robustness.uncertainty.quantity import QUANTILES, Choice, SpaceError, Uncertain
+from analysis.robustness.uncertainty.space import Space, scaled
 
 
 def box(*sides):

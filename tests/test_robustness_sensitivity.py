@@ -9,10 +9,7 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.design import independent
-from analysis.robustness.patterns import sobol
-from analysis.robustness.quantity import Choice, Uncertain
-from analysis.robustness.sensitivity import (
+from analysis.robustness.statistics.sensitivity import (
     censored,
     elementary_effects,
     morris,
@@ -20,8 +17,10 @@ from analysis.robustness.sensitivity import (
     saltelli,
     sobol_indices,
 )
-from analysis.robustness.space import Space, scaled
-from analysis.robustness.spec import unfinished_margin
+from analysis.robustness.stl.spec import unfinished_margin
+from analysis.robustness.uncertainty.design import independent, sobol
+from analysis.robustness.uncertainty.quantity import Choice, Uncertain
+from analysis.robustness.uncertainty.space import Space, scaled
 
 
 def cube(d, low=0.0, high=1.0):

@@ -8,7 +8,7 @@ from rows import each_row
 
 import nlctl
 from analysis.metrics import peak
-from analysis.robustness.formula import (
+from analysis.robustness.stl.formula import (
     Signals,
     always,
     eventually,
@@ -17,8 +17,8 @@ from analysis.robustness.formula import (
     signals_of,
     trace,
 )
-from analysis.robustness.piecewise import Trace, higher, largest, with_vertices
-from analysis.robustness.spec import (
+from analysis.robustness.stl.piecewise import Trace, higher, largest, with_vertices
+from analysis.robustness.stl.spec import (
     FAILED,
     Requirement,
     Spec,

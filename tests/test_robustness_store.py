@@ -16,8 +16,8 @@ import pytest
 from sweep_examples import experiment, loop, same
 
 from analysis.robustness import Requirement, Spec, always, in_band, independent, prepare, scaled
-from analysis.robustness.store import Store, StoreError, claimed, put, table_of
-from analysis.robustness.sweep import load, sweep
+from analysis.robustness.runs.store import Store, StoreError, claimed, put, table_of
+from analysis.robustness.runs.sweep import load, sweep
 
 ROWS, CHUNK, ENTROPY = 96, 12, 3
 

@@ -16,6 +16,7 @@ from scipy import stats
 from sweep_examples import experiment, loop, same
 
 import nlctl
+from analysis.cli.sweep_progress import sweep_bar
 from analysis.metrics import machine_code
 from analysis.robustness import (
     Choice,
@@ -30,10 +31,9 @@ from analysis.robustness import (
     sequence_bounds,
     tracking_metrics,
 )
-from analysis.robustness.piecewise import extremes, with_vertices
-from analysis.robustness.sweep import load, sweep
-from analysis.robustness.watch import Progress, Tally, until_decided
-from nlctl._sweep_progress import sweep_bar
+from analysis.robustness.runs.progress import Progress, Tally, until_decided
+from analysis.robustness.runs.sweep import load, sweep
+from analysis.robustness.stl.piecewise import extremes, with_vertices
 
 
 @pytest.fixture(scope="module")

@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from scipy import stats
 
 import nlctl
-from analysis.robustness.confirm import confirm
-from analysis.robustness.design import rows
-from analysis.robustness.experiment import Experiment, evaluate, prepare
-from analysis.robustness.formula import always, in_band
-from analysis.robustness.guarantee import NoGuaranteeError, violation_probability
-from analysis.robustness.quantity import Choice, SpaceError, Uncertain
-from analysis.robustness.shrink import shrink
-from analysis.robustness.space import Space, scaled
-from analysis.robustness.spec import Requirement, Spec
-from analysis.robustness.worst_case import worst_case
+from analysis.robustness.runs.experiment import Experiment, evaluate, prepare
+from analysis.robustness.search.confirmation import confirm
+from analysis.robustness.search.shrink import shrink
+from analysis.robustness.search.worst_case import worst_case
+from analysis.robustness.statistics.guarantee import NoGuaranteeError, violation_probability
+from analysis.robustness.stl.formula import always, in_band
+from analysis.robustness.stl.spec import Requirement, Spec
+from analysis.robustness.uncertainty.design import rows
+from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
+from analysis.robustness.uncertainty.space import Space, scaled
 
 
 def box(d, low=-1.0, high=2.0):

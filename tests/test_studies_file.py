@@ -9,8 +9,8 @@ from studies_example import HEAD, ROWS, write
 
 from analysis.robustness import nominal, resolved
 from analysis.studies import Study, StudyError, from_toml, read_study, to_toml
-from analysis.studies.problems import line_numbers, place_text
-from analysis.studies.schema import keyed
+from analysis.studies.file.errors import line_numbers, place_text
+from analysis.studies.file.schema import keyed
 from nlctl import ParameterError, paper
 from nlctl._names import unknown
 

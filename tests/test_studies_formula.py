@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rows import each_row
 
-from analysis.robustness.formula import (
+from analysis.robustness.stl.formula import (
     And,
     Signals,
     always,
@@ -15,7 +15,7 @@ from analysis.robustness.formula import (
     in_band,
     trace,
 )
-from analysis.studies.formula_text import parse_formula
+from analysis.robustness.stl.text import parse_formula
 from nlctl import ParameterError
 
 numbers = st.integers(-400, 400).map(lambda n: n / 8)

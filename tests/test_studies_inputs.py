@@ -5,8 +5,8 @@ import pytest
 from rows import each_row
 
 from analysis.robustness import nominal
-from analysis.robustness.evaluation import as_table
-from analysis.robustness.experiment import evaluate, prepare
+from analysis.robustness.runs.experiment import evaluate, prepare
+from analysis.robustness.search.evaluation import as_table
 from analysis.studies import StudyError, read_study
 
 LOOP = """\

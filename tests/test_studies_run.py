@@ -31,9 +31,9 @@ from analysis.studies import (
     run_differences,
 )
 from analysis.studies.build import own_design
+from analysis.studies.file.schema import keyed
 from analysis.studies.folder import load_finding, load_run, save_finding
-from analysis.studies.plain import origin_key
-from analysis.studies.schema import keyed
+from analysis.studies.sealed import origin_key
 from nlctl import ParameterError, UnknownNameError
 
 EVERY_KIND = """

@@ -227,8 +227,8 @@ def with_functions(folder, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["numpy:save", "_pytest.config:main", "pandas:read_pickle", "nlctl.cli:main",
-             "nlctl.cli_report:write_gallery_of", "matplotlib.pyplot:savefig"]
+    "name", ["numpy:save", "_pytest.config:main", "pandas:read_pickle", "analysis.cli.main:main",
+             "analysis.cli.report:write_gallery_of", "matplotlib.pyplot:savefig"]
 )  # fmt: skip
 def test_installed_packages_make_loops_or_are_not_called(place, name):
     """They may be imported; what they offer is mostly no diagram."""
@@ -240,7 +240,7 @@ def test_installed_packages_make_loops_or_are_not_called(place, name):
 def test_installed_packages_and_nlctl_are_trusted(place):
     """The studies that come with nlctl name its own modules."""
     folder, _ = place
-    head = HEAD.replace("loop.py:loop", "analysis.robustness.loops:example_1")
+    head = HEAD.replace("loop.py:loop", "analysis.paper.loops:example_1")
     head = head.replace('"lag.rate" = { uniform = [0.5, 2.5] }', "").replace("y <=", "e <=")
     head = head.replace('"lag.x(0)"', '"plant.x1(0)"').replace("|z|", "|u|").replace("1 s", "0 s")
     head = head.replace('error = "y"\ncontrol = "z"\n', "")

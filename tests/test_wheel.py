@@ -41,7 +41,7 @@ def test_wheel_holds_both_packages_and_their_data(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     for name in (
         *("nlctl/__init__.py", "nlctl/__init__.pyi", "nlctl/py.typed", "nlctl/controllers/rbf.py"),
-        *("analysis/py.typed", "analysis/reproduction/expected.csv"),
+        *("analysis/py.typed", "analysis/paper/expected.csv"),
         *("analysis/report/templates/report.html", "analysis/report/templates/report.css"),
         *("analysis/report/templates/report.js", "analysis/report/templates/gallery.html"),
         "analysis/studies/reports/example-1-quick.toml",

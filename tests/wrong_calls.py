@@ -7,8 +7,8 @@ from conftest import chain, function
 from scipy import stats
 
 import nlctl
-from analysis import lyapunov, robustness
-from analysis.lyapunov.box import Box
+from analysis import lyapunov, paper, robustness
+from analysis.intervals.box import Box
 from analysis.metrics import Metric, peak
 from analysis.robustness import (
     Choice,
@@ -354,7 +354,7 @@ SEARCHES = {
         confidence="a",
     ),
     "crossed": lambda: robustness.crossed(DRAWN, "arm"),
-    "contenders": lambda: robustness.contenders("example_3"),
+    "contenders": lambda: paper.contenders("example_3"),
     "tracking_metrics start": lambda: robustness.tracking_metrics(start=NAN, band=0.1),
     "tracking_metrics band": lambda: robustness.tracking_metrics(start=1.0, band=-1),
     "tracking_metrics text": lambda: robustness.tracking_metrics(start="1", band=0.1),

@@ -1,16 +1,5 @@
 """Results -> matplotlib figures.  Nothing here writes a file or shows a window."""
 
-from .histories import (
-    actuator_path,
-    adaptation,
-    control_input,
-    error_comparison,
-    nussbaum_gain,
-    overview,
-    tracking,
-    tracking_error,
-    upper_states,
-)
 from .proof import (
     bounds,
     burst,
@@ -21,23 +10,35 @@ from .proof import (
     lyapunov_bound,
     story,
 )
+from .rankings import paired_differences, screening, set_apart, shares, violation_rates
+from .runs import CLIP, LIMIT, Limit, fans, margins, most_frequent, quantile, running_estimate
+from .searches import degradation, deviations, failure_map, radius_steps, search
 
 __all__ = [
-    "actuator_path",
-    "adaptation",
+    "CLIP",
+    "LIMIT",
+    "Limit",
     "bounds",
     "burst",
-    "control_input",
+    "degradation",
+    "deviations",
     "envelope",
     "equality_residuals",
-    "error_comparison",
+    "failure_map",
+    "fans",
     "inequality_margins",
     "long_zeta",
     "lyapunov_bound",
-    "nussbaum_gain",
-    "overview",
+    "margins",
+    "most_frequent",
+    "paired_differences",
+    "quantile",
+    "radius_steps",
+    "running_estimate",
+    "screening",
+    "search",
+    "set_apart",
+    "shares",
     "story",
-    "tracking",
-    "tracking_error",
-    "upper_states",
+    "violation_rates",
 ]

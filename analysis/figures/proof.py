@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
-from ..lyapunov.long_run import LongRun
-from ..lyapunov.signals import Margin
+from ..lyapunov.loop.signals import Margin
+from ..lyapunov.nussbaum.long_run import LongRun
 from .axes import (
     BLUE,
     GREEN,

@@ -1,29 +1,29 @@
 """Lyapunov checks: constants with provenance, inequalities, certificates, the ledger."""
 
-from .balls import Proof, Range, enclose, prove
-from .box import Box, visited_box
-from .certificate import Certificate, certify
-from .certificate_design import Design, design
+from ..intervals.box import Box, visited_box
+from ..intervals.branch_and_bound import Proof, Range, enclose, prove
+from ..intervals.level_set import prove_decrease
+from .bounds.constants import constants, disturbance, kappa
+from .bounds.decomposition import Decomposition, DecompositionError, clipped_split, decompose
+from .bounds.premises import Premises, literal, premises
+from .bounds.provenance import Constant, Constants
+from .bounds.sector import Sector, sector
+from .bounds.weights import approximation_error, minimax_weights, tightest_weights
+from .certificate.certify import Certificate, certify
+from .certificate.gains import Design, design
 from .conservatism import Comparison, Conservatism, comparison, conservatism
-from .constants import constants, disturbance, kappa
-from .creep import Creep, burst_peak, creep
-from .decomposition import Decomposition, DecompositionError, clipped_split, decompose
-from .drift import Drift, drift, drift_margin, safe_horizon
-from .examine import Examination, examine
+from .examination import Examination, examine
 from .inequalities import inequalities
-from .integral import NussbaumIntegral, sharpest
 from .ledger import Ledger, ledger
-from .level_set import prove_decrease
 from .lines import Line
-from .nussbaum import nussbaum_property
-from .observed import observed
-from .parts import Parts, read_parts
-from .premises import Premises, literal, premises
-from .record import Constant, Constants
-from .sector import Sector, sector
-from .signals import Margin, Signals, signals_of
+from .loop.instrumented import observed
+from .loop.integral import NussbaumIntegral, sharpest
+from .loop.roles import Parts, read_parts
+from .loop.signals import Margin, Signals, signals_of
+from .nussbaum.energy import Drift, drift, drift_margin, safe_horizon
+from .nussbaum.property import nussbaum_property
+from .nussbaum.slow_drift import Creep, burst_peak, creep
 from .tighten import Tightened, tighten
-from .weights import approximation_error, minimax_weights, tightest_weights
 
 __all__ = [
     "Box",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .box import Box
-from .premises import Premises
-from .signals import Margin, Signals, inequality
+from ..intervals.box import Box
+from .bounds.premises import Premises
+from .loop.signals import Margin, Signals, inequality
 
 __all__ = ["assumptions"]
 

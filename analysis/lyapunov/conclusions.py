@@ -14,15 +14,15 @@ from nlctl._param import equation_arguments
 from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
 
-from .creep import Creep, creep
-from .drift import drift, drift_margin, safe_horizon
+from .bounds.error_bounds import error_bounds, reference_bounds
+from .bounds.premises import Premises, premises
+from .bounds.provenance import Constants
 from .inequalities import terms
 from .lines import Line
-from .nussbaum import antiderivative, lobe_around, nussbaum_property
-from .premises import Premises, premises
-from .record import Constants
-from .runs import Run
-from .tracking import error_bounds, reference_bounds
+from .loop.simulation import Run
+from .nussbaum.energy import drift, drift_margin, safe_horizon
+from .nussbaum.property import antiderivative, lobe_around, nussbaum_property
+from .nussbaum.slow_drift import Creep, creep
 
 __all__ = ["closure", "conclusions", "creep_of"]
 

@@ -12,14 +12,14 @@ import numpy as np
 from nlctl.functions import smooth_sign
 
 from ..metrics import over, peak
-from .examine import Examination, examine
-from .final_bound import KAPPA, initial_V
+from .bounds.final_bound import KAPPA, initial_V
+from .bounds.premises import Premises, premises
+from .bounds.provenance import Constants
+from .bounds.weights import Network, tightest_weights
+from .examination import Examination, examine
 from .inequalities import terms
-from .nussbaum import root
-from .premises import Premises, premises
-from .record import Constants
-from .signals import Signals
-from .weights import Network, tightest_weights
+from .loop.signals import Signals
+from .nussbaum.property import root
 
 if TYPE_CHECKING:
     import pandas as pd

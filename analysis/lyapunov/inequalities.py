@@ -1,7 +1,7 @@
 """Each numbered step of the proof, (9)-(36), as a margin along a response.
 
 The forms are the corrected ones.  V' is the gradient of V times the right-hand side of the
-diagram: the rates come from the blocks' own equations, see `analysis.lyapunov.observed`.
+diagram: the rates come from the blocks' own equations, see `analysis.lyapunov.loop.instrumented`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 from nlctl.functions import smooth_sign
 from nlctl.plants import coordinate_names
 
-from .final_bound import KAPPA
-from .premises import Premises
-from .signals import INTEGRATED, Margin, Signals, equality, inequality
+from .bounds.final_bound import KAPPA
+from .bounds.premises import Premises
+from .loop.signals import INTEGRATED, Margin, Signals, equality, inequality
 
 __all__ = ["Terms", "inequalities", "terms"]
 
@@ -122,7 +122,7 @@ def inequalities(signals: Signals, given: Premises) -> tuple[Margin, ...]:
     Parameters
     ----------
     signals : Signals
-        Of a run of `analysis.lyapunov.observed`, from the start of the loop.
+        Of a run of `analysis.lyapunov.loop.instrumented`, from the start of the loop.
     given : Premises
         The constants that the steps suppose.
 

@@ -15,11 +15,11 @@ from nlctl._names import unknown
 
 from ..json_values import as_json
 from ..metrics import peak
+from .bounds.provenance import Constants
 from .conclusions import conclusions, creep_of
-from .creep import Creep
-from .examine import U_MAX, Examination, examine
+from .examination import U_MAX, Examination, examine
 from .lines import Line, assumption_lines, decay_line, inequality_lines, run_line
-from .record import Constants
+from .nussbaum.slow_drift import Creep
 
 if TYPE_CHECKING:
     import pandas as pd

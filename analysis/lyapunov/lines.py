@@ -9,14 +9,14 @@ from typing import Literal
 import numpy as np
 
 from .assumptions import assumptions
-from .constants import kappa
-from .declared_terms import update_is_declared
-from .final_bound import alpha_1
+from .bounds.constants import kappa
+from .bounds.final_bound import alpha_1
+from .bounds.premises import literal, premises
+from .bounds.provenance import Constants, Provenance
 from .inequalities import inequalities
-from .premises import literal, premises
-from .record import Constants, Provenance
-from .runs import Run
-from .signals import Margin, Signals
+from .loop.declared_terms import update_is_declared
+from .loop.signals import Margin, Signals
+from .loop.simulation import Run
 
 __all__ = ["Line", "Status", "assumption_lines", "decay_line", "inequality_lines", "run_line"]
 

@@ -17,18 +17,18 @@ from nlctl._names import unknown
 from nlctl.plants import coordinate_names
 from nlctl.response import input_output_response
 
+from ..intervals.box import Box, visited_box
 from ..metrics import peak
-from .box import Box, visited_box
-from .constants import disturbance
-from .decomposition import Decomposition, decompose
-from .examine import U_MAX, Examination, examine
-from .final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
-from .integral import sharpest
-from .observed import observed
-from .parts import Parts, read_parts
-from .sector import sector
-from .signals import signals_of
-from .weights import approximation_error, network_on_grid, tightest_weights
+from .bounds.constants import disturbance
+from .bounds.decomposition import Decomposition, decompose
+from .bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
+from .bounds.sector import sector
+from .bounds.weights import approximation_error, network_on_grid, tightest_weights
+from .examination import U_MAX, Examination, examine
+from .loop.instrumented import observed
+from .loop.integral import sharpest
+from .loop.roles import Parts, read_parts
+from .loop.signals import signals_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,7 +15,7 @@ from typing import Any
 from nlctl._errors import ParameterError, UsageError
 
 from .outline import sort_key
-from .own import PARTS
+from .page import PARTS
 
 __all__ = ["Difference", "compare", "read_report"]
 

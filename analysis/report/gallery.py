@@ -12,8 +12,7 @@ from nlctl._errors import UsageError
 from .compare import read_report
 from .document import Claim
 from .outline import summary
-from .own import check_gallery_folder
-from .page import fill, write_files
+from .page import check_gallery_folder, fill, write_files
 
 __all__ = ["Entry", "entries", "write_gallery"]
 

@@ -22,8 +22,7 @@ from ..json_values import as_json
 from .document import Figure, History, Item, Report, Table
 from .history import chart
 from .outline import evidence, kind, meanings, place, summary
-from .own import check_report_folder
-from .page import fill, to_bytes, write_files
+from .page import check_report_folder, fill, to_bytes, write_files
 from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
 
 __all__ = ["file_hashes", "render_html", "render_json", "write_report"]

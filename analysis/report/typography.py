@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from .formula import spoken
+from .mathml import spoken
 
 __all__ = ["Piece", "in_print", "pieces", "plain"]
 

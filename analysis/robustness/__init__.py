@@ -1,29 +1,28 @@
 """Robustness studies: how sure, how far, what breaks it, what drives it."""
 
-from .burst import BurstForecast
-from .compare import Comparison, compare, crossed
-from .confirm import Confirmation, confirm
-from .contenders import contenders
-from .degradation import Degradation, degradation_curve
-from .design import Design, from_table, independent, row_seed, rows, seed_number
-from .experiment import Experiment, Prepared, evaluate, prepare
-from .failure_map import FailureMap, boundary, failure_map
-from .formula import always, eventually, in_band
-from .guarantee import (
+from ..lyapunov.nussbaum.forecast import BurstForecast
+from ..metrics import tracking_metrics
+from .runs.experiment import Experiment, Prepared, evaluate, prepare
+from .runs.progress import Progress, until_decided
+from .runs.store import StoreError
+from .runs.sweep import Sweep, load, sweep
+from .search.confirmation import Confirmation, confirm
+from .search.degradation import Degradation, degradation_curve
+from .search.failure_map import FailureMap, boundary, failure_map
+from .search.largest_scale import largest_scale
+from .search.radius import Radius, robustness_radius
+from .search.shrink import Shrunk, shrink
+from .search.worst_case import WorstCase, worst_case
+from .statistics.comparison import Comparison, compare, crossed
+from .statistics.guarantee import (
     NoGuaranteeError,
     Violation,
     clopper_pearson,
     runs_needed,
     violation_probability,
 )
-from .largest_scale import largest_scale
-from .multiplicity import holm
-from .paired import differences, mcnemar, wins
-from .patterns import corners, grid, latin_hypercube, one_at_a_time, sobol
-from .quantity import Choice, SpaceError, Uncertain
-from .radius import Radius, robustness_radius
-from .resolve import diagrams, resolved
-from .sensitivity import (
+from .statistics.paired import differences, holm, mcnemar, wins
+from .statistics.sensitivity import (
     censored,
     elementary_effects,
     morris,
@@ -31,16 +30,26 @@ from .sensitivity import (
     saltelli,
     sobol_indices,
 )
-from .sequential import SequentialTest, confidence_sequence, decide, sequence_bounds
-from .shrink import Shrunk, shrink
-from .space import Space, arguments, nominal, scaled
-from .spec import Requirement, Spec, margin, margins, unfinished_margin
-from .store import StoreError
-from .sweep import Sweep, load, sweep
-from .tracking import tracking_metrics
-from .verdict import Verdict, bound_verdict, test_verdict
-from .watch import Progress, until_decided
-from .worst_case import WorstCase, worst_case
+from .statistics.sequential import SequentialTest, confidence_sequence, decide, sequence_bounds
+from .statistics.verdict import Verdict, bound_verdict, test_verdict
+from .stl.formula import always, eventually, in_band
+from .stl.spec import Requirement, Spec, margin, margins, unfinished_margin
+from .uncertainty.binding import diagrams, resolved
+from .uncertainty.design import (
+    Design,
+    corners,
+    from_table,
+    grid,
+    independent,
+    latin_hypercube,
+    one_at_a_time,
+    row_seed,
+    rows,
+    seed_number,
+    sobol,
+)
+from .uncertainty.quantity import Choice, SpaceError, Uncertain
+from .uncertainty.space import Space, arguments, nominal, scaled
 
 __all__ = [
     "BurstForecast",
@@ -76,7 +85,6 @@ __all__ = [
     "compare",
     "confidence_sequence",
     "confirm",
-    "contenders",
     "corners",
     "crossed",
     "decide",

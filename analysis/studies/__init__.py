@@ -1,16 +1,16 @@
 """Study files: what is uncertain, what is asked, and everything joined to answer it."""
 
+from .file.errors import Problem, StudyError
+from .file.parse import StudyFile, read_study
+from .file.schema import Study
+from .file.shipped import shipped
+from .file.written import from_toml, to_toml
 from .folder import load_result, origin_differences, run_differences
-from .plain import RunFolderError
 from .plan import Plan, plan
-from .problems import Problem, StudyError
-from .read import StudyFile, read_study
 from .replay import Replay, replay, replay_figure
 from .result import Finding, Result
 from .run import run
-from .schema import Study
-from .shipped import shipped
-from .written import from_toml, to_toml
+from .sealed import RunFolderError
 
 __all__ = [
     "Finding",

@@ -33,10 +33,10 @@ from analysis.robustness import (
 from nlctl._errors import ParameterError
 from nlctl._names import unknown
 
-from .analyses import Morris, Sobol
-from .formula_text import parse_formula
-from .parts import DEFAULT, loop_function, option, uncertain
-from .schema import Choices, Rows, Study
+from ..robustness.stl.text import parse_formula
+from .file.resolve import DEFAULT, loop_function, option, uncertain
+from .file.schema import Choices, Rows, Study
+from .kinds.analyses import Morris, Sobol
 
 __all__ = [
     "choice",

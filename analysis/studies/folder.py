@@ -2,7 +2,7 @@
 
 study.toml           the study as it was run, with the settings of the command line
 run.json             where the files that it refers to are, and what all is computed from: `origin`
-rows/                the main table, see `analysis.robustness.store`
+rows/                the main table, see `analysis.robustness.runs.store`
 KEY/finding.json     what one analysis found, its tables beside it in Parquet
 KEY/rows/            the rows that it ran itself, where their number is known in advance
 results.json         everything but the tables, for other programs
@@ -21,18 +21,18 @@ from typing import Any
 import pandas as pd
 
 from analysis.robustness import Design, Space
-from analysis.robustness.identity import differences_of
-from analysis.robustness.store import opened
-from analysis.robustness.sweep import Sweep, load
+from analysis.robustness.runs.identity import differences_of
+from analysis.robustness.runs.store import opened
+from analysis.robustness.runs.sweep import Sweep, load
 from nlctl._files import replace_file
 
 from .build import labels, main_design
+from .file.resolve import uncertain
+from .file.schema import Study, keyed
+from .file.written import from_toml
 from .origin import loop_differences, plain_study, version_differences
-from .parts import uncertain
-from .plain import ANEW, RunFolderError, file_digest, origin_key, read_json, write_json
 from .result import Finding, Result
-from .schema import Study, keyed
-from .written import from_toml
+from .sealed import ANEW, RunFolderError, file_digest, origin_key, read_json, write_json
 
 __all__ = [
     "METRIC_COLUMNS",

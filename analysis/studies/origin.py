@@ -12,13 +12,13 @@ from typing import Any
 
 from analysis.json_values import as_json, from_json
 from analysis.robustness import Prepared
-from analysis.robustness.identity import differences_of, experiment_facts, labels_text
-from analysis.robustness.loop_record import loop_facts, loop_values, values_differ
+from analysis.robustness.runs.identity import differences_of, experiment_facts, labels_text
+from analysis.robustness.runs.loop_record import loop_facts, loop_values, values_differ
 
-from .analyses import Compare
-from .comparison import compared
-from .read import StudyFile
-from .schema import Study, keyed
+from .file.parse import StudyFile
+from .file.schema import Study, keyed
+from .kinds.analyses import Compare
+from .kinds.comparison import compared
 
 __all__ = [
     "compared_differences",

@@ -9,13 +9,13 @@ from typing import Any
 import pandas as pd
 
 from analysis.robustness import Prepared, evaluate, independent, prepare
-from analysis.robustness.columns import columns_of
+from analysis.robustness.runs.experiment import columns_of
 
-from .analyses import Compare, Degradation, Map, Morris, Radius, Sobol, WorstCase
 from .build import main_design, own_design
-from .comparison import alternatives
-from .read import StudyFile
-from .schema import keyed
+from .file.parse import StudyFile
+from .file.schema import keyed
+from .kinds.analyses import Compare, Degradation, Map, Morris, Radius, Sobol, WorstCase
+from .kinds.comparison import alternatives
 
 __all__ = ["Plan", "plan"]
 

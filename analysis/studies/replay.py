@@ -13,17 +13,17 @@ from matplotlib.figure import Figure
 
 from analysis.figures.axes import BLUE, ORANGE, TIME, stacked_axes
 from analysis.robustness import Experiment, Prepared, evaluate, prepare
-from analysis.robustness.experiment import by_diagram, simulate
-from analysis.robustness.formula import Band, parts_of
+from analysis.robustness.runs.experiment import by_diagram, simulate
+from analysis.robustness.stl.formula import Band, parts_of
 from nlctl._errors import ParameterError
 
-from .analyses import Compare
-from .comparison import alternatives, widened
+from .file.parse import StudyFile
+from .file.schema import keyed
 from .folder import load_finding, load_rows, load_run
-from .plain import RunFolderError, as_json, origin_key
-from .read import StudyFile
+from .kinds.analyses import Compare
+from .kinds.comparison import alternatives, widened
 from .run import reopened
-from .schema import keyed
+from .sealed import RunFolderError, as_json, origin_key
 
 __all__ = ["Replay", "replay", "replay_figure"]
 

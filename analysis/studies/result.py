@@ -9,11 +9,11 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.robustness.sweep import Sweep
+from analysis.robustness.runs.sweep import Sweep
 from nlctl._names import unknown
 
-from .plain import as_json, origin_key
-from .schema import Study, keyed
+from .file.schema import Study, keyed
+from .sealed import as_json, origin_key
 
 __all__ = ["Finding", "Result"]
 

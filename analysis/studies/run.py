@@ -13,28 +13,28 @@ from typing import Any
 import pandas as pd
 
 from analysis.robustness import Design, Prepared, evaluate, nominal, prepare
-from analysis.robustness.store import StoreError, locked
-from analysis.robustness.sweep import Sweep, load, sweep
-from analysis.robustness.watch import Progress, until_decided
+from analysis.robustness.runs.progress import Progress, until_decided
+from analysis.robustness.runs.store import StoreError, locked
+from analysis.robustness.runs.sweep import Sweep, load, sweep
 from nlctl._errors import UsageError
 from nlctl._files import replace_file
 
-from .answers import answer, unanswered
 from .build import main_design
-from .check import NEED_ROWS
+from .file.parse import StudyFile, read_study
+from .file.schema import Study, keyed
+from .file.validate import NEED_ROWS
+from .file.written import to_toml
 from .folder import METRIC_COLUMNS, load_finding, load_run, load_study, save_finding
-from .ground import Ground
+from .kinds.answers import answer, unanswered
+from .kinds.context import Ground
 from .origin import (
     compared_differences,
     loop_differences,
     origin_of,
     version_differences,
 )
-from .plain import RunFolderError, origin_key, write_json
-from .read import StudyFile, read_study
 from .result import Finding, Result
-from .schema import Study, keyed
-from .written import to_toml
+from .sealed import RunFolderError, origin_key, write_json
 
 __all__ = ["Reopened", "Watch", "reopened", "rerun_file", "run"]
 
@@ -94,7 +94,7 @@ def run(
     executor : concurrent.futures.Executor, optional
         Where rows are run whose number is known in advance; searches run here.
     threads : int, optional
-        As in `analysis.robustness.sweep`.
+        As in `analysis.robustness.runs.sweep`.
     watch : callable, optional
         See `Watch`.
 

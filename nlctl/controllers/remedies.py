@@ -81,7 +81,8 @@ class MonotoneNussbaumLaw(NussbaumLaw):
         zeta' = r eta >= 0,    s = W_hat^T psi + delta_hat tanh(r/tau) + Y_d,   zeta(0) = 1
 
     No remedy by itself: zeta creeps on.  But it cannot oscillate, and so cannot pump V under a
-    gain that varies with time; `analysis.lyapunov.drift.safe_horizon` supposes a monotone zeta.
+    gain that varies with time; `analysis.lyapunov.nussbaum.energy.safe_horizon` supposes a
+    monotone zeta.
     """
 
     b: float = param(0.1, unit="1", meaning="width of the smooth sign of r s", above=0)

@@ -1,0 +1,145 @@
+"""What `nlctl check` prints, and the initial states of its ensembles."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from nlctl._diagram import initial_state, state_names
+from nlctl._errors import ParameterError
+from nlctl._names import find_name
+
+if TYPE_CHECKING:
+    from analysis.lyapunov.ledger import Ledger, Line
+
+STATUSES = ("proved", "computed", "checked", "undecided", "not applicable", "violated")
+STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
+
+
+def random_start(
+    diagram: Any, start: Mapping[str, float], count: int, spread: float, seed: int
+) -> dict[str, Any]:
+    """Draw the plant's initial states, uniformly within `spread` of where it would start.
+
+    Parameters
+    ----------
+    diagram : control.InterconnectedSystem
+    start : mapping
+        Initial states that replace the diagram's; the plant's are the centres.
+    count : int
+        Number of runs.
+    spread : float
+        Largest distance of each state, in its unit.
+    seed : int
+
+    Returns
+    -------
+    dict
+        `start` with an array of shape (count,) for each state of the plant.
+
+    Raises
+    ------
+    ParameterError
+        If `spread` is not positive and finite.
+    UnknownNameError, AmbiguousNameError
+        If `start` names no state, or several.
+    """
+    if not 0 < spread < np.inf:
+        raise ParameterError(f"check needs a finite spread > 0, got {spread:g}")
+    rng = np.random.default_rng(seed)
+    nominal = dict(zip(state_names(diagram), initial_state(diagram, start), strict=True))
+    full = {find_name("state", name, nominal): value for name, value in start.items()}
+    drawn = {
+        name: value + spread * rng.uniform(-1, 1, count)
+        for name, value in nominal.items()
+        if name.startswith("plant.")
+    }
+    return {**full, **drawn}
+
+
+def replay(
+    example: str, horizon: float, settings: Sequence[str], start: Mapping[str, Any], member: int
+) -> str:
+    """Return the command that repeats one run of an ensemble, to the last digit.
+
+    Parameters
+    ----------
+    example : str
+    horizon : float
+        In s.
+    settings : sequence of str
+        ``NAME=VALUE`` as given; those of initial states are in `start`.
+    start : mapping
+        Initial states: a number, or an array with one entry per run.
+    member : int
+    """
+    params = [text for text in settings if not text.partition("=")[0].strip().endswith("(0)")]
+    states = [
+        f"{name}(0)={float(value if np.ndim(value) == 0 else value[member])!r}"
+        for name, value in start.items()
+    ]
+    options = [part for text in (*params, *states) for part in ("--set", text)]
+    return shlex.join(["nlctl", "check", example, "--horizon", f"{horizon:.17g}", *options])
+
+
+def worst_lines(found: Ledger) -> list[Line]:
+    """Return one line for each run that violates one; if none does, |r| <= C_0 of (36).
+
+    Margins of different lines have different units; that of (36) says which run is nearest to
+    its bound.
+    """
+    first: dict[int, Line] = {}
+    for line in found.violated:
+        first.setdefault(line.member, line)
+    return list(first.values()) or [found["(36)"]]
+
+
+def show_ledger(found: Ledger, console: Console) -> None:
+    """Print a ledger: a table on a terminal, elsewhere one line of text per statement."""
+    if not console.is_terminal:
+        print(found)
+        return
+    title, *_ = str(found).splitlines()
+    rows = Table("line", "status", "least margin", "at (s)", "statement", title=Text(title))
+    if found.members > 1:
+        rows.add_column("run")
+    for line in found.lines:
+        what = Text.assemble(line.statement, "\n", (line.evidence, "dim"))
+        if line.reading == "paper":
+            what.append("\nas in the paper", "italic")
+        if line.follows:
+            what.append(f"\n{line.follows}", "red" if line.reading == "corrected" else "yellow")
+        cells = (line.key, Text(line.status, STYLES.get(line.status, "")), _number(line.least))
+        who = (str(line.member),) if found.members > 1 else ()
+        rows.add_row(*cells, _number(line.time), what, *who)
+    console.print(rows)
+
+
+def summary(found: Ledger) -> str:
+    """Return the ledger in a few lines: bound, number of lines by status, what is violated."""
+    count = {status: sum(x.status == status for x in found.lines) for status in STATUSES}
+    told = ", ".join(f"{number} {status}" for status, number in count.items() if number)
+    paper = ", ".join(line.key for line in found.failing)
+    own = ", ".join(line.key for line in found.violated)
+    open_ = "; ".join(f"{line.key} ({line.evidence})" for line in found.undecided)
+    lost = found["run"]
+    until = f" until it is lost at {lost.time:.5g} s" if lost.status == "violated" else ""
+    lines = [
+        f"max |r| = {abs(found.max_r):.5g}{until}, least margin of |r| <= C_0: "
+        f"{found['(36)'].least:.5g}",
+        f"{len(found.lines)} lines: {told}",
+        f"violated: {own or 'none of the corrected statements'}",
+    ]
+    lines += [f"undecided: {open_}"] if open_ else []
+    lines += [f"false as the paper has it: {paper}"] if paper else []
+    return "\n".join(lines)
+
+
+def _number(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.5g}"

@@ -1,0 +1,141 @@
+"""The loops that the command line is asked for, and the settings of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from nlctl._errors import ParameterError, UsageError
+
+MOST_SAMPLES = 2_000_000  # times of one run: 16 MB a signal
+
+
+def named_loop(name: str) -> Any:
+    """Return the diagram that a loop's name stands for.
+
+    Parameters
+    ----------
+    name : str
+        ``example-1``, ``example-2``, ``path/to/file.py:function`` or ``package.module:function``;
+        the function is called without arguments.
+
+    Raises
+    ------
+    UsageError
+        If there is no such loop, or the function returns no diagram.
+    """
+    import control as ct
+
+    if ":" in name:
+        from analysis.studies.file.resolve import named_function  # takes a second
+
+        made = named_function(name, Path.cwd())()  # who types its name wants it called
+    else:
+        from nlctl.paper import named_example
+
+        try:
+            made = named_example(name)()
+        except UsageError as error:
+            raise ParameterError(f"{error}; {OWN}") from None
+    if not isinstance(made, ct.InputOutputSystem):
+        raise ParameterError(f"{name} needs to return a diagram, it returned {type(made).__name__}")
+    return made
+
+
+OWN = "a loop of your own is path/to/file.py:function or package.module:function"
+
+
+def sampled_times(until: float, step: float) -> Any:
+    """Return the times of a run, 0 to `until` in s.
+
+    Raises
+    ------
+    ParameterError
+        If not 0 < step < until, or there are too many.
+    """
+    import numpy as np
+
+    if not (0 < step < until < float("inf")):
+        raise ParameterError(f"simulate needs 0 < step < until, got step {step:g}, until {until:g}")
+    if until / step > MOST_SAMPLES:
+        raise ParameterError(
+            f"simulate needs at most {MOST_SAMPLES:.0e} samples, got until {until:g} s / step "
+            f"{step:g} s: take a longer --step"
+        )
+    return np.linspace(0, until, round(until / step) + 1)
+
+
+def input_values(diagram: Any, texts: Sequence[str]) -> Any:
+    """Return the constant value of each input of a diagram; 0 where none is given.
+
+    Raises
+    ------
+    UsageError
+        If a text is not ``NAME=NUMBER``, or the diagram has no such input.
+    """
+    import numpy as np
+
+    from nlctl._arguments import number
+    from nlctl._names import unknown
+
+    labels = list(diagram.input_labels)
+    values = dict.fromkeys(labels, 0.0)
+    for text in texts:
+        name, value = _pair("--input", text)
+        if name not in values:
+            raise unknown("input", name, labels, f"of '{diagram.name}'")
+        values[name] = number("simulate", f"input '{name}'", number_of(name, value))
+    return np.array([values[name] for name in labels])
+
+
+def assignments(diagram: Any, texts: Sequence[str]) -> tuple[dict[str, Any], dict[str, float]]:
+    """Sort ``NAME=VALUE`` texts into parameters and initial states; names must exist.
+
+    Raises
+    ------
+    UsageError
+        If a text is none, or a name does not exist.
+    """
+    from nlctl._diagram import parameter_names
+    from nlctl._names import base_name, find_name
+
+    params, initial = {}, {}
+    known = dict.fromkeys([*parameter_names(diagram), *diagram.params])
+    for text in texts:
+        name, value = _pair("--set", text)
+        if name.endswith("(0)"):
+            initial[name.removesuffix("(0)")] = number_of(name, value)
+        else:
+            find_name("parameter", base_name(name), known)
+            params[name] = _value(name, value)
+    return params, initial
+
+
+def _pair(option: str, text: str) -> tuple[str, str]:
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (name and equals and value):
+        raise ParameterError(f"{option} needs NAME=VALUE, got '{text}'")
+    return name, value
+
+
+def _value(name: str, text: str) -> bool | float | tuple[float, ...]:
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    if "," in text:
+        return tuple(number_of(name, part) for part in text.split(","))
+    return number_of(name, text)
+
+
+def number_of(name: str, text: str) -> float:
+    """Return a number.
+
+    Raises
+    ------
+    ParameterError
+        If the text is none.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        raise ParameterError(f"{name} needs a number, got '{text}'") from None

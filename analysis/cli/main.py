@@ -1,0 +1,223 @@
+"""The command line.  It only reads arguments and prints; everything heavy is imported late."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .report import register as register_reports
+from .studies import FAILS, OPEN
+from .studies import register as register_studies
+
+UNPROVED = {"violated": FAILS, "undecided": OPEN}  # exit code by the answer of a ledger
+
+app = typer.Typer(
+    name="nlctl",
+    help="Adaptive neural control of pure-feedback nonlinear systems with python-control.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help='A parameter ("actuator.b_r=0.6") or an initial state ("plant.x1(0)=0.8").',
+    ),
+]
+Loop = Annotated[
+    str,
+    typer.Argument(
+        metavar="LOOP",
+        help="example-1, example-2, or a loop of your own: path/to/file.py:function or "
+        "package.module:function, a function that returns the diagram. Its code is run.",
+    ),
+]
+
+
+def _told_version(wanted: bool) -> None:
+    if wanted:
+        from nlctl._version import __version__
+
+        print(f"nlctl {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def version(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_told_version, is_eager=True, help="Say which.")
+    ] = False,
+) -> None:
+    """Adaptive neural control of pure-feedback nonlinear systems with python-control."""
+
+
+@app.command()
+def simulate(
+    loop: Loop,
+    set_: Set = None,
+    input_: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="NAME=VALUE", help="A constant input; 0 by default."),
+    ] = None,
+    engine: Annotated[
+        str,
+        typer.Option(help="native, python-control, or auto: native if it can be compiled."),
+    ] = "auto",
+    until: Annotated[float, typer.Option(help="Horizon in s.")] = 20.0,
+    step: Annotated[float, typer.Option(help="Sampling interval of the output in s.")] = 0.01,
+    plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Table of signals to write.")] = None,
+) -> None:
+    """Simulate a loop, with parameters, initial states and inputs changed at will."""
+    from nlctl.response import input_output_response
+
+    from .loops import assignments, input_values, named_loop, sampled_times
+    from .terminal import check_figure, check_file, progress_bar, show_metrics, write_figure
+
+    times = sampled_times(until, step)
+    if plot is not None:
+        check_figure(plot)
+    if csv is not None:
+        check_file(csv)
+    diagram = named_loop(loop)
+    params, initial = assignments(diagram, set_ or [])
+    inputs = input_values(diagram, input_ or [])[:, None] + 0 * times
+    with progress_bar(f"simulating {loop}", until) as advance:
+        reached = [0.0]
+
+        def progress(t: float) -> None:
+            advance(t - reached[0])
+            reached[0] = t
+
+        response = input_output_response(
+            diagram, times, inputs, initial, params=params, engine=engine, progress=progress
+        )
+    signals = {name: response.y[i] for name, i in diagram.output_index.items()}
+    show_metrics(times, signals)
+    if csv is not None:
+        _write_csv(csv, times, signals)
+    if plot is not None:
+        from analysis.paper.figures import overview
+
+        write_figure(plot, overview(times, signals))
+        print(plot)
+
+
+@app.command()
+def check(
+    loop: Loop,
+    set_: Set = None,
+    horizon: Annotated[float, typer.Option(help="Length of the runs in s.")] = 20.0,
+    ensemble: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            help="Number of runs that start from random initial states of the plant: each state "
+            "uniform within SPREAD of its initial value; nothing else is varied. 0: one run.",
+        ),
+    ] = 0,
+    spread: Annotated[float, typer.Option(help="Largest distance of an initial state.")] = 0.1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random initial states.")] = 0,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
+) -> None:
+    """Check the assumptions and inequalities of the paper's proof, line by line.
+
+    Exit codes: 0 every line holds, 1 a line is violated, 5 none is violated, but not all are
+    decided. Statements that are false only as the paper has them are shown and do not count.
+    """
+    from rich.console import Console
+
+    from analysis.lyapunov.ledger import ledger
+    from nlctl._errors import ParameterError
+
+    from .check import random_start, replay, show_ledger, summary, worst_lines
+    from .loops import assignments, named_loop
+
+    if not 0 < horizon < float("inf"):
+        raise ParameterError(f"check needs a horizon > 0, got {horizon:g}")
+    diagram = named_loop(loop)
+    params, start = assignments(diagram, set_ or [])
+    if ensemble:
+        start = random_start(diagram, start, ensemble, spread, seed)
+    steps = round(20_000 * max(horizon, 10))  # several times what a run that ends well takes
+    found = ledger(diagram, horizon, start=start, params=params, max_steps=steps)
+    if json:
+        print(found.to_json())
+    else:
+        show_ledger(found, Console())
+        print(summary(found))
+        for line in worst_lines(found) if ensemble else ():
+            print(f"run {line.member}, worst in {line.key}, again (with constants of its own):")
+            print(f"  {replay(loop, horizon, set_ or [], start, line.member)}")
+    if found.answer in UNPROVED:
+        raise typer.Exit(UNPROVED[found.answer])
+
+
+@app.command("list")
+def list_(
+    name: Annotated[str | None, typer.Argument(help="A block, whose parameters are shown.")] = None,
+) -> None:
+    """List the blocks in groups, and the examples; with NAME, its parameters, units and bounds."""
+    from .terminal import show_block, show_groups
+
+    show_groups() if name is None else show_block(name)
+
+
+@app.command()
+def diagram(
+    loop: Loop,
+    out: Annotated[Path, typer.Option("-o", "--out", help="File: .svg, .png, .pdf.")],
+    expand: Annotated[bool, typer.Option(help="Show what is inside nested diagrams.")] = False,
+) -> None:
+    """Draw the block diagram of a loop."""
+    from nlctl.drawing import draw
+
+    from .loops import named_loop
+    from .terminal import check_figure, write_figure
+
+    check_figure(out)
+    write_figure(out, draw(named_loop(loop), expand=expand))
+    print(out)
+
+
+def _write_csv(path: Path, times, signals) -> None:
+    import pandas as pd
+
+    from nlctl._files import replace_file
+
+    table = pd.DataFrame({"time": times} | signals)
+    replace_file(path, lambda file: table.to_csv(file, index=False))
+
+
+register_reports(app)
+register_studies(app)
+
+
+def main() -> None:
+    """Run the command line; what the user can put right ends in one sentence and exit code 2.
+
+    An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
+    """
+    from nlctl._errors import DivergedError, UsageError
+
+    try:
+        app()
+    except (UsageError, DivergedError, OSError) as error:
+        print(f"nlctl: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    except KeyboardInterrupt:
+        print("nlctl: interrupted", file=sys.stderr)
+        raise SystemExit(130) from None
+    except MemoryError as error:
+        print(f"nlctl: this needs more memory than there is ({error})", file=sys.stderr)
+        raise SystemExit(2) from None
+    except Exception as error:
+        from .terminal import trace_of
+
+        print(trace_of(error), file=sys.stderr)
+        raise SystemExit(3) from None

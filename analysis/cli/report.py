@@ -1,0 +1,357 @@
+"""The commands about reports: make, show, compare, list them."""
+
+from __future__ import annotations
+
+import json as json_text
+import shlex
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .studies import ANSWERS, INCOMPLETE, INTERRUPTED, Trust, exit_codes, run_folder
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
+
+    from analysis.report.document import Report
+    from analysis.report.svg import Drawn
+    from nlctl._errors import UsageError
+
+QUICK = ("example-1-quick", "example-2-quick")  # the studies of the paper's report
+
+Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser.")]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace files of others in the folder of the page.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    for command in (report, compare, gallery):
+        app.command()(command)
+
+
+def report(
+    study: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="STUDY",
+            help="A study file (.toml), which is run or taken up, or the folder of a run. "
+            "Without it, the paper: both examples, the proof, and a quick study of each.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the report; reports/paper, or that of the run."),
+    ] = None,
+    jobs: Annotated[int, typer.Option(min=0, help="Threads; 0: one per core.")] = 0,
+    far: Annotated[
+        bool,
+        typer.Option("--far", help="Run Example 2 to its burst instead of showing the record."),
+    ] = False,
+    open_: Open = False,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
+    interactive: Annotated[
+        bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
+    ] = False,
+    force: Force = False,
+    trust: Trust = False,
+) -> None:
+    """Write a report, one page that needs nothing else.  Exit 1 if a claim of it fails.
+
+    Rows of a study are drawn from its loop: the code that the study names is run.
+    """
+    with exit_codes(json=False):
+        made, page, code = (
+            _paper(
+                out or Path("reports/paper"),
+                jobs,
+                far=far,
+                pdf=pdf,
+                interactive=interactive,
+                force=force,
+            )
+            if study is None
+            else _study(
+                study, out, jobs, pdf=pdf, interactive=interactive, force=force, trust=trust
+            )
+        )
+        print(made)
+        finish_report(page, pdf=pdf, open_=open_)
+        if code:
+            raise typer.Exit(code)
+
+
+def _paper(
+    out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool
+) -> tuple[str, Path, int]:
+    """Reproduce the paper; return the verdict, the page and the exit code."""
+    with _other_process() as beside:
+        compiling = beside.submit(_compile_ahead)  # first of all: imports here take seconds
+        check_report_options(out, pdf=pdf, force=force)
+        from analysis.report.render import write_report
+
+        from .study_report import clear_shipped
+
+        clear_shipped(QUICK, out, force=force)
+        made, drawn, passed = _reproduced(beside, compiling, out, jobs, far=far)
+        options = " --far" * far + " --interactive" * interactive
+        made = replace(made, command=made.command + options)
+        page = write_report(
+            made, out, interactive=interactive, force=force, pool=beside, drawn=drawn
+        )
+    return made.verdict, page, int(not passed)
+
+
+def _reproduced(
+    beside: Executor, compiling: Future[None], out: Path, jobs: int, *, far: bool
+) -> tuple[Report, Drawn, bool]:
+    """Return the report, those of its figures that are drawn, and whether all claims hold."""
+    from analysis.paper import checks
+    from analysis.paper.evidence import evidence, far_runs_in_background
+    from analysis.paper.page.report import paper_report, paper_sections
+    from analysis.report.svg import draw_ahead
+    from nlctl import paper
+
+    from .study_report import studies_part
+    from .terminal import progress_bar
+
+    with far_runs_in_background(whole=far) as long_runs:
+        runs, waiting = _runs(beside, out, jobs)
+        proofs = {}
+        with progress_bar("checking the proof", 2) as advance:
+            for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
+                proofs[number] = evidence(loop)
+                advance(1)
+        with progress_bar("running far beyond 20 s, and the studies", 2) as advance:
+            far_away = long_runs.result()
+            advance(1)
+            sections = paper_sections(runs, proofs=proofs, far=far_away)
+            drawn = draw_ahead(sections, until=waiting[-1].done)
+            *_, numbers = (task.result() for task in (compiling, *waiting))
+    made = paper_report(
+        runs,
+        proofs=proofs,
+        far=far_away,
+        sections=sections,
+        studies=studies_part([out / name for name in QUICK], threads=jobs or None),
+        numerics=numbers,
+    )
+    return made, drawn, all(check.passed for check in checks(runs))
+
+
+@contextmanager
+def _other_process() -> Iterator[Executor]:
+    """Lend a process for the other core; it ends when the body fails, whatever it is doing."""
+    from multiprocessing import active_children
+
+    from nlctl._workers import process_pool
+
+    with process_pool(1) as pool:
+        try:
+            yield pool
+        except BaseException:
+            for process in active_children():
+                process.terminate()
+            raise
+
+
+def _runs(beside: Executor, out: Path, jobs: int) -> tuple[Any, list[Future[Any]]]:
+    """Run the paper's cases; return them, and what runs in the other process meanwhile.
+
+    That is the studies, and last the numerics.  Both processes need the integrators: where nothing
+    is compiled yet only this one compiles them, while the other does what needs none.
+    """
+    from analysis.paper import CASES, numerics, run_all
+
+    from .study_report import run_shipped
+    from .terminal import progress_bar
+
+    with progress_bar("simulating", len(CASES)) as advance:
+        runs = run_all(CASES[:1], done=lambda _: advance(1))
+        studies = beside.submit(run_shipped, QUICK, out, jobs or None)
+        waiting = [studies, beside.submit(numerics)]
+        runs |= run_all(CASES[1:], done=lambda _: advance(1))  # machine code: in this process
+    return runs, waiting
+
+
+def _compile_ahead() -> None:
+    """Compile what is needed besides the integrators, first what the other process needs late."""
+    from analysis.paper import CASES, evidence
+    from analysis.paper import compile_ahead as compile_cases
+    from nlctl import paper
+
+    from .study_report import compile_shipped
+
+    evidence.compile_ahead(paper.example_1())
+    evidence.compile_ahead(paper.example_2())
+    compile_cases(CASES)  # by now the other process has the first two
+    compile_shipped(QUICK)
+
+
+def _study(
+    study: Path,
+    out: Path | None,
+    jobs: int,
+    *,
+    pdf: bool,
+    interactive: bool,
+    force: bool,
+    trust: bool,
+) -> tuple[str, Path, int]:
+    """Report a study; return the verdict, the page and the exit code."""
+    from .study_report import report_study
+    from .sweep_progress import sweep_bar
+
+    kept = run_folder(study) if study.suffix == ".toml" else study
+    check_report_options(out or kept, pdf=pdf, force=force)
+    page, result = report_study(
+        study,
+        out,
+        threads=jobs or None,
+        watch=sweep_bar,
+        interactive=interactive,
+        force=force,
+        trust=trust,
+    )
+    if result.complete:
+        return result.verdict, page, ANSWERS.get(result.answer, 0)
+    if study.suffix == ".toml":
+        print("nlctl: incomplete; the same command goes on", file=sys.stderr)
+    return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(help="report.json, its folder, or that of a run.")],
+    second: Annotated[Path, typer.Argument(help="Another one.")],
+    rtol: Annotated[float, typer.Option(help="Numbers this close count as equal.")] = 0.0,
+    json: Json = False,
+) -> None:
+    """Say what differs between two reports or two runs of studies; exit 1 if anything does."""
+    if not compare_reports(first, second, rtol=rtol, as_json=json):
+        raise typer.Exit(1)
+
+
+def gallery(
+    folder: Annotated[Path, typer.Argument(help="Folder with reports below it.")],
+    open_: Open = False,
+    force: Force = False,
+) -> None:
+    """Write FOLDER/index.html: every report below it with its verdict."""
+    write_gallery_of(folder, open_=open_, force=force)
+
+
+def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
+    """Refuse, before anything is computed, what could not be written afterwards.
+
+    Raises
+    ------
+    UsageError
+        If `out` cannot be written to or holds files that no report has made, or a PDF is wanted
+        and no browser is installed.
+    """
+    from analysis.report.page import check_report_folder
+
+    from .terminal import check_writable
+
+    check_writable(out)
+    if not force:
+        check_report_folder(out)
+    if pdf:
+        from analysis.report.browser import find_browser
+
+        find_browser()
+
+
+def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
+    """Print where the page is; print it to PDF and show it, as wanted.
+
+    Raises
+    ------
+    UsageError
+        If the PDF cannot be made; the page exists all the same.
+    """
+    from analysis.report.browser import open_page, write_pdf
+
+    print(page)
+    if pdf:
+        print(write_pdf(page, page.with_name("report.pdf")))
+    if open_ and not open_page(page):
+        print("no browser was found to show it")
+
+
+def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:
+    """Print what differs, one thing a line; return whether nothing does.
+
+    Two runs are compared by their results where one of them has no report.
+
+    Raises
+    ------
+    UsageError, OSError
+        If a file is no report, or cannot be read.
+    """
+    from analysis.report.compare import compare
+    from analysis.studies import origin_differences, run_differences
+
+    paths = (first, second)
+    without = [p for p in paths if p.is_dir() and not (p / "report.json").exists()]
+    as_runs = bool(without) and all((p / "results.json").exists() for p in paths)
+    if not as_runs:
+        for path in (p for p in paths if p in without or not p.exists()):
+            raise _no_report(path)
+    found: list[Any] = (
+        run_differences(first, second) if as_runs else compare(first, second, rtol=rtol)
+    )
+    if as_runs and (told := origin_differences(first, second)):
+        print(f"nlctl: the two runs were not computed from the same: {told}", file=sys.stderr)
+    if as_json:
+        told = [text if isinstance(text, str) else vars(text) for text in found]
+        print(json_text.dumps(told, indent=1, ensure_ascii=False))
+        return not found
+    for difference in found:
+        print(difference)
+    count = "no difference" if not found else f"{len(found)} differences"
+    print("1 difference" if len(found) == 1 else count)
+    return not found
+
+
+def _no_report(path: Path) -> UsageError:
+    """Return what is said of a path that cannot be compared, with the next step."""
+    from nlctl._errors import UsageError
+
+    if not path.exists():
+        return UsageError(f"there is no '{path}': compare needs two reports, or two runs")
+    run = shlex.quote(str(path))
+    if (path / "results.json").exists():
+        return UsageError(f"'{path}' is a run without a report: make it with 'nlctl report {run}'")
+    if (path / "study.toml").exists():
+        return UsageError(
+            f"'{path}' is a run that is not done: finish it with 'nlctl run STUDY --resume'"
+        )
+    return UsageError(f"'{path}' holds neither a report nor a run of a study")
+
+
+def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
+    """Write the index page over the reports below a folder, and print where it is.
+
+    Raises
+    ------
+    UsageError
+        If there is no report, or the folder cannot be written to, or its page is no gallery.
+    """
+    from analysis.report.browser import open_page
+    from analysis.report.gallery import write_gallery
+
+    from .terminal import check_writable
+
+    check_writable(folder)
+    page = write_gallery(folder, force=force)
+    print(page)
+    if open_ and not open_page(page):
+        print("no browser was found to show it")

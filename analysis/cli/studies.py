@@ -1,0 +1,312 @@
+"""The commands about study files.  Like `analysis.cli.main` it only reads arguments and prints.
+
+Exit codes: 0 all claims are shown, 1 a claim is refuted, 2 usage or an invalid study, 3 an
+internal error or one of the user's own functions, 4 incomplete and resumable, 5 no claim is
+refuted, but not all are shown yet, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import errno
+import json as json_text
+import shlex
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
+ANSWERS = {"refuted": FAILS, "not shown yet": OPEN}  # exit code by the answer to a study's claims
+CONNECT = "5s"  # how long a scheduler may take to answer
+
+StudyPath = Annotated[Path, typer.Argument(metavar="STUDY", help="The study file, .toml.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace what stands in the file: runs.size=100, "
+        'space."actuator.b_r".uniform=[0.3,0.6], analysis.0.confidence=0.9.',
+    ),
+]
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust", help="Run code from outside of the study's folder and of installed packages."
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+Jobs = Annotated[int, typer.Option(min=0, help="Threads or processes; 0: one per core.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the command line."""
+    for command in (run, validate, replay, schema):
+        app.command()(command)
+
+
+def run(
+    study: StudyPath,
+    set_: Settings = None,
+    resume: Annotated[bool, typer.Option(help="Go on with what the folder holds.")] = False,
+    jobs: Jobs = 0,
+    executor: Annotated[
+        str, typer.Option(help="threads, processes, or dask:ADDRESS of a scheduler.")
+    ] = "threads",
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the results; reports/NAME by default.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Use a folder with other files.")] = False,
+    trust: Trust = False,
+    json: Json = False,
+) -> None:
+    """Run a study, print what it found, and keep everything in a folder.
+
+    A study file names code, which is run: run the studies of those whose programs you would run.
+
+    Exit codes: 0 all claims are shown, 1 a claim is refuted, 5 none is refuted but not all are
+    shown yet, 2 an invalid study, 3 an error in a function of yours, 4 incomplete: go on with
+    --resume.
+    """
+    options = [part for text in set_ or [] for part in ("--set", text)]
+    options += [] if out is None else ["--out", str(out)]
+    options += [] if executor == "threads" else ["--executor", executor]
+    options += ["--jobs", str(jobs)] if jobs else []
+    options += ["--force"] * force + ["--trust"] * trust
+    folder = run_folder(study) if out is None else out
+    with exit_codes(json), _told_how_to_go_on(study, options, folder, resume, json):
+        from analysis.studies import read_study
+        from analysis.studies import run as run_study
+
+        from .sweep_progress import sweep_bar
+
+        file = read_study(study, set_ or [], trust=trust)
+        with _executor(executor, jobs) as pool:
+            result = run_study(
+                file,
+                folder,
+                resume=resume,
+                force=force,
+                executor=pool,
+                threads=jobs or None if pool is None else None,
+                watch=sweep_bar,
+            )
+        _show(result, json)
+        if not result.complete:
+            raise typer.Exit(INTERRUPTED if result.interrupted else INCOMPLETE)
+        if result.answer in ANSWERS:
+            raise typer.Exit(ANSWERS[result.answer])
+
+
+def validate(
+    study: StudyPath,
+    set_: Settings = None,
+    jobs: Jobs = 0,
+    trust: Trust = False,
+    json: Json = False,
+) -> None:
+    """Check a study file, and say how many runs, how much time and disk it will take.
+
+    To know, it makes the loop and runs a few rows: the code that the file names is run.
+    """
+    with exit_codes(json):
+        from analysis.studies import plan, read_study
+
+        found = plan(read_study(study, set_ or [], trust=trust), jobs or None)
+        if json:
+            content = {"valid": True, **vars(found), "total": found.total}
+            print(json_text.dumps(content, indent=1))
+            return
+        print(f"{study} is a valid study.")
+        for key, count in found.runs.items():
+            print(f"  {key}: {'at most ' if key in found.at_most else ''}{count} runs")
+        print(
+            f"In all {found.total} runs, about {_duration(found.seconds)} on this machine, and "
+            f"at most about {found.size / 1e6:.2g} MB on disk."
+        )
+
+
+def replay(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
+    row: Annotated[int, typer.Argument(min=0, help="Number of the row.")],
+    part: Annotated[
+        str, typer.Option(help="An analysis that keeps rows of its own, such as worst-case.")
+    ] = "",
+    plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
+    trust: Trust = False,
+    json: Json = False,
+) -> None:
+    """Run one row again, compare it with the stored one bit for bit, and plot its signals.
+
+    The loop is made anew: the code that the study names is run.
+    """
+    with exit_codes(json):
+        from analysis.studies import replay as replay_row
+        from analysis.studies import replay_figure
+
+        from .terminal import check_figure, write_figure
+
+        if plot is not None:
+            check_figure(plot)
+        made = replay_row(folder, row, part, trust=trust)
+        if plot is not None:
+            write_figure(plot, replay_figure(made))
+        if json:
+            print(json_text.dumps(made.plain(), indent=1))
+        else:
+            print(made)
+        if made.differences:
+            raise typer.Exit(FAILS)
+
+
+def schema() -> None:
+    """Print the JSON schema of study files, for editors."""
+    from analysis.studies import Study
+
+    print(json_text.dumps(Study.model_json_schema(), indent=1))
+
+
+def run_folder(study: Path) -> Path:
+    """Return where the run of a study file is kept by default."""
+    return Path("reports") / study.stem
+
+
+@contextmanager
+def _told_how_to_go_on(
+    study: Path, options: list[str], folder: Path, resume: bool, json: bool
+) -> Iterator[None]:
+    """Print the command that goes on, where a run ends early and may be continued.
+
+    It resumes from the moment on at which the folder holds the study; before, it begins.
+    """
+    kept = folder / "study.toml"
+    is_taken = kept.exists() and not resume  # by a run that is there already: it is refused
+    try:
+        yield
+        return
+    except KeyboardInterrupt:
+        print("nlctl: interrupted", file=sys.stderr)
+        code = INTERRUPTED
+    except typer.Exit as error:
+        if error.exit_code not in (INCOMPLETE, INTERRUPTED):
+            raise
+        code = error.exit_code
+    except (OSError, ValueError) as error:
+        if not _is_full(error):
+            raise
+        _fail(error, json)
+        code = INCOMPLETE
+    verb, flag = ("continue", ["--resume"]) if resume or kept.exists() else ("begin", [])
+    if not is_taken:
+        command = shlex.join(["nlctl", "run", str(study), *flag, *options])
+        print(f"{verb} with: {command}", file=sys.stderr)
+    raise typer.Exit(code) from None
+
+
+@contextmanager
+def exit_codes(json: bool) -> Iterator[None]:
+    """Turn what goes wrong into one message and an exit code."""
+    from nlctl._errors import DivergedError, UsageError
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        print("nlctl: interrupted", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
+    except (UsageError, DivergedError, OSError) as error:
+        _fail(error, json)
+        raise typer.Exit(INVALID) from None
+    except (typer.Exit, typer.Abort):
+        raise
+    except Exception as error:
+        from .terminal import trace_of
+
+        print(trace_of(error), file=sys.stderr)
+        if json:
+            print(json_text.dumps({"error": f"{type(error).__name__}: {error}"}))
+        raise typer.Exit(INTERNAL) from None
+
+
+def _fail(error: Exception, json: bool) -> None:
+    """Print one message: as JSON where that was asked for."""
+    if not json:
+        print(f"nlctl: {error}", file=sys.stderr)
+        return
+    content: dict[str, Any] = {"error": str(error)}
+    problems = getattr(error, "problems", None)
+    if problems is not None:
+        content |= {"valid": False, "problems": [problem.plain() for problem in problems]}
+    print(json_text.dumps(content, indent=1))
+
+
+def _is_full(error: BaseException | None) -> bool:
+    """Whether a disk or a quota is full: what is kept can be continued."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+            return True
+        error = error.__cause__
+    return False
+
+
+@contextmanager
+def _executor(text: str, jobs: int) -> Iterator[Any]:
+    """Yield the executor that an option names; None for the engine's own threads."""
+    from nlctl._errors import ParameterError
+
+    if text == "threads":
+        yield None
+    elif text == "processes":
+        from nlctl._workers import process_pool
+        from nlctl.native._ensemble import cores
+
+        with process_pool(jobs or cores()) as pool:
+            yield pool
+    elif text.startswith("dask:"):
+        with _dask_client(text.removeprefix("dask:")) as client:
+            yield client.get_executor()
+    else:
+        raise ParameterError(f"--executor needs threads, processes or dask:ADDRESS, got '{text}'")
+
+
+def _dask_client(address: str) -> Any:
+    """Return a client of the scheduler at an address; it is to be closed."""
+    from nlctl._errors import ParameterError
+
+    try:
+        from distributed import Client
+    except ImportError:
+        raise ParameterError(
+            '--executor dask:ADDRESS needs the extra: pip install "nlctl[cluster]"'
+        ) from None
+    try:
+        return Client(address, timeout=CONNECT)
+    except (OSError, ValueError) as error:
+        raise ParameterError(
+            f"cannot reach a Dask scheduler at '{address}' ({error}): give the address that it "
+            "prints when it starts, such as --executor dask:tcp://127.0.0.1:8786"
+        ) from None
+
+
+def _show(result: Any, json: bool) -> None:
+    """Print the verdict, then every finding in its own words."""
+    for note in result.notes:
+        print(f"nlctl: {note}", file=sys.stderr)
+    if json:
+        print(json_text.dumps(result.plain(), indent=1, ensure_ascii=False, allow_nan=False))
+        return
+    print(f"{result.study.study.title}\n{result.verdict}")
+    for finding in result.findings:
+        print(f"\n{finding.title}\n  {finding.sentence}")
+        if finding.claim:
+            print(f"  Claim: {finding.claim}: {finding.told}.")
+    print(f"\n{result.folder}")
+
+
+def _duration(seconds: float) -> str:
+    """Return a time in words."""
+    if seconds < 120:
+        return f"{max(seconds, 1):.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

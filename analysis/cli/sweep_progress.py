@@ -1,0 +1,68 @@
+"""A sweep's progress in a terminal."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+if TYPE_CHECKING:
+    from analysis.robustness.runs.progress import Progress as SweepProgress
+
+PERIOD = 0.25  # s between updates: drawing a bar takes as long as a run
+
+
+@contextmanager
+def sweep_bar(
+    what: str, console: Console | None = None, confidence: float = 0.99
+) -> Iterator[Callable[[SweepProgress], None]]:
+    """Show a bar on stderr while the body runs, if that is a terminal.
+
+    Behind the bar stand the rows, the rate, the remaining time, the violations so far and, for
+    independent draws, bounds of their probability that may be looked at any time.
+
+    Yields
+    ------
+    callable
+        What `analysis.robustness.runs.sweep` takes as ``progress``.
+    """
+    console = console or Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[rows]}"))
+    with Progress(
+        *columns,
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[found]}"),
+        console=console,
+        refresh_per_second=1 / PERIOD,
+        disable=not console.is_terminal,
+    ) as bar:
+        task = bar.add_task(what, total=None, rows="", found="")
+        shown = float("-inf")
+
+        def show(progress: SweepProgress) -> None:
+            nonlocal shown
+            if time.monotonic() < shown + PERIOD and progress.done < progress.total:
+                return
+            shown = time.monotonic()
+            bar.update(
+                task,
+                total=progress.total,
+                completed=progress.done,
+                rows=f"{progress.done}/{progress.total} rows, {progress.rate:.3g}/s",
+                found=found_text(progress, confidence),
+            )
+
+        yield show
+
+
+def found_text(progress: SweepProgress, confidence: float = 0.99) -> str:
+    """Return violations so far and their running interval."""
+    counted = f"{progress.violations} of {progress.runs} violate"
+    bounds = progress.interval(confidence)
+    if bounds is None:
+        return counted
+    return f"{counted}, p in [{bounds[0]:.2g}, {bounds[1]:.2g}] at {100 * confidence:.10g} %"

@@ -1,0 +1,180 @@
+"""What the command line prints, and the checks it makes before any work is done."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import sysconfig
+import tempfile
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from nlctl._errors import ParameterError
+from nlctl._files import replace_file
+
+if TYPE_CHECKING:
+    import numpy as np
+
+FIGURE_FORMATS = (".svg", ".png", ".pdf")
+
+
+@contextmanager
+def progress_bar(what: str, total: float) -> Iterator[Callable[[float], None]]:
+    """Show a bar on stderr while the body runs, if that is a terminal."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(
+        *columns, TimeRemainingColumn(), console=console, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda amount: bar.advance(task, amount)
+
+
+def check_writable(folder: Path) -> None:
+    """Refuse a folder that cannot be written to, before anything is computed.
+
+    Raises
+    ------
+    ParameterError
+        With the path and the reason.
+    """
+    existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+    if not existing.is_dir():
+        raise ParameterError(f"cannot write to '{folder}': '{existing}' is not a folder")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise ParameterError(f"cannot write to '{folder}': no permission for '{existing}'")
+    try:
+        with tempfile.TemporaryFile(dir=existing):
+            pass
+    except OSError as error:  # /proc, a full disk, a file system that is read-only
+        why = error.strerror or error
+        raise ParameterError(f"cannot write to '{folder}': {why} ('{existing}')") from None
+
+
+def check_file(path: Path) -> None:
+    """Refuse a file that could not be written, before anything is computed.
+
+    Raises
+    ------
+    ParameterError
+        With the path and the reason.
+    """
+    if path.is_dir():
+        raise ParameterError(f"cannot write '{path}': it is a folder")
+    check_writable(path.parent)
+    if not path.parent.is_dir():
+        raise ParameterError(f"cannot write '{path}': there is no folder '{path.parent}'")
+
+
+def check_figure(path: Path) -> None:
+    """Refuse a figure format that cannot be written, or a folder that cannot be written to.
+
+    Raises
+    ------
+    ParameterError
+        With the path and the rule.
+    """
+    if path.suffix.lower() not in FIGURE_FORMATS:
+        raise ParameterError(
+            f"cannot write figure '{path}': its name must end in {', '.join(FIGURE_FORMATS)}"
+        )
+    check_file(path)
+
+
+def write_figure(path: Path, figure: Any) -> None:
+    """Write a matplotlib figure in one step, in the format that its name ends in."""
+    replace_file(path, lambda file: figure.savefig(file, format=path.suffix[1:].lower()))
+
+
+def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
+    """Print peak, last half's peak and RMS, and final value of every signal."""
+    from analysis.metrics import final, over, peak, rms
+
+    half = times[-1] / 2
+    table = Table("signal", "max |.|", f"max |.|, t ≥ {half:g} s", f"RMS, t ≥ {half:g} s", "at end")
+    for name, y in signals.items():
+        late = over(times, y, half, times[-1])
+        numbers = (peak(times, y), peak(*late), rms(*late), final(times, y))
+        table.add_row(name, *(f"{v:.6g}" for v in numbers))
+    Console().print(table)
+
+
+def show_groups() -> None:
+    """Print the blocks in groups, one line each, and the examples."""
+    from nlctl._block_list import block_summaries
+
+    console = Console()
+    groups = block_summaries()
+    width = max(len(name) for group in groups.values() for name in group)
+    for title, group in groups.items():
+        console.print(f"[bold]{title.capitalize()}[/bold]", highlight=False)
+        for name, summary in group.items():
+            line = Text(f"  {name:<{width}}  {summary}")
+            console.print(line, no_wrap=True, overflow="ellipsis")
+    console.print("[bold]Examples[/bold]\n  example-1 (dead zone), example-2 (backlash)")
+    console.print("\nnlctl list NAME shows the parameters of a block.", highlight=False)
+
+
+def show_block(name: str) -> None:
+    """Print the parameter table of a block.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such block.
+    """
+    import numpy as np
+
+    from nlctl._catalogue import named_block
+    from nlctl._param import declared_params
+
+    record, console = named_block(name), Console()
+    table = Table("parameter", "default", "unit", "bounds", "meaning", title=None)
+    defaults = {f.name: f.default for f in dataclasses.fields(record)}
+    for field, rule in declared_params(record).items():
+        default = np.asarray(defaults[field])
+        text = str(defaults[field]) if default.size <= 4 else f"{default.shape} values"
+        table.add_row(field, text, rule.unit, rule.bounds, rule.meaning)
+    console.print(f"[bold]{name}[/bold]  {_summary(record)}", highlight=False)
+    if table.row_count:
+        console.print(table)
+
+
+def _summary(record: type) -> str:
+    return (record.__doc__ or "").strip().splitlines()[0]
+
+
+def trace_of(error: BaseException) -> str:
+    """Return what is told of an error that is no mistake of usage.
+
+    Where it comes from a function of the user's, that is its kind, its message and the lines of
+    the user's files; otherwise the whole trace.
+    """
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if _is_users(Path(frame.filename))]
+    if not own:
+        return "".join(traceback.format_exception(error)).rstrip()
+    lines = [f"nlctl: {type(error).__name__}: {error}"]
+    for frame in own:
+        lines.append(f'  File "{frame.filename}", line {frame.lineno}, in {frame.name}')
+        lines += [f"    {frame.line}"] if frame.line else []
+    return "\n".join(lines)
+
+
+def _is_users(path: Path) -> bool:
+    """Whether a file is neither nlctl's, nor of an installed package or Python's own."""
+    if not path.is_file() or {"site-packages", "dist-packages"} & set(path.parts):
+        return False
+    analysis = Path(__file__).resolve().parents[1]
+    installed = {Path(part) for key, part in sysconfig.get_paths().items() if "lib" in key}
+    roots = [analysis, analysis.parent / "nlctl", *installed]
+    places = {path, path.resolve()}
+    return not any(place.is_relative_to(root) for place in places for root in roots)

@@ -1,0 +1,111 @@
+"""Figures that rank quantities and controllers: bars with intervals, one line each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from .axes import BLUE, GREY, ORANGE, SHORT_LINE, legend_above
+from .labels import arms, number_axes
+
+__all__ = ["paired_differences", "screening", "set_apart", "shares", "violation_rates"]
+
+
+def screening(effects: pd.DataFrame) -> Figure:
+    """Mean magnitude of the effects of each quantity with its interval, and their deviation."""
+    effects = effects.sort_values("mu_star", ascending=False, kind="stable")
+    figure, ax = number_axes(effects.index)
+    _bar(ax, effects, ("mu_star", "low", "high"), BLUE, "$\\mu^*$, mean magnitude")
+    at = np.arange(len(effects))
+    ax.plot(effects["sigma"], at, "D", color=ORANGE, markersize=5, label="$\\sigma$, deviation")
+    legend_above(ax, line=SHORT_LINE)
+    ax.set_xlabel("effect: change of the response per width of the box")
+    return figure
+
+
+def shares(indices: pd.DataFrame) -> Figure:
+    """Shares of the variance: of each quantity by itself, and with all its interactions."""
+    indices = indices.sort_values("ST", ascending=False, kind="stable")
+    figure, ax = number_axes(indices.index)
+    _bar(ax, indices, ("S1", "S1_low", "S1_high"), BLUE, "$S_1$, by itself", -0.18)
+    _bar(ax, indices, ("ST", "ST_low", "ST_high"), ORANGE, "$S_T$, with interactions", 0.18, "///")
+    legend_above(ax, line=SHORT_LINE)
+    ax.set_xlabel("share of the variance (1)")
+    return figure
+
+
+def set_apart(table: pd.DataFrame) -> Figure:
+    """How far failing runs lie from passing ones in each quantity."""
+    table = table.sort_values("statistic", ascending=False, kind="stable")
+    figure, ax = number_axes(table.index)
+    ax.barh(np.arange(len(table)), table["statistic"], 0.6, color=BLUE)
+    ax.set(xlabel="distance between failing and passing runs (1)", xlim=(0.0, 1.0))
+    return figure
+
+
+def violation_rates(ranking: pd.DataFrame) -> Figure:
+    """Share of violations of each option with its interval."""
+    figure, ax = number_axes(ranking.index)
+    _bar(ax, ranking, ("rate", "rate_low", "rate_high"), ORANGE, "", hatch="///")
+    ax.set(xlabel="share of runs that violate the spec", xlim=(0.0, 1.02))
+    ax.xaxis.set_major_formatter(PercentFormatter(1.0))
+    return figure
+
+
+def paired_differences(table: pd.DataFrame, labels: Sequence[str], quantity: str) -> Figure:
+    """Median paired differences with their intervals; what is infinite is drawn at the edge.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Columns median, median_low, median_high.
+    labels : sequence of str
+    quantity : str
+        Name of the axis.
+    """
+    figure, ax = number_axes(labels)
+    middle, low, high = (table[c].to_numpy() for c in ("median", "median_low", "median_high"))
+    finite = np.concatenate([x[np.isfinite(x)] for x in (middle, low, high)])
+    reach = 1.15 * float(np.max(np.abs(finite), initial=0.0)) or 1.0
+    at = np.arange(len(table))
+    ax.hlines(at, np.clip(low, -reach, reach), np.clip(high, -reach, reach), color=BLUE)
+    for infinite, marker in ((middle == -np.inf, "<"), (middle == np.inf, ">")):
+        ends = np.clip(middle[infinite], -reach, reach)
+        ax.plot(ends, at[infinite], marker, color=ORANGE, markersize=7)
+    inside = np.isfinite(middle)
+    ax.plot(middle[inside], at[inside], "o", color=BLUE, markersize=5)
+    ax.axvline(0.0, color=GREY, linewidth=1.0, linestyle="--")
+    ax.set_xlim(-1.05 * reach, 1.05 * reach)
+    ax.xaxis.set_major_locator(MaxNLocator(5))
+    ax.set_xlabel(quantity, parse_math=False)
+    return figure
+
+
+def _bar(
+    ax: Axes,
+    table: pd.DataFrame,
+    columns: tuple[str, str, str],
+    colour: str,
+    label: str,
+    shift: float = 0.0,
+    hatch: str = "",
+) -> None:
+    """Draw a bar for each row, with its interval."""
+    value, low, high = (table[column].to_numpy(dtype=float) for column in columns)
+    at = np.arange(len(table)) + shift
+    height = 0.34 if shift else 0.6
+    ax.barh(at, value, height, color=colour, hatch=hatch, edgecolor="white", label=label or None)
+    ax.errorbar(
+        value,
+        at,
+        xerr=arms(value, low, high),
+        fmt="none",
+        ecolor="black",
+        elinewidth=1.2,
+        capsize=2,
+    )

@@ -1,0 +1,167 @@
+"""Figures of searches: what was found after how many runs, at which size, and where it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap, Normalize, TwoSlopeNorm
+from matplotlib.figure import Figure
+from matplotlib.tri import LinearTriInterpolator, Triangulation
+
+from ..robustness.stl.spec import violates
+from .axes import BLUE, GREEN, GREY, ORANGE, PURPLE, SHORT_LINE, WIDTH, legend_above, stacked_axes
+from .labels import arms, number_axes, plain
+from .runs import shown
+
+__all__ = ["degradation", "deviations", "failure_map", "radius_steps", "search"]
+
+SEARCHERS = {"corners": GREY, "uniform": BLUE, "CMA-ES": GREEN}
+INK = "#111111"  # on the map, which is light on dark pages as well
+COLOURS = ListedColormap(colormaps["PuOr"](np.linspace(0.15, 0.85, 256)))  # INK shows on all
+
+
+def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
+    """Lowest margin found after each run of a search, in the colour of what chose the run."""
+    figure, (ax,) = stacked_axes()
+    y, names = shown(lowest), np.asarray(searchers, dtype=object)
+    starts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1), names.size]
+    labelled = set()
+    for start, end in pairwise(starts):
+        name = str(names[start])
+        ax.axvspan(
+            start + 0.5, end + 0.5, color=SEARCHERS.get(name, PURPLE), alpha=0.15, linewidth=0,
+            label=None if name in labelled else plain(name),
+        )  # fmt: skip
+        labelled.add(name)
+    ax.step(np.arange(1, y.size + 1), y, where="post", color=ORANGE, linewidth=1.4)
+    ax.axhline(0.0, color=GREY, linewidth=1.0, linestyle="--")
+    legend_above(ax)
+    ax.set(xlabel="runs", ylabel="lowest margin (1)")
+    return figure
+
+
+def deviations(table: pd.DataFrame) -> Figure:
+    """How far the quantities of some rows deviate from nominal, in sides of the box.
+
+    Parameters
+    ----------
+    table : DataFrame
+        One row per quantity, one column per row of the study; 1 is the upper end of the box, -1
+        the lower one.
+    """
+    figure, ax = number_axes(table.index)
+    height = 0.7 / len(table.columns)
+    for i, ((name, values), (colour, hatch)) in enumerate(
+        zip(table.items(), ((GREY, ""), (ORANGE, "///")), strict=False)
+    ):
+        at = np.arange(len(table)) + (i - (len(table.columns) - 1) / 2) * height
+        ax.barh(at, values, height, color=colour, hatch=hatch, edgecolor="white", label=str(name))
+    for end in (-1.0, 0.0, 1.0):
+        ax.axvline(end, color=GREY, linewidth=0.8, linestyle="--" if end else "-")
+    legend_above(ax, line=SHORT_LINE)
+    ax.set_xlabel("deviation from nominal, in sides of the box (1)")
+    return figure
+
+
+def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | None = None) -> Figure:
+    """Share of violations with its interval against the size of the uncertainty."""
+    figure, (ax,) = stacked_axes()
+    size, rate = curve.index.to_numpy(dtype=float), curve["rate"].to_numpy()
+    ax.errorbar(
+        size, rate, yerr=arms(rate, curve["lower"], curve["upper"]), color=BLUE, marker="o",
+        markersize=4, linewidth=1.2, capsize=3,
+    )  # fmt: skip
+    if at is not None and limit is not None:
+        ax.plot([at], [limit], "v", color=ORANGE, markersize=7, label="limit")
+        ax.legend(frameon=False)
+    ax.set(xlabel="size of the uncertainty (1)", ylabel="probability of a violation")
+    ax.margins(x=0.03)
+    ax.set_ylim(bottom=-0.03 * ax.get_ylim()[1])
+    return figure
+
+
+def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
+    """Lowest margin that was found at each size that was looked at, and the radius."""
+    figure, (ax,) = stacked_axes()
+    margin = shown(steps["margin"])
+    violated = violates(margin)
+    for chosen, marker, colour, name in (
+        (~violated, "o", BLUE, "no violation found"),
+        (violated, "X", ORANGE, "violation"),
+    ):
+        if chosen.any():
+            ax.plot(steps["size"][chosen], margin[chosen], marker, color=colour, label=name)
+    if np.isfinite(radius):
+        ax.axvline(radius, color=ORANGE, linewidth=1.2, linestyle="--", label="radius at most")
+    ax.axhline(0.0, color=GREY, linewidth=1.0)
+    legend_above(ax)
+    ax.set(xlabel="size of the uncertainty (1)", ylabel="lowest margin (1)")
+    return figure
+
+
+def failure_map(
+    points: pd.DataFrame,
+    triangles: np.ndarray,
+    names: tuple[str, str],
+    labels: tuple[str, str] | None = None,
+    nominal: tuple[float, float] | None = None,
+    box: tuple[tuple[float, float], tuple[float, float]] | None = None,
+) -> Figure:
+    """Margins over the plane of two quantities, where they are 0, and the points that were run.
+
+    The colours go from the least to the largest margin, with white at 0; margins beyond ±1 are
+    drawn as ±1.
+
+    Parameters
+    ----------
+    points : DataFrame
+        The two quantities and ``spec``.
+    triangles : ndarray of int, shape (k, 3)
+        Rows of `points`.
+    names : tuple of 2 str
+    labels : tuple of 2 str, optional
+        Of the axes, with units.
+    nominal : tuple of 2 floats, optional
+    box : tuple of 2 pairs, optional
+        What the study takes to be possible: ends of both quantities.
+    """
+    figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
+    ax = figure.subplots()
+    x, y = (points[name].to_numpy(dtype=float) for name in names)
+    margin = np.clip(shown(points["spec"]), -1.0, 1.0)
+    net = Triangulation(x, y, triangles)
+    span = (x.min(), x.max(), y.min(), y.max())
+    plane = np.meshgrid(np.linspace(*span[:2], 240), np.linspace(*span[2:], 180))
+    field = LinearTriInterpolator(net, margin)(*plane)
+    image = ax.imshow(
+        field, extent=span, origin="lower", aspect="auto", cmap=COLOURS, norm=_centred(margin)
+    )
+    ax.plot(x, y, ".", color=INK, markersize=1.5, alpha=0.5, rasterized=True)
+    if margin.min() <= 0 < margin.max():
+        ax.tricontour(net, margin, levels=[0.0], colors=INK, linewidths=1.6)
+    if box is not None:
+        (left, right), (low, high) = box
+        ax.plot(
+            [left, right, right, left, left], [low, low, high, high, low], "--", color=INK,
+            linewidth=1.2,
+        )  # fmt: skip
+    if nominal is not None:
+        ax.plot(*nominal, "*", color=INK, markeredgecolor="white", markersize=13)
+    ax.set_xlim(*span[:2])
+    ax.set_ylim(*span[2:])
+    ax.set_xlabel(plain((labels or names)[0]), parse_math=False)
+    ax.set_ylabel(plain((labels or names)[1]), parse_math=False)
+    bar = figure.colorbar(image, ax=ax, label="margin (1)")
+    bar.ax.set_ylim(float(margin.min()), max(float(margin.max()), float(margin.min()) + 1e-6))
+    return figure
+
+
+def _centred(margin: np.ndarray) -> Normalize:
+    """Return the scale of colours that fits margins: 0 in the middle, their ends at its ends."""
+    low, high = float(margin.min()), float(margin.max())
+    least = 0.05  # a map that is all alike is not made to look as if it were not
+    return TwoSlopeNorm(0.0, min(low, -least), max(high, least))

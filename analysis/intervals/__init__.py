@@ -1,0 +1,1 @@
+"""Interval arithmetic: equations on balls, branch and bound, boxes, level sets."""

@@ -1,0 +1,292 @@
+"""Proved ranges: branch and bound over boxes, with equations evaluated on balls.
+
+On a box X with centre m the range of a function is enclosed by its value on X, by the mean-value
+form f(m) + f'(X)(X - m), and by both.  Where a comparison inside the equation stays undecided,
+every branch is followed and the results are joined: no branch is ever picked.
+
+What is proved is about the equation with its parameters as doubles; arithmetic between plain
+floats inside it (``2 * np.pi``) is rounded as in every run.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from nlctl._arguments import a_function, of_type, whole_number
+from nlctl._errors import ParameterError
+
+from .arithmetic import Ball, as_ball, common
+from .box import Box, Cell
+from .paths import Undecided, every_way
+
+__all__ = ["Ball", "Box", "Proof", "Range", "Undecided", "enclose", "prove", "upper"]
+
+Function = Callable[[tuple[Any, ...]], Any]
+HOPELESS = 5_000  # boxes after which a function still without bound somewhere is given up
+
+
+@dataclass(frozen=True, kw_only=True)
+class Range:
+    """A proved enclosure of a function's values on a box.
+
+    Attributes
+    ----------
+    low, high : float
+        low <= f <= high on the whole box, proved; infinite where that did not succeed.
+    least, greatest : float
+        Extreme values that are attained (on boxes with an infinite side: that interval
+        arithmetic gives at a point of the finite ones).
+    boxes, undecided : int
+        Boxes looked at, and those left without a finite bound.
+    seconds : float
+    """
+
+    low: float
+    high: float
+    least: float
+    greatest: float
+    boxes: int
+    undecided: int
+    seconds: float
+
+    @property
+    def magnitude(self) -> float:
+        """Bound of |f|."""
+        return float(np.maximum(abs(self.low), abs(self.high)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proof:
+    """What became of the claim low <= f <= high on a box.
+
+    Attributes
+    ----------
+    holds : bool or None
+        True: proved.  False: refuted, at the point `where`.  None: undecided.
+    boxes, undecided : int
+        Boxes looked at, and those that stayed undecided.
+    where : dict or None
+        The point that refutes the claim, or the centre of an undecided box.
+    value : float
+        Value of the function there.
+    seconds : float
+    """
+
+    holds: bool | None
+    boxes: int
+    undecided: int
+    where: dict[str, float] | None
+    value: float
+    seconds: float
+
+
+def enclose(function: Function, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) -> Range:
+    """Enclose the range of a function on a box, by branch and bound.
+
+    Parameters
+    ----------
+    function : callable
+        ``function((x1, ..., xm)) -> value`` for the coordinates in the order of the box; plain
+        Python and NumPy functions of scalars.
+    box : Box
+    tol : float, optional
+        Each end of the range is at most this far from a value that is attained.
+    max_boxes : int, optional
+        Limit for each end; where it is reached the range is wider, and still proved.
+
+    Returns
+    -------
+    Range
+
+    Raises
+    ------
+    ParameterError
+        If it is no function or no box, `tol` is not positive, or `max_boxes` is below 1.
+    """
+    a_function("enclose", "function", function)
+    of_type("enclose", "box", box, Box, "Box.of(x1=(-1, 1))")
+    if not tol > 0:  # infinite: the first box will do
+        raise ParameterError(f"enclose needs tol > 0, got {tol}")
+    whole_number("enclose", "max_boxes", max_boxes, at_least=1)
+    start = time.perf_counter()
+    high, greatest, n, lost = _supremum(function, box, tol, max_boxes)
+    low, least, m, missed = _supremum(lambda x: -as_ball(function(x)), box, tol, max_boxes)
+    return Range(
+        low=-low,
+        high=high,
+        least=-least,
+        greatest=greatest,
+        boxes=n + m,
+        undecided=lost + missed,
+        seconds=time.perf_counter() - start,
+    )
+
+
+def prove(
+    function: Function,
+    box: Box,
+    *,
+    low: float = -np.inf,
+    high: float = np.inf,
+    max_boxes: int = 50_000,
+) -> Proof:
+    """Prove or refute low <= f <= high on a box.
+
+    A claim that is attained with equality can only be proved where interval arithmetic is exact;
+    leave it a margin.
+
+    Parameters
+    ----------
+    function, box
+        As in `enclose`.
+    low, high : float, optional
+        The claim.
+    max_boxes : int, optional
+        Number of boxes after which the rest counts as undecided.
+
+    Raises
+    ------
+    ParameterError
+        If it is no function or no box, the claim is not low <= high, or `max_boxes` is below 1.
+    """
+    a_function("prove", "function", function)
+    of_type("prove", "box", box, Box, "Box.of(x1=(-1, 1))")
+    whole_number("prove", "max_boxes", max_boxes, at_least=1)
+    if not low <= high:  # refuses NaN, too
+        raise ParameterError(f"prove needs low <= high, got {low} and {high}")
+    start, queue, boxes = time.perf_counter(), [box.cell], 0
+    undecided, where, value, holds = 0, None, np.nan, True
+    while queue and boxes < max_boxes:
+        cell = queue.pop()
+        boxes += 1
+        bound, centre, gradient = _bounds(function, cell)
+        if bound.lower() >= low and bound.upper() <= high:
+            continue
+        refuted = centre.upper() < low or centre.lower() > high
+        halves = [] if refuted else _halves(cell, gradient, box)
+        if not halves:
+            where, value = dict(zip(box.names, _centre(cell), strict=True)), float(centre.mid())
+            holds, undecided = (False, 0) if refuted else (None, undecided + 1)
+        if refuted:
+            break
+        queue += halves
+    else:
+        if queue:
+            holds, undecided = None, undecided + len(queue)
+            where = where or dict(zip(box.names, _centre(queue[-1]), strict=True))
+    seconds = time.perf_counter() - start
+    return Proof(
+        holds=holds, boxes=boxes, undecided=undecided, where=where, value=value, seconds=seconds
+    )
+
+
+def _supremum(
+    function: Function, box: Box, tol: float, max_boxes: int
+) -> tuple[float, float, int, int]:
+    """Return a proved upper bound, the largest value met, boxes used and boxes undecided."""
+    order, boxes, best = itertools.count(), 0, -np.inf
+    heap: list[tuple[float, int, Cell, Any]] = []
+    done: list[float] = []
+    todo = [box.cell]
+    while True:
+        for cell in todo:
+            boxes += 1
+            bound, centre, gradient = _bounds(function, cell)
+            met = centre.upper() if _is_infinite(cell) else centre.lower()
+            best = max(best, float(met)) if met.is_finite() else best
+            heapq.heappush(heap, (-upper(bound), next(order), cell, gradient))
+        end, _, cell, gradient = heap[0]
+        limit = max_boxes if np.isfinite(end) else min(max_boxes, HOPELESS)
+        if -end - best <= tol or boxes >= limit:
+            break
+        todo = _halves(cell, gradient, box)
+        heapq.heappop(heap)
+        if not todo:  # as small as floats allow
+            done.append(-end)
+            if not heap:
+                break
+    bounds = [*done, *(-h[0] for h in heap)]
+    return max(bounds), best, boxes, sum(b == np.inf for b in bounds)
+
+
+def upper(ball: Any) -> float:
+    """Return the upper end of a ball as a float, rounded up; infinite for what is no number."""
+    end = as_ball(ball).value.upper()
+    if not end.is_finite():
+        return np.inf
+    nearest = float(end)
+    return nearest if arb(nearest) >= end else float(np.nextafter(nearest, np.inf))
+
+
+def _is_infinite(cell: Cell) -> bool:
+    return not np.all(np.isfinite(cell))
+
+
+def _centre(cell: Cell) -> tuple[float, ...]:
+    return tuple(
+        0.5 * a + 0.5 * b if np.isfinite(a) and np.isfinite(b) else np.nan for a, b in cell
+    )
+
+
+def _interval(a: float, b: float) -> arb:
+    return arb(a) if a == b else arb(a).union(arb(b)) if np.isfinite(b - a) else arb(0, "inf")
+
+
+def _bounds(function: Function, cell: Cell) -> tuple[arb, arb, tuple[arb, ...] | None]:
+    """Return the range on a cell, the value at its centre, and the gradient's range.
+
+    The gradient is None where the function, having branches there, need not be continuous.
+    """
+    wide = [_interval(a, b) for a, b in cell]
+    middle = _centre(cell)
+    points = [arb(m) if np.isfinite(m) else w for m, w in zip(middle, wide, strict=True)]
+    centre = _every_branch(function, points)
+    unit = [tuple(arb(int(i == j)) for i in range(len(cell))) for j in range(len(cell))]
+    try:
+        value = as_ball(function(tuple(map(Ball, wide, unit))))
+    except Undecided:
+        return _every_branch(function, wide), centre, None
+    gradient = value.gradient or (arb(0),) * len(cell)
+    mean = centre
+    for slope, w, point in zip(gradient, wide, points, strict=True):
+        mean = mean + slope * (w - point) if not slope.is_zero() else mean
+    return common(value.value, mean), centre, gradient
+
+
+def _every_branch(function: Function, coordinates: Sequence[arb]) -> arb:
+    """Return the hull over every way through the function; NaN if there is no end of them."""
+    balls, hull = tuple(map(Ball, coordinates)), None
+    try:
+        for result in every_way(lambda: function(balls)):
+            value = as_ball(result).value
+            hull = value if hull is None else hull.union(value)
+    except Undecided:
+        return arb.nan()
+    assert hull is not None
+    return hull
+
+
+def _halves(cell: Cell, gradient: tuple[arb, ...] | None, box: Box) -> list[Cell]:
+    """Halve a cell across the side that matters most; nothing if floats leave no room."""
+    weights = []
+    for i, (a, b) in enumerate(cell):
+        middle = 0.5 * a + 0.5 * b
+        whole = box.high[i] - box.low[i]
+        room = np.isfinite(b - a) and a < middle < b
+        steep = gradient is not None and all(g.is_finite() for g in gradient)
+        scale = float(gradient[i].abs_upper()) if steep and gradient else 1 / whole if whole else 0
+        weights.append((b - a) * scale if room else -1.0)
+    i = int(np.argmax(weights))
+    if weights[i] < 0:
+        return []
+    a, b = cell[i]
+    middle = 0.5 * a + 0.5 * b
+    return [(*cell[:i], half, *cell[i + 1 :]) for half in ((a, middle), (middle, b))]

@@ -1,0 +1,168 @@
+"""Difference quotients in v: F(x, v)/v = (f(x, v) - f(x, 0))/v without a division by v.
+
+A `Slope` carries a quantity at v, the same at v = 0, and their difference quotient, through the
+equation.  Terms without v then have the quotient 0 exactly, the limit v -> 0 needs no care, and
+the quotient has no pole for balls that contain v = 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flint import arb
+
+from nlctl.expressions.functions import FUNCTIONS
+
+from .arithmetic import Ball, NumPyFunctions, as_ball, common
+from .paths import Undecided
+
+__all__ = ["Slope", "slope_in"]
+
+
+class Slope(NumPyFunctions):
+    """A quantity q of an equation: q(v), q(0) and (q(v) - q(0)) / v, each a `Ball`."""
+
+    __slots__ = ("base", "here", "quotient")
+
+    def __init__(self, here: Ball, base: Ball, quotient: Ball) -> None:
+        self.here = here
+        self.base = base
+        self.quotient = quotient
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the quantity does not depend on v."""
+        return self.here is self.base
+
+    def __neg__(self) -> Slope:
+        return Slope(-self.here, -self.base, -self.quotient)
+
+    def __pos__(self) -> Slope:
+        return self
+
+    def __add__(self, other: Any) -> Any:
+        other = _as_slope(other)
+        if other is NotImplemented:
+            return other
+        return Slope(self.here + other.here, self.base + other.base, self.quotient + other.quotient)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        return self + -other
+
+    def __rsub__(self, other: Any) -> Any:
+        return -self + other
+
+    def __mul__(self, other: Any) -> Any:
+        other = _as_slope(other)
+        if other is NotImplemented:
+            return other
+        if other.is_constant:  # not 0 times v, which is nothing where v is unbounded
+            quotient = other.base * self.quotient
+        elif self.is_constant:
+            quotient = self.base * other.quotient
+        else:
+            quotient = self.here * other.quotient + other.base * self.quotient
+        return Slope(self.here * other.here, self.base * other.base, quotient)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        other = _as_slope(other)
+        if other is NotImplemented:
+            return other
+        base = self.base / other.base
+        quotient = (self.quotient - base * other.quotient) / other.here
+        return Slope(self.here / other.here, base, quotient)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        other = _as_slope(other)
+        return other if other is NotImplemented else other / self
+
+    def __pow__(self, n: Any) -> Slope:
+        if n != int(n):
+            return (self.apply("log") * n).apply("exp")
+        if n < 0:
+            return 1 / self**-n
+        result = _as_slope(1)
+        for _ in range(int(n)):
+            result = result * self
+        return result
+
+    def __abs__(self) -> Slope:
+        return self if self >= 0 else -self
+
+    def minimum(self, other: Any) -> Any:
+        """Smaller one, where that is decided."""
+        return self if self <= other else other
+
+    def maximum(self, other: Any) -> Any:
+        """Larger one, where that is decided."""
+        return self if self >= other else other
+
+    def apply(self, name: str) -> Slope:
+        """Return phi of the quantity for the NumPy function of that name."""
+        here, base = self.here.apply(name), self.base.apply(name)
+        secant = _secant(name, self.here, self.base, here, base)
+        return Slope(here, base, secant * self.quotient)
+
+    def _agree(self, at_v: bool, at_zero: bool) -> bool:
+        """A quotient exists within one branch only."""
+        if at_v != at_zero:
+            raise Undecided("v and 0 lie on different branches of the equation")
+        return at_v
+
+    def __lt__(self, other: Any) -> bool:
+        other = _as_slope(other)
+        return self._agree(self.here < other.here, self.base < other.base)
+
+    def __le__(self, other: Any) -> bool:
+        other = _as_slope(other)
+        return self._agree(self.here <= other.here, self.base <= other.base)
+
+    def __gt__(self, other: Any) -> bool:
+        return not self <= other
+
+    def __ge__(self, other: Any) -> bool:
+        return not self < other
+
+    def __eq__(self, other: object) -> bool:
+        return self <= other and self >= other
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __bool__(self) -> bool:
+        return self != 0
+
+
+def _as_slope(x: Any) -> Any:
+    if isinstance(x, Slope):
+        return x
+    ball = as_ball(x)
+    return ball if ball is NotImplemented else Slope(ball, ball, Ball(arb(0)))
+
+
+def _secant(name: str, a: Ball, b: Ball, at_a: Ball, at_b: Ball) -> Ball:
+    """Return (phi(a) - phi(b)) / (a - b), with the limit phi'(a) where a = b.
+
+    It is the mean of phi' between a and b, so it lies in phi'(hull) and its derivatives with
+    respect to a and b lie in phi''(hull) / 2.  Where a - b has no zero the quotient itself is
+    an enclosure as well.
+    """
+    mean = as_ball(FUNCTIONS[name].derivative[0](Ball(a.value.union(b.value), (arb(1),))))
+    half = (mean.gradient[0] if mean.gradient else arb(0)) / 2
+    enclosure = (a + b).chain(mean.value, half)
+    distance = a - b
+    if distance.value.contains(0):
+        return enclosure
+    quotient = (at_a - at_b) / distance
+    pairs = zip(enclosure.gradient, quotient.gradient, strict=True)
+    return Ball(common(enclosure.value, quotient.value), tuple(common(g, h) for g, h in pairs))
+
+
+def slope_in(function: Any, v: Any) -> Ball:
+    """Return (q(v) - q(0)) / v for a function q of one number, as a ball."""
+    result = function(Slope(as_ball(v), Ball(arb(0)), Ball(arb(1))))
+    return result.quotient if isinstance(result, Slope) else Ball(arb(0))

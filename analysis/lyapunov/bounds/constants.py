@@ -1,0 +1,225 @@
+"""The constants of the proof (18)-(36) for one loop and one box, each with its provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl._arguments import number, of_type, vector
+from nlctl._errors import ParameterError
+from nlctl.functions import smooth_sign
+from nlctl.plants import coordinate_names
+
+from ...intervals.arithmetic import as_ball
+from ...intervals.box import Box, visited_box
+from ...intervals.branch_and_bound import Proof, Range, enclose, prove, upper
+from ..loop.roles import Parts, read_parts
+from .decomposition import Decomposition, decompose
+from .final_bound import KAPPA, alpha_0, alpha_1, initial_V, total_error
+from .provenance import Constant, Constants, Provenance, bound, per_second
+from .sector import Sector, plant_terms, sector
+from .weights import approximation_error, network_on_grid, tightest_weights
+
+__all__ = ["Constant", "Constants", "constants", "disturbance", "kappa", "visited_box"]
+
+
+def kappa() -> Proof:
+    """Prove s - s tanh s <= 0.2785 for s >= 0, (29), with the equation of the robust term.
+
+    By branch and bound on [0, 10].  Beyond, s - s tanh s < 2 s exp(-2 s), which falls for
+    s > 1/2 and is below 1e-7 at s = 10.
+    """
+    return prove(lambda s: s[0] - s[0] * smooth_sign(s[0], 1.0), Box.of(s=(0, 10)), high=KAPPA)
+
+
+def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float = 1e-3) -> Range:
+    """Prove the range of d(x, t) over a box and a span of time, which may be infinite.
+
+    Parameters
+    ----------
+    plant : record
+        Plant of the class (1).
+    box : Box
+        Sides x1, ..., xn.
+    times : (start, end)
+        In s; ``(0, inf)`` bounds d for all time, with the phases at their worst.
+    tol : float, optional
+        As in `analysis.intervals.branch_and_bound.enclose`.
+    """
+    _, d = plant_terms(plant)
+    of_type("disturbance", "box", box, Box, "Box.of(x1=(-1, 1))")
+    if not (isinstance(times, tuple | list) and len(times) == 2 and times[0] <= times[1]):
+        raise ParameterError(f"disturbance needs times = (start, end) in s, got {times}")
+    return enclose(lambda z: d(z[:-1], z[-1]), box.times("t", *times), tol=tol)
+
+
+def constants(
+    loop: ct.InterconnectedSystem,
+    box: Box,
+    *,
+    W: Any = None,
+    k: tuple[float, float] | None = None,
+    times: tuple[float, float] = (0.0, np.inf),
+    start: Mapping[str, float] | None = None,
+    params: Mapping[str, Any] | None = None,
+    tol: float = 1e-3,
+) -> Constants:
+    """Assemble the constants of the proof for a loop and a box.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+        A loop of `nlctl.paper`, or any diagram of a plant, an actuator, a reference and the
+        pieces of the paper's controller.
+    box : Box
+        Sides x1, ..., xn, and v (all v without it); see `visited_box`.  A side u says for which
+        inputs a split of the actuator is proved.
+    W : array_like of shape (l,), optional
+        Ideal weights; by default those that make C_0 smallest, see `tightest_weights`.
+    k : (k_1, k_2), optional
+        Bounds of the actuator's gain, see `decompose`.
+    times : (start, end), optional
+        Span of time for d*, in s.
+    start, params : mapping, optional
+        Initial states and parameters other than the loop's own.
+    tol : float, optional
+        Of every branch and bound.
+
+    Returns
+    -------
+    Constants
+
+    Raises
+    ------
+    DiagramError
+        If the loop is not one that the proof is about.
+    DecompositionError
+        If the actuator has no split (2).
+    ParameterError, UnknownNameError
+        If the box lacks a side, W has the wrong length or its norm is above 1e5.
+    """
+    parts = read_parts(loop, start, params)
+    box = of_type("constants", "box", box, Box, "Box.of(x1=(-1, 1), v=(-5, 5))")
+    number("constants", "tol", tol, above=0)
+    states = box.only(*coordinate_names(parts.order))
+    v = box["v"] if "v" in box.names else (-np.inf, np.inf)
+    over_v = states.times("v", *v)
+    bounds = sector(parts.plant, over_v, tol=tol)
+    reach = {"u_max": max(map(abs, box["u"]))} if "u" in box.names else {}
+    split = decompose(parts.actuator, k=k, **reach)
+    d = disturbance(parts.plant, states, times, tol=tol)
+    rest = total_error(bounds.G_max, split.eps_star, d.magnitude, 0.0)
+    W, origin = _weights(parts, states, W, rest)
+    eps = approximation_error(parts.plant, parts.basis, W, states, tol=tol)
+    G_max = as_ball(bounds.G_max)
+    delta = upper(total_error(G_max, split.eps_star, d.magnitude, eps.magnitude))
+    entries = (
+        *_sector_entries(bounds, over_v, parts.order),
+        *_split_entries(split),
+        *_error_entries(d, eps, states, times, parts.order),
+        *_final_entries(parts, W, origin, delta),
+    )
+    return Constants(entries=entries, parts=parts, box=over_v, sector=bounds, split=split, W=W)
+
+
+def _weights(
+    parts: Parts, box: Box, W: Any, rest: float
+) -> tuple[np.ndarray, tuple[Provenance, str]]:
+    """Return the weights, and where they come from."""
+    nodes = len(parts.gains.W_hat_0)
+    if not nodes:
+        return np.zeros(0), ("given", "no network")
+    if W is None and not np.isfinite(rest):
+        return np.zeros(nodes), ("computed", "0: delta* is infinite for every W")
+    if W is None:
+        W = tightest_weights(network_on_grid(parts.plant, parts.basis, box), parts.gains, rest)
+        return W, ("computed", "argmin of C_0 (convex programme on a grid); any W will do")
+    W = vector("constants", "W", W)
+    if W.shape != (nodes,):
+        raise ParameterError(f"constants needs W of shape ({nodes},), got {W.shape}")
+    return W, ("given", "any W will do")
+
+
+def _outcome(bound: float) -> Provenance:
+    return "proved" if np.isfinite(bound) else "undecided"
+
+
+def _sector_entries(bounds: Sector, box: Box, n: int) -> list[Constant]:
+    how = f"F/v, {bounds.boxes} boxes"
+    notes = {"m1": "v >= 0", "m2": "v >= 0", "m3": "v < 0, upper", "m4": "v < 0, lower"}
+    return [
+        Constant(
+            symbol=symbol,
+            value=getattr(bounds, symbol),
+            unit=per_second(n),
+            provenance=_outcome(getattr(bounds, symbol)),
+            how=f"{notes[symbol]}: {how}" if symbol in notes else how,
+            over=str(box),
+        )
+        for symbol in ("m1", "m2", "m3", "m4", "G_min", "G_max")
+        if not np.isnan(getattr(bounds, symbol))  # a box without v < 0 has no m3, m4
+    ]
+
+
+def _split_entries(split: Decomposition) -> list[Constant]:
+    values = {"k_1": split.k_1, "k_2": split.k_2, "eps_u*": split.eps_star}
+    return [
+        Constant(
+            symbol=symbol,
+            value=value,
+            unit="1",
+            provenance=split.provenance,
+            how=split.how,
+            over=split.over,
+        )
+        for symbol, value in values.items()
+    ]
+
+
+def _error_entries(
+    d: Range, eps: Range, box: Box, times: tuple[float, float], n: int
+) -> list[Constant]:
+    at = f"{box}, t in [{times[0]:g}, {times[1]:g}] s"
+    rows = (
+        ("d*", d, "sup |d(x, t)|", at),
+        ("eps*", eps, "sup |g - W^T psi|", str(box)),
+    )
+    return [
+        Constant(
+            symbol=symbol,
+            value=found.magnitude,
+            unit=per_second(n),
+            provenance=_outcome(found.magnitude),
+            how=f"{how}, {found.boxes} boxes",
+            over=over,
+        )
+        for symbol, found, how, over in rows
+    ]
+
+
+def _final_entries(
+    parts: Parts, W: np.ndarray, origin: tuple[Provenance, str], delta: float
+) -> list[Constant]:
+    """(20), (29), (31), (21), (36), rounded up."""
+    gains, n = parts.gains, parts.order
+    error = W - np.array(gains.W_hat_0)
+    squares = [sum((as_ball(w) ** 2 for w in vector), as_ball(0)) for vector in (W, error)]
+    a_0 = upper(alpha_0(gains, as_ball(delta), squares[0]))
+    V_0, a_1 = upper(initial_V(gains, as_ball(delta), squares[1])), alpha_1(gains)
+    rates = "min{2 beta, sigma_1 Gamma, sigma_2 gamma}" if gains.W_hat_0 else "no network"
+    rows: list[tuple[str, float, str, Provenance, str, str]] = [
+        ("|W|", float(np.linalg.norm(W)), per_second(n), *origin, "a fixed W"),
+        ("kappa", KAPPA, "1", "proved", "(29), branch and bound and a tail estimate", "all s"),
+        ("delta*", delta, per_second(n), "computed", "G_max eps_u* + d* + eps*", "the box"),
+        ("alpha_1", a_1, "1/s", "computed", rates, "all t"),
+        ("alpha_0", a_0, per_second(2 * n - 1), "computed", "(31)", "the box"),
+        ("V(0)", V_0, per_second(2 * n - 2), "computed", "(21)", "this initial state"),
+        ("C_0", bound(a_0, a_1, V_0, 0.0), per_second(n - 1), "computed", "(36), Q = 0", "the box"),
+    ]
+    return [
+        Constant(symbol=symbol, value=value, unit=unit, provenance=origin, how=how, over=over)
+        for symbol, value, unit, origin, how, over in rows
+    ]

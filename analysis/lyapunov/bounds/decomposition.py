@@ -1,0 +1,373 @@
+"""Assumption 1: actuators as v = k(u, t) u + eps_u (2), with the bounds (3) of k and of eps_u.
+
+The split of an actuator is not unique.  Any bounds 0 < k_1 <= k_2 give one: k u is v clipped
+between the lines k_1 u and k_2 u, and eps_u the rest.  A small k_1 buys a small eps_u.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from flint import arb
+
+from nlctl._arguments import number, vector
+from nlctl._errors import ParameterError, UsageError
+from nlctl._param import equation_arguments
+from nlctl.actuators import Backlash, DeadZone, play_band
+from nlctl.functions import clip
+
+from ...intervals.arithmetic import Ball, as_ball, common
+from ...intervals.branch_and_bound import Box, Range, Undecided, enclose
+from ...intervals.paths import on_balls
+from ...intervals.quotient import slope_in
+from ...intervals.time_dependence import UNREAD, reads_time
+
+__all__ = ["Decomposable", "Decomposition", "DecompositionError", "clipped_split", "decompose"]
+
+UNTIMED, TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
+Edge = Callable[[Any, Any], Any]
+TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared splits are tried
+
+
+class DecompositionError(UsageError):
+    """An actuator that (2) and (3) do not describe; the message says why."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decomposition:
+    """A split v = k(u, v) u + eps_u of an actuator, (2) and (3).
+
+    Attributes
+    ----------
+    k_1, k_2 : float
+        0 < k_1 <= k <= k_2.
+    eps_low, eps_high : float
+        Bounds of eps_u.
+    part : callable
+        ``part(u, v)`` is k u; floats and arrays.  `gain` and `eps_u` follow from it.
+    provenance : {"computed", "proved", "given"}
+        "computed" in closed form, "proved" by branch and bound, "given" by the record alone:
+        samples do not refute it, and nothing proves it.
+    how, over : str
+        How the bounds were obtained, and for which inputs they hold.
+    """
+
+    k_1: float
+    k_2: float
+    eps_low: float
+    eps_high: float
+    part: Callable[[Any, Any], Any]
+    provenance: Literal["proved", "computed", "given"]
+    how: str
+    over: str
+
+    def __post_init__(self) -> None:
+        if not 0 < self.k_1 <= self.k_2 < np.inf:
+            raise DecompositionError(
+                f"Assumption 1 needs 0 < k_1 <= k_2, got {self.k_1:g} and {self.k_2:g}"
+            )
+
+    @property
+    def eps_star(self) -> float:
+        """Bound eps_u* of |eps_u|."""
+        return float(np.maximum(abs(self.eps_low), abs(self.eps_high)))
+
+    def eps_u(self, u: Any, v: Any) -> Any:
+        """Return eps_u = v - k u for input u and output v."""
+        return v - self.part(u, v)
+
+    def gain(self, u: Any, v: Any) -> Any:
+        """Return k for input u and output v; k_1 at u = 0, where it has no effect."""
+        u = np.asarray(u, dtype=float)
+        k = self.part(u, v) / np.where(u == 0, 1.0, u)
+        return np.where(u == 0, self.k_1, k)
+
+
+class Decomposable(Protocol):
+    """An actuator record that knows its own split."""
+
+    def decomposition(self, u_max: float) -> Decomposition:
+        """Return the split for inputs |u| <= u_max."""
+        ...
+
+
+def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
+    """Return k u of the split k = min(max(v/u, k_1), k_2), written without the division.
+
+    It serves numbers, arrays and balls, and leaves the smallest |eps_u| that any split with
+    k_1 <= k <= k_2 leaves at (u, v).
+
+    Raises
+    ------
+    ParameterError
+        If not 0 < k_1 <= k_2, both finite.
+    """
+    number("clipped_split", "k_1", k_1, above=0)
+    number("clipped_split", "k_2", k_2, at_least=k_1)
+
+    def part(u: Any, v: Any) -> Any:
+        one, other = k_1 * u, k_2 * u
+        return clip(v, np.minimum(one, other), np.maximum(one, other))
+
+    return part
+
+
+def check_gain(who: str, k: Any) -> None:
+    """Refuse bounds of k that are no pair with 0 < k_1 <= k_2; None is none.
+
+    Raises
+    ------
+    ParameterError
+    """
+    bounds = None if k is None else vector(who, "k = (k_1, k_2)", k)
+    if bounds is not None and (bounds.size != 2 or not 0 < bounds[0] <= bounds[1]):
+        raise ParameterError(f"{who} needs k = (k_1, k_2) with 0 < k_1 <= k_2, got {k}")
+
+
+def decompose(
+    actuator: Any,
+    *,
+    k: tuple[float, float] | None = None,
+    u_max: float = 60.0,
+    tol: float = 1e-4,
+) -> Decomposition:
+    """Split an actuator as v = k u + eps_u and bound k and eps_u.
+
+    Parameters
+    ----------
+    actuator : record
+        A `nlctl.DeadZone` (by default split as in textbooks: k is the slope factor, and 1 inside
+        the dead zone), a `nlctl.Backlash` (k is the slope), a memoryless actuator with one input
+        and one output (`k` must be given), or a record with a method ``decomposition(u_max)``,
+        see `Decomposable`.
+    k : (k_1, k_2), optional
+        Bounds that k shall have.  The split is then `clipped_split`, and eps_u is bounded by
+        branch and bound.
+    u_max : float, optional
+        Largest |u| of the branch and bound.
+    tol : float, optional
+        eps_u* is at most this far from a value that is attained.
+
+    Notes
+    -----
+    The bounds hold for all t >= 0: time is a side of the boxes.  What a record declares itself is
+    "proved" where branch and bound confirms it, and "given" otherwise, whatever the record says.
+
+    Returns
+    -------
+    Decomposition
+
+    Raises
+    ------
+    DecompositionError
+        If eps_u is not bounded for all u, as with saturation, no split is known, or the record's
+        own one is refuted by a sample of its output.
+    ParameterError
+        If `k` is no pair with 0 < k_1 <= k_2, or `u_max` or `tol` is not positive.
+    """
+    u_max = number("decompose", "u_max", u_max, above=0)
+    tol = number("decompose", "tol", tol, above=0)
+    check_gain("decompose", k)
+    if k is None and hasattr(actuator, "decomposition"):
+        return _declared_split(actuator, u_max, tol)
+    if k is None and type(actuator) is DeadZone:
+        return _textbook_dead_zone(actuator)
+    if k is None and type(actuator) is Backlash:
+        if actuator.m_r == actuator.m_l:
+            return _play(actuator)
+        k = (min(actuator.m_r, actuator.m_l), max(actuator.m_r, actuator.m_l))
+    if k is None:
+        raise DecompositionError(
+            f"{type(actuator).__name__} has no known split (2): give the bounds k=(k_1, k_2), or "
+            "the record a method decomposition(u_max)"
+        )
+    return _proved_split(actuator, k, u_max, tol)
+
+
+def _declared_split(actuator: Any, u_max: float, tol: float) -> Decomposition:
+    """Return the split that a record declares, with what is known of it."""
+    split = actuator.decomposition(u_max)
+    _refute(actuator, split, u_max)
+    given = dataclasses.replace(
+        split, provenance="given", how=f"declared by {type(actuator).__name__}: {split.how}"
+    )
+    try:
+        proved = _proved_split(actuator, (split.k_1, split.k_2), u_max, tol)
+    except DecompositionError:
+        return given
+    if proved.eps_low < split.eps_low - tol or proved.eps_high > split.eps_high + tol:
+        return given
+    low, high = min(proved.eps_low, split.eps_low), max(proved.eps_high, split.eps_high)
+    return dataclasses.replace(proved, eps_low=low, eps_high=high)
+
+
+def _refute(actuator: Any, split: Decomposition, u_max: float) -> None:
+    """Look for an input and a time at which a memoryless actuator breaks what it declares."""
+    if len(actuator.states):
+        return
+    _, output = _edges(actuator)
+    points = [(u, 0.0) for u in np.linspace(-u_max, u_max, 2001)]
+    points += [(u, t) for t in TIMES for u in np.linspace(-u_max, u_max, 101)]
+    for u, t in points:
+        v = output(u, t)
+        k, eps_u = split.gain(u, v), split.eps_u(u, v)
+        room = 1e-9 * (1 + abs(v))
+        if not (
+            split.k_1 - 1e-9 <= k <= split.k_2 + 1e-9
+            and split.eps_low - room <= eps_u <= split.eps_high + room
+        ):
+            raise DecompositionError(
+                f"{type(actuator).__name__} declares k in [{split.k_1:g}, {split.k_2:g}] and eps_u "
+                f"in [{split.eps_low:g}, {split.eps_high:g}], but at u = {u:g}, t = {t:g} s k is "
+                f"{k:g} and eps_u is {eps_u:g}: correct its decomposition"
+            )
+
+
+def _textbook_dead_zone(zone: DeadZone) -> Decomposition:
+    """k = m(u) outside and 1 inside: eps_u = -m(u) b outside, -u inside."""
+    right = zone.slope_r + abs(zone.ripple_r)
+    left = zone.slope_l + abs(zone.ripple_l)
+    least = min(zone.slope_r - abs(zone.ripple_r), zone.slope_l - abs(zone.ripple_l))
+
+    def part(u: Any, v: Any) -> Any:
+        u, v = np.asarray(u, dtype=float), np.asarray(v, dtype=float)
+        inside = (zone.b_l <= u) & (u <= zone.b_r)
+        distance = np.where(u > 0, u - zone.b_r, u - zone.b_l)
+        return np.where(inside, u, v / np.where(inside, 1.0, distance) * u)
+
+    return Decomposition(
+        k_1=min(1.0, least),
+        k_2=max(1.0, right, left),
+        eps_low=-zone.b_r * max(1.0, right),
+        eps_high=-zone.b_l * max(1.0, left),
+        part=part,
+        provenance="computed",
+        how="slope factor outside the dead zone, 1 inside: eps_u = -m(u) b, or -u",
+        over="all u",
+    )
+
+
+def _play(play: Backlash) -> Decomposition:
+    """k = m: v lies between m (u - c_r) and m (u - c_l)."""
+    m = play.m_r
+    return Decomposition(
+        k_1=m,
+        k_2=m,
+        eps_low=-m * play.c_r,
+        eps_high=-m * play.c_l,
+        part=clipped_split(m, m),
+        provenance="computed",
+        how="k is the slope; v lies in the gap from the first instant",
+        over="all u",
+    )
+
+
+def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: float) -> Decomposition:
+    edges = _edges(actuator)
+    wide = _eps_range(k, edges, 2 * u_max, tol)
+    undecided = sum(end.undecided for end in wide)
+    if undecided:
+        raise DecompositionError(
+            f"eps_u of {type(actuator).__name__} could not be bounded for |u| <= {2 * u_max:g}: "
+            f"{undecided} boxes are undecided"
+        )
+    _refuse_growth(actuator, k, u_max, (_eps_range(k, edges, u_max, tol), wide))
+    return Decomposition(
+        k_1=k[0],
+        k_2=k[1],
+        eps_low=wide[0].low,
+        eps_high=wide[1].high,
+        part=clipped_split(*k),
+        provenance="proved",
+        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in wide)} boxes",
+        over=f"|u| <= {2 * u_max:g}, all t",
+    )
+
+
+def _edges(actuator: Any) -> tuple[Edge, Edge]:
+    """Return the least and the greatest output v that the actuator can have at input u, time t."""
+    p = equation_arguments(actuator)
+    if type(actuator) is Backlash:
+        return (lambda u, t: play_band(u, p)[0]), (lambda u, t: play_band(u, p)[1])
+    if len(actuator.states) or len(actuator.inputs) != 1 or len(actuator.outputs) != 1:
+        raise DecompositionError(
+            f"{type(actuator).__name__} has memory or several signals: give the record a method "
+            "decomposition(u_max)"
+        )
+
+    def refusal(why: str) -> DecompositionError:
+        return DecompositionError(
+            f"the output of {type(actuator).__name__} cannot be evaluated on intervals of u "
+            f"and t ({why}): write it with arithmetic and NumPy functions of numbers"
+        )
+
+    output = on_balls(lambda u, t: actuator.output(t, (), (u,), p)[0], refusal)
+    return output, output
+
+
+def _eps_range(
+    k: tuple[float, float], edges: tuple[Edge, Edge], u_max: float, tol: float
+) -> tuple[Range, Range]:
+    """Ranges of eps_u along both edges, for all t >= 0; it grows with v, so these are its ends."""
+    part = clipped_split(*k)
+
+    def along(edge: Edge) -> Range:
+        def eps_u(point: tuple[Any, ...]) -> Any:
+            u, t = (*point, UNREAD)[:2]
+            v = edge(u, t)
+            rest = as_ball(v - part(u, v))
+            return rest if t is UNREAD else _sharpened(rest, edge, k, u, t)
+
+        if reads_time(edge):
+            box, limit = Box.of(u=(-u_max, u_max), t=(0.0, np.inf)), TIMED
+        else:
+            box, limit = Box.of(u=(-u_max, u_max)), UNTIMED
+        return enclose(eps_u, box, tol=tol, max_boxes=limit)
+
+    low = along(edges[0])
+    return low, low if edges[1] is edges[0] else along(edges[1])
+
+
+def _sharpened(rest: Any, edge: Edge, k: tuple[float, float], u: Any, t: Any) -> Any:
+    """Return eps_u from the difference quotient q of v in u as well, v = q u + v(0, t).
+
+    v - clip(v, k_1 u, k_2 u) grows with v, and no faster: it is u (q - clip(q, k_1, k_2)) and what
+    lies between 0 and v(0, t).  Between v and its clipped self intervals forget that t is one time.
+    """
+    try:
+        q, start = slope_in(lambda w: edge(w, t), u).value, as_ball(edge(0.0, t)).value
+    except Undecided:
+        return rest
+    low, high = (_excess(end, k) for end in (q.lower(), q.upper()))
+    sharper = as_ball(u).value * low.union(high) + arb(0).union(start)
+    if not rest.value.overlaps(sharper):  # answers that contradict each other: nobody goes this way
+        return rest
+    value = common(rest.value, sharper)
+    return Ball(value, (arb(0, "inf"),) * len(as_ball(u).gradient))
+
+
+def _excess(q: arb, k: tuple[float, float]) -> arb:
+    return (q - k[1]).max(arb(0)) + (q - k[0]).min(arb(0))
+
+
+def _refuse_growth(
+    actuator: Any,
+    k: tuple[float, float],
+    u_max: float,
+    reach: tuple[tuple[Range, Range], tuple[Range, Range]],
+) -> None:
+    """(2) wants one eps_u* for all u; where eps_u grows with the range of u, there is none."""
+    name, near, (low, high) = type(actuator).__name__, *reach
+    bound = max(-near[0].low, near[1].high)
+    attained = max(high.greatest, -low.least)
+    if attained > bound:
+        raise DecompositionError(
+            f"{name} is not of the form (2) with k in [{k[0]:g}, {k[1]:g}]: |eps_u| is at most "
+            f"{bound:.4g} for |u| <= {u_max:g} and reaches {attained:.4g} for |u| <= "
+            f"{2 * u_max:g}, so no eps_u* bounds it for all u (saturation, or k too narrow); "
+            "give other k, or replace the actuator"
+        )

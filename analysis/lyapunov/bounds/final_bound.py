@@ -1,0 +1,109 @@
+"""The final bound of the proof: V(0), (31), (34)-(36), as formulas of the controller's gains.
+
+Each formula is written once and serves floats, balls and cvxpy expressions alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+__all__ = ["KAPPA", "Gains", "alpha_0", "alpha_1", "final_bound", "initial_V", "total_error"]
+
+KAPPA = 0.2785
+"""Bound of s - s tanh s for s >= 0, (29); `analysis.lyapunov.bounds.constants.kappa` proves it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gains:
+    """Gains of the controller (23)-(25), and where it starts.
+
+    Attributes
+    ----------
+    beta : float
+        Gain of r, (23).
+    Gamma, sigma_1 : float
+        Adaptation gain and sigma-modification of W_hat, (25).
+    gamma, sigma_2, tau : float
+        Adaptation gain, sigma-modification and width of the robust term, (25).
+    r_0, delta_hat_0 : float
+        r(0) and delta_hat(0).
+    W_hat_0 : tuple of float
+        W_hat(0); empty where there is no network.
+    b : float
+        Width of the smooth sign of r s in a law with a damped base, r (beta r + s) <= r eta +
+        0.2785 b; 0 for eta of (23).
+    """
+
+    beta: float
+    Gamma: float
+    sigma_1: float
+    gamma: float
+    sigma_2: float
+    tau: float
+    r_0: float
+    delta_hat_0: float
+    W_hat_0: tuple[float, ...]
+    b: float = 0.0
+
+
+def total_error(G_max: Any, eps_u: Any, d: Any, eps: Any) -> Any:
+    """Return delta* = G_max eps_u* + d* + eps*, the bound of all errors in (20)."""
+    return G_max * eps_u + d + eps
+
+
+def alpha_1(gains: Gains) -> float:
+    """Return alpha_1 = min{2 beta, sigma_1 / lambda_max(Gamma^-1), sigma_2 gamma}, (31).
+
+    Without a network its term drops out.
+    """
+    rates = [2 * gains.beta, gains.sigma_2 * gains.gamma]
+    if gains.W_hat_0:
+        rates.append(gains.sigma_1 * gains.Gamma)
+    return float(np.min(rates))
+
+
+def alpha_0(gains: Gains, delta: Any, W_squared: Any) -> Any:
+    """Return alpha_0 = 0.2785 (tau delta* + b) + sigma_1 |W|^2 / 2 + sigma_2 delta*^2 / 2, (31).
+
+    Parameters
+    ----------
+    gains : Gains
+    delta : float, Ball or cvxpy expression
+        delta*.
+    W_squared : float, Ball or cvxpy expression
+        |W|^2.
+    """
+    return (
+        KAPPA * gains.tau * delta
+        + KAPPA * gains.b
+        + 0.5 * gains.sigma_1 * W_squared
+        + 0.5 * gains.sigma_2 * delta**2
+    )
+
+
+def initial_V(gains: Gains, delta: Any, W_error_squared: Any) -> Any:  # noqa: N802
+    """Return V(0) = r^2/2 + |W - W_hat|^2 / (2 Gamma) + (delta* - delta_hat)^2 / (2 gamma), (21).
+
+    Parameters
+    ----------
+    gains, delta
+        As in `alpha_0`.
+    W_error_squared : float, Ball or cvxpy expression
+        |W - W_hat(0)|^2.
+    """
+    return (
+        0.5 * gains.r_0**2
+        + (0.5 / gains.Gamma) * W_error_squared
+        + (0.5 / gains.gamma) * (delta - gains.delta_hat_0) ** 2
+    )
+
+
+def final_bound(alpha_0: Any, alpha_1: float, V_0: Any, Q: float) -> Any:
+    """Return C_0 = sqrt(2 (alpha_0 / alpha_1 + V(0) + Q)), (36), for alpha_1 > 0.
+
+    With ``V_0 = 0`` and the limit superior of I(t) for `Q` it is the ultimate bound.
+    """
+    return np.sqrt(2 * (alpha_0 / alpha_1 + V_0 + Q))

@@ -1,0 +1,126 @@
+"""The numbers that the inequalities suppose, and the paper's own reading of Example 1."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nlctl._param import equation_arguments
+from nlctl.plants import ForcedDuffing, duffing_forcing
+
+from ...intervals.branch_and_bound import enclose
+from ..loop.integral import sharpest
+from .decomposition import Decomposition
+from .final_bound import Gains, alpha_0, alpha_1, total_error
+from .provenance import Constants, bound
+
+__all__ = ["Premises", "literal", "premises"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Premises:
+    """What the proof supposes of a loop, as numbers.
+
+    Attributes
+    ----------
+    gains : Gains
+    lambdas : tuple of float
+        Of the filtered error (14).
+    N : callable
+        Nussbaum function.
+    W : ndarray of shape (l,)
+        Ideal weights.
+    split : Decomposition
+        Of the actuator, along trajectories.
+    G_min, G_max, d, eps, delta : float
+        Bounds of G, d* and eps*, and delta*.
+    forcing : callable
+        ``forcing(t)`` of arrays: what the reading counts to g and not to d.
+    """
+
+    gains: Gains
+    lambdas: tuple[float, ...]
+    N: Callable[[Any], Any]
+    W: np.ndarray
+    split: Decomposition
+    G_min: float
+    G_max: float
+    d: float
+    eps: float
+    delta: float
+    forcing: Callable[[np.ndarray], np.ndarray] = np.zeros_like
+
+    @property
+    def alpha_0(self) -> float:
+        """Constant of (31)."""
+        return float(alpha_0(self.gains, self.delta, float(self.W @ self.W)))
+
+    @property
+    def alpha_1(self) -> float:
+        """Rate of (31)."""
+        return alpha_1(self.gains)
+
+    def C_0(self, V_0: float, Q: float) -> float:  # noqa: N802
+        """C_0 of (36)."""
+        return bound(self.alpha_0, self.alpha_1, V_0, Q)
+
+
+def premises(
+    constants: Constants, gains: Gains | None = None, split: Decomposition | None = None
+) -> Premises:
+    """Return the premises that constants make.
+
+    Parameters
+    ----------
+    constants : Constants
+    gains : Gains, optional
+        Of a member of an ensemble; by default those of the constants.
+    split : Decomposition, optional
+        By default `sharpest` of the constants' split.
+    """
+    parts = constants.parts
+    return Premises(
+        gains=parts.gains if gains is None else gains,
+        lambdas=tuple(parts.filtered_error.lambdas),
+        N=parts.law.N,
+        W=constants.W,
+        split=sharpest(constants.split) if split is None else split,
+        G_min=constants["G_min"],
+        G_max=constants["G_max"],
+        d=constants["d*"],
+        eps=constants["eps*"],
+        delta=constants["delta*"],
+    )
+
+
+def literal(given: Premises, constants: Constants, plant: Any = None) -> Premises | None:
+    """Return the premises of Example 1 as the paper prints them; None for another plant.
+
+    There q cos(w t) stands inside the static g(x), so that d* bounds 0.1 |x|^2 sin t alone.
+
+    Parameters
+    ----------
+    given : Premises
+    constants : Constants
+        Their plant and box give d*.
+    plant : record, optional
+        Of a member of an ensemble, for its forcing.
+    """
+    declared: Any = constants.parts.plant
+    plant = declared if plant is None else plant
+    if not isinstance(declared, ForcedDuffing):
+        return None
+    quiet = dataclasses.replace(declared, q_mean=0.0, q_ripple=0.0)
+    own, p = equation_arguments(quiet), equation_arguments(plant)
+    box = constants.box.only("x1", "x2").times("t", 0.0, np.inf)
+    d = enclose(lambda z: quiet.d(z[:-1], z[-1], own), box).magnitude
+    return dataclasses.replace(
+        given,
+        d=d,
+        delta=float(total_error(given.G_max, given.split.eps_star, d, given.eps)),
+        forcing=lambda t: duffing_forcing(t, p),
+    )

@@ -1,0 +1,119 @@
+"""What the proof's constants are: values with unit, provenance and the set that they hold over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from nlctl._names import unknown
+
+from ...intervals.arithmetic import as_ball
+from ...intervals.box import Box
+from ...intervals.branch_and_bound import upper
+from ..loop.roles import Parts
+from .decomposition import Decomposition
+from .final_bound import final_bound
+from .sector import Sector
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Constant", "Constants", "Provenance", "bound", "per_second"]
+
+Provenance = Literal["proved", "computed", "sampled", "given", "undecided"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constant:
+    """A constant of the proof.
+
+    Attributes
+    ----------
+    symbol : str
+        As in the paper, ``"delta*"``.
+    value : float
+    unit : str
+    provenance : {"proved", "computed", "sampled", "given", "undecided"}
+        "proved": by interval branch and bound.  "computed": in closed form, from constants that
+        are themselves in the table.  "sampled": from trajectories or a grid.  "given": a choice.
+        "undecided": branch and bound found no bound, and the value is infinite.
+    how : str
+        Method, or formula.
+    over : str
+        Set for which it holds.
+    """
+
+    symbol: str
+    value: float
+    unit: str
+    provenance: Provenance
+    how: str
+    over: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constants:
+    """All constants of the proof for one loop and one box.
+
+    ``constants["delta*"]`` is a value.  The bounds hold while the trajectory stays in the box.
+
+    Attributes
+    ----------
+    entries : tuple of Constant
+    parts : Parts
+        The records that they belong to; ``parts.gains`` are the controller's gains.
+    box : Box
+    sector : Sector
+    split : Decomposition
+        Of the actuator.
+    W : ndarray of shape (l,)
+        The ideal weights that were chosen; empty without a network.
+    """
+
+    entries: tuple[Constant, ...]
+    parts: Parts
+    box: Box
+    sector: Sector
+    split: Decomposition
+    W: np.ndarray
+
+    def __getitem__(self, symbol: str) -> float:
+        for entry in self.entries:
+            if entry.symbol == symbol:
+                return entry.value
+        raise unknown("constant", symbol, [entry.symbol for entry in self.entries])
+
+    def C_0(self, Q: float = 0.0) -> float:  # noqa: N802
+        """Return C_0 of (36) for Q = sup I(t), (33); infinite where alpha_1 = 0."""
+        return bound(self["alpha_0"], self["alpha_1"], self["V(0)"], Q)
+
+    def ultimate(self, limsup_I: float = 0.0) -> float:
+        """Return the bound of limsup |r| that (34) gives for limsup I(t)."""
+        return bound(self["alpha_0"], self["alpha_1"], 0.0, limsup_I)
+
+    def table(self) -> pd.DataFrame:
+        """Return the constants as a table with one row each, indexed by symbol."""
+        import pandas as pd
+
+        return pd.DataFrame([vars(entry) for entry in self.entries]).set_index("symbol")
+
+    def __str__(self) -> str:
+        width = max(len(entry.symbol) for entry in self.entries)
+        lines = [f"Constants over {self.box}"]
+        lines += [
+            f"  {e.symbol:<{width}}  {e.value:<10.6g} {e.unit:<7}  {e.provenance:<8}  {e.how}"
+            for e in self.entries
+        ]
+        return "\n".join(lines)
+
+
+def bound(alpha_0: float, alpha_1: float, V_0: float, Q: float) -> float:
+    """C_0 rounded up; without decay there is no bound."""
+    return upper(final_bound(as_ball(alpha_0), alpha_1, V_0, Q)) if alpha_1 > 0 else np.inf
+
+
+def per_second(power: int) -> str:
+    """The unit 1/s^power; x1, u and v count as pure numbers."""
+    return "1/s" if power == 1 else f"1/s^{power}"

@@ -1,0 +1,153 @@
+"""Assumption 3: the sector of F(x, v) = f(x, v) - f(x, 0), (4)-(8), proved over a box."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nlctl._arguments import of_type
+from nlctl._errors import DiagramError, ParameterError
+from nlctl._param import equation_arguments
+from nlctl.plants import PureFeedback, coordinate_names
+
+from ...intervals.box import Box
+from ...intervals.branch_and_bound import Range, enclose
+from ...intervals.quotient import slope_in
+
+__all__ = ["Sector", "plant_terms", "quotient_range", "sector"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sector:
+    """Sector constants of Assumption 3 over a box.
+
+    The paper prints m1 v <= F <= m2 v for v >= 0 and m3 v <= F <= m4 v for v < 0; dividing by
+    v < 0 turns the second pair round, so m4 <= F/v <= m3 there.
+
+    Attributes
+    ----------
+    positive, negative : Range or None
+        Proved range of F/v over the box with v >= 0 and with v < 0; at v = 0 it is dF/dv.  None
+        where the box has no such v.
+    box : Box
+    """
+
+    positive: Range | None
+    negative: Range | None
+    box: Box
+
+    @property
+    def m1(self) -> float:
+        """Lower bound of F/v for v >= 0."""
+        return self.positive.low if self.positive else np.nan
+
+    @property
+    def m2(self) -> float:
+        """Upper bound of F/v for v >= 0."""
+        return self.positive.high if self.positive else np.nan
+
+    @property
+    def m3(self) -> float:
+        """Upper bound of F/v for v < 0."""
+        return self.negative.high if self.negative else np.nan
+
+    @property
+    def m4(self) -> float:
+        """Lower bound of F/v for v < 0."""
+        return self.negative.low if self.negative else np.nan
+
+    @property
+    def G_min(self) -> float:  # noqa: N802
+        """Lower bound of G = F/v (8); Assumption 3 holds on the box where it is positive."""
+        return float(np.nanmin([self.m1, self.m4]))
+
+    @property
+    def G_max(self) -> float:  # noqa: N802
+        """Upper bound of G = F/v (8)."""
+        return float(np.nanmax([self.m2, self.m3]))
+
+    @property
+    def boxes(self) -> int:
+        """Boxes of the branch and bound."""
+        return sum(half.boxes for half in (self.positive, self.negative) if half)
+
+
+def plant_terms(plant: Any) -> tuple[Callable[[Any, Any], Any], Callable[[Any, Any], Any]]:
+    """Return f(x, v) and d(x, t) of a plant record of the class (1).
+
+    Raises
+    ------
+    DiagramError
+        If the record has no f and d.
+    """
+    if not (hasattr(plant, "f") and hasattr(plant, "d")):
+        raise DiagramError(
+            f"{type(plant).__name__} is no plant of the class (1): it lacks f and d; see "
+            "nlctl.PureFeedback"
+        )
+    if isinstance(plant, PureFeedback):  # the user's functions, without parameters
+        return plant.f, plant.d
+    p = equation_arguments(plant)
+    return lambda x, v: plant.f(x, v, p), lambda x, t: plant.d(x, t, p)
+
+
+def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) -> Sector:
+    """Prove the sector constants m1, ..., m4 and G_max of Assumption 3 over a box.
+
+    Parameters
+    ----------
+    plant : record
+        Plant of the class (1) with f(x, v), for instance `nlctl.ForcedDuffing`.
+    box : Box
+        Sides x1, ..., xn and v.
+    tol : float, optional
+        Each constant is at most this far from a value of F/v that is attained.
+    max_boxes : int, optional
+        Limit for each constant.
+
+    Returns
+    -------
+    Sector
+
+    Raises
+    ------
+    UnknownNameError
+        If the box lacks a side.
+    ParameterError
+        If it is no box, or `tol` is not positive.
+    """
+    f, _ = plant_terms(plant)
+    box = of_type("sector", "box", box, Box, "Box.of(x1=(-1, 1), v=(-5, 5))")
+    if not tol > 0:
+        raise ParameterError(f"sector needs tol > 0, got {tol}")
+    box = box.only(*coordinate_names(len(plant.states)), "v")
+    return quotient_range(lambda x, v: f(tuple(x), v), box, tol=tol, max_boxes=max_boxes)
+
+
+def quotient_range(
+    function: Callable[[tuple[Any, ...], Any], Any], box: Box, *, tol: float, max_boxes: int
+) -> Sector:
+    """Prove the range of (q(x, v) - q(x, 0)) / v over a box whose last side is v.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(x, v)``, x the coordinates of the other sides.
+    box : Box
+    tol, max_boxes
+        As for `sector`.
+    """
+
+    def gain(point: tuple[Any, ...]) -> Any:
+        *x, v = point
+        return slope_in(lambda v: function(tuple(x), v), v)
+
+    (low, high), rest = box["v"], box.only(*box.names[:-1])
+    halves: list[Range | None] = []
+    for a, b in ((max(low, 0.0), high), (low, min(high, 0.0))):
+        part = rest.times("v", a, b) if a < b or (a == b and low == high) else None
+        halves.append(enclose(gain, part, tol=tol, max_boxes=max_boxes) if part else None)
+    return Sector(positive=halves[0], negative=halves[1], box=box)

@@ -1,0 +1,210 @@
+"""Ideal weights W* of (11), and the error eps* of the network with given weights.
+
+The proof holds for every fixed W with its own eps*, so W is a choice.  The minimax weights of
+(11) are ill-conditioned (norms of 1e17 and more); those that make the final bound smallest are
+the solution of a convex programme.  Weights are computed on a grid, where eps* is a lower bound;
+`approximation_error` proves eps* over the whole box.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nlctl._errors import ParameterError
+from nlctl._param import equation_arguments
+from nlctl.controllers import AdaptiveWeights
+
+from ...intervals.branch_and_bound import Box, Range, enclose
+from .final_bound import Gains, alpha_0, alpha_1, initial_V
+from .sector import plant_terms
+
+__all__ = [
+    "LARGEST_NORM",
+    "Network",
+    "approximation_error",
+    "least_squares_weights",
+    "minimax_weights",
+    "network_on_grid",
+    "tightest_weights",
+]
+
+LARGEST_NORM = 1e5  # |W|^2 = 1e10 has a rounding error of 1e-6 in double precision
+
+
+@dataclass(frozen=True, kw_only=True)
+class Network:
+    """The network and the function that it approximates, on a grid.
+
+    Attributes
+    ----------
+    psi : ndarray of shape (m, l)
+        Basis functions at the m grid points.
+    g : ndarray of shape (m,)
+        g(x) = f(x, 0).
+    points : ndarray of shape (m, n)
+    """
+
+    psi: np.ndarray
+    g: np.ndarray
+    points: np.ndarray
+
+    def error(self, W: np.ndarray) -> float:
+        """Return max |g - W^T psi| over the grid: a lower bound of eps*."""
+        return float(np.max(np.abs(self.g - self.psi @ W)))
+
+
+def network_on_grid(plant: Any, basis: Any, box: Box, per_side: int | None = None) -> Network:
+    """Evaluate the basis and g on a full grid over a box.
+
+    Parameters
+    ----------
+    plant, basis : record
+        Plant of the class (1) and `nlctl.GaussianBasis`; the basis takes the first states.
+    box : Box
+        Sides x1, ..., xn.
+    per_side : int, optional
+        Grid points along each side; 61 for n = 2, 15 for n = 3.
+    """
+    n = len(box.names)
+    per_side = max(3, round(3500 ** (1 / n)) + 2 * (n == 2)) if per_side is None else per_side
+    axes = [np.linspace(a, b, per_side) for a, b in box.cell]
+    points = np.array(list(itertools.product(*axes)))
+    f, _ = plant_terms(plant)
+    p = equation_arguments(basis)
+    inputs = len(basis.inputs)
+    psi = np.array([basis.output(0.0, (), x[:inputs], p) for x in points])
+    return Network(psi=psi, g=np.array([f(tuple(x), 0.0) for x in points]), points=points)
+
+
+def minimax_weights(network: Network, largest: float | None = None) -> np.ndarray:
+    """Return W* of (11): the weights with the smallest max |g - W^T psi| on the grid.
+
+    A linear programme (HiGHS) with columns scaled to maximum 1.
+
+    Parameters
+    ----------
+    network : Network
+    largest : float, optional
+        Bound of every |W_i|; without it the weights have no useful size.
+
+    Returns
+    -------
+    ndarray of shape (l,)
+
+    Raises
+    ------
+    ParameterError
+        If the linear programme has no solution that HiGHS finds.
+    """
+    from scipy.optimize import linprog
+
+    scale = np.max(np.abs(network.psi), axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    columns, one = network.psi / scale, np.ones((len(network.g), 1))
+    bounds: list[tuple[float | None, float | None]] = [
+        (None, None) if largest is None else (-largest * s, largest * s) for s in scale
+    ]
+    result = linprog(
+        np.append(np.zeros(scale.size), 1.0),
+        A_ub=np.block([[columns, -one], [-columns, -one]]),
+        b_ub=np.concatenate([network.g, -network.g]),
+        bounds=[*bounds, (0, None)],
+        method="highs",
+    )
+    if result.x is None:
+        raise ParameterError(f"minimax_weights found no weights: {result.message}")
+    return result.x[:-1] / scale
+
+
+def least_squares_weights(network: Network) -> np.ndarray:
+    """Return the weights with the smallest sum of squared errors on the grid, columns scaled."""
+    scale = np.max(np.abs(network.psi), axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    return np.linalg.lstsq(network.psi / scale, network.g, rcond=None)[0] / scale
+
+
+def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.ndarray:
+    """Return the weights that make the final bound C_0 of (36) smallest, for Q = 0.
+
+    The convex programme  min alpha_0/alpha_1 + V(0)  over W and eps* with
+    delta* = delta_rest + eps* and |g - W^T psi| <= eps* on the grid (cvxpy, Clarabel).
+
+    Parameters
+    ----------
+    network : Network
+    gains : Gains
+    delta_rest : float
+        G_max eps_u* + d*.
+
+    Returns
+    -------
+    ndarray of shape (l,)
+
+    Raises
+    ------
+    ParameterError
+        If the solver finds no solution.
+    """
+    import cvxpy as cp
+
+    W, eps = cp.Variable(network.psi.shape[1]), cp.Variable(nonneg=True)
+    delta, rate = delta_rest + eps, alpha_1(gains)
+    cost = alpha_0(gains, delta, cp.sum_squares(W))
+    if rate > 0:  # otherwise C_0 is infinite for every W, and alpha_0 is what W can make small
+        cost = cost / rate + initial_V(gains, delta, cp.sum_squares(W - np.array(gains.W_hat_0)))
+    programme = cp.Problem(cp.Minimize(cost), [cp.abs(network.g - network.psi @ W) <= eps])
+    programme.solve(solver=cp.CLARABEL)
+    if W.value is None:
+        raise ParameterError(
+            f"tightest_weights found no weights: the solver says {programme.status}"
+        )
+    return np.array(W.value)
+
+
+def approximation_error(
+    plant: Any, basis: Any, W: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000
+) -> Range:
+    """Prove the range of eps(x) = g(x) - W^T psi(x) over a box, (19).
+
+    eps* is its ``magnitude``.  With no weights (``W = ()``) it is the range of g.
+
+    Parameters
+    ----------
+    plant, basis
+        As in `network_on_grid`; `basis` may be None without weights.
+    W : array_like of shape (l,)
+        Any weights of norm up to 1e5.
+    box : Box
+        Sides x1, ..., xn.
+    tol, max_boxes
+        As in `analysis.intervals.branch_and_bound.enclose`.
+
+    Raises
+    ------
+    ParameterError
+        If the norm of W is larger: W^T psi and V then lose their digits to rounding.
+    """
+    W = np.asarray(W, dtype=float)
+    norm = float(np.linalg.norm(W))
+    if not norm <= LARGEST_NORM:
+        raise ParameterError(
+            f"approximation_error needs |W| <= {LARGEST_NORM:g}, got {norm:.3g}: |W|^2 enters V "
+            "and (31), where rounding would exceed the bound; use tightest_weights, or "
+            "minimax_weights with largest="
+        )
+    f, _ = plant_terms(plant)
+    if not W.size:
+        return enclose(lambda x: f(x, 0.0), box, tol=tol, max_boxes=max_boxes)
+    p, weights = equation_arguments(basis), AdaptiveWeights(nodes=W.size)
+    own, inputs = equation_arguments(weights), len(basis.inputs)
+
+    def eps(x: tuple[Any, ...]) -> Any:
+        psi = basis.output(0.0, (), np.array(x[:inputs], dtype=object), p)
+        W_psi, _ = weights.output(0.0, W, np.append(np.array([0.0], dtype=object), psi), own)
+        return f(x, 0.0) - W_psi
+
+    return enclose(eps, box, tol=tol, max_boxes=max_boxes)

@@ -1,0 +1,165 @@
+"""Reading a loop with `nlctl.KnownSignLaw`: what its certificate is about."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from nlctl._block import block
+from nlctl._diagram import Place, initial_state, interconnect
+from nlctl._errors import DiagramError, ParameterError
+from nlctl._names import unknown
+from nlctl._param import as_numbers, equation_arguments
+from nlctl.controllers import (
+    AdaptiveWeights,
+    FilteredError,
+    GaussianBasis,
+    KnownSignLaw,
+    RobustTerm,
+    Zero,
+)
+from nlctl.references import SumOfSines
+
+from ...intervals.branch_and_bound import upper
+from ..loop.plant_form import Acceleration, acceleration, check_chain
+from ..loop.roles import Parts, Roles, joined_again, read_parts, record_of
+from ..loop.same_loop import check_same, points_around
+
+__all__ = ["KnownSignLoop", "read_loop"]
+
+PROVED_FOR = {
+    "reference": (SumOfSines,),
+    "filtered_error": (FilteredError,),
+    "basis": (GaussianBasis,),
+    "weights": (AdaptiveWeights, Zero),
+    "robust": (RobustTerm,),
+    "law": (KnownSignLaw,),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownSignLoop:
+    """The records of a loop with `nlctl.KnownSignLaw`, and where it starts.
+
+    Attributes
+    ----------
+    parts : Parts
+        Records of the blocks, and the gains.
+    reference : SumOfSines
+    e0 : tuple of n arb
+        Initial errors e_1(0), ..., e_n(0).
+    acceleration : callable
+        x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
+    disturbance : float
+        Bound of what external inputs add to the plant's v.
+    """
+
+    parts: Parts
+    reference: SumOfSines
+    e0: tuple[arb, ...]
+    acceleration: Acceleration
+    disturbance: float = 0.0
+
+    @property
+    def law(self) -> KnownSignLaw:
+        """The control law."""
+        return self.parts.law
+
+    @property
+    def lambdas(self) -> tuple[float, ...]:
+        """lambda_1, ..., lambda_{n-1} of the filtered error."""
+        return self.parts.filtered_error.lambdas
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes of the network; 0 without one."""
+        return len(self.parts.gains.W_hat_0)
+
+
+def read_loop(
+    loop: Any,
+    params: Mapping[str, Any] | None = None,
+    inputs: Mapping[str, float] | None = None,
+) -> KnownSignLoop:
+    """Read a loop that is made of the paper's blocks and `nlctl.KnownSignLaw`.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+    params : mapping, optional
+        Overrides by qualified name, as in a run.
+    inputs : mapping, optional
+        Bound of |w| for every external input w that is added to the plant's v, by name.
+
+    Raises
+    ------
+    DiagramError
+        If a block is missing, or is none of those that the proof is about; if the wiring, or a
+        block's function, is another one; if the plant is not a chain of integrators; if an
+        external input has no bound.
+    """
+    parts = read_parts(loop, params=params, inputs=True)
+    bound = _bound_of_inputs(parts.roles, inputs or {}, loop)
+    for part, kinds in PROVED_FOR.items():
+        if part in parts.roles.places:
+            _check_kind(parts.roles.places[part], kinds)
+    plant = parts.roles.places["plant"]
+    check_chain(plant)
+    reference: Any = parts.roles.spec("reference")
+    yd = reference.output(0.0, (), (), equation_arguments(reference))
+    x0 = initial_state(loop)
+    # the radius covers what double precision has lost in yd(0)
+    own = x0[plant.state_offset :][: parts.order]
+    e0 = tuple(arb(float(x)) - arb(float(y), 1e-12) for x, y in zip(own, yd, strict=False))
+    read = KnownSignLoop(
+        parts=parts,
+        reference=reference,
+        e0=e0,
+        acceleration=acceleration(plant),
+        disturbance=bound,
+    )
+    again = joined_again(loop, parts.roles, lambda part, spec, name: block(spec, name))
+    check_same(loop, interconnect(again, name=str(loop.name)), points_around(x0), params)
+    loop._update_params(dict(params or {}))
+    return read
+
+
+def _check_kind(place: Place, kinds: tuple[type, ...]) -> None:
+    """Check that a block is of a kind that the proof knows, and runs the equations of that kind."""
+    spec = record_of(place)
+    if type(spec) not in kinds:
+        wanted = " or ".join(kind.__name__ for kind in kinds)
+        raise DiagramError(
+            f"the certificate is about a {wanted} in the place of '{place.path}', "
+            f"got {type(spec).__name__}: put one there"
+        )
+    for name, used in (("update", place.system.updfcn), ("output", place.system.outfcn)):
+        known = vars(type(spec)).get(name)
+        if isinstance(known, staticmethod) and used is not known.__func__:
+            raise DiagramError(
+                f"block '{place.path}' has another {name} function than {type(spec).__name__}: "
+                "the certificate is about the latter"
+            )
+
+
+def _bound_of_inputs(roles: Roles, inputs: Mapping[str, float], loop: Any) -> float:
+    """Return the bound of what external inputs add to v."""
+    for name, value in inputs.items():
+        if name not in roles.disturbances:
+            raise unknown("external input", name, loop.input_labels, "that is added to v")
+        number = as_numbers(value)
+        if number is None or number.ndim or not 0 <= number < np.inf:
+            raise ParameterError(f"certify needs a finite bound >= 0 of '{name}', got {value!r}")
+    for name in roles.disturbances:
+        if name not in inputs:
+            raise DiagramError(
+                f"external input '{name}' is added to the plant's v, and may be anything: declare "
+                f"its bound, certify(loop, inputs={{'{name}': 0.1}}), or take it away"
+            )
+    return upper(
+        sum((arb(abs(gain)) * inputs[name] for name, gain in roles.disturbances.items()), arb(0))
+    )

@@ -1,0 +1,109 @@
+"""What a plant asks of the controller while the filtered error keeps a bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from nlctl.plants import coordinate_names
+
+from ...intervals.arithmetic import as_ball
+from ...intervals.box import Box
+from ...intervals.branch_and_bound import enclose, upper
+from ..bounds.decomposition import Decomposition
+from ..bounds.error_bounds import error_bounds, reference_bounds
+from ..bounds.final_bound import total_error
+from ..bounds.sector import quotient_range
+from .known_sign import KnownSignLoop
+
+__all__ = ["Demand", "demand"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demand:
+    """What the plant asks of the controller while |r| <= C; of the gains only lambda enters.
+
+    Attributes
+    ----------
+    C : float
+        Bound of |r|.
+    box : Box
+        What x stays in.
+    errors : tuple of float
+        Bounds of |e_1|, ..., |e_n|.
+    G_min, G_max : float
+        Proved bounds of G = F/v over the box, for all v.
+    matched : float
+        Proved bound of |g(x) + d(x, t)| over the box, for all t.
+    delta_star : float
+        matched + G_max eps_u*.
+    boxes : int
+        Boxes of the proofs.
+    """
+
+    C: float
+    box: Box
+    errors: tuple[float, ...]
+    G_min: float
+    G_max: float
+    matched: float
+    delta_star: float
+    boxes: int
+
+
+def demand(loop: KnownSignLoop, split: Decomposition, C: float, *, tol: float = 1e-3) -> Demand:
+    """Bound what the plant asks of the controller while |r| <= C.
+
+    Parameters
+    ----------
+    loop : KnownSignLoop
+    split : Decomposition
+        Of the loop's actuator.
+    C : float
+        Bound of |r|.
+    tol : float, optional
+        The suprema are proved to this, relative to their size.
+
+    Returns
+    -------
+    Demand
+    """
+    errors = error_bounds(loop.lambdas, loop.e0, arb(C))
+    wanted = reference_bounds(loop.reference)
+    reach = tuple(upper(e + y) for e, y in zip(errors, wanted, strict=False))
+    low, names = tuple(-a for a in reach), coordinate_names(len(reach))
+    box = Box(names=names, low=low, high=reach, how=f"|r| <= {C:.6g}")
+
+    def over_all(*more: str) -> Box:
+        sides = {"t": (0.0, np.inf), "v": (-np.inf, np.inf)}
+        whole = box
+        for name in more:
+            whole = whole.times(name, *sides[name])
+        return whole
+
+    def matched(point: tuple[Any, ...]) -> Any:
+        *x, t = point
+        return loop.acceleration(t, x, 0.0)
+
+    rough = enclose(matched, over_all("t"), max_boxes=1).magnitude
+    fineness = tol * rough if 0 < rough < np.inf else tol
+    fine = enclose(matched, over_all("t"), tol=fineness, max_boxes=20_000)
+    gain = quotient_range(
+        lambda x, v: loop.acceleration(x[-1], x[:-1], v),
+        over_all("t", "v"),
+        tol=tol,
+        max_boxes=2_000,
+    )
+    return Demand(
+        C=C,
+        box=box,
+        errors=tuple(map(upper, errors)),
+        G_min=gain.G_min,
+        G_max=gain.G_max,
+        matched=fine.magnitude,
+        delta_star=upper(total_error(as_ball(gain.G_max), split.eps_star, fine.magnitude, 0.0)),
+        boxes=fine.boxes + gain.boxes,
+    )

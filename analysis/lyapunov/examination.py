@@ -1,0 +1,164 @@
+"""Runs of a loop and the constants that the proof has for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl import native
+from nlctl._arguments import one_of, whole_number
+
+from ..intervals.box import Box, visited_box
+from .bounds.constants import constants
+from .bounds.decomposition import Decomposition, decompose
+from .bounds.provenance import Constants
+from .loop.integral import sharpest
+from .loop.roles import read_parts
+from .loop.simulation import Member, Run, members_of, observe, observed_loop
+
+__all__ = ["U_MAX", "Examination", "Runs", "compile_ahead", "examine"]
+
+U_MAX = 60.0  # a split that is proved and not computed holds for |u| <= 2 U_MAX
+
+
+@dataclass(frozen=True, kw_only=True)
+class Runs:
+    """Runs of the members; more than one are made anew at each iteration, one after the other.
+
+    Attributes
+    ----------
+    loop : control.InterconnectedSystem
+    members : sequence of Member
+    split : Decomposition
+        Of the actuator.
+    max_steps : int
+        Steps after which a run counts as lost.
+    """
+
+    loop: ct.InterconnectedSystem
+    members: Sequence[Member] = field(repr=False)
+    split: Decomposition
+    max_steps: int = 2_000_000
+
+    def __iter__(self) -> Iterator[Run]:
+        if len(self.members) == 1:
+            return iter([self.first])
+        return observe(self.loop, self.members, self.split, self.max_steps)
+
+    @cached_property
+    def first(self) -> Run:
+        """The first run."""
+        return next(observe(self.loop, self.members[:1], self.split, self.max_steps))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Examination:
+    """What the ledger and the conservatism are made of.
+
+    Attributes
+    ----------
+    loop : control.InterconnectedSystem
+    runs : Runs
+    constants : Constants
+    """
+
+    loop: ct.InterconnectedSystem
+    runs: Runs
+    constants: Constants
+
+
+def examine(
+    loop: ct.InterconnectedSystem,
+    run: Any = 20.0,
+    *,
+    box: Box | None = None,
+    W: Any = "tightest",
+    k: tuple[float, float] | None = None,
+    start: Mapping[str, Any] | None = None,
+    params: Mapping[str, Any] | None = None,
+    step: float = 4e-3,
+    max_steps: int = 2_000_000,
+) -> Examination:
+    """Run a loop, observed, and find the constants of the proof.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+        Of the blocks that `nlctl.paper.example_1` joins, with a Nussbaum law.
+    run : float, control.TimeResponseData or sequence of them, optional
+        Horizon (s), or responses of the loop, which are run again with what the proof needs.
+    box : Box, optional
+        The compact set, sides x1, ..., xn and v; by default what the runs visit, and a tenth.
+    W : array_like or "tightest", optional
+        Ideal weights; by default those with the smallest C_0.
+    k : (k_1, k_2), optional
+        Bounds of the actuator's gain, see `decompose`.
+    start, params : mapping, optional
+        Initial states and parameters by qualified name: a number, or an array with one entry per
+        member of an ensemble.  The constants are those of the loop with the numbers; members are
+        measured by them, with their own gains and their own V(0).
+    step : float, optional
+        Sampling interval (s).
+    max_steps : int, optional
+        Steps after which a run counts as lost.
+
+    Returns
+    -------
+    Examination
+
+    Raises
+    ------
+    DiagramError
+        If the loop is not one that the proof is about.
+    DecompositionError
+        If the actuator has no split (2).
+    ParameterError, UnknownNameError
+        If a run, a box or a name is refused.
+    """
+    max_steps = whole_number("examine", "max_steps", max_steps, at_least=1)
+    if isinstance(W, str):
+        one_of("examine", "W", W, ["tightest"])
+    members = members_of(loop, run, step, start, params)
+    fixed = _numbers(start), _numbers(params)
+    if len(members) == 1:
+        fixed = dict(members[0].start), dict(members[0].params)
+    parts = read_parts(loop, *fixed)
+    split = _split(parts.actuator, k)
+    runs = Runs(loop=loop, members=members, split=split, max_steps=max_steps)
+    box = _visited(runs) if box is None else box
+    sides = [name for name in box.names if name != "u"]
+    weights = None if isinstance(W, str) and W == "tightest" else W
+    found = constants(
+        loop, box.only(*sides).times("u", -U_MAX, U_MAX), W=weights, k=k, start=fixed[0],
+        params=fixed[1],
+    )  # fmt: skip
+    return Examination(loop=loop, runs=runs, constants=found)
+
+
+def compile_ahead(loop: ct.InterconnectedSystem) -> None:
+    """Compile the diagram that `examine` runs, which otherwise happens with the first run."""
+    native.compile_ahead(observed_loop(loop, _split(read_parts(loop).actuator)))
+
+
+def _split(actuator: Any, k: tuple[float, float] | None = None) -> Decomposition:
+    return sharpest(decompose(actuator, k=k, u_max=U_MAX))
+
+
+def _numbers(values: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return what is the same for all members."""
+    return {k: v for k, v in (values or {}).items() if np.ndim(v) == 0 or isinstance(v, tuple)}
+
+
+def _visited(runs: Runs) -> Box:
+    reached = []
+    for run in runs:
+        names = [n for n in run.signals.values if n == "v" or (n[:1] == "x" and n[1:].isdigit())]
+        y = [np.array([np.min(run.signals[n]), np.max(run.signals[n])]) for n in names]
+        ends = run.signals.t[[0, -1]]  # whatever lies in between does not count
+        reached.append(ct.TimeResponseData(ends, np.array(y), output_labels=names, issiso=False))
+    return visited_box(*reached)

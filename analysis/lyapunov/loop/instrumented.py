@@ -1,0 +1,165 @@
+"""A loop whose blocks also output what the proof speaks of: rates of the states, g, G and d.
+
+The rates are the blocks' own update equations on the loop's own signals, so that V' is the
+gradient of V times the right-hand side of the diagram, and no difference of samples.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl._block import Block, block
+from nlctl._diagram import interconnect
+from nlctl._equation import equation
+from nlctl._errors import DiagramError
+
+from ..bounds.decomposition import Decomposition
+from .declared_terms import terms_with_parameters
+from .integral import NussbaumIntegral
+from .roles import Parts, joined_again
+
+__all__ = ["input_gain", "observed"]
+
+NEAR = 1e-5  # |v| below which G is interpolated: F/v would lose its digits
+
+
+def input_gain(f: Callable) -> Callable:
+    """Make the equation G(x, v) = F(x, v) / v of (6), (7), with its limit at v = 0.
+
+    For |v| < 1e-5 it is the line through its values at v = -1e-5 and 1e-5, whose error is of the
+    order of the rounding, 1e-11, for a twice differentiable F.
+
+    Parameters
+    ----------
+    f : equation
+        ``f(x, v, p)`` of a plant.
+
+    Returns
+    -------
+    equation
+        ``G(x, v, p)``.
+    """
+
+    @equation
+    def gain(x, v, p):
+        at_rest = f(x, 0.0, p)
+        if abs(v) >= NEAR:  # false for NaN, which then reaches G
+            return (f(x, v, p) - at_rest) / v
+        right, left = (f(x, NEAR, p) - at_rest) / NEAR, (at_rest - f(x, -NEAR, p)) / NEAR
+        return 0.5 * (right + left) + 0.5 * (right - left) * (v / NEAR)
+
+    return gain
+
+
+def observed(
+    loop: ct.InterconnectedSystem, parts: Parts, split: Decomposition, alpha_1: float
+) -> ct.InterconnectedSystem:
+    """Return the loop with all its signals as outputs, and with the integrals of (32), (33).
+
+    Added are ``rate_<state>`` for every state of plant, weights, robust term and law, the
+    estimates ``W_hat[i]``, ``g``, ``G``, ``d`` and ``state_<state>`` of the plant, and
+    `NussbaumIntegral`.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+    parts : Parts
+        What `read_parts` found in it; the blocks are given the parameters of that run.
+    split : Decomposition
+        Of the actuator; machine code must be able to call its ``part``, see `sharpest`.
+    alpha_1 : float
+        Rate of the weight in (32).
+
+    Returns
+    -------
+    control.InterconnectedSystem
+        To be compiled, and run from ``nlctl.initial_state``.
+
+    Raises
+    ------
+    DiagramError
+        If the law has no Nussbaum argument.
+    """
+    if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
+        raise DiagramError(
+            "(23), (24) need a law with the state zeta and a function N, got "
+            f"{type(parts.law).__name__}: for a known sign see certify"
+        )
+    integral = NussbaumIntegral(alpha_1=alpha_1, part=split.part)
+    systems = [*joined_again(loop, parts.roles, _observed_block), block(integral, "integral")]
+    return interconnect(systems, name=f"{loop.name}_observed")
+
+
+def _observed_block(part: str, spec: Any, name: str) -> Block:
+    if part == "plant":
+        spec = _with_outputs(spec, *_plant_terms(spec))
+    elif part in ("weights", "robust", "law"):
+        spec = _with_outputs(spec)
+    return block(spec, name)
+
+
+def _plant_terms(plant: Any) -> tuple[tuple[str, ...], Callable]:
+    """Return the outputs g, G, d and the states of a plant, and the equation of them."""
+    f, d = terms_with_parameters(plant)
+    G = input_gain(f)
+
+    @equation
+    def terms(t, x, u, p):
+        (v,) = u
+        state = tuple(x)
+        return (f(state, 0.0, p), G(state, v, p), d(state, t, p)) + state
+
+    return ("g", "G", "d", *(f"state_{name}" for name in plant.states)), terms
+
+
+def _with_outputs(spec: Any, names: tuple[str, ...] = (), terms: Callable | None = None) -> Any:
+    """Return a record with the same parameters and equations, and with more outputs.
+
+    These are the rates of its states, of a record of vectors also the states that it does not
+    deliver, and what `terms` returns.
+    """
+    if not spec.states:
+        return spec
+    vector = getattr(spec, "vector", False)
+    hidden = [s for s in spec.states if s not in spec.outputs] if vector else []
+    output = _longer_vector(spec, hidden) if vector else _longer_tuple(spec, terms)
+    namespace = {
+        "outputs": (*spec.outputs, *(f"rate_{s}" for s in spec.states), *hidden, *names),
+        "output": staticmethod(output),
+        "feedthrough": True,
+    }
+    kind = type(type(spec).__name__, (type(spec),), namespace)
+    return kind(**{f.name: getattr(spec, f.name) for f in dataclasses.fields(spec) if f.init})
+
+
+def _longer_vector(spec: Any, hidden: list[str]) -> Callable:
+    output, update = spec.output, spec.update
+    picked = np.array([list(spec.states).index(s) for s in hidden], dtype=np.int64)
+
+    @equation
+    def longer(t, x, u, p):
+        return np.concatenate((np.array(output(t, x, u, p)), update(t, x, u, p), x[picked]))
+
+    return longer
+
+
+def _longer_tuple(spec: Any, terms: Callable | None) -> Callable:
+    output, update = spec.output, spec.update
+    more = no_terms if terms is None else terms
+
+    @equation
+    def longer(t, x, u, p):
+        return output(t, x, u, p) + update(t, x, u, p) + more(t, x, u, p)
+
+    return longer
+
+
+@equation
+def no_terms(t, x, u, p):
+    """Nothing to add."""
+    return ()

@@ -1,0 +1,110 @@
+"""The plant's own equations on balls: that it is a chain of integrators, and what drives its end.
+
+A record's f and d say what the plant should be; what a run integrates is `update`.  The
+certificate encloses the latter, so that nothing rests on the two being the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from nlctl._diagram import Place
+from nlctl._errors import DiagramError
+from nlctl.plants import coordinate_names
+
+from ...intervals.arithmetic import Ball, as_ball
+from ...intervals.paths import Undecided, every_way, on_balls
+
+__all__ = ["Acceleration", "acceleration", "check_chain", "on_intervals"]
+
+Acceleration = Callable[[Any, Any, Any], Any]
+
+
+def on_intervals(path: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a block's function; that intervals cannot go through it is said with its name.
+
+    Raises
+    ------
+    DiagramError
+        When the function that is returned fails.
+    """
+
+    def refusal(why: str) -> DiagramError:
+        return DiagramError(
+            f"the equations of block '{path}' cannot be evaluated on intervals, which the "
+            f"proof needs ({why}): write them with arithmetic and NumPy functions of numbers"
+        )
+
+    return on_balls(function, refusal)
+
+
+def acceleration(plant: Place) -> Acceleration:
+    """Return x_n' as ``function(t, x, v)``, from what a run integrates, with its parameters."""
+    update, p = plant.system.updfcn, plant.system._current_params
+
+    def last(t: Any, x: Any, v: Any) -> Any:
+        return update(t, _objects(x), _objects((v,)), p)[-1]
+
+    return on_intervals(plant.path, last)
+
+
+def check_chain(plant: Place) -> None:
+    """Prove x_i' = x_{i+1} for i < n, and that the outputs are y = x_1 and x_1, ..., x_n.
+
+    For all x and v and all t >= 0: on every way through the function each is the coordinate itself,
+    or, where there is one way only, it has the coordinate's gradient everywhere and its value at 0.
+
+    Raises
+    ------
+    DiagramError
+        If one is something else, or cannot be decided.
+    """
+    system, n = plant.system, plant.system.nstates
+    states, outputs = coordinate_names(n), list(system.current_spec.outputs)
+    update = [(i, f"{states[i]}'", i + 1) for i in range(n - 1)]
+    output = [(outputs.index(s), s, states.index(s)) for s in states if s in outputs]
+    output += [(outputs.index("y"), "y", 0)]
+    for what, function, wanted in (
+        ("update", system.updfcn, update), ("output", system.outfcn, output)
+    ):  # fmt: skip
+        for i, name, k in wanted:
+            if not _is_coordinate(plant, function, i, k):
+                raise DiagramError(
+                    f"the proof is about plants (1), with {name} = {states[k]}; the {what} "
+                    f"function of block '{plant.path}' makes {name} something else, or it cannot "
+                    "be decided"
+                )
+
+
+def _is_coordinate(plant: Place, function: Any, i: int, k: int) -> bool:
+    """Whether result i of a plant's function is x_{k+1}, for all states, inputs and times."""
+    n, p = plant.system.nstates, plant.system._current_params
+    called = on_intervals(plant.path, function)
+
+    def result(z: list[Ball]) -> Any:
+        return called(z[n + 1], _objects(z[:n]), _objects(z[n : n + 1]), p)[i]
+
+    unit = [tuple(arb(int(a == b)) for a in range(n + 2)) for b in range(n + 2)]
+    wide = [Ball(arb(0, "inf"), gradient) for gradient in unit]
+    try:
+        ways = list(every_way(lambda: result(wide)))
+        if all(way is wide[k] for way in ways):
+            return True
+        ball, start = as_ball(ways[0]), as_ball(result([Ball(arb(0))] * (n + 2)))
+    except Undecided:
+        return False
+    if len(ways) > 1 or ball is NotImplemented or start is NotImplemented:
+        return False
+    slopes = [bool(g == int(j == k)) for j, g in enumerate(ball.gradient)]
+    return bool(slopes) and all(slopes) and bool(start.value == 0)
+
+
+def _objects(values: Any) -> np.ndarray:
+    """Return balls as an array, which equations may unpack, slice or compute with."""
+    array = np.empty(len(values), dtype=object)
+    array[:] = list(values)
+    return array

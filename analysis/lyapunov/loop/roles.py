@@ -1,0 +1,410 @@
+"""Which block is what in a closed loop, read from its wiring, and whether that is the proof's.
+
+The proof is about one loop: plant, actuator, reference and the paper's controller, each signal
+connected once, with gain 1.  Blocks are known by the signals that their records declare, whatever
+these are called in the diagram; every wire is read from python-control's own maps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl._block import Block
+from nlctl._diagram import Place, initial_state, interconnect
+from nlctl._errors import CompileError, DiagramError
+from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
+from nlctl.native._wiring import Combination, Signal, Wiring
+from nlctl.native.thirdparty.checks import check_functions, check_sizes
+from nlctl.plants import coordinate_names
+
+from ..bounds.final_bound import Gains
+
+__all__ = ["Parts", "Roles", "joined_again", "read_parts", "read_roles"]
+
+# A block is known by a signal that it outputs, and by what the proof reads of its record.
+PIECES = {
+    "reference": ("yd", ()),
+    "plant": ("y", ("f", "d")),
+    "actuator": ("v", ()),
+    "filtered_error": ("r", ("lambdas",)),
+    "basis": ("psi[0]", ("centres",)),
+    "weights": ("W_psi", ()),
+    "robust": ("robust", ("gamma", "sigma_2", "tau")),
+    "law": ("u", ("beta",)),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Roles:
+    """The blocks of a closed loop by the part that they play, with the wiring checked.
+
+    Attributes
+    ----------
+    places : mapping
+        Place of every block, by part: "reference", "plant", "actuator", "filtered_error",
+        "basis" (where there is one), "weights", "robust", "law".
+    disturbances : mapping
+        Gain of every external input that is added to the plant's input v, by name.
+    """
+
+    places: Mapping[str, Place] = field(repr=False)
+    disturbances: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def paths(self) -> dict[str, str]:
+        """Path of every block in the diagram, by part."""
+        return {part: place.path for part, place in self.places.items()}
+
+    def spec(self, part: str) -> Any:
+        """Return the record of a part with the parameters of the latest run; None without one."""
+        return record_of(self.places[part]) if part in self.places else None
+
+
+def record_of(place: Place) -> Any:
+    """Return the record of a block with the parameters of the latest run; None if it has none."""
+    return place.system.current_spec if type(place.system) is Block else None
+
+
+def declared(place: Place, kind: str) -> list[str]:
+    """Return the names of a block's signals as its record declares them, not as it was renamed.
+
+    Parameters
+    ----------
+    place : Place
+    kind : {"inputs", "outputs"}
+    """
+    spec = record_of(place)
+    labels = place.system.input_labels if kind == "inputs" else place.system.output_labels
+    return list(labels if spec is None else getattr(spec, kind))
+
+
+def read_roles(loop: Any) -> Roles:
+    """Find the blocks of a closed loop and check every wire between them.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+        In continuous time, nested to any depth, its signals called whatever they are.
+
+    Returns
+    -------
+    Roles
+
+    Raises
+    ------
+    DiagramError
+        If a part is missing, does not have what the proof needs, or there is a block that the proof
+        does not know; if an input of a block is not fed by the one signal that the proof supposes,
+        with gain 1; if an output of the diagram has the name of a signal and is another one; if a
+        block's function does not depend on its arguments alone.
+    """
+    if not isinstance(loop, ct.InterconnectedSystem) or "r" not in loop.output_labels:
+        raise DiagramError("the proof needs a closed loop, a diagram with the output r")
+    wiring = Wiring(loop)
+    _check_blocks(loop, wiring)
+    places = _found(wiring)
+    named = {
+        name: Signal(i, k)
+        for i, place in enumerate(wiring.blocks)
+        for k, name in enumerate(declared(place, "outputs"))
+    }
+    disturbances = _check_inputs(wiring, places, named)
+    _check_outputs(wiring, named)
+    return Roles(places=places, disturbances=disturbances)
+
+
+def _check_blocks(loop: Any, wiring: Wiring) -> None:
+    """Continuous time, no block that remembers or changes something, no states left out."""
+    check_sizes(loop, (place.system for place in wiring.blocks))
+    for place in (wiring.top, *wiring.blocks):
+        if not ct.isctime(place.system):
+            raise DiagramError(
+                f"the proof is about continuous time, and '{place.path or loop.name}' is sampled "
+                f"with dt = {place.system.dt}: leave dt out"
+            )
+    for place in wiring.blocks:
+        try:
+            check_functions(place.path, place.system)
+        except CompileError as error:
+            raise DiagramError(f"the proof needs functions of their arguments: {error}") from None
+        _check_functions_are_own(place)
+
+
+def _check_functions_are_own(place: Place) -> None:
+    """A run calls the functions of the block, the proof reads those of its record."""
+    system = place.system
+    if type(system) is not Block:
+        return
+    pairs = [("output", system.outfcn)] + ([("update", system.updfcn)] if system.nstates else [])
+    for name, used in pairs:
+        own = getattr(system.spec, name)
+        if getattr(used, "__code__", used) is not getattr(own, "__code__", own):
+            raise DiagramError(
+                f"block '{place.path}' has another {name} function than its record "
+                f"{type(system.spec).__name__}, which the proof reads: make the block of a record "
+                "with that function"
+            )
+
+
+def _found(wiring: Wiring) -> dict[str, Place]:
+    """Return the block of every part."""
+    found: dict[str, Place] = {}
+    for place in wiring.blocks:
+        outputs = declared(place, "outputs")
+        part = next((p for p, (signal, _) in PIECES.items() if signal in outputs), None)
+        if part is None:
+            raise DiagramError(
+                f"the proof does not know what block '{place.path}' ({', '.join(outputs)}) is for: "
+                "it is about a plant, an actuator, a reference and the paper's controller only"
+            )
+        if part in found:
+            raise DiagramError(
+                f"two blocks output '{PIECES[part][0]}', '{found[part].path}' and '{place.path}': "
+                f"the proof is about one {part}"
+            )
+        found[part] = place
+    for part, (signal, needed) in PIECES.items():
+        if part in found:
+            _check_record(found[part], part, needed)
+        elif part != "basis" or isinstance(_weights(found), AdaptiveWeights):
+            raise DiagramError(f"the proof needs a block that outputs '{signal}' ({part})")
+    return found
+
+
+def _weights(found: Mapping[str, Place]) -> Any:
+    return record_of(found["weights"]) if "weights" in found else None
+
+
+def _check_record(place: Place, part: str, needed: tuple[str, ...]) -> None:
+    spec = record_of(place)
+    if part != "reference" and spec is None:
+        raise DiagramError(
+            f"the proof reads the record of '{place.path}', which is not an nlctl block"
+        )
+    if part == "plant":
+        _check_coordinates(place, spec)
+    missing = [name for name in needed if not hasattr(spec, name)]
+    if missing:
+        raise DiagramError(
+            f"the proof needs {', '.join(missing)} of block '{place.path}', and "
+            f"{type(spec).__name__} has no such thing"
+        )
+
+
+def _check_coordinates(place: Place, spec: Any) -> None:
+    states = coordinate_names(len(spec.states))
+    missing = [name for name in states if name not in spec.outputs]
+    if tuple(spec.states) != states or missing:
+        raise DiagramError(
+            f"the proof needs the states {', '.join(states)} of block '{place.path}' in this order "
+            f"and as outputs, got the states {', '.join(spec.states)} and the outputs "
+            f"{', '.join(spec.outputs)}"
+        )
+
+
+def _check_inputs(
+    wiring: Wiring, places: Mapping[str, Place], named: Mapping[str, Signal]
+) -> dict[str, float]:
+    """Check what feeds every block; return the external inputs that are added to v."""
+    disturbances: dict[str, float] = {}
+    for place in wiring.blocks:
+        for name, terms in zip(declared(place, "inputs"), wiring.inputs(place), strict=True):
+            given = {signal: gain for signal, gain in terms.items() if gain != 0}
+            wanted = {named[name]: 1.0} if name in named else {}
+            if place is places["plant"] and name == "v":
+                outside = {s: gain for s, gain in given.items() if s.block is None}
+                labels = wiring.top.system.input_labels
+                disturbances |= {labels[s.index]: gain for s, gain in outside.items()}
+                given = {s: gain for s, gain in given.items() if s not in outside}
+            if given != wanted or not wanted:
+                raise DiagramError(_wrong_wire(wiring, place, name, given, wanted))
+    return disturbances
+
+
+def _check_outputs(wiring: Wiring, named: Mapping[str, Signal]) -> None:
+    """An output of the diagram that is called as a signal of the proof is that signal."""
+    for i, label in enumerate(wiring.top.system.output_labels):
+        if label in named:
+            terms = {s: gain for s, gain in wiring.output(wiring.top, i).items() if gain != 0}
+            if terms != {named[label]: 1.0}:
+                raise DiagramError(
+                    f"output '{label}' of '{wiring.top.system.name}' is {_combined(wiring, terms)},"
+                    f" the proof speaks of {_signal(wiring, named[label])}: give it another name"
+                )
+
+
+def _wrong_wire(
+    wiring: Wiring, place: Place, name: str, given: Combination, wanted: Combination
+) -> str:
+    got = f"input '{name}' of block '{place.path}' is {_combined(wiring, given)}"
+    if not wanted:
+        return f"{got}, and no block of the proof outputs '{name}': the proof is about another loop"
+    if any(signal.block is None for signal in given):
+        return (
+            f"{got}: the proof knows external inputs only where they are added to the plant's v, "
+            "with a declared bound; take the input away"
+        )
+    return (
+        f"{got}, the proof is about {_combined(wiring, wanted)}: correct the connection, or make "
+        "gain and sign part of the block"
+    )
+
+
+def _combined(wiring: Wiring, terms: Combination) -> str:
+    """Return a linear combination of signals in words."""
+    parts = []
+    for signal, gain in terms.items():
+        factor = "" if gain == 1 else "-" if gain == -1 else f"{gain:g} * "
+        parts.append(factor + _signal(wiring, signal))
+    return " + ".join(parts) or "connected to nothing"
+
+
+def _signal(wiring: Wiring, signal: Signal) -> str:
+    if signal.block is None:
+        return f"external input '{wiring.top.system.input_labels[signal.index]}'"
+    place = wiring.blocks[signal.block]
+    return f"'{declared(place, 'outputs')[signal.index]}' of '{place.path}'"
+
+
+def joined_again(
+    loop: ct.InterconnectedSystem, roles: Roles, remade: Callable[[str, Any, str], Any]
+) -> list[Any]:
+    """Return copies of a loop's blocks that are connected by the names that the records declare.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+    roles : Roles
+        Of the loop; with them its wiring is known to be the one by name.
+    remade : callable
+        ``remade(part, record, name)`` makes a block of a part.
+
+    Returns
+    -------
+    list of control.InputOutputSystem
+        For `nlctl.interconnect`; nested diagrams stay nested, all their signals are outputs.
+    """
+    parts = {place.path: part for part, place in roles.places.items()}
+
+    def copied(diagram: Any, path: str) -> Iterator[Any]:
+        for system in diagram.syslist:
+            here = f"{path}{system.name}"
+            if isinstance(system, ct.InterconnectedSystem):
+                inner = list(copied(system, f"{here}."))
+                made = {label for block in inner for label in block.output_labels}
+                taken = [label for block in inner for label in block.input_labels]
+                outside = [label for label in dict.fromkeys(taken) if label not in made]
+                yield interconnect(inner, inputs=outside, name=system.name)
+            elif type(system) is Block:
+                yield remade(parts[here], system.current_spec, system.name)
+            else:
+                yield system.copy(name=system.name)
+
+    return list(copied(loop, ""))
+
+
+DAMPED = (KnownSignLaw, MonotoneNussbaumLaw)  # laws with eta = beta r + s tanh(r s / b)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parts:
+    """The records of a loop, by the part that they play in the proof.
+
+    Attributes
+    ----------
+    plant, actuator, filtered_error, robust, law : record
+        With the parameters of the run.
+    basis, weights : record or None
+        None where `nlctl.Zero` stands in the place of the network.
+    roles : Roles
+        Places of the blocks in the diagram.
+    gains : Gains
+        Gains and initial values of the controller.
+    """
+
+    plant: Any
+    actuator: Any
+    filtered_error: Any
+    robust: Any
+    law: Any
+    basis: Any
+    weights: Any
+    roles: Roles
+    gains: Gains
+
+    @property
+    def paths(self) -> dict[str, str]:
+        """Path of every block in the diagram, by part."""
+        return self.roles.paths
+
+    @property
+    def order(self) -> int:
+        """Order n of the plant."""
+        return len(self.plant.states)
+
+
+def read_parts(
+    loop: ct.InterconnectedSystem,
+    start: Mapping[str, float] | None = None,
+    params: Mapping[str, Any] | None = None,
+    inputs: bool = False,
+) -> Parts:
+    """Read plant, actuator and controller pieces of a loop such as `nlctl.paper.example_1`.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+        With the output r.
+    start : mapping, optional
+        Initial states other than the blocks' own, ``{"plant.x1": 0.8}``.
+    params : mapping, optional
+        Qualified parameters other than the blocks' own.
+    inputs : bool, optional
+        Whether external inputs may be added to the plant's v.
+
+    Raises
+    ------
+    DiagramError
+        As `analysis.lyapunov.loop.roles.read_roles` does, or if there are external inputs.
+    """
+    roles = read_roles(loop)
+    if roles.disturbances and not inputs:
+        names = ", ".join(f"'{name}'" for name in roles.disturbances)
+        raise DiagramError(
+            f"external input {names} is added to the plant's v: the proof needs its bound, and "
+            "takes one in certify(loop, inputs={...}) only"
+        )
+    loop._update_params(dict(params or {}))
+    specs = {part: roles.spec(part) for part in roles.places}
+    x0 = initial_state(loop, start)
+    own = {p: x0[f.state_offset :][: f.system.nstates or 0] for p, f in roles.places.items()}
+    outputs = np.asarray(loop.output(0.0, x0, np.zeros(loop.ninputs or 0), dict(params or {})))
+    weights = specs["weights"] if isinstance(specs["weights"], AdaptiveWeights) else None
+    gains = Gains(
+        beta=specs["law"].beta,
+        Gamma=weights.Gamma if weights else 1.0,
+        sigma_1=weights.sigma_1 if weights else 0.0,
+        gamma=specs["robust"].gamma,
+        sigma_2=specs["robust"].sigma_2,
+        tau=specs["robust"].tau,
+        r_0=float(outputs[loop.output_labels.index("r")]),
+        delta_hat_0=float(own["robust"][0]),
+        W_hat_0=tuple(map(float, own["weights"])) if weights else (),
+        b=specs["law"].b if isinstance(specs["law"], DAMPED) else 0.0,
+    )
+    return Parts(
+        plant=specs["plant"],
+        actuator=specs["actuator"],
+        filtered_error=specs["filtered_error"],
+        robust=specs["robust"],
+        law=specs["law"],
+        basis=specs.get("basis") if weights else None,
+        weights=weights,
+        roles=roles,
+        gains=gains,
+    )

@@ -1,0 +1,179 @@
+"""Signals of an observed loop over time, and margins of statements about them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+
+__all__ = ["Margin", "Signals", "equality", "inequality", "signals_of"]
+
+POINTWISE = 1e-9  # of a statement's size: rounding, and G near v = 0
+INTEGRATED = 1e-6  # of V: the integrator's error at its default tolerance
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signals:
+    """Signals of `analysis.lyapunov.loop.instrumented` over time, ``signals["r"]``.
+
+    Attributes
+    ----------
+    t : ndarray of shape (m,)
+    values : mapping
+        Arrays of shape (m,) by output name.
+    """
+
+    t: np.ndarray
+    values: Mapping[str, np.ndarray] = field(repr=False)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self.values:
+            raise unknown("output signal", name, list(self.values), "of the response")
+        return self.values[name]
+
+    def vector(self, name: str) -> np.ndarray:
+        """Return name[0], name[1], ... as the columns of an array of shape (m, l)."""
+        count = 0
+        while f"{name}[{count}]" in self.values:
+            count += 1
+        columns = [self.values[f"{name}[{i}]"] for i in range(count)]
+        return np.column_stack(columns) if columns else np.zeros((self.t.size, 0))
+
+    def at(self, time: float) -> dict[str, float]:
+        """Return x, r, u, v, zeta and delta_hat at the sample nearest to a time."""
+        i = int(np.argmin(np.abs(self.t - time)))
+        names = [n for n in self.values if n[:1] == "x" and n[1:].isdigit()]
+        shown = [*names, "r", "u", "v", "zeta", "delta_hat"]
+        return {name: float(self.values[name][i]) for name in shown if name in self.values}
+
+
+def signals_of(response: Any) -> Signals:
+    """Return the outputs of a response by name.
+
+    Parameters
+    ----------
+    response : control.TimeResponseData
+        With several outputs.
+
+    Raises
+    ------
+    ParameterError
+        If it is no response.
+    """
+    if not hasattr(response, "output_labels"):
+        raise ParameterError(
+            f"signals_of needs a response with named outputs, got {type(response).__name__}"
+        )
+    rows = np.atleast_2d(np.asarray(response.outputs))
+    return Signals(
+        t=np.asarray(response.time, dtype=float),
+        values=dict(zip(response.output_labels, rows, strict=True)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margin:
+    """Margin of one statement over time; it holds where it is not below -tolerance * scale.
+
+    Attributes
+    ----------
+    equation : str
+        Number in the paper, ``"(31)"``.
+    statement : str
+        In corrected form.
+    kind : {"inequality", "equality"}
+        The margin is the larger side less the smaller one; of an equality it is minus the
+        distance between the sides.
+    t, margin : ndarray of shape (m,)
+    scale : float
+        Size of the terms that the statement is made of.
+    tolerance : float
+        Relative to `scale`.
+    """
+
+    equation: str
+    statement: str
+    kind: Literal["inequality", "equality"]
+    t: np.ndarray = field(repr=False)
+    margin: np.ndarray = field(repr=False)
+    scale: float
+    tolerance: float
+
+    @property
+    def least(self) -> float:
+        """Least margin; NaN if it is NaN anywhere."""
+        return float(np.min(self.margin))
+
+    @property
+    def at(self) -> float:
+        """Time (s) of the least margin, or of the first NaN."""
+        return float(self.t[int(np.argmin(self.margin))])
+
+    @property
+    def holds(self) -> bool:
+        """Whether it holds at every sample, up to the tolerance."""
+        return bool(self.least >= -self.tolerance * self.scale)
+
+    @property
+    def share_violated(self) -> float:
+        """Share of the samples at which it does not hold."""
+        return float(np.mean(~(self.margin >= -self.tolerance * self.scale)))
+
+    @property
+    def first_violated(self) -> float:
+        """Time (s) of the first sample at which it does not hold; NaN if there is none."""
+        broken = ~(self.margin >= -self.tolerance * self.scale)
+        return float(self.t[int(np.argmax(broken))]) if broken.any() else np.nan
+
+
+def inequality(
+    equation: str,
+    statement: str,
+    t: np.ndarray,
+    low: Any,
+    high: Any,
+    scale: float | None = None,
+    tolerance: float = POINTWISE,
+) -> Margin:
+    """Return the margin high - low of low <= high."""
+    return _margin(equation, statement, "inequality", t, low, high, scale, tolerance)
+
+
+def equality(
+    equation: str,
+    statement: str,
+    t: np.ndarray,
+    one: Any,
+    other: Any,
+    scale: float | None = None,
+    tolerance: float = POINTWISE,
+) -> Margin:
+    """Return the margin -|one - other| of one = other."""
+    return _margin(equation, statement, "equality", t, one, other, scale, tolerance)
+
+
+def _margin(
+    equation: str, statement: str, kind: Any, t: np.ndarray, low: Any, high: Any,
+    scale: float | None, tolerance: float,
+) -> Margin:  # fmt: skip
+    low, high = (np.broadcast_to(np.asarray(side, dtype=float), t.shape) for side in (low, high))
+    if scale is None:
+        finite = np.abs(np.concatenate([low, high]))
+        scale = float(np.max(finite[np.isfinite(finite)], initial=0.0))
+    with np.errstate(invalid="ignore"):  # inf - inf is NaN, which does not hold
+        difference = high - low
+    margin = -np.abs(difference) if kind == "equality" else difference
+    return Margin(
+        equation=equation,
+        statement=statement,
+        kind=kind,
+        t=t,
+        margin=margin,
+        scale=scale,
+        tolerance=tolerance,
+    )

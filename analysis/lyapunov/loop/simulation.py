@@ -1,0 +1,248 @@
+"""Runs of a loop that are observed for the proof."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl import native
+from nlctl._arguments import number
+from nlctl._diagram import initial_state
+from nlctl._diagram import state_names as all_states
+from nlctl._errors import ParameterError
+from nlctl.response import input_output_response
+
+from ..bounds.decomposition import Decomposition
+from ..bounds.final_bound import Gains, alpha_1
+from .instrumented import observed
+from .reference_rates import reference_margin
+from .response_of_loop import own_parameters
+from .roles import Parts, read_parts
+from .same_loop import check_same, points_around
+from .signals import Margin, Signals, signals_of
+
+__all__ = ["Member", "Run", "members_of", "observe", "observed_loop"]
+
+LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
+AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
+
+
+@dataclass(frozen=True, kw_only=True)
+class Member:
+    """Where a run starts, and its parameters, both by qualified name.
+
+    Attributes
+    ----------
+    start, params : mapping
+    times : ndarray of shape (m,)
+    expected : control.TimeResponseData or None
+        A response that the run must reproduce.
+    """
+
+    start: Mapping[str, float]
+    params: Mapping[str, Any]
+    times: np.ndarray
+    expected: Any = None
+
+    @property
+    def options(self) -> str:
+        """Options of the command line that replay it; vectors are left out."""
+        values = {**self.params, **{f"{k}(0)": v for k, v in self.start.items()}}
+        return " ".join(f'--set "{k}={v:.17g}"' for k, v in values.items() if np.ndim(v) == 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A member, and what became of it.
+
+    Attributes
+    ----------
+    member : Member
+    parts : Parts
+        With the member's parameters and gains.
+    signals : Signals
+        Up to the time that the run reached.
+    lost : float or None
+        Time (s) at which the run ended early, diverged or too stiff.
+    message : str
+        Why it ended early.
+    reference : Margin or None
+        Of the reference's derivatives, see `analysis.lyapunov.loop.reference_rates`.
+    """
+
+    member: Member
+    parts: Parts
+    signals: Signals
+    lost: float | None
+    message: str = ""
+    reference: Margin | None = None
+
+    @property
+    def gains(self) -> Gains:
+        """Gains of the member."""
+        return self.parts.gains
+
+
+def members_of(
+    loop: ct.InterconnectedSystem,
+    run: Any,
+    step: float,
+    start: Mapping[str, Any] | None,
+    params: Mapping[str, Any] | None,
+) -> list[Member]:
+    """Return the members that a horizon or responses stand for.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+    run : float, control.TimeResponseData or sequence of them
+        A horizon (s), or responses of the loop with its states.
+    step : float
+        Sampling interval (s) for a horizon.
+    start, params : mapping or None
+        Numbers, or arrays with one entry per member; for a horizon only.
+
+    Raises
+    ------
+    ParameterError
+        If arrays differ in length, or the horizon is not positive.
+    """
+    if not np.isscalar(run):
+        if start or params:
+            raise ParameterError("ledger takes start and params of the responses: leave them out")
+        responses = list(run) if isinstance(run, Sequence) else [run]
+        return [_of_response(loop, response) for response in responses]
+    horizon, step = number("ledger", "horizon", run), number("ledger", "step", step)
+    if not (0 < step < horizon < np.inf):
+        raise ParameterError(f"ledger needs 0 < step < horizon, got {step:g} and {horizon:g}")
+    times = np.linspace(0.0, horizon, round(horizon / step) + 1)
+    varied = {**(start or {}), **(params or {})}
+    sizes = {len(v) for v in varied.values() if np.ndim(v) == 1 and not isinstance(v, tuple)}
+    if len(sizes) > 1:
+        raise ParameterError(f"ledger needs arrays of one length, got lengths {sorted(sizes)}")
+    count = sizes.pop() if sizes else 1
+
+    def one(values: Mapping[str, Any] | None, i: int) -> dict[str, Any]:
+        return {
+            k: v[i] if np.ndim(v) == 1 and not isinstance(v, tuple) else v
+            for k, v in (values or {}).items()
+        }
+
+    return [Member(start=one(start, i), params=one(params, i), times=times) for i in range(count)]
+
+
+def _of_response(loop: ct.InterconnectedSystem, response: Any) -> Member:
+    states = np.atleast_2d(np.asarray(response.states))
+    if states.shape[0] != (loop.nstates or 0):
+        raise ParameterError(
+            f"ledger needs responses with the {loop.nstates} states of '{loop.name}', got "
+            f"{states.shape[0]}"
+        )
+    start = dict(zip(all_states(loop), map(float, states[:, 0]), strict=True))
+    own = own_parameters(loop, response)
+    return Member(
+        start=start, params=own, times=np.asarray(response.time, dtype=float), expected=response
+    )
+
+
+def observe(
+    loop: ct.InterconnectedSystem,
+    members: Sequence[Member],
+    split: Decomposition,
+    max_steps: int = 2_000_000,
+) -> Iterator[Run]:
+    """Run the members, observed; see `analysis.lyapunov.loop.instrumented`.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+    members : sequence of Member
+    split : Decomposition
+        Of the actuator.
+    max_steps : int, optional
+        Steps after which a run counts as lost.
+
+    Raises
+    ------
+    ParameterError
+        If a member does not reproduce the response that it stands for.
+    DiagramError
+        If the loop is not the one that the proof is about.
+    """
+    compiled = observed_loop(loop, split)
+    for place, member in enumerate(members):
+        parts = read_parts(loop, member.start, member.params)
+        params = {**member.params, "integral.alpha_1": alpha_1(parts.gains)}
+        x0 = initial_state(loop, member.start)
+        points = points_around(x0) if place == 0 else [(0.0, x0)]
+        check_same(loop, compiled.system, points, member.params, params)
+        response: Any = input_output_response(
+            compiled,
+            member.times,
+            0,
+            member.start,
+            params=params,
+            max_steps=max_steps,
+            ignore_errors=True,
+        )
+        signals = signals_of(native.uninterrupted(response))
+        seen = _along(loop, response, LOOKS if place == 0 else 1)
+        check_same(loop, compiled.system, seen, member.params, params)
+        _check_reproduced(member, signals)
+        lost = None if response.success else float(response.statistics.time)
+        message = str(response.message or "")
+        yield Run(
+            member=member,
+            parts=parts,
+            signals=signals,
+            lost=lost,
+            message=message,
+            reference=_reference(loop, parts, response, signals, member.params),
+        )
+
+
+def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any]:
+    """Return times and states of the loop that a response of the observed loop has visited."""
+    states = np.asarray(response.states)[: loop.nstates or 0]
+    finite = np.flatnonzero(np.isfinite(states).all(axis=0))
+    places = np.unique(np.linspace(finite.size - 1, 0, count).astype(int)) if finite.size else []
+    return [(float(response.time[i]), states[:, i].copy()) for i in finite[places]]
+
+
+def _reference(
+    loop: ct.InterconnectedSystem,
+    parts: Parts,
+    response: Any,
+    signals: Signals,
+    params: Mapping[str, Any],
+) -> Margin | None:
+    """Compare the reference's derivatives with those of its own outputs."""
+    loop._update_params(dict(params))
+    states = np.asarray(response.states)[: loop.nstates or 0]
+    whole = np.isfinite(states).all(axis=0)
+    place = parts.roles.places["reference"]
+    return reference_margin(place, signals.t[whole], states[:, whole]) if whole.sum() > 1 else None
+
+
+def observed_loop(loop: ct.InterconnectedSystem, split: Decomposition) -> native.Compiled:
+    """Compile what `observe` runs."""
+    base = read_parts(loop)
+    return native.compile(observed(loop, base, split, alpha_1(base.gains)))
+
+
+def _check_reproduced(member: Member, signals: Signals) -> None:
+    if member.expected is None:
+        return
+    told = dict(zip(member.expected.output_labels, member.expected.outputs, strict=True))
+    r, again = np.asarray(told["r"]), signals["r"]
+    far = np.abs(r[: again.size] - again)
+    if not np.all(far <= AGREE * np.max(np.abs(r))):
+        at = float(signals.t[int(np.argmax(far))])
+        raise ParameterError(
+            f"the response is not one of this loop: at t = {at:g} s its r is off by "
+            f"{np.max(far):.3g} from a run with the same start and parameters"
+        )

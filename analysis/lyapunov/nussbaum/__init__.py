@@ -1,0 +1,1 @@
+"""Nussbaum functions: property (12), the slow drift of zeta, long runs."""

@@ -1,0 +1,70 @@
+"""When the creep of zeta will burst the loop, as a number of a run that ends long before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nlctl import functions
+from nlctl._errors import ParameterError
+
+from .property import lobe_around
+from .slow_drift import creep
+
+__all__ = ["BurstForecast"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Samples:
+    """What `creep` reads of a response."""
+
+    time: np.ndarray
+    outputs: np.ndarray
+    output_labels = ("zeta", "r", "u")
+
+
+@dataclass(frozen=True, kw_only=True)
+class BurstForecast:
+    """Time (s) at which zeta will have crossed its lobe, by the balance of its drift.
+
+    A metric of `nlctl.ensemble_response` and of `experiment.Experiment`, for loops with the law
+    (23), (24): see `analysis.lyapunov.nussbaum.slow_drift`.  Infinite where the drift stops or
+    reverses before; the time of the burst itself where it lies within the run.  A forecast, not a
+    bound: it supposes that disturbance and reference go on as they were.
+
+    Attributes
+    ----------
+    key, unit, meaning : str
+    window : float
+        Length (s) of the windows over which rates are averaged, whole periods of the reference; a
+        run needs six at least, sampled every 10 ms.
+    N : callable
+        The Nussbaum function of the law.
+    start, end : float
+        Interval of time (s) that counts, from 0 on.
+    """
+
+    key: str = "burst"
+    window: float = 4 * np.pi
+    N: Callable[[float], float] = functions.nussbaum
+    start: float = 0.0
+    end: float = np.inf
+
+    signals = ("zeta", "r", "u")
+    unit = "s"
+    meaning = "time at which zeta is forecast to leave its lobe"
+
+    def function(self, t: np.ndarray, zeta: np.ndarray, r: np.ndarray, u: np.ndarray) -> float:
+        """Return the forecast; NaN where zeta was in no lobe for five windows."""
+        lobe = lobe_around(float(zeta[0]), self.N)
+        beyond = np.flatnonzero(zeta >= lobe.high)
+        if beyond.size:
+            return float(t[beyond[0]])
+        run: Any = _Samples(time=t, outputs=np.array([zeta, r, u]))
+        try:
+            return float(creep(run, self.N, window=self.window).burst)
+        except ParameterError:
+            return np.nan

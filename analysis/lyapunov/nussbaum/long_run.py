@@ -1,0 +1,211 @@
+"""A loop far beyond the paper's 20 s: whether its gain loses its sign, and what foretold it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl import native
+from nlctl.response import input_output_response
+
+from ..loop.roles import read_parts
+from .property import Lobe, lobe_around
+from .slow_drift import Creep, creep
+
+__all__ = ["LOOKS", "LongRun", "long_run"]
+
+# From so many seconds of the run the rest is predicted, from windows of so many: whole periods of
+# the paper's reference, which lasts 4 pi.
+LOOKS = {200.0: 4 * np.pi, 1000.0: 16 * np.pi}
+FINE, COARSE = (
+    0.01,
+    0.1,
+)  # s; sampling interval up to the last look, which `creep` needs, and beyond
+END, FINEST = 0.5, 1e-5  # s; how much of a burst is run again, and the sampling interval there
+STANDSTILL = 1e-5  # s; a burst has no end: a run that gets no further in 2000 steps is given up
+SIGNALS = ("zeta", "e", "r", "u")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LongRun:
+    """What became of a loop over a long time.
+
+    Attributes
+    ----------
+    loop : str
+        Name of the diagram.
+    horizon, rtol : float
+        What was asked for (s), and the relative tolerance of the integrator.
+    time : ndarray of shape (m,)
+        In s, up to the time that the run reached; not evenly spaced.
+    signals : mapping
+        zeta, e, r and u over `time`.
+    lobe : Lobe
+        The lobe of the Nussbaum function that zeta starts in.
+    predictions : tuple of Creep
+        Each made from the beginning of the run alone.
+    lost : float or None
+        Time (s) at which the run was given up, because its steps shrank to nothing.
+    """
+
+    loop: str
+    horizon: float
+    rtol: float
+    time: np.ndarray = field(repr=False)
+    signals: Mapping[str, np.ndarray] = field(repr=False)
+    lobe: Lobe
+    predictions: tuple[Creep, ...]
+    lost: float | None
+
+    @property
+    def burst(self) -> float:
+        """Time (s) at which zeta leaves its lobe and N changes its sign; NaN if it never does."""
+        zeta = self.signals["zeta"]
+        beyond = np.flatnonzero(zeta >= self.lobe.high)
+        if not beyond.size:
+            return np.nan
+        around = slice(max(beyond[0] - 1, 0), beyond[0] + 1)
+        return float(np.interp(self.lobe.high, zeta[around], self.time[around]))
+
+    @property
+    def calm(self) -> float:
+        """Largest |e| from 200 s until a second before the burst or the end; NaN if none."""
+        end = self.time[-1] if np.isnan(self.burst) else self.burst - 1.0
+        settled = np.abs(self.signals["e"][(self.time >= 200.0) & (self.time <= end)])
+        return float(np.max(settled)) if settled.size else np.nan
+
+    def __str__(self) -> str:
+        end, zeta = self.time[-1], self.signals["zeta"][-1]
+        what = f"no burst, zeta ends at {zeta:.4g}"
+        if np.isfinite(self.burst):
+            what = f"zeta crosses {self.lobe.high:g} at {self.burst:.1f} s"
+        lost = "" if self.lost is None else f"; steps shrink to nothing at {self.lost:.3f} s"
+        lines = [
+            f"{self.loop} at rtol {self.rtol:g} over {end:.6g} s: {what}{lost}",
+            f"max |e| before, from 200 s on: {self.calm:.3g}",
+        ]
+        for p in self.predictions:
+            rest = "" if p.rest is None else f", at rest at zeta = {p.rest:.4g}"
+            burst = f", burst at {p.burst:.4g} s"
+            lines.append(
+                f"foretold after {p.time:g} s: {p.verdict}"
+                + (burst if np.isfinite(p.burst) else rest)
+            )
+        return "\n".join(lines)
+
+
+def long_run(
+    loop: ct.InterconnectedSystem,
+    horizon: float = 9_600.0,
+    *,
+    rtol: float = 1e-6,
+    start: Mapping[str, float] | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> LongRun:
+    """Run a loop with a Nussbaum law for hours of its time, and predict the end early on.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+        Of the blocks that `nlctl.paper.example_1` joins, with a Nussbaum law.
+    horizon : float, optional
+        In s; the run ends earlier where it diverges.
+    rtol : float, optional
+        Relative tolerance; the absolute one is a hundredth of it.
+    start : mapping, optional
+        Initial states other than the blocks' own, ``{"law.zeta": 2.9}``.
+    progress : callable, optional
+        Called with the time, as `nlctl.input_output_response` does.
+
+    Returns
+    -------
+    LongRun
+
+    Raises
+    ------
+    DiagramError
+        If the loop is not one that the proof is about.
+    ParameterError, UnknownNameError
+        If zeta is not in a lobe for long enough for a prediction, or `start` is refused.
+    """
+    last = min(max(LOOKS), horizon)
+    times = np.append(
+        np.linspace(0.0, last, round(last / FINE) + 1),
+        np.arange(1, round((horizon - last) / COARSE) + 1) * COARSE + last,
+    )
+    compiled, N = native.compile(loop), read_parts(loop).law.N
+    settings: Any = {"rtol": rtol, "atol": rtol / 100, "ignore_errors": True}
+    whole = _watched(compiled, times, start, progress, settings)
+    time, signals = whole.time, _signals(whole)
+    predictions = tuple(
+        creep(_Beginning(time, signals, look), N, window=window)
+        for look, window in LOOKS.items()
+        if look <= last
+    )
+    lost = None
+    if not whole.success:
+        i = max(int(np.searchsorted(time, whole.statistics.time - END)) - 1, 0)
+        again = np.arange(time[i], whole.statistics.time + END, FINEST)
+        end = _watched(compiled, again, whole.states[:, i], progress, settings)
+        late = _signals(end)
+        time = np.append(time[:i], end.time)
+        signals = {name: np.append(signals[name][:i], late[name]) for name in SIGNALS}
+        lost = None if end.success else end.statistics.time
+    return LongRun(
+        loop=str(loop.name),
+        horizon=horizon,
+        rtol=rtol,
+        time=time,
+        signals=signals,
+        lobe=lobe_around(float(signals["zeta"][0]), N),
+        predictions=predictions,
+        lost=lost,
+    )
+
+
+def _watched(
+    compiled: native.Compiled,
+    times: np.ndarray,
+    start: Any,
+    progress: Callable[[float], object] | None,
+    settings: Mapping[str, Any],
+) -> Any:
+    """Return a run that may end where it stands still, but not where Ctrl-C ends it."""
+    watch = _Watch(progress)
+    response = input_output_response(compiled, times, 0, start, progress=watch, **settings)
+    return response if watch.stands_still else native.uninterrupted(response)
+
+
+def _signals(response: Any) -> dict[str, np.ndarray]:
+    rows = dict(zip(response.output_labels, np.asarray(response.outputs), strict=True))
+    return {name: rows[name] for name in SIGNALS}
+
+
+@dataclass
+class _Watch:
+    """Ends a run that stands still, as Ctrl-C would: what it has reached is kept."""
+
+    progress: Callable[[float], object] | None
+    reached: float = -np.inf
+    stands_still: bool = False
+
+    def __call__(self, t: float) -> None:
+        if self.progress is not None:
+            self.progress(t)
+        self.stands_still = t - self.reached < STANDSTILL
+        if self.stands_still:
+            raise KeyboardInterrupt
+        self.reached = t
+
+
+class _Beginning:
+    """The beginning of a run, as `creep` reads a response."""
+
+    def __init__(self, time: np.ndarray, signals: Mapping[str, np.ndarray], end: float) -> None:
+        until = time <= end + 1e-9
+        self.time, self.output_labels = time[until], list(SIGNALS)
+        self.outputs: Any = np.array([signals[name][until] for name in SIGNALS])

@@ -1,0 +1,354 @@
+r"""The creep of the Nussbaum argument: where it leads, and when.
+
+The law (23), (24) obeys N(zeta) zeta' = r u.  While zeta crosses a lobe in which N has the right
+sign (k G N < 0), the loop spends the lobe's budget :math:`\int |N| d\zeta`,
+
+.. math:: \frac{d}{dt} \int |N| \, d\zeta = -r u,
+
+and when the budget is spent the loop has the wrong sign: r grows until zeta has crossed the next
+lobe.  The right-hand side has a mean because u must work against the disturbance with a finite
+gain, r ~ u / (beta N), and because r follows Y_d, which the gain does not change.  Averaged over
+windows it is a balance,
+
+.. math:: \frac{dA}{dt} = p \left\langle \frac1{|N|} \right\rangle - q,
+
+so that the drift stops where |N| = p / q, if the lobe has such a place; otherwise it goes on until
+the budget is spent.  p and q are fitted to a response.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.integrate import quad, trapezoid
+
+from nlctl import functions
+from nlctl._arguments import number, of_type, whole_number
+from nlctl._errors import ParameterError
+
+from ..loop.response_of_loop import law_of_response
+from .energy import Drift, drift
+from .property import Function, Lobe, antiderivative, lobe_around, root
+
+__all__ = ["Balance", "Creep", "burst_peak", "creep"]
+
+SAMPLED = 0.1  # mismatch beyond which the samples do not show that N is that of the law
+ERRORS, MODEL = 2.0, 0.05  # standard errors, and share of the time left, that the range allows
+BLOCKS = 5  # fits that leave one of so many parts out give the range of a prediction
+
+
+@dataclass(frozen=True, kw_only=True)
+class Balance:
+    """The fitted law of the drift, A' = p / |N| - q.
+
+    Attributes
+    ----------
+    p, q : float
+        Fitted to the mean rates over the windows, by least squares.
+    residual : float
+        Root mean square of what the fit leaves, in the unit of the rate (1/s).
+    """
+
+    p: float
+    q: float
+    residual: float
+
+    def rate(self, N: float) -> float:
+        """Rate A' (1/s) at a value of N."""
+        return self.p / abs(N) - self.q
+
+    def __str__(self) -> str:
+        return f"A' = {self.p:.4g} / |N| {'+' if self.q < 0 else '-'} {abs(self.q):.4g}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Creep:
+    """Where zeta stands in its lobe at the end of a response, and where it drifts.
+
+    Attributes
+    ----------
+    time, zeta : float
+        End of the response (s), and zeta there.
+    lobe : Lobe
+        The lobe that zeta lies in.
+    spent : float
+        A = int |N| dzeta from the lobe's lower end.
+    window : float
+        Length of a window (s).
+    rates : tuple of float
+        Mean of A' over each window (1/s), the first windows left out.
+    burst, burst_range : float, tuple of float
+        Forecast of the time (s) at which the budget is spent, infinite where the drift stops or
+        turns round before; and the earliest and the latest time when mean rate and dependence on
+        1/|N| are moved by two standard errors each, and the time that is left by 5 % more.  It
+        is meant to hold the burst in nine of ten loops at least, and has done so in simulated ones
+        (tests/test_creep_forecast.py), as long as disturbance and reference go on as they were.
+    balance : Balance
+        The law fitted to all windows.
+    rest, rest_range : float or None, tuple of float or None
+        zeta at which the balance stops the drift, and its range over fits with a part of the
+        windows left out; None if it does not stop in this lobe.
+    peak : float
+        max |r| of the burst, sqrt(2 k G |int N|) over the next lobe.
+    mismatch : float
+        Largest distance between int |N| dzeta and -int r u dt over the response, over the largest
+        of them: how well the samples obey N zeta' = r u.
+    """
+
+    time: float
+    zeta: float
+    lobe: Lobe
+    spent: float
+    window: float
+    rates: tuple[float, ...]
+    burst: float
+    burst_range: tuple[float, float]
+    balance: Balance
+    rest: float | None
+    rest_range: tuple[float, float] | None
+    peak: float
+    mismatch: float
+
+    @property
+    def share(self) -> float:
+        """Share of the lobe's budget that is spent."""
+        return self.spent / self.lobe.budget
+
+    @property
+    def recent(self) -> np.ndarray:
+        """Rates (1/s) of the last windows, from which "the present rate" is taken."""
+        return _recent(np.array(self.rates))
+
+    @property
+    def verdict(self) -> str:
+        """One of "creeps", "settles", "turned round", "undecided".
+
+        "turned round": the mean rate of the last windows is not positive; "settles": it is, and
+        in all fits the drift stops in this lobe; "creeps": in none; "undecided" otherwise.
+        """
+        if not self.recent.mean() > 0:
+            return "turned round" if self.recent.mean() <= 0 else "undecided"
+        if self.rest is None:
+            return "creeps" if self.rest_range is None else "undecided"
+        return "settles" if self.rest_range and self.rest_range[1] < self.lobe.high else "undecided"
+
+    def __str__(self) -> str:
+        lines = [
+            f"at {self.time:.6g} s zeta = {self.zeta:.6g} in ({self.lobe.low:.6g}, "
+            f"{self.lobe.high:.6g}): {self.spent:.6g} of {self.lobe.budget:.6g} spent "
+            f"({100 * self.share:.3g} %)",
+            f"the rate is {self.recent.mean():.4g} 1/s: {self.verdict}",
+            f"balance: {self.balance}",
+        ]
+        if self.rest is not None:
+            span = " to ".join(f"{z:.5g}" for z in self.rest_range or ())
+            lines.append(f"by the balance the drift stops at zeta = {self.rest:.5g} ({span})")
+        else:
+            lines.append("by the balance it does not stop in this lobe")
+        if np.isfinite(self.burst):
+            span = " to ".join(f"{t:.4g}" for t in self.burst_range)
+            lines.append(f"the budget lasts until about {self.burst:.4g} s ({span} s)")
+        if not self.mismatch <= SAMPLED:
+            lines.append(
+                f"between the samples int N dzeta and int r u differ by {self.mismatch:.2g} of the "
+                "larger: sample more densely, or give the loop, to know that N is that of the law"
+            )
+        lines.append(f"a burst would reach max |r| = {self.peak:.4g}")
+        return "\n".join(lines)
+
+
+def burst_peak(lobe: Lobe, kG: float) -> float:
+    """Return max |r| = sqrt(2 k G |int N|) of a burst through a lobe of the wrong sign.
+
+    r^2/2 grows by int k G N dzeta, against which disturbances and beta r are small.
+
+    Raises
+    ------
+    ParameterError
+        If it is no lobe, or `kG` is not positive.
+    """
+    of_type("burst_peak", "lobe", lobe, Lobe, "lobe_around(zeta)")
+    number("burst_peak", "kG", kG, above=0)
+    return float(np.sqrt(2 * kG * lobe.budget))
+
+
+def creep(
+    response: Any,
+    N: Function = functions.nussbaum,
+    *,
+    loop: Any = None,
+    window: float = 16 * np.pi,
+    skip: int = 1,
+    kG: float = 1.0,
+) -> Creep:
+    """Tell from a response how the creep of zeta will go on.
+
+    The prediction supposes that disturbance and reference stay as they were; a chirp does not.
+
+    Parameters
+    ----------
+    response : control.TimeResponseData
+        Of a loop with the law (23), (24), with outputs zeta, r and u; samples dense enough to
+        see zeta turn (10 ms for the paper's examples).
+    N : callable, optional
+        The Nussbaum function of the law.
+    loop : control.InterconnectedSystem or Compiled, optional
+        The loop that the response is of: N is then that of its law, and it is checked that the
+        loop is one that this is about, see `analysis.lyapunov.loop.response_of_loop`.
+    window : float, optional
+        Length of the windows (s) over which rates are averaged; whole periods of the reference,
+        of which the default holds four for the paper's.
+    skip : int, optional
+        Windows at the beginning that are left out, since the loop still settles.
+    kG : float, optional
+        Input gain for the peak of a burst.
+
+    Returns
+    -------
+    Creep
+
+    Raises
+    ------
+    DiagramError
+        If `loop` is not one that this is about.
+    ParameterError
+        If the response is not one of `loop`, zeta, r or u is not finite, fewer than 5 windows are
+        left, or zeta lies in a lobe without end.
+    """
+    N = N if loop is None else law_of_response(loop, response)
+    run = drift(response, N)
+    number("creep", "window", window, above=0)
+    whole_number("creep", "skip", skip, at_least=0)
+    lobe = lobe_around(float(run.zeta[-1]), N)
+    rates, inverse = _windows(run, N, lobe, window, skip)
+    balance = _fitted(rates, inverse)
+    rest, rest_range = _rest(rates, inverse, N, lobe)
+    spent = abs(float(np.diff(antiderivative(N)(np.array([lobe.low, run.zeta[-1]])))[0]))
+    time = float(run.time[-1])
+    stops = rest is not None and rest_range is not None and rest_range[1] < lobe.high
+    lasts = _forecast(rates, inverse, N, lobe, float(run.zeta[-1]))
+    if stops or not _recent(rates).mean() > 0:
+        lasts = (np.inf, lasts[1], np.inf)
+    return Creep(
+        time=time,
+        zeta=float(run.zeta[-1]),
+        lobe=lobe,
+        spent=spent,
+        window=window,
+        rates=tuple(map(float, rates)),
+        burst=time + lasts[0],
+        burst_range=(time + lasts[1], time + lasts[2]),
+        balance=balance,
+        rest=rest,
+        rest_range=rest_range,
+        peak=burst_peak(lobe_around(lobe.high, N), kG),
+        mismatch=run.mismatch,
+    )
+
+
+def _recent(rates: np.ndarray) -> np.ndarray:
+    """Return the last fifth of the windows, two at least."""
+    return rates[-max(2, rates.size // BLOCKS) :]
+
+
+def _windows(
+    run: Drift, N: Function, lobe: Lobe, window: float, skip: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean of A' and of 1/|N| over each window that zeta spends in the lobe."""
+    start = run.time[0] + skip * window
+    count = int(np.floor((run.time[-1] - start) / window * (1 + 1e-12)))
+    edges = run.time[-1] - window * np.arange(max(count, 0), -1, -1)
+    at = np.searchsorted(run.time, edges - 1e-9 * window)
+    values = np.abs(np.vectorize(N)(run.zeta))
+    rates, inverse = [], []
+    for a, b in itertools.pairwise(at):
+        if np.all((run.zeta[a : b + 1] > lobe.low) & (run.zeta[a : b + 1] < lobe.high)):
+            length = run.time[b] - run.time[a]
+            rates.append(lobe.sign * (run.phi[b] - run.phi[a]) / length)
+            inverse.append(trapezoid(1 / values[a : b + 1], run.time[a : b + 1]) / length)
+    if len(rates) < BLOCKS:
+        raise ParameterError(
+            f"creep needs {BLOCKS} windows of {window:g} s within a lobe, got {len(rates)} in "
+            f"[{run.time[0]:g}, {run.time[-1]:g}] s: take a longer response or shorter windows"
+        )
+    return np.array(rates), np.array(inverse)
+
+
+def _fitted(rates: np.ndarray, inverse: np.ndarray) -> Balance:
+    """Fit A' = p <1/|N|> - q by least squares."""
+    columns = np.column_stack([inverse, -np.ones_like(inverse)])
+    (p, q), *_ = np.linalg.lstsq(columns, rates, rcond=None)
+    left = rates - columns @ (p, q)
+    return Balance(p=float(p), q=float(q), residual=float(np.sqrt(np.mean(left**2))))
+
+
+def _rest_of(balance: Balance, N: Function, lobe: Lobe) -> float | None:
+    """Return the zeta of the lobe, below its extremum, at which the balance stops the drift.
+
+    Beyond the extremum |N| falls again, and the same |N| is passed on the way to the burst.
+    """
+    if not (balance.p > 0 and balance.q > 0):
+        return None
+    wanted = balance.p / balance.q
+    if wanted >= abs(lobe.extremum):
+        return None
+    return root(lambda z: abs(N(z)) - wanted, lobe.low, lobe.place)
+
+
+def _rest(
+    rates: np.ndarray, inverse: np.ndarray, N: Function, lobe: Lobe
+) -> tuple[float | None, tuple[float, float] | None]:
+    """Return the resting zeta, and its range over fits that leave a part of the windows out.
+
+    A fit in which the drift does not stop counts as the lobe's upper end.
+    """
+    found = []
+    for part in np.array_split(np.arange(rates.size), BLOCKS):
+        rest = _rest_of(_fitted(np.delete(rates, part), np.delete(inverse, part)), N, lobe)
+        found.append(lobe.high if rest is None else rest)
+    rest = _rest_of(_fitted(rates, inverse), N, lobe)
+    if rest is None and min(found) == lobe.high:
+        return None, None
+    return rest, (min(found), max(found))
+
+
+def _forecast(
+    rates: np.ndarray, inverse: np.ndarray, N: Function, lobe: Lobe, zeta: float
+) -> tuple[float, float, float]:
+    """Return how long the budget lasts, and the shortest and the longest time that it may.
+
+    The rate is taken as <A'> + p (1/|N| - <1/|N|>), p >= 0.  Windows that saw little of the lobe
+    tell little of p: it is shrunk by p^2 / (p^2 + its variance), towards a constant rate.
+    """
+    mean, centre = float(rates.mean()), float(inverse.mean())
+    slope, of_slope, of_mean = _slope(rates, inverse)
+    p = max(slope, 0.0) ** 3 / (slope**2 + of_slope**2) if slope else 0.0
+
+    def lasts(rate: float, slope: float) -> float:
+        return _duration(Balance(p=slope, q=slope * centre - rate, residual=0.0), zeta, N, lobe)
+
+    slopes = {max(p - ERRORS * of_slope, 0.0), p, max(slope + ERRORS * of_slope, 0.0)}
+    moved = [lasts(mean + s * of_mean, q) for s in (-ERRORS, ERRORS) for q in slopes]
+    return lasts(mean, p), min(moved) * (1 - MODEL), max(moved) * (1 + MODEL)
+
+
+def _slope(rates: np.ndarray, inverse: np.ndarray) -> tuple[float, float, float]:
+    """Return p of the balance, and the standard errors of p (jackknife) and of the mean rate."""
+    fit, parts = _fitted(rates, inverse), np.array_split(np.arange(rates.size), BLOCKS)
+    slopes = [_fitted(np.delete(rates, part), np.delete(inverse, part)).p for part in parts]
+    of_slope = np.sqrt((BLOCKS - 1) * np.var(slopes))
+    freedom = max(rates.size - 2, 1)
+    return fit.p, float(of_slope), fit.residual / float(np.sqrt(freedom))
+
+
+def _duration(balance: Balance, zeta: float, N: Function, lobe: Lobe) -> float:
+    """Time until the budget is spent by the balance: int |N| dzeta / A'."""
+    if balance.rate(lobe.extremum) <= 0 and zeta < lobe.place:
+        return np.inf
+    slowest = balance.rate(N(zeta) if zeta > lobe.place else lobe.extremum)
+    if not slowest > 0:
+        return np.inf
+    return quad(lambda z: abs(N(z)) / balance.rate(N(z)), zeta, lobe.high, limit=200)[0]

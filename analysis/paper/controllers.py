@@ -1,0 +1,203 @@
+"""All controllers of an example: the paper's, its ablations, baselines, certified and repaired."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl import paper
+from nlctl._names import unknown
+from nlctl.controllers import (
+    PID,
+    AdaptiveWeights,
+    DeadZoneNussbaumLaw,
+    KnownSignLaw,
+    LeakyNussbaumLaw,
+    MonotoneNussbaumLaw,
+    RobustTerm,
+    SlidingModeLaw,
+    ablations,
+    replaced,
+    sliding_mode,
+)
+from nlctl.native import compile as compiled_loop
+from nlctl.native import ensemble_response
+from nlctl.references import BandLimitedNoise
+
+from ..metrics import tracking_metrics
+from .tuning import Tuned, tune
+
+__all__ = ["baselines", "contenders", "sensor", "tuned"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Gains:
+    """What the controllers of an example are made with.
+
+    Attributes
+    ----------
+    pid, sliding : dict
+        Found by `tuned`.
+    reached : float
+        -N(zeta) of the paper's loop at 20 s.
+    r_0 : float
+        Dead zone of r in zeta', for |e| <= 0.133 (example 1) and 0.13 (example 2).
+    weights, robust, law : dict
+        Gains for which `analysis.lyapunov.certify` proves a bound.
+    """
+
+    pid: dict[str, float]
+    sliding: dict[str, float]
+    reached: float
+    r_0: float
+    weights: dict[str, float]
+    robust: dict[str, float]
+    law: dict[str, float]
+
+
+GAINS = {
+    "example_1": _Gains(
+        pid={"k_p": 12.5, "k_i": 748.0, "k_d": 97.4, "T_f": 0.275},
+        sliding={"K": 8.99, "phi": 0.027},
+        reached=26.9,
+        r_0=0.2,
+        weights={"Gamma": 10.0},
+        robust={"gamma": 1e5, "sigma_2": 1e-4},
+        law={"N_0": 2.4},
+    ),
+    "example_2": _Gains(
+        pid={"k_p": 1.39, "k_i": 0.152, "k_d": 5.56, "T_f": 0.00513},
+        sliding={"K": 2.19, "phi": 0.0278},
+        reached=7.79,
+        r_0=0.13,
+        weights={"Gamma": 34.0, "sigma_1": 0.3},
+        robust={"gamma": 1e5, "sigma_2": 3e-4, "tau": 0.05},
+        law={"N_0": 0.84, "beta": 5.0},
+    ),
+}
+
+
+def contenders(example: str) -> dict[str, ct.InputOutputSystem]:
+    """Return every controller of an example by label, the paper's first.
+
+    Parameters
+    ----------
+    example : {"example_1", "example_2"}
+
+    Returns
+    -------
+    dict
+        For ``controller=`` of `nlctl.paper.example_1` or `example_2`, one by one or as the
+        options of a `Choice`:
+
+        * "paper"; "no network", "no robust term", "neither", "fixed gain": see
+          `nlctl.ablations`, where the fixed gain is -N(zeta) that the paper's loop has reached
+          after 20 s;
+        * "PID", "sliding mode": see `baselines`;
+        * "certified": `nlctl.KnownSignLaw` with gains that `analysis.lyapunov.certify` proves a
+          bound for;
+        * "dead zone in zeta'", "leakage", "monotone zeta": the paper's gains with another law for
+          the Nussbaum argument.
+
+        "fixed gain", "PID", "sliding mode" and "certified" assume the sign of the input gain.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such example.
+    """
+    published, gains = _published(example), GAINS[example]
+    beta = _part(published, "law").spec.beta
+    laws = {
+        "dead zone in zeta'": DeadZoneNussbaumLaw(beta=beta, r_0=gains.r_0),
+        "leakage": LeakyNussbaumLaw(beta=beta),
+        "monotone zeta": MonotoneNussbaumLaw(beta=beta),
+    }
+    return {
+        "paper": published,
+        **ablations(published, kappa=gains.reached),
+        **baselines(example),
+        "certified": replaced(
+            published,
+            weights=AdaptiveWeights(nodes=_part(published, "weights").spec.nodes, **gains.weights),
+            robust=RobustTerm(**gains.robust),
+            law=KnownSignLaw(**gains.law),
+        ),
+        **{label: replaced(published, law=law) for label, law in laws.items()},
+    }
+
+
+def baselines(example: str) -> dict[str, Any]:
+    """Return a PID and a boundary-layer sliding-mode controller for an example.
+
+    Tuned by `tuned`: the least IAE over 20 s of the nominal loop with measurement noise, for the
+    paper's max |u| in the same noise.  They know the sign of the input gain and have gains made
+    for this plant; the paper's controller has neither.
+    """
+    surface, gains = _part(_published(example), "filtered_error").spec, GAINS[example]
+    return {
+        "PID": PID(**gains.pid, u_max=100.0),
+        "sliding mode": sliding_mode(surface, SlidingModeLaw(**gains.sliding)),
+    }
+
+
+def sensor(example: str, rms: float = 0.01, seed: int = 0) -> BandLimitedNoise:
+    """Return measurement noise on all states of an example, 0 to 50 rad/s."""
+    states = _part(_build(example)(), "plant").spec.states
+    return BandLimitedNoise(
+        takes=states, delivers=tuple(f"{x}_measured" for x in states), rms=rms, seed=seed
+    )
+
+
+def tuned(example: str, *, generations: int = 40, seed: int = 0) -> dict[str, Tuned]:
+    """Tune the baselines of an example: where the numbers of `baselines` come from.
+
+    The least IAE with max |u| at most that of the paper's controller, both with the noise of
+    `sensor`: without noise the gains would grow without end, since nothing in the model bounds
+    them.  Nor may a run take more than 10,000 steps.
+
+    Returns
+    -------
+    dict
+        `Tuned` by label; a few minutes of computing.
+    """
+    build, times = _build(example), np.linspace(0, 20, 2001)
+    by_key = {m.key: m for m in tracking_metrics(start=10, band=0.15, weights="", gain="")}
+    cost, limited = by_key["iae"], by_key["peak_u"]
+    published = compiled_loop(build(sensor=sensor(example)))
+    own = {"law.beta": np.array([_part(_published(example), "law").spec.beta])}
+    row = ensemble_response(published, times, params=own, metrics=(limited,)).table.iloc[0]
+    limit = float(row[limited.key])
+    bounds = {
+        "PID": {f"controller.{k}": (0.01, 1000.0) for k in ("k_p", "k_i", "k_d")}
+        | {"controller.T_f": (0.005, 0.5)},
+        "sliding mode": {"law.K": (limit / 10, limit), "law.phi": (0.01, 1.0)},
+    }
+    found = {}
+    for label, controller in baselines(example).items():
+        loop = compiled_loop(build(controller=controller, sensor=sensor(example)))
+        found[label] = tune(
+            loop, bounds[label], times, cost,
+            limited=limited, limit=limit, generations=generations, seed=seed,
+        )  # fmt: skip
+    return found
+
+
+def _build(example: str) -> Callable[..., ct.InterconnectedSystem]:
+    """Return what makes the diagram of an example."""
+    if example not in paper.EXAMPLES:
+        raise unknown("example", example, paper.EXAMPLES)
+    return paper.EXAMPLES[example]
+
+
+def _published(example: str) -> ct.InterconnectedSystem:
+    """Return the paper's controller of an example."""
+    return _part(_build(example)(), "controller")
+
+
+def _part(diagram: ct.InterconnectedSystem, name: str) -> Any:
+    return diagram.syslist[diagram.syslist_index[name]]

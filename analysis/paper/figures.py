@@ -1,0 +1,118 @@
+"""Figures of the paper's runs: signals over time, and the actuator's characteristic."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from nlctl.functions import nussbaum
+
+from ..figures.axes import BLUE, GREY, TIME, draw_lines, set_style, stacked_axes
+from . import TAIL, Run
+
+__all__ = [
+    "actuator_path",
+    "adaptation",
+    "control_input",
+    "error_comparison",
+    "nussbaum_gain",
+    "overview",
+    "tracking",
+    "tracking_error",
+    "upper_states",
+]
+
+
+def _one(time: np.ndarray, curves: Mapping[str, np.ndarray], label: str) -> Figure:
+    """Draw up to four signals into one pair of axes."""
+    figure, (ax,) = stacked_axes()
+    draw_lines(ax, time, curves)
+    ax.set(xlabel=TIME, ylabel=label)
+    return figure
+
+
+def tracking(run: Run) -> Figure:
+    """Output y against the reference yd."""
+    return _one(run.time, {"$y$": run.signals["y"], "$y_d$": run.signals["yd"]}, "output")
+
+
+def tracking_error(run: Run) -> Figure:
+    """Tracking error e1, with the largest one of the last half marked."""
+    figure, (ax,) = stacked_axes()
+    bound = run.metrics["tail_max_e"]
+    draw_lines(ax, run.time, {"$e_1$": run.signals["e"]})
+    ax.fill_between([TAIL, run.time[-1]], -bound, bound, color=GREY, alpha=0.15, linewidth=0)
+    ax.annotate(
+        f"±{bound:.4f}",
+        (run.time[-1], bound),
+        (-3, 3),
+        textcoords="offset points",
+        ha="right",
+        color=GREY,
+    )
+    ax.set(xlabel=TIME, ylabel="tracking error $e_1$")
+    return figure
+
+
+def upper_states(run: Run) -> Figure:
+    """The states x2, ..., xn."""
+    numbers = [i for i in range(2, 10) if f"x{i}" in run.signals]
+    curves = {f"$x_{i}$": run.signals[f"x{i}"] for i in numbers}
+    return _one(run.time, curves, "state " + ", ".join(curves))
+
+
+def control_input(run: Run) -> Figure:
+    """Control input u and what the actuator makes of it, v."""
+    curves = {"$u$": run.signals["u"], "$v$": run.signals["v"]}
+    return _one(run.time, curves, "input $u$, actuator output $v$")
+
+
+def actuator_path(run: Run) -> Figure:
+    """The part of the actuator's characteristic that was travelled: v over u."""
+    figure = Figure(figsize=(4.6, 3.6), layout="constrained")
+    ax = figure.subplots()
+    set_style(ax)
+    u, v = run.signals["u"], run.signals["v"]
+    late = run.time >= TAIL
+    ax.plot(u, v, "-", color=GREY, linewidth=0.9, label=f"t < {TAIL:g} s")
+    ax.plot(u[late], v[late], "-", color=BLUE, linewidth=1.6, label=f"t ≥ {TAIL:g} s")
+    ax.legend(frameon=False, loc="upper left")
+    ax.set(xlabel="input $u$", ylabel="actuator output $v$")
+    return figure
+
+
+def nussbaum_gain(run: Run) -> Figure:
+    """The argument zeta, and the gain N(zeta) that it gives."""
+    figure, (top, bottom) = stacked_axes(rows=2, height=1.9)
+    zeta = run.signals["zeta"]
+    draw_lines(top, run.time, {"$\\zeta$": zeta})
+    draw_lines(bottom, run.time, {"$N(\\zeta)$": nussbaum(zeta)})
+    top.set(ylabel="$\\zeta$")
+    bottom.set(xlabel=TIME, ylabel="$N(\\zeta)$")
+    return figure
+
+
+def adaptation(run: Run) -> Figure:
+    """Norm of the network's weights, and the estimate delta_hat."""
+    curves = {"$\\|\\hat W\\|$": run.signals["W_norm"], "$\\hat\\delta$": run.signals["delta_hat"]}
+    return _one(run.time, curves, ", ".join(curves))
+
+
+def error_comparison(runs: Sequence[Run], labels: Sequence[str]) -> Figure:
+    """Tracking errors of up to four runs above each other."""
+    curves = dict(zip(labels, (run.signals["e"] for run in runs), strict=True))
+    return _one(runs[0].time, curves, "tracking error $e_1$")
+
+
+def overview(time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Figure:
+    """Tracking, input and Nussbaum argument of one run above each other."""
+    figure, (top, middle, bottom) = stacked_axes(rows=3, height=2.0)
+    draw_lines(top, time, {"$y$": signals["y"], "$y_d$": signals["yd"], "$e_1$": signals["e"]})
+    draw_lines(middle, time, {"$u$": signals["u"], "$v$": signals["v"]})
+    draw_lines(bottom, time, {"$\\zeta$": signals["zeta"], "$\\hat\\delta$": signals["delta_hat"]})
+    top.set(ylabel="output, error")
+    middle.set(ylabel="input")
+    bottom.set(xlabel=TIME, ylabel="$\\zeta$, $\\hat\\delta$")
+    return figure

@@ -1,0 +1,89 @@
+"""The examples' loops with one keyword per question: noise, wrong sign, saturation, controller.
+
+For study files, ``analysis.paper.loops:example_1``: every choice may be given by a label or a
+number.  What is asked of the actuator are parameters of its cascade: ``actuator.body.b_r``,
+``actuator.body.c_r``, ``actuator.saturation.limit``, ``actuator.gain.k``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+
+from nlctl import paper
+from nlctl._names import unknown
+from nlctl.actuators import Backlash, DeadZone, Gain, Saturation, cascade
+
+from .controllers import contenders, sensor
+
+__all__ = ["example_1", "example_2"]
+
+WIDE = 1e6  # a saturation beyond every |u| of a run that is worth keeping
+
+
+def example_1(
+    *,
+    controller: Any = "paper",
+    actuator: Any = None,
+    gain: float = 1.0,
+    limit: float = WIDE,
+    noise: float | None = None,
+) -> ct.InterconnectedSystem:
+    """Example 1 with another controller, gain, saturation or noise.
+
+    Parameters
+    ----------
+    controller : str, record or control.InputOutputSystem, optional
+        A label of `contenders.contenders`, or a controller.
+    actuator : record, optional
+        The ``body`` of the cascade; the example's by default.
+    gain : float, optional
+        Factor between the saturation and the body; -1 turns the sign of the input gain round.
+    limit : float, optional
+        Largest |u| that passes; none by default.
+    noise : float, optional
+        RMS of measurement noise on each state, see `contenders.sensor`; without it there is no
+        sensor, with 0 there is one whose ``sensor.rms`` and ``sensor.seed`` may be varied.
+
+    Returns
+    -------
+    control.InterconnectedSystem
+        As `nlctl.paper.example_1`.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such controller.
+    """
+    body = DeadZone() if actuator is None else actuator
+    return _loop("example_1", body, controller, gain, limit, noise)
+
+
+def example_2(
+    *,
+    controller: Any = "paper",
+    actuator: Any = None,
+    gain: float = 1.0,
+    limit: float = WIDE,
+    noise: float | None = None,
+) -> ct.InterconnectedSystem:
+    """Example 2 with another controller, gain, saturation or noise; see `example_1`."""
+    body = Backlash() if actuator is None else actuator
+    return _loop("example_2", body, controller, gain, limit, noise)
+
+
+def _loop(
+    example: str, body: Any, controller: Any, gain: float, limit: float, noise: float | None
+) -> ct.InterconnectedSystem:
+    if isinstance(controller, str):
+        known = contenders(example)
+        if controller not in known:
+            raise unknown("controller", controller, known)
+        controller = known[controller]
+    stages = {"saturation": Saturation(limit=limit), "gain": Gain(k=gain), "body": body}
+    return paper.EXAMPLES[example](
+        controller=controller,
+        actuator=cascade(stages),
+        sensor=None if noise is None else sensor(example, noise),
+    )

@@ -1,0 +1,1 @@
+"""The page of the paper's reproduction, and its part on the proof."""

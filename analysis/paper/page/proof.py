@@ -1,0 +1,240 @@
+"""The report's part on the proof: what happens far beyond 20 s, and the ledger of each example."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from ... import figures
+from ...lyapunov.ledger import Line
+from ...lyapunov.nussbaum.long_run import LongRun
+from ...report.document import Figure, Item, Paragraph, Section, Table
+from ..evidence import FAR, LOOK, Evidence, evidence
+from . import proof_text as text
+from .notation import formulas
+from .proof_text import LONG_RUN
+
+__all__ = ["LONG_RUN", "Evidence", "evidence", "lyapunov_sections"]
+
+GROUPS = (  # of the ledger's lines, each a table of its own
+    (("violated",), "corrected", text.VIOLATED),
+    (("proved", "computed"), None, text.PROVED),
+    (("checked",), None, text.CHECKED),
+    (("violated",), "paper", text.FAILING),
+    (("undecided", "not applicable"), None, text.OPEN),
+)
+
+
+def lyapunov_sections(
+    found: Mapping[int, Evidence], far: Mapping[str, LongRun] | None = None
+) -> list[Section]:
+    """Compose the part from what was found.
+
+    Parameters
+    ----------
+    found : mapping
+        Result of `evidence` by number of the example; without any there is no part.
+    far : mapping, optional
+        Runs far beyond 20 s, by key of `analysis.paper.evidence.FAR`.
+
+    Returns
+    -------
+    list of Section
+    """
+    if not found:
+        return []
+    parts = [section for number, one in found.items() for section in _example(number, one)]
+    return [_finding(found, far or {}), _lemma(), *parts]
+
+
+def _finding(found: Mapping[int, Evidence], far: Mapping[str, LongRun]) -> Section:
+    return Section(
+        key="proof",
+        title="The proof, and what happens far beyond 20 s",
+        items=[
+            *_burst(far),
+            _creep_table(found),
+            *(Paragraph(text=words, code=command) for words, command in text.COMMANDS),
+        ],
+    )
+
+
+def _burst(far: Mapping[str, LongRun]) -> Iterator[Item]:
+    run = far.get("2")
+    if run is not None and np.isfinite(run.burst):
+        yield Paragraph(text=text.burst(run))
+        yield Figure(
+            key="proof-burst",
+            caption=text.BURST,
+            description=f"{text.burst(run)} {text.BURST}",
+            figure=figures.burst(run),
+        )
+    else:
+        yield Paragraph(text=text.NO_LONG_RUN if run is None else text.calm(run))
+    calm = {FAR[key][0]: r for key, r in far.items() if key != "2"}
+    if calm:
+        yield Figure(
+            key="proof-calm",
+            caption=text.CALM,
+            description=" ".join(f"{name}: {text.calm(r)}" for name, r in calm.items()),
+            figure=figures.long_zeta(calm),
+        )
+    if far:
+        yield _far_table(far)
+
+
+def _far_table(far: Mapping[str, LongRun]) -> Table:
+    return Table(
+        caption=text.FAR_CAPTION,
+        columns=("loop", "rtol", "runs until (s)", "max |e₁| before", "foretold", "happened"),
+        rows=[
+            (FAR[key][0], f"{r.rtol:g}", f"{r.time[-1]:.0f}", r.calm, *text.told(r))
+            for key, r in far.items()
+        ],
+    )
+
+
+def _creep_table(found: Mapping[int, Evidence]) -> Table:
+    rows = []
+    for number, one in found.items():
+        c = one.creep
+        burst = f"{c.burst:.4g} s" if np.isfinite(c.burst) else "none"
+        rest = "none" if c.rest is None else f"{c.rest:.4g}"
+        if c.rest_range is not None:
+            rest = f"{rest}, by parts of the data {c.rest_range[0]:.4g} to {c.rest_range[1]:.4g}"
+        spent = f"{100 * c.share:.3g} %"
+        rows.append((f"Example {number}", f"{c.zeta:.5g}", spent, c.verdict, rest, burst))
+    return Table(
+        caption=f"The drift of ζ, judged after {LOOK:g} s. {text.CREEP}",
+        columns=("loop", "ζ", "budget spent", "verdict", "ζ comes to rest at", "burst at"),
+        rows=rows,
+    )
+
+
+def _lemma() -> Section:
+    return Section(
+        key="proof-lemma",
+        title="What Lemma 1 gives, and what it does not",
+        level=3,
+        items=[Paragraph(text=words) for words in text.LEMMA],
+    )
+
+
+def _example(number: int, one: Evidence) -> list[Section]:
+    key = f"proof-{number}"
+    return [
+        Section(
+            key=key,
+            title=f"Example {number}: the proof line by line",
+            level=3,
+            folded=True,
+            items=[Paragraph(text=text.summary(one.ledger)), *_ledger_tables(one.ledger.lines)],
+        ),
+        Section(
+            key=f"{key}-bound",
+            title=f"Example {number}: V, its bound, and how far the bound is from what happens",
+            level=3,
+            folded=True,
+            items=[*_bound(key, one)],
+        ),
+        Section(
+            key=f"{key}-steps",
+            title=f"Example {number}: every margin over time",
+            level=3,
+            folded=True,
+            items=[*_margins(key, one)],
+        ),
+        Section(
+            key=f"{key}-constants",
+            title=f"Example {number}: the constants of the proof",
+            level=3,
+            folded=True,
+            items=[_constants(one)],
+        ),
+    ]
+
+
+def _ledger_tables(lines: Sequence[Line]) -> Iterator[Table]:
+    for statuses, reading, caption in GROUPS:
+        group = [x for x in lines if x.status in statuses and reading in (None, x.reading)]
+        rows = [_row(line) for line in group]
+        if rows:
+            columns = ("line", "status", "statement", "least margin", "at (s)", "evidence")
+            yield Table(caption=caption, columns=columns, rows=rows, status="status")
+
+
+def _row(line: Line) -> tuple[str, ...]:
+    least, at = ("" if np.isnan(x) else f"{x + 0.0:.4g}" for x in (line.least, line.time))
+    told = formulas(line.evidence)
+    if not np.isnan(line.first):
+        told = f"{told}, first at {line.first:.4g} s"
+    if line.follows:
+        told = f"{told}. What follows: {formulas(line.follows)}"
+    status = line.status
+    if status == "violated" and line.reading == "paper":
+        status = "violated as printed"  # the paper's statement is wrong, nothing of ours
+    return line.key, status, formulas(line.statement), least, at, told
+
+
+def _bound(key: str, one: Evidence) -> Iterator[Item]:
+    c = one.conservatism
+    yield Figure(
+        key=f"{key}-V",
+        caption=text.V_CAPTION,
+        description=f"{text.V_CAPTION} C₀ is {c.C_0:.4g}, max |r| is {c.max_r:.4g}.",
+        figure=figures.lyapunov_bound(one.t, one.curves),
+    )
+    for caption, group in ((text.shares(c), c.shares), (text.delta_shares(c), c.delta_shares)):
+        yield Table(
+            caption=caption,
+            columns=("term", "formula", "value", "share"),
+            rows=[
+                (formulas(x.term), formulas(x.formula), f"{x.value:.4g}", f"{100 * x.share:.1f} %")
+                for x in group
+            ],
+        )
+    numbers = text.ladder(one)
+    yield Figure(
+        key=f"{key}-bounds",
+        caption=text.LADDER,
+        description="; ".join(f"{name}: {value:.4g}" for name, (value, _) in numbers.items()),
+        figure=figures.bounds(numbers),
+    )
+
+
+def _margins(key: str, one: Evidence) -> Iterator[Item]:
+    groups = (
+        ("assumptions", text.ASSUMPTIONS, one.assumptions),
+        ("margins", text.MARGINS, [m for m in one.margins if m.kind == "inequality"]),
+    )
+    for name, caption, margins in groups:
+        yield Figure(
+            key=f"{key}-{name}",
+            caption=caption,
+            description="; ".join(
+                f"{m.equation}: least margin {m.least:.4g} at {m.at:.4g} s" for m in margins
+            ),
+            figure=figures.inequality_margins(margins),
+        )
+    equalities = [m for m in one.margins if m.kind == "equality"]
+    worst = max(-m.least / m.scale for m in equalities)
+    yield Figure(
+        key=f"{key}-equations",
+        caption=text.EQUATIONS,
+        description=f"{text.EQUATIONS} The largest is {worst:.2g}.",
+        figure=figures.equality_residuals(equalities),
+    )
+
+
+def _constants(one: Evidence) -> Table:
+    entries = one.ledger.constants.entries
+    return Table(
+        caption=f"{text.CONSTANTS} {formulas(str(one.ledger.constants.box))}.",
+        columns=("constant", "value", "unit", "provenance", "how"),
+        rows=[
+            (formulas(c.symbol), f"{c.value:.6g}", formulas(c.unit), c.provenance, formulas(c.how))
+            for c in entries
+        ],
+        status="provenance",
+    )

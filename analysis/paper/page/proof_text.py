@@ -1,0 +1,194 @@
+"""What the report says about the proof: sentences, captions, commands."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from ...lyapunov.conservatism import Conservatism
+from ...lyapunov.ledger import Ledger
+from ...lyapunov.nussbaum.long_run import LOOKS, LongRun
+from ..evidence import Evidence
+from .notation import formulas
+
+_IMPORT = "import nlctl; from analysis.lyapunov.nussbaum.long_run import long_run"
+LONG_RUN = f'python -c "{_IMPORT}; print(long_run(nlctl.paper.example_2(), rtol=1e-8))"'
+LONG_RUN_1 = (
+    f"python -c \"{_IMPORT}; print(long_run(nlctl.paper.example_1(phase='integral'), 20_000))\""
+)
+COMMANDS = (  # what each one shows
+    ("The burst at a tolerance of 1e-8, and likewise at others (some minutes):", LONG_RUN),
+    ("Example 1 until 20 000 s instead of 1000 s:", LONG_RUN_1),
+)
+NO_LONG_RUN = "The runs far beyond 20 s are not part of this report."
+BURST = (
+    "Left: ζ, and the largest |e₁| in each period of the reference. Dots: what the prediction was "
+    "made from; lines of the same colour: the burst that it foretold. At ζ = 3, dashed, N(ζ) "
+    "changes its sign. Right: the end of the same run; time runs to the right and is what is left "
+    "of the run, on a logarithmic axis. The filtered error r and the input u grow beyond bounds "
+    "within milliseconds, before e₁ has time to move."
+)
+CALM = (
+    "Example 1: the Nussbaum argument ζ far beyond 20 s, for both readings of cos(w t). Dashed: "
+    "ζ = 3, where N(ζ) changes its sign. Dotted, in the colour of the run: where the drift is "
+    "foretold to stop."
+)
+FAR_CAPTION = (
+    "Runs of this report far beyond 20 s. Foretold: from the first 200 s and from the first "
+    "1000 s of the same run. max |e₁|: from 200 s on, until a second before the burst. What comes "
+    "after 1000 s of Example 2 is a record of the same computation, kept with the program and "
+    "continued from where today's run ends, unless the command at the end of this page has "
+    "--far: then all of it was computed again."
+)
+CREEP = (
+    "While ζ crosses an interval between two zeros of N, a lobe, it uses up the lobe's budget, the "
+    "integral of |N|. Creeps: by the fitted balance of the drift it goes on until the budget is "
+    "used up, and the gain changes its sign. Settles: by all fits the drift stops before. "
+    "Undecided: the fits disagree, or the chirp of Example 1 has not shown enough."
+)
+LEMMA = (
+    r"The paper bounds \(V\), \(\zeta\) and \(\int k\,G\,N\,d\zeta\) by its Lemma 1, for all time. "
+    r"The lemma is false on [0, ∞): with \(\dot\zeta = c_1 c_2/(2 + e^{\zeta^2})\) and \(V = c_1 + "
+    r"I\) its premise holds and \(\zeta\) grows without bound. The reason is the constant "
+    r"\(\alpha_0\) of (31): it pays for a slow drift of \(\zeta\) for ever. So the steps (33) to "
+    r"(36), and that the loop is uniformly ultimately bounded, do not follow from the paper's "
+    r"argument.",
+    r"What does follow: over any time that a run was seen to stay in the box, every step up to "
+    r"(32) holds, and \(|r| \le C_0\) with \(Q = \sup I(t)\) taken from the run. Without the "
+    r"lemma, (31) gives line (c) of the lists below, \(V \le V(0) + \alpha_0 t + \zeta - \zeta(0) "
+    r"+ l_+ E_+ - l_- E_-\), with \(l_-\) and \(l_+\) the bounds of \(k\,G\) and \(E_+\), \(E_-\) "
+    r"the energy that the Nussbaum term has given and taken; it grows with \(t\). For a constant "
+    r"gain or a \(\zeta\) that never falls, line (b) turns it into a time before which \(N\) "
+    r"cannot change its sign. A bound for all time needs another law: with the sign of the gain "
+    r"known, analysis.lyapunov.certify proves one, shown with each example below.",
+)
+PROVED = (
+    "Proved: by interval arithmetic over the whole box of states, or for all arguments. Computed: "
+    "in closed form."
+)
+CHECKED = (
+    "Only checked: seen to hold at every sample of this run, up to rounding. That is no proof for "
+    "other runs, nor between samples."
+)
+VIOLATED = (
+    "Violated: statements of the proof in their corrected form that do not hold along this run."
+)
+FAILING = (
+    "False as the paper has it: statements as printed, or as the paper uses them. “Literal”: with "
+    "q cos(w t) counted to g(x), which must not depend on t; the corrected line counts it to d."
+)
+OPEN = "Left open: what this run cannot decide, and what does not apply to it."
+V_CAPTION = (
+    r"\(V\) of (21) against its bounds: the level of (34), which is \(C_0^2/2\), the bound (32) "
+    r"that depends on time, and the part \(r^2/2\) that the filtered error has in \(V\). \(I\) and "
+    r"\(Q\) are "
+    "those of this run. Logarithmic."
+)
+LADDER = (
+    "Bounds of |r|, and what |r| reaches; logarithmic. Only what is proved for all time is called "
+    "so; the other bounds take Q or more from this run, and say nothing of times beyond it. By "
+    "comparison: without V and without Lemma 1. Known sign: another controller, with the law that "
+    "knows the sign of the gain and gains that suit it."
+)
+ASSUMPTIONS = (
+    "Margins of what the proof supposes, over time: the larger side less the smaller one. Dot: the "
+    "least. Omega: distance to the faces of the box over half its width."
+)
+MARGINS = (
+    "Margins of the inequalities of the proof over time: the larger side less the smaller one. "
+    "Dot: the least. The axes are linear near 0 and logarithmic beyond a thousandth of the largest "
+    "margin. Where a margin starts at 0, both sides are equal there by construction."
+)
+EQUATIONS = (
+    "Equations of the proof: distance between the two sides over the size of their terms. Grey: "
+    "the tolerance; what stays below it is rounding. What is less than 1e-18, or 0, is drawn "
+    "there."
+)
+CONSTANTS = "Every constant of the proof, with how it was obtained. They hold over the box"
+
+
+def burst(run: LongRun) -> str:
+    """Return what a long run came to, in one paragraph."""
+    early, *_ = run.predictions
+    late = run.predictions[-1]
+    return (
+        "Example 2 as published does not stay bounded. It tracks calmly for "
+        f"{run.burst / 3600:.1f} hours, max |e₁| = {run.calm:.3f} from {min(LOOKS):g} s on; all "
+        f"the while the Nussbaum argument ζ creeps upwards, and at t = {run.burst:.1f} s (relative "
+        f"tolerance {run.rtol:g}) it reaches {run.lobe.high:g}, where the gain N(ζ) changes to "
+        "the wrong sign: the input and r grow beyond bounds, and the integrator's steps shrink to "
+        "nothing. So the paper's conclusion, that all signals stay bounded, fails in this run. At "
+        "other tolerances the burst comes at other times, since errors add up over hours; the "
+        "command below prints one. The drift told so long "
+        f"before: from the first {early.time:g} s the burst is foretold for "
+        f"{early.burst:.0f} s, from the first {late.time:g} s for "
+        f"{late.burst:.0f} s."
+    )
+
+
+def calm(run: LongRun) -> str:
+    """Return what became of a long run that did not burst."""
+    return f"No burst within {run.time[-1]:.0f} s: ζ ends at {run.signals['zeta'][-1]:.3f}."
+
+
+def told(run: LongRun) -> tuple[str, str]:
+    """Return what was foretold of a long run, and what happened."""
+    before = [
+        f"at rest at ζ = {p.rest:.3f}"
+        if p.rest is not None
+        else f"burst at {p.burst:.0f} s"
+        if np.isfinite(p.burst)
+        else p.verdict
+        for p in run.predictions
+    ]
+    happened = f"ζ = {run.signals['zeta'][-1]:.3f} at the end, no burst"
+    if np.isfinite(run.burst):
+        happened = f"burst at {run.burst:.1f} s"
+    return "; ".join(before), happened
+
+
+def summary(found: Ledger) -> str:
+    """Return the ledger in a paragraph: what is violated, and how many lines are what."""
+    own = ", ".join(line.key for line in found.violated)
+    paper = ", ".join(line.key for line in found.failing)
+    count = Counter(line.status for line in found.lines)
+    told = ", ".join(f"{number} {status}" for status, number in count.items())
+    return (
+        f"Corrected statements violated: {own or 'none'}. False as the paper has them: "
+        f"{paper or 'none'}. One run over {found.horizon:g} s; of {len(found.lines)} lines "
+        f"{told}. The constants hold on the box {formulas(str(found.constants.box))}."
+    )
+
+
+def shares(c: Conservatism) -> str:
+    """Return the caption of the terms of C_0, which says what makes it large."""
+    most = max(c.shares, key=lambda share: share.share)
+    return (
+        f"What the bound is made of: C₀ = {c.C_0:.4g}, {c.ratio:.3g} times max |r| = "
+        f"{c.max_r:.4g}. The terms of C₀²/2; the largest is {formulas(most.term)}."
+    )
+
+
+def delta_shares(c: Conservatism) -> str:
+    """Return the caption of the terms of delta*."""
+    most = max(c.delta_shares, key=lambda share: share.share)
+    return f"The terms of δ*; the largest is {formulas(most.term)}."
+
+
+def ladder(one: Evidence) -> dict[str, tuple[float, str]]:
+    """Return bounds of |r| and what happens by name, each with its kind, see `figures.bounds`."""
+    c, run, seen = one.conservatism, "along this run", "what happens"
+    late = {f"t ≥ {x.start:g} s, by comparison": (x.bound, run) for x in c.comparisons[-1:]}
+    return {
+        "C₀ of (36)": (c.C_0, run),
+        "C₀, δ* along the run": (c.C_0_along, run),
+        "C₀, W fitted to the run as well": (c.C_0_fitted, run),
+        "√(2 max V)": (c.sqrt_2V, run),
+        "max |r|": (c.max_r, seen),
+        "in the end, by (34)": (c.ultimate, run),
+        **late,
+        "max |r|, second half": (c.tail_max_r, seen),
+        "known sign, for all t": (one.certificate.C_0, "proved"),
+        "known sign, max |r|": (one.certified_max_r, seen),
+    }

@@ -1,0 +1,95 @@
+"""The kept record of Example 2 until its gain loses the sign: two minutes of computing, once.
+
+``python -m analysis.paper.reference_run`` makes it again.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..lyapunov.nussbaum.long_run import LOOKS, SIGNALS, LongRun
+
+__all__ = ["RECORD", "continued", "read_record", "thinned", "write_record"]
+
+RECORD = Path(__file__).with_name("example-2-burst.csv")
+WINDOW = 4 * np.pi  # s; period of the paper's reference: one row in each, where |e| is largest
+LAST, STEP, PER_DECADE = 100.0, 0.5, 60  # s, s; the last seconds by time left until the end
+
+
+def thinned(run: LongRun) -> LongRun:
+    """Return a run with fewer samples, which its figure and its `burst` and `calm` do not miss.
+
+    Kept are the largest \\|e\\| of each period, the two samples around the burst, one in half a
+    second of the last hundred, of the last second as many in each decade of time left, and those
+    at which predictions are made.
+    """
+    time, error = run.time, np.abs(run.signals["e"])
+    number = np.floor(time / WINDOW).astype(int)
+    starts = np.flatnonzero(np.diff(number, prepend=-1))
+    ends = [*starts[1:], time.size]
+    peaks = [a + int(np.argmax(error[a:b])) for a, b in zip(starts, ends, strict=True)]
+    left = np.concatenate([np.arange(LAST, 1.0, -STEP), np.geomspace(1.0, 1e-5, 5 * PER_DECADE)])
+    late = np.searchsorted(time, time[-1] - left)
+    cross = np.searchsorted(run.signals["zeta"], run.lobe.high) + np.array([-1, 0])
+    calm = np.searchsorted(time, run.burst - 1.0, "right") - 1
+    looks = np.searchsorted(time, list(LOOKS))
+    keep = np.unique(np.concatenate([peaks, late, cross, looks, [0, calm, time.size - 1]]))
+    keep = keep[keep < time.size]
+    signals = {name: y[keep] for name, y in run.signals.items()}
+    return replace(run, time=time[keep], signals=signals)
+
+
+def write_record(run: LongRun, path: Path = RECORD) -> None:
+    """Write a run as CSV; the first line says what it is, in JSON."""
+    about = {"loop": run.loop, "horizon": run.horizon, "rtol": run.rtol, "lost": run.lost}
+    rows = np.column_stack([run.time, *(run.signals[name] for name in SIGNALS)])
+    names = ",".join(["time", *SIGNALS])
+    formats = ["%.6f", *["%.7g"] * len(SIGNALS)]
+    header = f"{json.dumps(about)}\n{names}"
+    np.savetxt(path, rows, fmt=formats, delimiter=",", header=header, comments="# ")
+
+
+def read_record(beginning: LongRun, path: Path = RECORD) -> LongRun:
+    """Return the record as a run, with the lobe and the predictions of a run made today."""
+    with path.open(encoding="utf-8") as file:
+        about = json.loads(file.readline().removeprefix("# "))
+        time, *rows = np.loadtxt(file, delimiter=",").T
+    signals = dict(zip(SIGNALS, rows, strict=True))
+    return replace(beginning, time=time, signals=signals, **about)
+
+
+def continued(beginning: LongRun, record: LongRun) -> LongRun:
+    """Return a run that goes on with the record where it ends.
+
+    Raises
+    ------
+    ValueError
+        If zeta of the two differs by more than 1e-4 there: the record is of other equations.
+    """
+    end = beginning.time[-1]
+    before = float(np.interp(end, record.time, record.signals["zeta"]))
+    if not abs(before - beginning.signals["zeta"][-1]) < 1e-4:
+        raise ValueError(
+            f"the record of '{record.loop}' has zeta = {before:.5f} at {end:g} s, a run of today "
+            f"{beginning.signals['zeta'][-1]:.5f}: make it again with "
+            "'python -m analysis.paper.reference_run'"
+        )
+    later = record.time > end
+    signals = {
+        name: np.append(y, record.signals[name][later]) for name, y in beginning.signals.items()
+    }
+    return replace(record, time=np.append(beginning.time, record.time[later]), signals=signals)
+
+
+if __name__ == "__main__":
+    from nlctl import paper
+
+    from ..lyapunov.nussbaum.long_run import long_run
+
+    made = long_run(paper.example_2(), progress=lambda t: print(f"\r{t:7.1f} s", end=""))
+    write_record(thinned(made))
+    print(f"\n{made}\n{RECORD}: the predictions need {max(LOOKS):g} s of a run and are not kept")

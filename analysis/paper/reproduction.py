@@ -1,0 +1,152 @@
+"""Running the cases and comparing them with what a right implementation reaches."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+
+import numpy as np
+
+from nlctl import native
+from nlctl.native import compile  # noqa: A004 (what it does)
+from nlctl.response import input_output_response
+
+from ..metrics import Metric, over
+from .cases import HORIZON, METRICS, Case
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expectation:
+    """A figure to reach, as printed, and the tolerance that the simulation method allows.
+
+    The values in ``expected.csv`` come from an independent computation with an event-located
+    integrator of order eight; all digits shown are converged.
+    """
+
+    case: str
+    metric: str
+    printed: str
+    tolerance: float
+
+    @property
+    def value(self) -> float:
+        """The figure as a number."""
+        return float(self.printed)
+
+
+def expectations() -> list[Expectation]:
+    """Read the figures to reach; no tolerance is below half a unit of the last printed digit."""
+    text = files("analysis.paper").joinpath("expected.csv").read_text(encoding="utf-8")
+    return [
+        Expectation(
+            case=row["case"],
+            metric=row["metric"],
+            printed=row["value"],
+            tolerance=max(float(row["tolerance"]), _half_unit(row["value"])),
+        )
+        for row in csv.DictReader(text.splitlines())
+    ]
+
+
+def _half_unit(printed: str) -> float:
+    return 0.5 * 10.0 ** -len(printed.partition(".")[2])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A simulated case: times (s), signals by name, and its metrics by key."""
+
+    case: Case
+    time: np.ndarray
+    signals: Mapping[str, np.ndarray]
+    metrics: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """A figure that was reached or missed."""
+
+    expectation: Expectation
+    metric: Metric
+    value: float
+
+    @property
+    def error(self) -> float:
+        """Distance from the expected value."""
+        return abs(self.value - self.expectation.value)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the distance is within the tolerance; false for NaN."""
+        return self.error <= self.expectation.tolerance
+
+
+def sample_times(horizon: float = HORIZON) -> np.ndarray:
+    """Return output times (s): 0.2 ms apart in the first half second, then 5 ms.
+
+    The largest control input is a peak of a few milliseconds in the first half second.
+    """
+    early = np.linspace(0, 0.5, 2501)
+    return np.concatenate(
+        [early, np.linspace(0.5, horizon, round((horizon - 0.5) / 0.005) + 1)[1:]]
+    )
+
+
+def run(case: Case) -> Run:
+    """Simulate a case over the paper's horizon, its diagram compiled to machine code.
+
+    The tests compare the published cases with plain python-control.
+
+    Raises
+    ------
+    nlctl.DivergedError
+        If the loop diverges.
+    """
+    diagram = case.diagram
+    atol = 1e-2 * case.rtol
+    response = input_output_response(compile(diagram), sample_times(), rtol=case.rtol, atol=atol)
+    return measured(case, response.time, dict(zip(diagram.output_labels, response.y, strict=True)))
+
+
+def measured(case: Case, time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Run:
+    """Return a run with its metrics, whatever simulated it."""
+    metrics = {m.key: m.function(*over(time, signals[m.signal], m.start, m.end)) for m in METRICS}
+    return Run(case=case, time=time, signals=signals, metrics=metrics)
+
+
+def run_all(
+    cases: Iterable[Case], *, done: Callable[[Case], object] | None = None
+) -> dict[str, Run]:
+    """Simulate cases and return them by key, in order.
+
+    `done` is called with each case when it is finished.
+    """
+    results = {}
+    for case in cases:
+        results[case.key] = run(case)
+        if done is not None:
+            done(case)
+    return results
+
+
+def compile_ahead(cases: Iterable[Case]) -> None:
+    """Compile the diagrams of cases, which otherwise happens when they are run."""
+    for case in cases:
+        native.compile_ahead(compile(case.diagram))
+
+
+def checks(runs: Mapping[str, Run]) -> list[Check]:
+    """Compare runs with the figures to reach; cases that were not run are left out."""
+    by_key = {m.key: m for m in METRICS}
+    return [
+        Check(
+            expectation=e,
+            metric=by_key[e.metric],
+            value=runs[e.case].metrics.get(e.metric, math.nan),
+        )
+        for e in expectations()
+        if e.case in runs
+    ]

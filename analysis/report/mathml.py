@@ -1,0 +1,263 @@
+"""LaTeX -> MathML, through a whitelist: what is not known to be harmless is shown as its source."""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import re
+import sys
+import unicodedata
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from xml.etree import ElementTree
+
+from latex2mathml.converter import convert_to_element
+from markupsafe import Markup
+
+from .document import Equation
+
+__all__ = [
+    "ATTRIBUTES",
+    "CHARACTERS",
+    "ELEMENTS",
+    "FAMILY",
+    "font_face",
+    "inline",
+    "italic",
+    "mathml",
+    "spoken",
+    "subset",
+]
+
+ELEMENTS = frozenset(
+    (
+        *("math", "mfrac", "mi", "mn", "mo", "mover", "mpadded", "mphantom", "mroot", "mrow"),
+        *("mspace", "msqrt", "mstyle", "msub", "msubsup", "msup", "mtable", "mtd", "mtext", "mtr"),
+        *("munder", "munderover"),
+    )
+)
+ATTRIBUTES = frozenset(
+    (
+        *("accent", "accentunder", "columnspan", "depth", "display", "displaystyle", "fence"),
+        *("form", "height", "largeop", "linebreak", "linethickness", "lspace", "mathvariant"),
+        *("maxsize", "minsize", "movablelimits", "rowspan", "rspace", "scriptlevel", "separator"),
+        *("stretchy", "symmetric", "voffset", "width"),
+    )
+)
+IGNORED = frozenset(["mathbackground", "mathcolor", "xmlns"])  # the page has its own colours
+ACCENTS = {"^": "ˆ", "~": "˜", "¯": "¯", "˙": "˙", "¨": "¨", "→": "→"}
+UPRIGHT = frozenset("ΓΔΘΛΞΠΣΥΦΨΩ")
+COMBINING = {"ˆ": "\u0302", "˜": "\u0303", "¯": "\u0304", "˙": "\u0307", "¨": "\u0308"}
+BINARY = frozenset("=≤≥<>+−-∈±→")
+SIGNS = frozenset("+−±-")
+CLOSING = frozenset(")]}⟩‖|!…")
+OPERANDS = frozenset(["mfrac", "mi", "mn", "mover", "msqrt", "msub", "msubsup", "msup"])
+THIN, WIDE = "0.167em", "0.8em"
+FUNCTION = re.compile("[A-Za-z]{2,}")
+
+
+class NotMathError(ValueError):
+    """An element or attribute that has no place in a formula."""
+
+
+def mathml(equation: Equation) -> Markup:
+    """Return a formula as MathML; one that cannot be read or trusted, as its LaTeX source."""
+    return _markup(equation.latex, "block")
+
+
+def inline(latex: str) -> Markup:
+    """Return a formula inside a line of text; else as `mathml`."""
+    return _markup(latex, "inline")
+
+
+def spoken(latex: str) -> str:
+    """Return the letters and signs of a formula in a row: V̇ ≤ −α_1 V."""
+    root = _tree(latex, "inline")
+    return latex if root is None else unicodedata.normalize("NFC", " ".join(_letters(root).split()))
+
+
+def _letters(element: ElementTree.Element) -> str:
+    parts = [_letters(child) for child in element]
+    if element.tag == "mover" and len(parts) == 2:
+        return parts[0] + COMBINING.get(parts[1].strip(), parts[1])
+    if element.tag in ("msub", "msup", "msubsup") and len(parts) > 1:
+        marks = {"msub": "_", "msup": "^", "msubsup": "_^"}[element.tag]
+        scripts = (p.strip() if len(p.strip()) < 4 else f"({p.strip()})" for p in parts[1:])
+        told = (mark + script for mark, script in zip(marks, scripts, strict=True))
+        return f"{parts[0].rstrip()}{''.join(told)}"
+    if element.tag == "mspace":
+        return " "
+    if element.tag == "mfrac":
+        return "/".join(parts)
+    if element.tag == "msqrt":
+        return f"√({''.join(parts)})"
+    text = element.text or ""
+    if element.tag == "mo" and text == ",":
+        return ", "
+    spaced = element.tag == "mo" and text in BINARY and element.get("form") != "prefix"
+    row = f" {text} " if spaced else text + "".join(parts)
+    return f"−{row[3:]}" if row.startswith(" − ") and parts else row  # the sign of the first term
+
+
+def _markup(latex: str, display: str) -> Markup:
+    root = _tree(latex, display)
+    if root is None:
+        return Markup("<code>{}</code>").format(latex)
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def _tree(latex: str, display: str) -> ElementTree.Element | None:
+    """Return a formula as elements that are on the lists; None if it is no such formula."""
+    try:
+        root = convert_to_element(latex, display=display)
+        for element in root.iter():
+            _check(element)
+    except Exception:  # the parser fails in many ways, and none may cost the report
+        return None
+    for element in list(root.iter()):
+        _accent(element)
+        _set_row(element)
+    return root
+
+
+def _check(element: ElementTree.Element) -> None:
+    """Refuse what is not on the lists; make text of character references."""
+    if element.tag not in ELEMENTS:
+        raise NotMathError(f"<{element.tag}> is no element of a formula")
+    for name in list(element.attrib):
+        value = element.attrib.pop(name)
+        if name == "columnalign" and value in ("left", "right"):
+            element.set("class", value)  # Chromium aligns cells by CSS only
+        elif name in ATTRIBUTES:
+            element.set(name, value)
+        elif name not in IGNORED:
+            raise NotMathError(f"'{name}' is no attribute of a formula")
+    if element.text:
+        element.text = re.sub(
+            "&#x([0-9A-F]{4,6});", lambda found: chr(int(found[1], 16)), element.text
+        )
+    if element.tag in ("mi", "mo") and (element.text or "").startswith("\\"):
+        raise NotMathError(f"{element.text} is an unknown command")
+    if element.tag == "mo" and FUNCTION.fullmatch(element.text or ""):
+        element.tag = "mi"  # names like min are no operators
+    if element.tag == "mi" and (element.text or "") in UPRIGHT:
+        element.set("mathvariant", "normal")
+
+
+def _accent(element: ElementTree.Element) -> None:
+    """Say that a hat is a hat, so that it sits on its letter; keep scripts off hats and ∫."""
+    if element.tag == "mover" and len(element) == 2 and element[1].text in ACCENTS:
+        element.set("accent", "true")
+        element[1].text = ACCENTS[element[1].text]
+        if element[0].tag == "mi":
+            element[1].set("stretchy", "false")
+    if element.tag in ("msup", "msubsup"):
+        lean = {"mover": THIN, "∫": WIDE}.get(element[0].text or element[0].tag)
+        if lean:
+            high = ElementTree.Element("mrow")
+            high.extend([ElementTree.Element("mspace", width=lean), element[-1]])
+            element[-1] = high
+
+
+def _set_row(row: ElementTree.Element) -> None:
+    """Set signs that belong to their number close to it, and names of functions apart."""
+    if row.tag not in ("math", "mrow", "mtd", "mstyle"):
+        return
+    parts = list(row)
+    for place in range(len(parts) - 1, 0, -1):
+        before, here = parts[place - 1], parts[place]
+        if here.tag == "mo" and here.text in SIGNS and _opens(before):
+            here.set("form", "prefix")
+        name, last = _name(here), _name(before)
+        if (name and before.tag not in ("mo", "mspace")) or (last and here.tag in OPERANDS):
+            row.insert(place, ElementTree.Element("mspace", width=THIN))
+
+
+def _opens(element: ElementTree.Element) -> bool:
+    return element.tag == "mo" and element.text not in CLOSING
+
+
+def _name(element: ElementTree.Element) -> bool:
+    """Whether an element is the name of a function, perhaps with an exponent."""
+    if element.tag in ("msup", "msub") and len(element):
+        return _name(element[0])
+    return element.tag == "mi" and bool(FUNCTION.fullmatch(element.text or ""))
+
+
+FAMILY = "nlctl Math"  # a changed STIX font must not be called STIX
+FILE = "fonts/nlctl-math.woff2"
+
+_GREEK = "αβγδεζηθικλμνξοπρςστυφχψωϑϕϖϱϵΓΔΘΛΞΠΣΥΦΨΩ"
+_OPERATORS = "·×÷±∓∂∇∞∫∑∏√∈∉∋∀∃∅∩∪⊂⊆≤≥≪≫≠≈≡∼∝∘∗⋅⋯…⋮⋱∧∨¬⊤⊥∣∥‖|−⁄′″ℓℎℏℜℑ"
+_ARROWS = "←→↔↑↓⇐⇒⇔↦⟶⟹⟨⟩⌈⌉⌊⌋"
+_ACCENTS = "ˆ^~˜¯‾―_˙¨˘ˇ\u0302\u0303\u0304\u0307\u0308\u20d7"
+_BLACKBOARD = "ℂℕℚℝℤ"
+
+
+def italic(character: str) -> str:
+    """Return the slanted form in which a browser draws a one-letter ``<mi>``."""
+    code = ord(character)
+    if character == "h":
+        return "ℎ"
+    for first, last, start in (
+        ("A", "Z", 0x1D434),
+        ("a", "z", 0x1D44E),
+        ("Α", "Ω", 0x1D6E2),
+        ("α", "ω", 0x1D6FC),
+    ):
+        if ord(first) <= code <= ord(last):
+            return chr(start + code - ord(first))
+    odd = {"∂": 0x1D715, "ϵ": 0x1D716, "ϑ": 0x1D717, "ϕ": 0x1D719, "ϱ": 0x1D71A, "ϖ": 0x1D71B}
+    return chr(odd.get(character, code))
+
+
+_LATIN = "".join(chr(code) for code in range(0x20, 0x7F))
+CHARACTERS = frozenset(_LATIN + _GREEK + _OPERATORS + _ARROWS + _ACCENTS + _BLACKBOARD)
+CHARACTERS |= {"\u00a0"} | {italic(c) for c in _LATIN + _GREEK + "∂"}
+
+
+def subset(source: str | os.PathLike[str]) -> bytes:
+    """Return the subset of a math font that `CHARACTERS` need, as WOFF2.
+
+    The pieces of stretched signs and the MATH table stay; the names change, as the licence asks.
+    """
+    from fontTools.subset import Options, Subsetter
+    from fontTools.ttLib import TTFont
+
+    font = TTFont(source, recalcTimestamp=False)
+    options = Options()
+    options.layout_features = []
+    options.desubroutinize = True  # larger, but it packs better
+    options.hinting = False
+    options.name_IDs = [0, 1, 2, 4, 6, 14]
+    options.drop_tables += ["DSIG", "FFTM"]
+    subsetter = Subsetter(options)
+    subsetter.populate(unicodes=[ord(c) for c in CHARACTERS])
+    subsetter.subset(font)
+    names = {1: FAMILY, 4: FAMILY, 6: FAMILY.replace(" ", "-")}
+    for record in font["name"].names:
+        if record.nameID in names:
+            record.string = names[record.nameID].encode(record.getEncoding())
+    top = font["CFF "].cff
+    top.fontNames = [FAMILY.replace(" ", "-")]
+    top.topDictIndex[0].FullName = top.topDictIndex[0].FamilyName = FAMILY
+    font.flavor = "woff2"
+    buffer = io.BytesIO()
+    font.save(buffer)
+    return buffer.getvalue()
+
+
+@cache
+def font_face() -> str:
+    """Return the CSS rule that holds the whole font, so that the page fetches nothing."""
+    data = base64.b64encode(files("analysis.report").joinpath(FILE).read_bytes()).decode()
+    return (
+        f'@font-face {{ font-family: "{FAMILY}"; '
+        f'src: url("data:font/woff2;base64,{data}") format("woff2"); }}\n'
+    )
+
+
+if __name__ == "__main__":
+    Path(__file__).with_name("fonts").joinpath("nlctl-math.woff2").write_bytes(subset(sys.argv[1]))

@@ -1,0 +1,333 @@
+"""What is simulated for each row of a design, and what is measured on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import control as ct
+import numpy as np
+import pandas as pd
+
+from nlctl import native
+from nlctl._arguments import a_function, of_type
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+from nlctl._param import as_numbers, checked_times
+from nlctl._run_arguments import input_array
+from nlctl.native import Compiled, Ensemble, Status, ensemble_response
+from nlctl.native import compile as compiled
+from nlctl.native._simulate import Settings
+
+from ...metrics import Metric, machine_code
+from ..stl.piecewise import with_vertices
+from ..stl.spec import Requirement, Spec, unfinished_margin
+from ..uncertainty.binding import diagrams, resolved
+from ..uncertainty.space import Space, arguments, checked_rows
+
+__all__ = [
+    "Columns",
+    "Experiment",
+    "Prepared",
+    "by_diagram",
+    "columns_of",
+    "compile_ahead",
+    "evaluate",
+    "prepare",
+    "simulate",
+    "typed",
+]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Experiment:
+    """A loop, what is uncertain in it, and what is asked of it.
+
+    Attributes
+    ----------
+    space : Space
+    build : callable
+        Returns the diagram, with one keyword per choice of the space, such as
+        `nlctl.paper.example_1`.
+    spec : Spec
+    timepts : ndarray of shape (m,)
+        Times in s at which signals are sampled, from 0; requirements and metrics see these
+        samples.
+    metrics : tuple of Metric
+    inputs : array_like or float
+        Inputs of the diagram, the same for all rows.
+    rtol, atol : float
+        Tolerances of the integrator.
+    max_steps : int
+        A run that needs more steps has failed.
+    method : str
+        As in `nlctl.input_output_response`.
+
+    Raises
+    ------
+    ParameterError
+        If times do not start at 0, a requirement looks beyond the last one, two numbers or
+        quantities have the same name, or a tolerance or a number of steps is not positive.
+    UnknownNameError
+        If there is no such method.
+    """
+
+    space: Space
+    build: Callable[..., ct.InputOutputSystem]
+    spec: Spec
+    timepts: np.ndarray
+    metrics: tuple[Metric, ...] = ()
+    inputs: Any = 0.0
+    rtol: float = 1e-6
+    atol: float = 1e-8
+    max_steps: int = 1_000_000
+    method: str = "auto"
+
+    def __post_init__(self) -> None:
+        who = "an experiment"
+        of_type(who, "space", self.space, Space)
+        of_type(who, "spec", self.spec, Spec)
+        a_function(who, "build", self.build)
+        for metric in self.metrics:
+            if not (hasattr(metric, "key") and hasattr(metric, "signals")):
+                raise ParameterError(
+                    f"{who} needs metrics such as analysis.metrics.Metric, got {metric!r}"
+                )
+        Settings(rtol=self.rtol, atol=self.atol, max_steps=self.max_steps, method=self.method)
+        given = as_numbers(self.inputs)
+        if given is not None and not np.all(np.isfinite(given)):
+            raise ParameterError(f"{who} needs finite inputs, got {self.inputs!r}")
+        times = checked_times(self.timepts)
+        object.__setattr__(self, "timepts", times)
+        if times[0] != 0:
+            raise ParameterError(f"an experiment needs times from 0 s, got {times[0]:g} s")
+        for requirement in self.spec.requirements:
+            if requirement.until > times[-1]:
+                raise ParameterError(
+                    f"requirement '{requirement.key}' needs a response until "
+                    f"{requirement.until:g} s, the experiment ends at {times[-1]:g} s"
+                )
+        names = [*self.space.names, *self.measured]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ParameterError(f"an experiment needs each column once, got twice: {twice}")
+
+    @property
+    def measured(self) -> list[str]:
+        """Columns that `evaluate` adds to those of the space."""
+        keys = [m.key for m in (*self.metrics, *self.spec.requirements)]
+        return ["status", "time", "steps", *keys, "spec"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prepared:
+    """An experiment whose diagrams are machine code; made by `prepare`, travels to processes.
+
+    Attributes
+    ----------
+    experiment : Experiment
+        Its space has full names, and units and nominal values from the nominal diagram.
+    loops : tuple of (labels, Compiled)
+        One for each combination of the choices.
+    """
+
+    experiment: Experiment
+    loops: tuple[tuple[Mapping[str, str], Compiled], ...]
+
+
+def prepare(experiment: Experiment) -> Prepared:
+    """Build and compile every diagram of an experiment, and hold names and values against them.
+
+    Raises
+    ------
+    UsageError
+        As in `resolve.diagrams` and `nlctl.compile`.
+    ParameterError
+        If the inputs do not fit a diagram, or are not finite.
+    UnknownNameError
+        If a requirement or a metric asks for a signal that a diagram lacks.
+    """
+    space = of_type("prepare", "experiment", experiment, Experiment).space
+    built = diagrams(space, experiment.build)
+    middle = {choice.name: choice.nominal for choice in space.choices}
+    full = resolved(space, next(diagram for labels, diagram in built if labels == middle))
+    for _, diagram in built:
+        input_array(diagram, experiment.inputs, experiment.timepts)
+        resolved(full, diagram)  # the full names must be known to every diagram
+        for asked in (*experiment.spec.requirements, *experiment.metrics):
+            for signal in asked.signals:
+                if signal not in diagram.output_labels:
+                    raise unknown("signal", signal, diagram.output_labels, f"for '{asked.key}'")
+    loops = tuple((labels, compiled(diagram)) for labels, diagram in built)
+    return Prepared(experiment=replace(experiment, space=full), loops=loops)
+
+
+def evaluate(
+    prepared: Prepared,
+    table: pd.DataFrame,
+    *,
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> pd.DataFrame:
+    """Simulate rows and take their margins and metrics.
+
+    A row's result does not depend on the other rows, on their order or on `threads`.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    table : pandas.DataFrame
+        One column for each name of the space, such as `design.rows` returns; others are ignored.
+    threads : int, optional
+        Number of threads; by default one per core.
+    progress : callable, optional
+        Called with the number of rows that are finished.
+
+    Returns
+    -------
+    pandas.DataFrame
+        With the index of `table`: its columns of the space, ``status``, ``time`` (s) reached,
+        ``steps``, metrics (NaN for a failed run), the margin of each requirement by its key
+        (`spec.unfinished_margin` for a failed run) and their least as ``spec``.  Rows that
+        Ctrl-C kept from finishing are missing.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        If the table lacks a column, has a row twice, or a number that is not finite.
+    """
+    of_type("evaluate", "prepared", prepared, Prepared, "prepare(experiment)")
+    checked_rows(prepared.experiment.space, table)
+    of_type("evaluate", "prepared", prepared, Prepared, "prepare(experiment)")
+    checked_rows(prepared.experiment.space, table)
+    parts, finished = [], 0
+    for loop, rows in by_diagram(prepared, table):
+        notify = None if progress is None else partial(_forward, progress, finished)
+        parts.append(_run(prepared.experiment, loop, rows, threads, notify))
+        finished += len(rows)
+        if len(parts[-1]) < len(rows):
+            break
+    none = pd.DataFrame(columns=prepared.experiment.measured, index=table.index[:0])
+    results = pd.concat(parts) if parts else none
+    order = table.index.intersection(results.index, sort=False)
+    space = table.loc[order, prepared.experiment.space.names]
+    return pd.concat([space, results.loc[order]], axis=1)
+
+
+def by_diagram(prepared: Prepared, table: pd.DataFrame) -> Iterator[tuple[Compiled, pd.DataFrame]]:
+    """Yield each diagram that rows of a table ask for, with these rows: those with its labels."""
+    for labels, loop in prepared.loops:
+        same = [table[name] == label for name, label in labels.items()]
+        rows = table.loc[np.logical_and.reduce(same)] if same else table
+        if len(rows):
+            yield loop, rows
+
+
+def simulate(
+    experiment: Experiment,
+    loop: Compiled,
+    rows: pd.DataFrame,
+    *,
+    metrics: Sequence[Metric | Requirement] = (),
+    keep: Sequence[str] = (),
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Ensemble:
+    """Simulate rows of one diagram, see `by_diagram`, with the settings of an experiment.
+
+    `metrics` and the arguments after them are those of `nlctl.ensemble_response`.
+    """
+    varied = arguments(experiment.space, rows)
+    return ensemble_response(
+        loop,
+        experiment.timepts,
+        experiment.inputs,
+        varied["initial_state"],
+        params=varied["params"],
+        metrics=metrics,
+        keep=keep,
+        threads=threads,
+        rtol=experiment.rtol,
+        atol=experiment.atol,
+        max_steps=experiment.max_steps,
+        method=experiment.method,
+        progress=progress,
+    )
+
+
+def _forward(progress: Callable[[int], object], before: int, count: int) -> None:
+    progress(before + count)
+
+
+def _run(
+    experiment: Experiment,
+    loop: Compiled,
+    rows: pd.DataFrame,
+    threads: int | None,
+    progress: Callable[[int], object] | None,
+) -> pd.DataFrame:
+    requirements = experiment.spec.requirements
+    metrics = (*map(_fast, experiment.metrics), *requirements)
+    made = simulate(experiment, loop, rows, metrics=metrics, threads=threads, progress=progress)
+    found = made.table.reindex(columns=experiment.measured)
+    found = found.set_axis(rows.index[found.index.to_numpy()])
+    failed = found["status"] != Status.OK.name
+    end = float(experiment.timepts[-1])
+    graded = [unfinished_margin(time, end) for time in found.loc[failed, "time"]]
+    for requirement in requirements:
+        found.loc[failed, requirement.key] = graded
+    found["spec"] = np.min(found.loc[:, [r.key for r in requirements]].to_numpy(), axis=1)
+    return found
+
+
+def compile_ahead(prepared: Prepared) -> None:
+    """Compile diagrams, metrics and margins, which otherwise happens with the first row."""
+    for _, loop in prepared.loops:
+        native.compile_ahead(loop, ensemble=True)
+    time = np.linspace(0.0, 1.0, 5)
+    with_vertices(time, np.zeros(time.size))
+    for metric in prepared.experiment.metrics:
+        if isinstance(metric, Metric):
+            _fast(metric).function(time, *np.zeros((len(metric.signals), time.size)))
+
+
+def _fast(metric: Metric) -> Metric:
+    if not isinstance(metric, Metric):  # what is like a metric runs as it is
+        return metric
+    return replace(metric, function=machine_code(metric.function))
+
+
+Columns = Mapping[str, str | Sequence[str]]
+"""For each column the name of its type, or the labels that it may hold."""
+
+
+def columns_of(prepared: Prepared) -> Columns:
+    """Return the columns of a sweep's table, in order.
+
+    Those of `experiment.evaluate`, then ``seed`` (see `design.seed_number`) and ``wall_time``, the
+    time (s) that a row's chunk took over its number of rows.
+    """
+    experiment = prepared.experiment
+    numbers = (*experiment.space.names, *experiment.measured)
+    columns: dict[str, str | Sequence[str]] = dict.fromkeys(numbers, "float64")
+    columns |= {choice.name: list(choice.options) for choice in experiment.space.choices}
+    columns |= {"status": [status.name for status in Status], "steps": "int64"}
+    return columns | {"seed": "uint64", "wall_time": "float64"}
+
+
+def typed(frame: pd.DataFrame, columns: Columns) -> pd.DataFrame:
+    """Return those columns that a frame has, in their order and with their types.
+
+    Raises
+    ------
+    ValueError
+        If a column cannot have its type.
+    """
+    types = {
+        name: kind if isinstance(kind, str) else pd.CategoricalDtype(list(kind))
+        for name, kind in columns.items()
+        if name in frame
+    }
+    return frame.filter(list(types)).astype(types)

@@ -1,0 +1,188 @@
+"""What a study is made of, so that its results are never mixed with those of another one."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import platform
+from collections.abc import Iterator, Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl import _errors
+
+from ...metrics import Metric
+from ..uncertainty.design import Design
+from ..uncertainty.quantity import Uncertain
+from ..uncertainty.space import Space
+from .experiment import Prepared
+from .loop_record import array_text, loop_facts, short_key
+
+__all__ = ["differences_of", "experiment_facts", "identity_of", "labels_text", "versions"]
+
+VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
+COMPUTING = {
+    Path(_errors.__file__).parent: ("**/*.py",),
+    Path(__file__).parents[2]: ("robustness/**/*.py", "studies/**/*.py", "metrics.py"),
+}
+TOLD = ("_layout", "drawing", "page")  # they compute nothing
+PROBES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])
+
+
+def identity_of(
+    prepared: Prepared, design: Design, more: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return everything that the numbers of a study follow from, as data for a JSON file.
+
+    It names no path and no machine.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    design : Design
+    more : mapping, optional
+        What else belongs to it, under ``"study"``; JSON must be able to hold it.
+    """
+    content = experiment_facts(prepared, design.space) | {
+        "design": {
+            "kind": design.kind,
+            "size": design.size,
+            "is_iid": design.is_iid,
+            "entropy": str(design.entropy),  # too long for the numbers of other JSON readers
+            "points": None if design.points is None else _table(design.points),
+        },
+        "study": dict(more or {}),
+    }
+    return json.loads(json.dumps(content)) | {"sha256": _digest(json.dumps(content))}
+
+
+def experiment_facts(prepared: Prepared, space: Space | None = None) -> dict[str, Any]:
+    """Return what the numbers of any row of an experiment follow from, its design aside.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    space : Space, optional
+        Where rows are drawn, if not in the experiment's own space.
+    """
+    experiment = prepared.experiment
+    space = experiment.space if space is None else space
+    return {
+        "space": {q.name: _quantity(q) for q in space.quantities},
+        "choices": {c.name: dict(zip(c.options, c.weights, strict=True)) for c in space.choices},
+        "scale": space.scale,
+        "spec": {
+            r.key: {"formula": repr(r.formula), "until": r.until}
+            for r in experiment.spec.requirements
+        },
+        "metrics": {m.key: _metric(m) for m in experiment.metrics},
+        "settings": {
+            "times": array_text(experiment.timepts),
+            "inputs": array_text(experiment.inputs),
+            **{k: getattr(experiment, k) for k in ("rtol", "atol", "max_steps", "method")},
+        },
+        "diagrams": {
+            labels_text(labels): loop_facts(loop.system) for labels, loop in prepared.loops
+        },
+        "versions": versions(),
+    }
+
+
+def labels_text(labels: Mapping[str, str]) -> str:
+    """Return which diagram of an experiment this is: the options that it has."""
+    return ", ".join(f"{name} = {label}" for name, label in labels.items()) or "only"
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """Return the versions of all that computes numbers; nlctl's with a key of its source."""
+    source = hashlib.sha256()
+    for root, parts in COMPUTING.items():
+        for path in (path for part in parts for path in sorted(root.glob(part))):
+            name = path.relative_to(root).as_posix()
+            if not name.startswith(TOLD):
+                source.update(f"{name}\0".encode() + path.read_bytes())
+    own = f"{metadata.version('nlctl')} ({source.hexdigest()[:12]})"
+    found = {name: metadata.version(name) for name in VERSIONS}
+    return {"nlctl": own, **found, "python": platform.python_version()}
+
+
+def _quantity(quantity: Uncertain) -> dict[str, Any]:
+    law = quantity.law
+    numbers = [np.asarray(a).tolist() for a in law.args]
+    numbers += [f"{k}={np.asarray(v).tolist()}" for k, v in law.kwds.items()]
+    return {
+        "law": f"{law.dist.name}({', '.join(map(str, numbers))})",
+        "quantiles": [f"{v:.10g}" for v in law.ppf(PROBES)],  # of a law of the user's own as well
+        "bounds": list(quantity.box),
+        "nominal": quantity.nominal,
+        "unit": quantity.unit,
+    }
+
+
+def _metric(metric: Metric) -> dict[str, Any]:
+    return {
+        "signals": list(metric.signals),
+        "function": _function(metric.function),
+        "start": repr(metric.start),
+        "end": repr(metric.end),
+        "unit": metric.unit,
+    }
+
+
+def _function(function: Any) -> str:
+    """Return a function's name, and a key of it and of all that it reaches."""
+    plain = function
+    while isinstance(plain, functools.partial):
+        plain = plain.func
+    plain = getattr(plain, "py_func", plain)
+    name = getattr(plain, "__qualname__", type(plain).__qualname__)
+    return f"{name} {short_key(function)}"
+
+
+def _table(points: pd.DataFrame) -> str:
+    digest = hashlib.sha256(",".join(map(str, points.columns)).encode())
+    for column in points.columns:
+        values = points[column].to_numpy()
+        is_number = values.dtype.kind in "iuf"
+        digest.update(values.astype("<f8").tobytes() if is_number else repr(list(values)).encode())
+    return f"{digest.hexdigest()[:16]} of shape {points.shape}"
+
+
+def _digest(content: str | bytes) -> str:
+    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
+
+
+def differences_of(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """Return what differs between two identities, one text for each place."""
+    old, new = dict(_flat(before)), dict(_flat(now))
+    places = [place for place in {**old, **new} if place != "sha256"]
+    missing = "nothing"
+    return [
+        f"{place} was {old.get(place, missing)}, now {new.get(place, missing)}"
+        for place in places
+        if not _same(old.get(place, missing), new.get(place, missing))
+    ]
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values of JSON are equal; NaN equals NaN, here and inside of lists."""
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
+    return one == other or (one != one and other != other)
+
+
+def _flat(content: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in content.items():
+        here = f"{place}.{key}" if place else key
+        if isinstance(value, Mapping):
+            yield from _flat(value, here)
+        else:
+            yield here, value

@@ -1,0 +1,326 @@
+"""A sweep's folder: chunk files in Parquet, each written in one step, so that a kill costs little.
+
+study.json        what is run, see `identity`
+chunks/000000000-000000999.parquet
+                  rows 0 to 999; the file exists only when it is whole
+.lock, .owner     held by the operating system for the process that works here; which that is
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import socket
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.dataset as ds
+import pyarrow.parquet as pq
+from filelock import FileLock, Timeout
+
+from nlctl._errors import UsageError
+from nlctl._files import replace_file
+
+from .experiment import Columns, typed
+from .identity import differences_of
+
+SEALS = b"nlctl.seals"  # a key of each column, in a chunk's file
+
+__all__ = [
+    "Store",
+    "StoreError",
+    "claimed",
+    "locked",
+    "opened",
+    "put",
+    "stored",
+    "table_of",
+    "taken_up",
+]
+
+
+class StoreError(UsageError):
+    """A folder that a sweep cannot be kept in; the message names it and says what is kept."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Store:
+    """A folder with chunks of one study.
+
+    Attributes
+    ----------
+    folder : Path
+    identity : mapping
+        See `identity.identity_of`.
+    columns : mapping
+        See `columns.columns_of`.
+    """
+
+    folder: Path
+    identity: Mapping[str, Any]
+    columns: Columns
+
+    @property
+    def chunks(self) -> Path:
+        """Where the chunk files are."""
+        return self.folder / "chunks"
+
+    @property
+    def size(self) -> int:
+        """Number of rows of the design."""
+        return self.identity["design"]["size"]
+
+
+@contextmanager
+def locked(folder: Path, error: type[UsageError] = StoreError) -> Iterator[None]:
+    """Hold a folder for this process alone; it is made where there is none.
+
+    The lock is the operating system's: it ends with the process, however that ends.
+
+    Parameters
+    ----------
+    folder : Path
+    error : type, optional
+        Class of what is raised.
+
+    Raises
+    ------
+    UsageError
+        If the folder cannot be written, or another process works in it.
+    """
+    owner, lock = folder / ".owner", FileLock(folder / ".lock", timeout=0)
+    me = f"process {os.getpid()} on {socket.gethostname()}".encode()
+    try:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            lock.acquire()
+            replace_file(owner, lambda file: file.write(me))
+        except Timeout:
+            raise error(
+                f"'{folder}' is in use by {_text(owner) or 'another process'}: wait until it "
+                "ends, or take another folder"
+            ) from None
+        except OSError as reason:
+            raise error(f"cannot write to '{folder}': {reason.strerror or reason}") from reason
+        yield
+    finally:
+        lock.release()  # does nothing where it is not held
+
+
+def _text(path: Path) -> str:
+    """Return what a file holds; nothing if it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError:
+        return ""
+
+
+@contextmanager
+def claimed(store: Store, *, resume: bool = False) -> Iterator[None]:
+    """Hold a folder for this process alone, with the study's identity in it.
+
+    Raises
+    ------
+    StoreError
+        As in `locked`, or if the folder holds chunks and `resume` is False, or belongs to another
+        study; the message says what differs.
+    """
+    with locked(store.folder):
+        _identify(store, resume)
+        yield
+
+
+def _identify(store: Store, resume: bool) -> None:
+    """Write who a folder belongs to, or compare."""
+    begun = bool(_ranges(store))
+    if begun and not resume:
+        raise StoreError(
+            f"'{store.folder}' holds rows of a study already: continue it with resume=True "
+            "(--resume), or take another folder"
+        )
+    if begun:
+        changed = differences_of(opened(store.folder).identity, store.identity)
+        if changed:
+            more = f", and {len(changed) - 5} more" if len(changed) > 5 else ""
+            raise StoreError(
+                f"'{store.folder}' holds another study: {'; '.join(changed[:5])}{more}. Continue "
+                "it with what it was begun with, or take another folder"
+            )
+        return
+    content = {"format": 1, "identity": store.identity, "columns": store.columns}
+    _write(store, store.folder / "study.json", json.dumps(content, indent=1).encode())
+
+
+def opened(folder: str | os.PathLike[str]) -> Store:
+    """Return the store that a folder holds.
+
+    Raises
+    ------
+    StoreError
+        If it holds none.
+    """
+    path = Path(folder) / "study.json"
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return Store(folder=path.parent, identity=content["identity"], columns=content["columns"])
+    except (OSError, ValueError, KeyError) as error:
+        raise StoreError(f"'{path}' is no study of a sweep: {error}") from error
+
+
+def _write(store: Store, path: Path, content: bytes | memoryview) -> None:
+    """Write a file of a store in one step, and return when it is on the disk."""
+
+    def write(file: Any) -> None:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+    try:
+        path.parent.mkdir(exist_ok=True)
+        replace_file(path, write)
+    except OSError as error:
+        raise StoreError(
+            f"cannot write '{path}': {error.strerror or error}. {stored(store)} of {store.size} "
+            "rows are kept there; make room and continue with resume=True (--resume)"
+        ) from error
+
+
+def put(store: Store, frame: pd.DataFrame) -> None:
+    """Write consecutive rows as one chunk; floats keep their bits.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be written; the message says what is kept.
+    """
+    columns = {"row": frame.index.to_numpy()} | {name: frame[name].array for name in frame}
+    arrays = {name: pa.array(v, from_pandas=False) for name, v in columns.items()}  # NaN, not null
+    labels: Any = [name for name, kind in store.columns.items() if not isinstance(kind, str)]
+    seals = {name: _seal(frame[name]) for name in store.columns}
+    table = pa.table(arrays).replace_schema_metadata({SEALS: json.dumps(seals)})
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd", use_dictionary=labels, write_page_checksum=True)
+    numbers = range(frame.index[0], frame.index[-1] + 1)
+    _write(store, _path(store, numbers), memoryview(sink.getvalue()))
+
+
+def _seal(column: Any) -> str:
+    """Return a key of a column's values, which whoever edits the file does not keep."""
+    is_number = isinstance(column.dtype, np.dtype) and column.dtype.kind in "iufb"
+    text = b"" if is_number else "\0".join(map(str, column)).encode()
+    return hashlib.sha256(column.to_numpy().tobytes() if is_number else text).hexdigest()[:16]
+
+
+def _check_seals(path: Path, frame: pd.DataFrame) -> None:
+    """Refuse rows that are not what was written into a file.
+
+    Raises
+    ------
+    ValueError
+        If a value has changed since, or somebody else has written the file.
+    """
+    seals = json.loads((pq.read_schema(path).metadata or {}).get(SEALS, b"{}"))
+    changed = [name for name in frame if seals.get(name) != _seal(frame[name])]
+    if changed:
+        raise ValueError(f"'{path.name}' is not as it was written: '{changed[0]}' was edited")
+
+
+def _ranges(store: Store) -> list[range]:
+    """Return the rows of every chunk file, in order."""
+    found = []
+    for path in sorted(store.chunks.glob("*.parquet")):
+        name = re.fullmatch(r"(\d+)-(\d+)", path.stem)
+        if name:
+            found.append(range(int(name[1]), int(name[2]) + 1))
+    return sorted(found, key=lambda numbers: numbers.start)
+
+
+def _path(store: Store, numbers: range) -> Path:
+    return store.chunks / f"{numbers[0]:09d}-{numbers[-1]:09d}.parquet"
+
+
+def stored(store: Store) -> int:
+    """Return the number of rows in the folder."""
+    return sum(map(len, _ranges(store)))
+
+
+def taken_up(store: Store) -> Iterator[tuple[range, np.ndarray | str]]:
+    """Go through the chunks that are there, and clear what a killed process has left.
+
+    Yields
+    ------
+    (range, margins)
+        Rows of a chunk that was read to its end, and their margins ``spec``.
+    (range, message)
+        Rows of a chunk that is damaged: its file has been renamed.
+    """
+    for place, pattern in (
+        (store.folder, "..owner.*"),
+        (store.folder, ".*.json.*"),
+        (store.chunks, ".*.parquet.*"),
+    ):
+        for left in place.glob(pattern):
+            left.unlink(missing_ok=True)
+    end = 0
+    for numbers in _ranges(store):
+        path = _path(store, numbers)
+        try:
+            frame = _read(store, [path])
+            if numbers.start < end or numbers.stop > store.size:
+                raise ValueError("its rows are not where they belong")
+            if not np.array_equal(frame.index, numbers):
+                raise ValueError("it holds other rows than its name says")
+            margins = frame["spec"].to_numpy()
+        except (OSError, ValueError, KeyError) as error:  # pyarrow's errors are ValueErrors
+            damaged = path.with_suffix(".damaged")
+            os.replace(path, damaged)
+            reason = str(error).partition("\n")[0]
+            yield numbers, f"'{path}' is damaged ({reason}): kept as {damaged.name}, run again"
+            continue
+        end = numbers.stop
+        yield numbers, margins
+
+
+def table_of(store: Store, columns: Sequence[str] | None = None) -> pd.DataFrame:
+    """Read the rows that are there, in order; only some columns where asked.
+
+    Raises
+    ------
+    StoreError
+        If a file cannot be read.
+    """
+    try:
+        return _read(store, [_path(store, numbers) for numbers in _ranges(store)], columns)
+    except (OSError, ValueError) as error:
+        raise StoreError(
+            f"cannot read the chunks in '{store.chunks}': {error}. Run damaged ones again with "
+            "resume=True (--resume)"
+        ) from error
+
+
+def _read(
+    store: Store, paths: Sequence[Path], columns: Sequence[str] | None = None
+) -> pd.DataFrame:
+    chosen = {name: store.columns[name] for name in columns or store.columns}
+    if not paths:
+        return typed(
+            pd.DataFrame(columns=list(chosen), index=pd.Index([], name="row", dtype="int64")),
+            chosen,
+        )
+    options = ds.ParquetFragmentScanOptions(page_checksum_verification=True)
+    layout = ds.ParquetFileFormat(default_fragment_scan_options=options)
+    found = ds.dataset([str(path) for path in paths], format=layout)
+    frame = found.to_table(columns=["row", *chosen]).to_pandas().set_index("row")
+    frame, end = typed(frame, chosen), 0
+    for path in paths:
+        first, end = end, end + pq.read_metadata(path).num_rows
+        _check_seals(path, frame.iloc[first:end])
+    return frame

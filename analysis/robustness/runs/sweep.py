@@ -1,0 +1,300 @@
+"""All rows of a design, run wherever there are processors, and kept whatever happens."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from nlctl._arguments import of_type, whole_number
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+
+from ..uncertainty.design import Design
+from .executors import LostChunkError, chunk_table, computed_elsewhere, computed_here
+from .experiment import Prepared, columns_of
+from .identity import identity_of
+from .progress import Progress, Tally
+from .store import Store, claimed, opened, put, stored, table_of, taken_up
+
+__all__ = ["Interrupt", "Sweep", "gentle_interrupt", "load", "sweep"]
+
+LARGEST = 1024  # rows of a chunk: some 200 kB on disk, and seconds of work
+FEWEST = 20  # chunks of a sweep, so that a kill costs little
+STEP = 64  # rows: a chunk keeps the SIMD lanes of several threads busy
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sweep:
+    """Rows of a design that were run.
+
+    Attributes
+    ----------
+    design : Design or None
+        None where a folder was read without it.
+    folder : Path or None
+        Where the rows are kept.
+    done : int
+        Number of rows that are finished.
+    complete : bool
+        Whether these are all rows of the design.
+    decided : object
+        What ended the sweep early, see `sweep`; None if nothing did.
+    interrupted : bool
+        Whether Ctrl-C was pressed; in the last chunk that leaves it complete.
+    notes : tuple of str
+        What the user has to know: damaged chunks that were run again, lost workers.
+    """
+
+    design: Design | None = field(repr=False)
+    folder: Path | None
+    done: int
+    complete: bool
+    decided: Any = None
+    interrupted: bool = False
+    notes: tuple[str, ...] = ()
+    held: pd.DataFrame | None = field(default=None, repr=False)
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """All finished rows by their numbers; read from the folder each time it is asked for."""
+        return self.columns()
+
+    def columns(self, *names: str) -> pd.DataFrame:
+        """Return some columns of `table`, all by default; the others are not read."""
+        if self.folder is None:
+            assert self.held is not None
+            return self.held.filter(list(names)) if names else self.held
+        return table_of(opened(self.folder), names or None)
+
+
+def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
+    """Return the rows in a folder, finished or not, also while a sweep is working in it.
+
+    Raises
+    ------
+    StoreError
+        If the folder holds no sweep.
+    """
+    store = opened(folder)
+    done = stored(store)
+    return Sweep(design=design, folder=store.folder, done=done, complete=done == store.size)
+
+
+def sweep(
+    prepared: Prepared,
+    design: Design,
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    executor: Executor | None = None,
+    chunk: int | None = None,
+    resume: bool = False,
+    threads: int | None = None,
+    progress: Callable[[Progress], object] | None = None,
+    stop: Callable[[Progress], Any] | None = None,
+    identity: Mapping[str, Any] | None = None,
+) -> Sweep:
+    """Run the rows of a design.
+
+    A row's result depends on the row alone: the table is the same, bit for bit, for any executor,
+    chunk size and number of threads, and after any number of interruptions.  Only the column
+    ``wall_time`` differs.  Ctrl-C finishes the chunks in hand; pressed again, it drops them.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    design : Design
+        Of the space of ``prepared.experiment``.
+    folder : path, optional
+        Every finished chunk is kept here at once, in Parquet, and memory stays flat.
+    executor : concurrent.futures.Executor, optional
+        Where chunks are computed: threads, processes, or a Dask cluster by
+        ``client.get_executor()``.  By default in this process, with the engine's own threads,
+        which is the fastest on one machine.
+    chunk : int, optional
+        Number of rows that are computed, kept and lost together.
+    resume : bool, optional
+        Whether rows that the folder holds already are taken up.  They must be of the same study.
+    threads : int, optional
+        Number of threads of each chunk; by default one per core, and one in an executor.
+    progress : callable, optional
+        Called with a `Progress` whenever rows are finished.
+    stop : callable, optional
+        Called with a `Progress` after every chunk; what it returns, unless false, ends the sweep
+        and becomes ``decided``, see `watch.until_decided`.
+    identity : mapping, optional
+        What else identifies the study in `folder`, such as the text of its study file.
+
+    Returns
+    -------
+    Sweep
+        Incomplete after Ctrl-C before the last chunk, an early stop, or if workers were lost.
+
+    Raises
+    ------
+    ParameterError
+        If the design is of another space, `chunk` or `threads` is no integer >= 1, or there is no
+        folder to resume.
+    StoreError
+        As in `store.claimed`, or if a chunk cannot be written; those before it are kept.
+    """
+    _check(prepared, design, executor, threads, resume and folder is None)
+    chunk = _chunk_size(design) if chunk is None else whole_number("a sweep", "chunk", chunk, 1)
+    tally, frames, notes = Tally(design), [], []
+    keep: Callable[[pd.DataFrame], object] = frames.append
+    with ExitStack() as stack:
+        if folder is not None:
+            facts = identity_of(prepared, design, identity)
+            store = Store(folder=Path(folder), identity=facts, columns=columns_of(prepared))
+            stack.enter_context(claimed(store, resume=resume))
+            keep = partial(put, store)
+            notes += _continued(store, tally) if resume else []
+        interrupt = stack.enter_context(gentle_interrupt())
+        tally.restart()
+        run = _Run(tally=tally, interrupt=interrupt, progress=progress, stop=stop)
+        todo = tally.missing(chunk)
+        found = (
+            computed_here(prepared, design, todo, run.wanted, threads=threads, progress=run.tell)
+            if executor is None
+            else computed_elsewhere(executor, prepared, design, todo, run.wanted, threads=threads)
+        )
+        notes += run.through(stack.enter_context(closing(found)), keep)
+    held = None
+    if folder is None:
+        frames = frames or [chunk_table(prepared, design, range(0))]
+        held = pd.concat(frames).sort_index()
+    return Sweep(
+        design=design,
+        folder=None if folder is None else Path(folder),
+        done=tally.done,
+        complete=tally.done == design.size,
+        decided=run.decided,
+        interrupted=interrupt.asked,
+        notes=tuple(notes),
+        held=held,
+    )
+
+
+def _check(
+    prepared: Prepared, design: Design, executor: Any, threads: int | None, nothing_kept: bool
+) -> None:
+    of_type("a sweep", "prepared", prepared, Prepared, "prepare(experiment)")
+    of_type("a sweep", "design", design, Design, "independent(space, size)")
+    if executor is not None:
+        of_type("a sweep", "executor", executor, Executor, "concurrent.futures")
+    if threads is not None:
+        whole_number("a sweep", "threads", threads, at_least=1)
+    if nothing_kept:
+        raise ParameterError("a sweep needs a folder to resume, got none")
+    _check_space(prepared, design)
+
+
+def _check_space(prepared: Prepared, design: Design) -> None:
+    known, given = prepared.experiment.space.names, design.space.names
+    for name in given:
+        if name not in known:
+            raise unknown("quantity", name, known, "in the design: take prepared.experiment.space")
+    if known != given:
+        raise ParameterError(f"the experiment's space has {known}, the design's has {given}")
+
+
+def _chunk_size(design: Design) -> int:
+    return min(LARGEST, STEP * math.ceil(design.size / (FEWEST * STEP)))
+
+
+def _continued(store: Store, tally: Tally) -> list[str]:
+    """Count the chunks that are there; return what is to be said of damaged ones."""
+    notes = []
+    for numbers, found in taken_up(store):
+        if isinstance(found, str):
+            notes.append(found)
+        else:
+            tally.count(numbers, found)
+    return notes
+
+
+@dataclass(kw_only=True)
+class _Run:
+    """A sweep on its way: counts, and reasons to end it."""
+
+    tally: Tally
+    interrupt: Interrupt
+    progress: Callable[[Progress], object] | None
+    stop: Callable[[Progress], Any] | None
+    decided: Any = None
+
+    def wanted(self) -> bool:
+        """Whether another chunk should begin."""
+        return not (self.interrupt.asked or self.decided)
+
+    def tell(self, unfinished: int = 0) -> None:
+        """Report the progress."""
+        if self.progress is not None:
+            self.progress(self.tally.progress(unfinished))
+
+    def consider(self) -> None:
+        """Ask whether the rows so far are enough."""
+        if self.stop is not None and not self.decided:
+            self.decided = self.stop(self.tally.progress()) or None
+
+    def through(
+        self,
+        chunks: Iterator[tuple[range, pd.DataFrame]],
+        keep: Callable[[pd.DataFrame], object],
+    ) -> list[str]:
+        """Keep and count all chunks; return what went wrong."""
+        self.tell()
+        self.consider()
+        try:
+            for numbers, frame in chunks:
+                keep(frame)
+                self.tally.count(numbers, frame["spec"].to_numpy())
+                self.tell()
+                self.consider()
+        except LostChunkError as lost:
+            return [str(lost)]
+        except KeyboardInterrupt:
+            self.interrupt.asked = True
+        return []
+
+
+class Interrupt:
+    """Whether Ctrl-C was pressed."""
+
+    asked = False
+
+
+@contextmanager
+def gentle_interrupt() -> Iterator[Interrupt]:
+    """Take down the first SIGINT; the second one raises KeyboardInterrupt.
+
+    Only Python's main thread may listen to signals: in another one, and where SIGINT is ignored,
+    nothing changes.  What listened before listens again afterwards.
+    """
+    interrupt = Interrupt()
+
+    def pressed(number: int, frame: Any) -> None:
+        if interrupt.asked:
+            raise KeyboardInterrupt
+        interrupt.asked = True
+
+    before = signal.getsignal(signal.SIGINT)
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or before in (signal.SIG_IGN, None):
+        yield interrupt
+        return
+    signal.signal(signal.SIGINT, pressed)
+    try:
+        yield interrupt
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,1 @@
+"""Searches for violations: the worst case, the radius, where a spec fails."""

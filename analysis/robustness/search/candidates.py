@@ -1,0 +1,154 @@
+"""Which rows a search for the worst case runs next: corners, uniform draws, CMA-ES."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..uncertainty.design import corners, numbered
+from ..uncertainty.space import Space, boxed, ends
+from .evaluation import Evaluate, evaluated, margins_of
+
+__all__ = ["Found", "corner_count", "search"]
+
+SHARE = 4
+"""Corners, and uniform draws, take one part in this many of the runs each."""
+BATCH = 64
+"""Rows that run together."""
+GENERATION = 16
+"""CMA-ES has at least so many rows in a generation: they fill the lanes of two cores."""
+SPREAD = 0.25
+"""First standard deviation of CMA-ES, in units of the boxes."""
+RESOLUTION = 1e-6
+"""A search ends where margins, or places in the unit cube, differ by less."""
+EXTREME = 1e9
+"""CMA-ES, which needs finite numbers, sees margins up to this size."""
+
+
+class Found:
+    """The rows that were run so far."""
+
+    def __init__(self, evaluate: Evaluate, space: Space, runs: int, target: float | None) -> None:
+        self.evaluate, self.space, self.runs, self.target = evaluate, space, runs, target
+        self.tables: list[pd.DataFrame] = []
+        self.results: list[pd.DataFrame] = []
+        self.searchers: list[str] = []
+        self.margins = np.empty(0)
+
+    @property
+    def left(self) -> int:
+        """How many rows may still be run; none once the target is met."""
+        met = self.target is not None and np.any(self.margins <= self.target)
+        return 0 if met else self.runs - self.margins.size
+
+    @property
+    def points(self) -> pd.DataFrame:
+        """All rows."""
+        return pd.concat(self.tables)
+
+    def run(self, searcher: str, table: pd.DataFrame) -> np.ndarray:
+        """Run rows, return their margins."""
+        table = numbered(table, self.margins.size)
+        results = evaluated(self.evaluate, table)
+        margins = margins_of(results)
+        self.tables.append(table)
+        self.results.append(results)
+        self.searchers += [searcher] * len(table)
+        self.margins = np.concatenate([self.margins, margins])
+        return margins
+
+
+def search(found: Found, rng: np.random.Generator) -> None:
+    """Run rows until the budget is spent or the target met; see `worst_case.worst_case`."""
+    space = found.space
+    is_finite = not space.quantities or space.scale == 0  # the corners are everything
+    share = found.runs if is_finite else max(found.runs // SHARE, 1)
+    has_all = corner_count(space) <= share
+    some = corners(space).table if has_all else _some_corners(space, share, rng)
+    _in_batches(found, "corners", some)
+    if is_finite:
+        return
+    _in_batches(found, "uniform", _uniform(space, min(share, found.left), rng))
+    for restart in itertools.count():
+        size = int(max(GENERATION, 4 + 3 * np.log(len(space.quantities)))) << restart
+        if size > found.left:
+            break
+        _evolve(found, rng, size, is_first=restart == 0)
+    _in_batches(found, "uniform", _uniform(space, found.left, rng))
+
+
+def corner_count(space: Space) -> int:
+    """Return the number of corners of the box, times that of combinations of choices."""
+    return 2 ** len(space.quantities) * math.prod(len(c.options) for c in space.choices)
+
+
+def _some_corners(space: Space, count: int, rng: np.random.Generator) -> pd.DataFrame:
+    unit = rng.random((count, len(space.names)))
+    d = len(space.quantities)
+    unit[:, :d] = np.rint(unit[:, :d])
+    return boxed(space, unit).drop_duplicates(ignore_index=True)
+
+
+def _uniform(space: Space, count: int, rng: np.random.Generator) -> pd.DataFrame:
+    return boxed(space, rng.random((count, len(space.names))))
+
+
+def _in_batches(found: Found, searcher: str, table: pd.DataFrame) -> None:
+    for first in range(0, len(table), BATCH):
+        if found.left:
+            found.run(searcher, table.iloc[first : first + min(BATCH, found.left)])
+
+
+def _evolve(found: Found, rng: np.random.Generator, size: int, *, is_first: bool) -> None:
+    """One search by CMA-ES with `size` rows in a generation."""
+    space, d = found.space, len(found.space.quantities)
+    start = found.points.iloc[[np.argmin(found.margins)]] if is_first else _uniform(space, 1, rng)
+    labels = start[[choice.name for choice in space.choices]].iloc[0].to_dict()
+    strategy = _strategy(_places(space, start)[0], size, rng)
+    while not strategy.stop() and found.left >= size:
+        asked = strategy.ask()
+        unit = np.full((size, len(space.names)), 0.5)
+        unit[:, :d] = np.clip(asked, 0.0, 1.0)[:, :d]
+        margins = found.run("CMA-ES", boxed(space, unit).assign(**labels))
+        with _quiet():
+            strategy.tell(asked, list(np.clip(margins, -EXTREME, EXTREME)))
+
+
+def _places(space: Space, table: pd.DataFrame) -> np.ndarray:
+    """Return the places of rows in their boxes, the opposite of `boxed`."""
+    box = ends(space)
+    low, high = box.to_numpy()
+    return np.clip((table[box.columns].to_numpy(dtype=float) - low) / (high - low), 0.0, 1.0)
+
+
+def _strategy(start: np.ndarray, size: int, rng: np.random.Generator) -> Any:
+    """Return CMA-ES in the unit cube, with random numbers of its own."""
+    with _quiet():
+        import cma  # late: it takes a second
+
+        start = np.append(start, 0.5) if start.size == 1 else start  # needs two coordinates
+        options = {
+            "bounds": [0, 1],
+            "popsize": size,
+            "tolfun": RESOLUTION,
+            "tolx": RESOLUTION,
+            "verbose": -9,
+            "seed": np.nan,  # leaves NumPy's global generator alone
+            "randn": lambda *shape: rng.standard_normal(shape),
+        }
+        return cma.CMAEvolutionStrategy(start, SPREAD, options)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """What CMA-ES warns of, such as flat margins, ends a search and is no news."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module=r"cma\b")
+        yield

@@ -1,0 +1,175 @@
+"""A witness run again in other ways, before it is called confirmed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl._arguments import flag, of_type
+from nlctl._errors import DivergedError
+from nlctl.native import Status
+from nlctl.response import input_output_response
+
+from ..runs.experiment import Experiment, Prepared, by_diagram, evaluate
+from ..stl.spec import margins, unfinished_margin
+from ..uncertainty.space import arguments, checked_row
+from .evaluation import as_table
+
+__all__ = ["TIGHTER", "Confirmation", "confirm"]
+
+TIGHTER = 100.0
+"""Tolerances are divided by this."""
+OTHERS = ("tsit5", "rodas5p")
+"""The explicit integrator and the stiff one."""
+REFERENCE = "LSODA"
+"""SciPy's, in python-control."""
+BURST = (Status.DIVERGED.name, Status.STEP_TOO_SMALL.name)
+"""How a run may end where its states leave the finite numbers."""
+SAME = 0.01
+"""Bursts are the same if their times differ by at most this part of the later one."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Confirmation:
+    """Whether a violation stays one in other integrations; printed, it is a sentence.
+
+    Attributes
+    ----------
+    row : dict
+    replays : pandas.DataFrame
+        One row per replay: engine, method, rtol, atol, status, time (s) reached and margin.  The
+        first is as in the study.
+    reason : str
+        Why it is not confirmed; empty if it is.
+    """
+
+    row: Mapping[str, Any]
+    replays: pd.DataFrame
+    reason: str
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether every replay violates the spec in the same way."""
+        return not self.reason
+
+    @property
+    def spread(self) -> float:
+        """Largest difference of two replays' margins."""
+        return float(np.ptp(self.replays["margin"].to_numpy(dtype=float)))
+
+    def __str__(self) -> str:
+        if self.reason:
+            return f"Not confirmed: {self.reason}."
+        low, high = self.replays["margin"].min(), self.replays["margin"].max()
+        return (
+            f"Confirmed by {len(self.replays)} integrations: margins from {low:.6g} to {high:.6g}, "
+            f"which differ by {self.spread:.2g}."
+        )
+
+
+def confirm(
+    prepared: Prepared, row: Mapping[str, Any], *, python_control: bool = False
+) -> Confirmation:
+    """Run a row as in the study, and at 1/100 of its tolerances with either integrator.
+
+    It is confirmed only if all violate the spec and end alike: all at the end of the experiment,
+    or all in a burst at the same time, to 1 %.  A run that needed too many steps confirms nothing,
+    nor does one that bursts where others do not.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    row : mapping
+        ``{name: value}``, such as `WorstCase.witness`.
+    python_control : bool, optional
+        Also run it in python-control, at the tighter tolerances: another engine, and other code of
+        the diagram.  There memory blocks relax instead of being exact, see `nlctl.Backlash`.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        If the row lacks a quantity, has another one, or a number is not finite.
+    """
+    study = of_type("confirm", "prepared", prepared, Prepared, "prepare(experiment)").experiment
+    row = checked_row(study.space, row)
+    python_control = flag("confirm", "python_control", python_control)
+    tighter = replace(study, rtol=study.rtol / TIGHTER, atol=study.atol / TIGHTER)
+    table = as_table(study.space, [row])
+    replays = []
+    for experiment in (study, *(replace(tighter, method=method) for method in OTHERS)):
+        found = evaluate(replace(prepared, experiment=experiment), table).iloc[0]
+        replays.append(_replay("native", experiment, found["status"], found["time"], found["spec"]))
+    if python_control:
+        replays.append(_in_python_control(prepared, tighter, table))
+    made = pd.DataFrame(replays)
+    return Confirmation(row=dict(row), replays=made, reason=_reason(made))
+
+
+def _replay(
+    engine: str,
+    experiment: Experiment,
+    status: str,
+    time: float,
+    margin: float,
+    method: str = "",
+) -> dict[str, Any]:
+    return {
+        "engine": engine,
+        "method": method or experiment.method,
+        "rtol": experiment.rtol,
+        "atol": experiment.atol,
+        "status": status,
+        "time": float(time),
+        "margin": float(margin),
+    }
+
+
+def _in_python_control(
+    prepared: Prepared, experiment: Experiment, table: pd.DataFrame
+) -> dict[str, Any]:
+    ((loop, _),) = by_diagram(prepared, table)
+    given = arguments(experiment.space, table)
+    end = float(experiment.timepts[-1])
+    told = partial(_replay, "python-control", experiment, method=REFERENCE)
+    try:
+        response = input_output_response(
+            loop.system,
+            experiment.timepts,
+            experiment.inputs,
+            engine="python-control",
+            method=REFERENCE,
+            rtol=experiment.rtol,
+            atol=experiment.atol,
+            initial_state={name: values[0] for name, values in given["initial_state"].items()},
+            params={name: values[0] for name, values in given["params"].items()},
+        )
+    except DivergedError as error:
+        margin = unfinished_margin(error.time, end)
+        return told(Status.DIVERGED.name, error.time, margin)
+    signals = dict(zip(loop.system.output_labels, np.atleast_2d(response.outputs), strict=True))
+    margin = margins(experiment.spec, experiment.timepts, signals)["spec"]
+    return told(Status.OK.name, end, margin)
+
+
+def _reason(replays: pd.DataFrame) -> str:
+    """Return why a violation is not confirmed, or nothing."""
+    runs = replays.to_dict("records")
+    for run in runs:
+        how = f"with {run['engine']}, method {run['method']}, rtol = {run['rtol']:.1g}"
+        if run["status"] not in (Status.OK.name, *BURST):
+            return f"the run {how} ended with {run['status']} at {run['time']:.4g} s"
+        if (run["status"] in BURST) != (runs[0]["status"] in BURST):
+            return f"the run {how} ended with {run['status']}, the study's with {runs[0]['status']}"
+        if np.isnan(run["margin"]):
+            return f"the run {how} has no margin"
+        if run["margin"] > 0:
+            return f"the run {how} holds, margin {run['margin']:.4g}"
+    times = replays["time"].to_numpy(dtype=float)
+    if np.ptp(times) > SAME * np.max(times):
+        return f"the runs end at different times, from {np.min(times):.4g} to {np.max(times):.4g} s"
+    return ""

@@ -1,0 +1,96 @@
+"""What every search asks of a row: its margin, by simulation or by a formula."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl._arguments import a_function
+from nlctl._errors import ParameterError
+
+from ..uncertainty.quantity import Uncertain
+from ..uncertainty.space import Space, moved, nominal
+
+__all__ = ["Evaluate", "as_table", "evaluated", "margins_of", "row_text", "towards_nominal"]
+
+Evaluate = Callable[[pd.DataFrame], pd.DataFrame]
+"""Takes rows, returns a table with their index and a column ``spec``, > 0 holds; for a loop
+``functools.partial(evaluate, prepared)``."""
+
+
+def evaluated(evaluate: Evaluate, table: pd.DataFrame) -> pd.DataFrame:
+    """Evaluate rows; the results are in their order.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If rows are missing, because Ctrl-C kept them from finishing.
+    ParameterError
+        If `evaluate` is no function, or its result is no table of these rows with a column
+        ``spec``.
+    """
+    results = a_function("a search", "evaluate", evaluate)(table)
+    if not isinstance(results, pd.DataFrame):
+        raise ParameterError(
+            f"a search needs results as a pandas.DataFrame, got {type(results).__name__}"
+        )
+    if "spec" not in results.columns:
+        raise ParameterError(
+            f"a search needs results with a column 'spec', got {list(results.columns)}"
+        )
+    if len(results) < len(table):
+        raise KeyboardInterrupt
+    if not table.index.isin(results.index).all():
+        raise ParameterError(
+            "a search needs results with the index of the rows, got "
+            f"{list(results.index[:3])} ... for {list(table.index[:3])} ..."
+        )
+    return results.loc[table.index]
+
+
+def margins_of(results: pd.DataFrame) -> np.ndarray:
+    """Return the margins; NaN, which is a violation, counts as the lowest."""
+    margins = results["spec"].to_numpy(dtype=float)
+    return np.where(np.isnan(margins), -np.inf, margins)
+
+
+def as_table(space: Space, rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+    """Return rows given as ``{name: value}`` as a table with the space's columns."""
+    return pd.DataFrame(list(rows), columns=space.names)
+
+
+def towards_nominal(
+    space: Space, row: Mapping[str, Any], factor: float, names: Collection[str] | None = None
+) -> dict[str, Any]:
+    """Return the row with the deviations of numbers from nominal multiplied by `factor`.
+
+    Parameters
+    ----------
+    space : Space
+    row : mapping
+    factor : float
+    names : collection of str, optional
+        What is moved; by default every quantity.  Whole numbers are rounded, choices stay.
+
+    Raises
+    ------
+    SpaceError
+        If a quantity has no nominal value.
+    """
+    middle = nominal(space)
+
+    def nearer(quantity: Uncertain) -> float:
+        value = moved(middle[quantity.name], row[quantity.name], factor)
+        return float(np.rint(value)) if quantity.is_whole else float(value)
+
+    return dict(row) | {
+        q.name: nearer(q) for q in space.quantities if names is None or q.name in names
+    }
+
+
+def row_text(row: Mapping[str, Any]) -> str:
+    """Return a row as text, ``a = 1.5, arm = x``."""
+    return ", ".join(f"{k} = {v if isinstance(v, str) else f'{v:.6g}'}" for k, v in row.items())

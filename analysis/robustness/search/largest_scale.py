@@ -1,0 +1,152 @@
+"""How far boxes may be scaled before a loop refuses a value."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import control as ct
+
+from nlctl._arguments import number, of_type
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+from nlctl._param import with_overrides
+
+from ..runs.experiment import Prepared
+from ..uncertainty.binding import owner_of
+from ..uncertainty.space import Space, ends, nominal
+from .evaluation import towards_nominal
+
+__all__ = ["largest_scale", "refusal_of"]
+
+FEW = 10
+"""Of up to so many quantities of one block all corners are tried."""
+
+
+def largest_scale(
+    prepared: Prepared, at_most: float = 4.0, names: Collection[str] | None = None
+) -> tuple[float, str]:
+    """Return how far the boxes may be scaled before the loop refuses a value, and why.
+
+    A block refuses its own parameters only, but several of them together: a backlash needs
+    c_l < c_r.  So the corners of each block's own box are tried.  Where these are admissible,
+    everything between them is: the rules of nlctl's blocks are linear, or say that a polynomial is
+    Hurwitz (Kharitonov's theorem).  Of a block with more than 10 quantities only each end by
+    itself and the corners of each pair are tried, the others nominal: a rule about three may then
+    refuse a row later.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    at_most : float, optional
+        Larger factors are not tried.
+    names : collection of str, optional
+        Quantities that are scaled, the others nominal; all by default.
+
+    Returns
+    -------
+    factor : float
+        To 10 digits; nothing that is tried is refused at this factor.
+    reason : str
+        Of the refusal that ends the sizes; empty if `at_most` is admissible.
+
+    Raises
+    ------
+    ParameterError
+        If `at_most` is no finite number > 0, or the nominal values themselves are refused.
+    UnknownNameError
+        If the space has no quantity of such a name.
+    """
+    of_type("a largest scale", "prepared", prepared, Prepared, "prepare(experiment)")
+    factor, why = number("a largest scale", "at_most", at_most, above=0), ""
+    space = prepared.experiment.space
+    for name in () if names is None else names:
+        if name not in space.names:
+            raise unknown("quantity", str(name), space.names, "of a largest scale")
+    systems = [loop.system for _, loop in prepared.loops]
+    tries = list(_tries(space, systems, space.names if names is None else names))
+    while (refusal := next((one for one in tries if one(factor)), None)) is not None:
+        why = f"since at {factor:.4g} {refusal(factor)}"
+        factor = _largest(refusal, factor)
+    return factor, why and f"Sizes end at {factor:.4g} {why}"
+
+
+def refusal_of(space: Space, systems: Iterable[ct.InputOutputSystem]) -> str:
+    """Return why a block refuses values of the boxes that each by itself are admissible, or "".
+
+    Parameters
+    ----------
+    space : Space
+        With full names, and nominal values, which are admissible.
+    systems : iterable of control.InputOutputSystem
+        See `largest_scale` for what is tried of their blocks.
+    """
+    return next(filter(None, (one(1.0) for one in _tries(space, systems, space.names))), "")
+
+
+def _tries(
+    space: Space, systems: Iterable[ct.InputOutputSystem], names: Collection[str]
+) -> Iterator[Callable[[float], str]]:
+    """Yield for each corner what tells from a factor why its block refuses it, or nothing."""
+    for part in _parts(space, systems, names):
+        for corner in _corners(space, list(part.fields)):
+            yield partial(part.refusal, space, corner)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Part:
+    """A block's record at the nominal values, and fields of it by the names of quantities."""
+
+    record: Any
+    path: str
+    fields: Mapping[str, str]
+
+    def refusal(self, space: Space, corner: Mapping[str, Any], factor: float) -> str:
+        """Return why the block refuses a corner moved by a factor from nominal, or nothing."""
+        row = towards_nominal(space, corner, factor, corner)
+        try:
+            with_overrides(self.record, {self.fields[name]: row[name] for name in row}, self.path)
+        except ParameterError as error:
+            return str(error)
+        return ""
+
+
+def _parts(
+    space: Space, systems: Iterable[ct.InputOutputSystem], names: Collection[str]
+) -> Iterator[_Part]:
+    """Yield every block with parameters that are uncertain; `names` may be scaled."""
+    middle = nominal(space)
+    for system in systems:
+        places, fields = {}, {}
+        for quantity in space.quantities:
+            owner = None if quantity.is_initial else owner_of(system, quantity.name)
+            if owner is not None:  # a foreign block takes what it is given
+                place, key = owner
+                places[place.path] = place
+                fields.setdefault(place.path, {})[quantity.name] = key
+        for path, keys in fields.items():
+            given = {key: middle[name] for name, key in keys.items()}
+            record = with_overrides(places[path].system.current_spec, given, path)
+            scaled = {name: key for name, key in keys.items() if name in names}
+            yield _Part(record=record, path=path, fields=scaled)
+
+
+def _corners(space: Space, names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Yield what is tried of some quantities: those that are not nominal, each at an end."""
+    values = ends(space).to_dict("list")
+    sizes = [len(names)] if len(names) <= FEW else [1, 2]
+    for group in itertools.chain(*(itertools.combinations(names, size) for size in sizes)):
+        for corner in itertools.product(*(values[name] for name in group)):
+            yield dict(zip(group, corner, strict=True))
+
+
+def _largest(refusal: Callable[[float], str], refused: float) -> float:
+    """Return the largest factor below a refused one that is not, by bisection from 0."""
+    low, high = 0.0, refused
+    while high - low > 1e-10 * high:
+        middle = (low + high) / 2
+        low, high = (low, middle) if refusal(middle) else (middle, high)
+    return low

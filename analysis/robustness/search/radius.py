@@ -1,0 +1,270 @@
+"""How far the uncertainty may grow before a violation is found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl._arguments import fraction, number, of_type, whole_number
+from nlctl._errors import UsageError
+
+from ..statistics.guarantee import Violation, violation_probability
+from ..uncertainty.design import checked_entropy, independent
+from ..uncertainty.space import Space, combinations, nominal, scaled
+from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
+from .worst_case import worst_case
+
+__all__ = ["Radius", "robustness_radius", "size_of"]
+
+START = 1 / 16
+"""Smallest size that is searched first, as a part of the largest; then twice that, and so on."""
+SMALLEST = 1e-3
+"""Smaller sizes are not searched, as a part of the largest."""
+RAY = 12
+"""Bisections along the ray to a witness."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Radius:
+    """The smallest size of the uncertainty at which a violation was found; prints a sentence.
+
+    Sizes are factors by which the box is scaled about the nominal values.
+
+    Attributes
+    ----------
+    upper : float
+        A violation exists in the box of this size: the radius is at most that.  Infinite if none
+        was found, 0 if the nominal values violate the spec.
+    witness : dict, optional
+        The violating row, at the edge of that box.
+    margin : float
+        Of this row; NaN without one.
+    searched : float
+        Largest size at which the search found nothing.  That is no bound: draws may have found a
+        violation there.
+    statement : Violation, optional
+        How likely a violation is at the size `searched`, from independent draws of the laws of
+        that size, which took no part in the search.
+    largest : float
+        Largest size that may be looked at.
+    notes : tuple of str
+        Why it is the largest, and why there is no statement.
+    steps : pandas.DataFrame
+        What was run: step ("nominal", "search", "ray"), size, lowest margin, runs.
+    """
+
+    upper: float
+    witness: Mapping[str, Any] | None
+    margin: float
+    searched: float
+    statement: Violation | None
+    largest: float
+    notes: tuple[str, ...]
+    steps: pd.DataFrame
+
+    @property
+    def violates_at_nominal(self) -> bool:
+        """Whether the nominal values violate the spec, with some option of every choice."""
+        return self.upper == 0
+
+    @property
+    def runs(self) -> int:
+        """Number of runs of the search, without the independent draws."""
+        return sum(self.steps["runs"].tolist())
+
+    def __str__(self) -> str:
+        searched = f"the size {self.searched:.4g}"
+        if self.violates_at_nominal:
+            text = [
+                f"The nominal values violate the spec (margin {self.margin:.4g}): "
+                f"{row_text(self.witness or {})}. There is no robustness radius."
+            ]
+        elif self.witness is None:
+            text = [f"No violation was found up to {searched}, which proves nothing."]
+        else:
+            text = [
+                f"The robustness radius is at most {self.upper:.4g}: {row_text(self.witness)} "
+                f"violates the spec (margin {self.margin:.4g})."
+            ]
+            if self.searched:
+                text += [f"A search at {searched} found none, which proves nothing."]
+        if self.statement:
+            text += [f"Draws of that size: {self.statement}"]
+        return " ".join([*text, *(f"{note}." for note in self.notes)])
+
+
+def size_of(space: Space, row: Mapping[str, Any]) -> float:
+    """Return the smallest factor by which the box must be scaled to hold a row.
+
+    The largest deviation from nominal, each as a multiple of its side of the box.
+
+    Raises
+    ------
+    SpaceError
+        If a quantity has no nominal value.
+    """
+    middle, sizes = nominal(space), [0.0]
+    for quantity in space.quantities:
+        low, high = quantity.box
+        deviation = (row[quantity.name] - middle[quantity.name]) / space.scale
+        side = (high if deviation > 0 else low) - middle[quantity.name]
+        sizes.append(np.inf if deviation and not side else abs(deviation / (side or 1.0)))
+    return float(np.max(sizes))
+
+
+def robustness_radius(
+    evaluate: Evaluate,
+    space: Space,
+    largest: float = 4.0,
+    *,
+    limit: str = "",
+    runs: int = 500,
+    tolerance: float = 0.02,
+    draws: int = 459,
+    confidence: float = 0.99,
+    entropy: int | None = None,
+) -> Radius:
+    """Search for the smallest box about the nominal values that holds a violation.
+
+    The box of size rho has all sides multiplied by rho; these boxes are nested.  `worst_case` looks
+    at growing sizes until it finds a violation, and then between the last size without one and the
+    violation.  Each violation is first moved towards nominal along its ray by bisection, so that
+    the result is a violating row at the edge of its box.  All searches use the same points of the
+    unit cube (common random numbers).
+
+    Parameters
+    ----------
+    evaluate : callable
+        See `evaluation.Evaluate`.
+    space : Space
+        With nominal values, see `resolve.resolved`.  Choices are not scaled: every option is
+        searched at every size.
+    largest : float, optional
+        Largest size; for a loop from `largest_scale.largest_scale`.
+    limit : str, optional
+        Why no larger one, for the text.
+    runs : int, optional
+        Of the search at each size.
+    tolerance : float, optional
+        It ends when the largest size without a violation found is that close, relatively, or at a
+        thousandth of `largest`.
+    draws : int, optional
+        Independent draws for the statement; 459, without a violation, bound its probability by
+        1 % with confidence 99 %, see `runs_needed`.  0 leaves it out.
+    confidence : float, optional
+    entropy : int, optional
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of range.
+    SpaceError
+        If a quantity has no nominal value.
+    KeyboardInterrupt
+        If Ctrl-C kept rows from finishing.
+    """
+    who = "a robustness radius"
+    of_type(who, "space", space, Space)
+    runs = whole_number(who, "runs", runs, at_least=1)
+    draws = whole_number(who, "draws", draws, at_least=0)
+    fraction(who, "tolerance", tolerance)
+    fraction(who, "confidence", confidence)
+    number(who, "largest", largest, above=0)
+    number(who, "scale", space.scale, above=0)
+    search = _Search(evaluate, space, runs, checked_entropy(entropy))
+    search.at_nominal()
+    size = largest * START
+    while search.upper == np.inf and search.searched < largest:
+        search.at(min(size, largest))
+        size *= 2
+    while max(SMALLEST * largest, search.low / (1 - tolerance)) < search.upper < np.inf:
+        search.at((search.low + search.upper) / 2)
+    statement, missing = _drawn(search, draws, confidence)
+    return Radius(
+        upper=search.upper,
+        witness=search.witness,
+        margin=search.margin,
+        searched=search.searched,
+        statement=statement,
+        largest=float(largest),
+        notes=tuple(note for note in (limit, missing) if note),
+        steps=pd.DataFrame(search.steps, columns=["step", "size", "margin", "runs"]),
+    )
+
+
+class _Search:
+    """The best violation so far, the sizes that were searched, and where bisection goes on."""
+
+    def __init__(self, evaluate: Evaluate, space: Space, runs: int, entropy: int) -> None:
+        self.evaluate, self.space, self.runs, self.entropy = evaluate, space, runs, entropy
+        self.upper, self.low, self.searched, self.margin = np.inf, 0.0, 0.0, np.nan
+        self.witness: dict[str, Any] | None = None
+        self.steps: list[tuple[str, float, float, int]] = []
+
+    def at_nominal(self) -> None:
+        """Look at the nominal values with every combination of choices."""
+        middle = nominal(self.space)
+        rows = as_table(self.space, [middle | labels for labels in combinations(self.space)])
+        margins = margins_of(evaluated(self.evaluate, rows))
+        worst = int(np.argmin(margins))
+        self.steps.append(("nominal", 0.0, margins[worst], len(rows)))
+        if not margins[worst] > 0:
+            self._keep(rows.iloc[worst].to_dict(), margins[worst])
+
+    def at(self, size: float) -> None:
+        """Search the box of a size; a violation becomes the upper bound."""
+        box = scaled(self.space, size)
+        found = worst_case(self.evaluate, box, self.runs, entropy=self.entropy, target=0.0)
+        if not found.is_finished:
+            raise KeyboardInterrupt
+        self.steps.append(("search", size, found.margin, found.design.size))
+        before = self.upper
+        if found.is_violated:
+            self.along_ray(found.witness, found.margin)
+        else:
+            self.searched = size
+        if self.upper == before:  # nothing, or a whole number that was rounded out of the box
+            self.low = size
+
+    def along_ray(self, row: dict[str, Any], margin: float) -> None:
+        """Move a violation towards nominal as far as bisection keeps it one."""
+        full, low, high = row, 0.0, 1.0
+        for _ in range(RAY):
+            middle = (low + high) / 2
+            nearer = towards_nominal(self.space, full, middle)
+            value = margins_of(evaluated(self.evaluate, as_table(self.space, [nearer])))[0]
+            if value > 0:
+                low = middle
+            else:
+                row, margin, high = nearer, value, middle
+        self.steps.append(("ray", size_of(self.space, row), margin, RAY))
+        self._keep(row, margin)
+
+    def _keep(self, row: dict[str, Any], margin: float) -> None:
+        size = size_of(self.space, row)
+        if size < self.upper:
+            self.upper, self.witness, self.margin = size, row, float(margin)
+
+
+def _drawn(search: _Search, draws: int, confidence: float) -> tuple[Violation | None, str]:
+    """Return a statement from draws at the size that was searched, or why there is none."""
+    if not draws:
+        return None, ""
+    if search.upper == 0:
+        return None, ""
+    if not search.searched:
+        return None, "There is no statement: no size was searched without a violation"
+    design = independent(scaled(search.space, search.searched), draws, search.entropy)
+    try:
+        results = evaluated(search.evaluate, design.table)
+    except UsageError as error:
+        return None, f"There is no statement: a draw was refused, {error}"
+    margins = margins_of(results)
+    worst = int(np.argmin(margins))
+    if not margins[worst] > 0:
+        search.along_ray(design.table.iloc[worst].to_dict(), margins[worst])
+    return violation_probability(design, margins, confidence), ""

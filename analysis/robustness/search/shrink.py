@@ -1,0 +1,184 @@
+"""The smallest part of a violating row that still violates the spec."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nlctl._arguments import of_type, whole_number
+from nlctl._errors import ParameterError
+
+from ..uncertainty.space import Space, checked_row, nominal
+from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
+
+__all__ = ["Shrunk", "shrink"]
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shrunk:
+    """A violation by few deviating quantities; printed, it is a sentence.
+
+    Attributes
+    ----------
+    row : dict
+        Violates the spec; all but `names` are nominal.
+    margin : float
+        Of this row.
+    names : tuple of str
+        What deviates.  Each is needed: with any single one of them back at nominal, the spec
+        holds.
+    of : int
+        How many deviated at first.
+    is_fewest : bool
+        Whether every smaller set of the first row's deviations was tried and holds; otherwise
+        fewer may suffice.
+    runs : int
+    """
+
+    row: Mapping[str, Any]
+    margin: float
+    names: tuple[str, ...]
+    of: int
+    is_fewest: bool
+    runs: int
+
+    def __str__(self) -> str:
+        if not self.names:
+            return f"The nominal values violate the spec, margin {self.margin:.4g}."
+        why = "no fewer do" if self.is_fewest else "each of them is needed"
+        kept = row_text({name: self.row[name] for name in self.names})
+        return (
+            f"{len(self.names)} of {self.of} deviations suffice for a violation, and {why}: "
+            f"{kept} (margin {self.margin:.4g}, {self.runs} runs)."
+        )
+
+
+def shrink(
+    evaluate: Evaluate,
+    space: Space,
+    row: Mapping[str, Any],
+    *,
+    steps: int = 10,
+    most: int = 2000,
+) -> Shrunk:
+    """Set as much of a violating row back to nominal as the violation bears.
+
+    1. Deviations are set back one after the other, each time the one without which the margin is
+       lowest, until every further one would make the spec hold: what is left is 1-minimal in the
+       sense of Zeller and Hildebrandt (IEEE Trans. Softw. Eng. 28, 2002).
+    2. Where the row has at most `most` smaller sets of deviations, all are tried from the smallest
+       on: the first violation has the fewest of this row's deviations.
+    3. Each number that is left is moved towards nominal by bisection as far as the spec stays
+       violated, in the order of the space.  What has become needless by that is set back.
+
+    Parameters
+    ----------
+    evaluate : callable
+        See `evaluation.Evaluate`.
+    space : Space
+        With nominal values, see `resolve.resolved`.
+    row : mapping
+        ``{name: value}``, such as `WorstCase.witness`.
+    steps : int, optional
+        Number of bisections for each number: to 2^-steps of its deviation.
+    most : int, optional
+        Largest number of runs that 2 may take.
+
+    Raises
+    ------
+    UnknownNameError
+        If the row lacks a quantity.
+    ParameterError
+        If the row does not violate the spec, or a number is out of range or not finite.
+    SpaceError
+        If a quantity has no nominal value.
+    """
+    of_type("shrinking", "space", space, Space)
+    steps = whole_number("shrinking", "steps", steps, at_least=0)
+    most = whole_number("shrinking", "most", most, at_least=0)
+    first = checked_row(space, row)
+    task = _Task(evaluate, space)
+    margin = task.margins([first])[0]
+    if margin > 0:
+        raise ParameterError(f"only a violation can be shrunk, this row has margin {margin:.4g}")
+    few = _deleted(task, first)
+    fewest, is_fewest = _fewest(task, first, len(task.deviating(few)), most)
+    small = _scaled(task, few if fewest is None else fewest, steps)
+    while (smaller := _deleted(task, small)) != small:
+        small = _scaled(task, smaller, steps)
+    return Shrunk(
+        row=small,
+        margin=float(task.margins([small])[0]),
+        names=tuple(task.deviating(small)),
+        of=len(task.deviating(first)),
+        is_fewest=is_fewest,
+        runs=task.runs,
+    )
+
+
+class _Task:
+    """Counts the runs."""
+
+    def __init__(self, evaluate: Evaluate, space: Space) -> None:
+        self.evaluate, self.space, self.middle = evaluate, space, nominal(space)
+        self.runs = 0
+
+    def margins(self, rows: Sequence[Row]) -> np.ndarray:
+        if not rows:
+            return np.empty(0)
+        self.runs += len(rows)
+        return margins_of(evaluated(self.evaluate, as_table(self.space, rows)))
+
+    def deviating(self, row: Row) -> list[str]:
+        return [name for name in self.space.names if row[name] != self.middle[name]]
+
+    def without(self, row: Row, names: Collection[str]) -> Row:
+        return row | {name: self.middle[name] for name in names}
+
+
+def _deleted(task: _Task, row: Row) -> Row:
+    """Set back one deviation after the other while the spec stays violated."""
+    while names := task.deviating(row):
+        rows = [task.without(row, [name]) for name in names]
+        margins = task.margins(rows)
+        best = int(np.argmin(margins))
+        if margins[best] > 0:
+            break
+        row = rows[best]
+    return row
+
+
+def _fewest(task: _Task, row: Row, size: int, most: int) -> tuple[Row | None, bool]:
+    """Try all sets of less than `size` deviations; return a violation, and whether it tried."""
+    names = task.deviating(row)
+    if sum(math.comb(len(names), count) for count in range(size)) > most:
+        return None, False
+    for count in range(size):
+        kept = itertools.combinations(names, count)
+        rows = [task.without(row, set(names) - set(some)) for some in kept]
+        margins = task.margins(rows)
+        best = int(np.argmin(margins))
+        if not margins[best] > 0:
+            return rows[best], True
+    return None, True
+
+
+def _scaled(task: _Task, row: Row, steps: int) -> Row:
+    """Move one number after the other towards nominal by bisection."""
+    for name in [q.name for q in task.space.quantities if q.name in task.deviating(row)]:
+        full, low, high = row, 0.0, 1.0
+        for _ in range(steps):
+            middle = (low + high) / 2
+            nearer = towards_nominal(task.space, full, middle, [name])
+            if task.margins([nearer])[0] > 0:
+                low = middle
+            else:
+                row, high = nearer, middle
+    return row

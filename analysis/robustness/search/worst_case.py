@@ -1,0 +1,153 @@
+"""The row with the lowest margin that a search finds; what it does not find proves nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl._arguments import number, of_type, whole_number
+
+from ..uncertainty.design import Design, checked_entropy, listed
+from ..uncertainty.space import Space
+from .candidates import Found, corner_count, search
+from .evaluation import Evaluate, margins_of, row_text
+
+__all__ = ["WorstCase", "worst_case"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WorstCase:
+    """The rows that a search ran, and the worst of them; printed, it is a sentence.
+
+    Attributes
+    ----------
+    design : Design
+        All rows in the order in which they ran.  They were chosen by looking at earlier results,
+        so statements about probabilities refuse them.
+    results : pandas.DataFrame
+        What was evaluated, by row.
+    searchers : ndarray of str, shape (design.size,)
+        What chose each row: ``"corners"``, ``"uniform"`` or ``"CMA-ES"``.
+    is_finished : bool
+        False if Ctrl-C ended the search.
+    all_corners : bool
+        Whether every corner of the box is among the rows; otherwise they are a random subset.
+    """
+
+    design: Design
+    results: pd.DataFrame
+    searchers: np.ndarray
+    is_finished: bool
+    all_corners: bool
+
+    @property
+    def number(self) -> int:
+        """Number of the worst row, the first of equals."""
+        return int(np.argmin(margins_of(self.results)))
+
+    @property
+    def witness(self) -> dict[str, Any]:
+        """The worst row."""
+        return self.design.table.iloc[self.number].to_dict()
+
+    @property
+    def margin(self) -> float:
+        """Its margin; NaN where that is what it got."""
+        return float(self.results["spec"].iloc[self.number])
+
+    @property
+    def is_violated(self) -> bool:
+        """Whether the worst row violates the spec."""
+        return not self.margin > 0
+
+    @property
+    def found_by(self) -> str:
+        """What chose the worst row."""
+        return str(self.searchers[self.number])
+
+    @property
+    def runs(self) -> dict[str, int]:
+        """Number of rows by what chose them."""
+        names, counts = np.unique(self.searchers, return_counts=True)
+        return dict(zip(map(str, names), map(int, counts), strict=True))
+
+    @property
+    def best_so_far(self) -> np.ndarray:
+        """Lowest margin after each run."""
+        return np.minimum.accumulate(margins_of(self.results))
+
+    def __str__(self) -> str:
+        some = "" if self.all_corners else "random "
+        names = {"corners": f"{some}corners", "uniform": "uniform draws"}
+        rows = ", ".join(f"{count} {names.get(name, name)}" for name, count in self.runs.items())
+        found = (
+            f"the lowest margin is {self.margin:.4g} (row {self.number}, {self.found_by}): "
+            f"{row_text(self.witness)}"
+        )
+        verdict = "A violation" if self.is_violated else "No violation, which proves nothing"
+        return f"{verdict}: of {self.design.size} runs ({rows}) {found}."
+
+
+def worst_case(
+    evaluate: Evaluate,
+    space: Space,
+    runs: int = 1000,
+    *,
+    entropy: int | None = None,
+    target: float | None = None,
+) -> WorstCase:
+    """Search the box for the row with the lowest margin.
+
+    Three searches, one after the other: the corners of the box with every combination of choices,
+    where these are at most a quarter of the runs, otherwise that many random ones; uniform draws
+    in the box, with choices by their weights, a quarter; and with the rest CMA-ES (Hansen,
+    arXiv:1604.00772) on the margin.  CMA-ES starts from the worst row so far, and whenever it has
+    come to an end from a random point with twice the population (Auger, Hansen, CEC 2005);
+    choices stand still within one such search.  What is left of the runs is uniform draws.
+
+    Parameters
+    ----------
+    evaluate : callable
+        See `evaluation.Evaluate`.
+    space : Space
+        Its boxes are searched; what a law may draw beyond its box is not.
+    runs : int, optional
+        Number of rows.
+    entropy : int, optional
+        Of all random numbers; the same entropy takes the same steps, and in a scaled space draws
+        the same points of the unit cube.
+    target : float, optional
+        The search ends with the first batch that has a margin <= target; 0 ends it with the first
+        violation.
+
+    Raises
+    ------
+    ParameterError
+        If `runs` is no whole number >= 1, or an option of a choice has weight 0.
+    KeyboardInterrupt
+        If Ctrl-C comes before the first batch is done; later it ends the search.
+    """
+    of_type("a worst case", "space", space, Space)
+    runs = whole_number("a worst case", "runs", runs, at_least=1)
+    if target is not None and not (isinstance(target, float) and np.isinf(target)):
+        number("a worst case", "target", target)
+    entropy = checked_entropy(entropy)
+    found = Found(evaluate, space, runs, target)
+    is_finished = True
+    try:
+        search(found, np.random.default_rng(entropy))
+    except KeyboardInterrupt:
+        if not found.tables:
+            raise
+        is_finished = False
+    searchers = np.array(found.searchers)
+    return WorstCase(
+        design=listed(space, "adaptive", found.points, entropy),
+        results=pd.concat(found.results),
+        searchers=searchers,
+        is_finished=is_finished,
+        all_corners=int(np.sum(searchers == "corners")) == corner_count(space),
+    )

@@ -1,0 +1,1 @@
+"""Statements from samples: probabilities, comparisons, sensitivities."""

@@ -1,0 +1,299 @@
+"""Which quantities matter: screening, shares of the variance, and what sets failures apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from nlctl._arguments import of_type, whole_number
+from nlctl._errors import ParameterError
+
+from ..stl.spec import FAILED
+from ..uncertainty.design import Design, affordable, checked_entropy, listed, sobol_points
+from ..uncertainty.space import Space, boxed, sampled
+from .guarantee import Margins, checked_confidence, series_of
+from .paired import holm
+
+__all__ = ["censored", "elementary_effects", "morris", "regional", "saltelli", "sobol_indices"]
+
+_WHO = "shares of the variance"
+
+
+def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
+    """Return margins with one number for all failed runs, for effects and shares of a variance.
+
+    The margin of a run that did not reach its end is graded for searches, a million times the
+    others (`spec.unfinished_margin`): it would be the whole variance.  What such a run tells is
+    that its margin is no better than those of the runs that did, so it counts as the least of
+    these, and at most as -1, beyond the bound by the bound itself.  The others stay as they are.
+
+    Returns
+    -------
+    values : ndarray
+    failed : int
+        Number of rows that count as `least`.
+    least : float
+
+    Raises
+    ------
+    ParameterError
+        If no run reached its end.
+    """
+    values = series_of(margins, "margins").to_numpy(copy=True)
+    ended = values > -FAILED  # not of NaN
+    if not ended.any():
+        raise ParameterError(
+            f"none of {values.size} rows reached its end, so that their margins tell nothing apart"
+        )
+    least = min(float(values[ended].min()), -1.0)
+    return np.where(ended, values, least), int(np.sum(~ended)), least
+
+
+def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None = None) -> Design:
+    """Walk through the boxes, one quantity a step: for `elementary_effects`.
+
+    Each trajectory starts at a random point of a grid with `levels` values per quantity and changes
+    every quantity once, in random order, by levels / (2 (levels - 1)) of its box (Morris,
+    Technometrics 33, 1991).  It takes (number of quantities + 1) rows.
+
+    Parameters
+    ----------
+    space : Space
+        Without choices.
+    trajectories : int
+        At least 2; 10 to 50 are usual.
+    levels : int, optional
+        An even number.
+    entropy : int, optional
+
+    Raises
+    ------
+    ParameterError
+        If the space has choices, or a number is out of range.
+    """
+    if space.choices:
+        raise ParameterError(
+            f"screening walks along numbers, and {[c.name for c in space.choices]} are choices: "
+            "screen each combination on its own, or use saltelli"
+        )
+    r = whole_number("screening", "trajectories", trajectories, at_least=2)
+    affordable("screening", r * (len(space.names) + 1), len(space.names))
+    if whole_number("screening", "levels", levels, at_least=2) % 2:
+        raise ParameterError(f"screening needs an even number of levels, got {levels}")
+    d, entropy = len(space.names), checked_entropy(entropy)
+    rng = np.random.default_rng(entropy)
+    step = levels / (2 * (levels - 1))
+    low = rng.integers(0, levels // 2, (r, 1, d)) / (levels - 1)
+    upwards = rng.random((r, 1, d)) < 0.5
+    turn = rng.permuted(np.tile(np.arange(d), (r, 1)), axis=1)[:, None, :]
+    changed = np.arange(d + 1)[None, :, None] > turn  # row k has made the first k changes
+    unit = np.minimum(low + step * (changed == upwards), 1.0)  # rounding
+    points = boxed(space, unit.reshape(-1, d))
+    return listed(space, "Morris", points, entropy, {"trajectories": r})
+
+
+def elementary_effects(
+    design: Design, values: Sequence[float] | np.ndarray, confidence: float = 0.95
+) -> pd.DataFrame:
+    """Return how much a step in each quantity changes a response: Morris screening.
+
+    An effect is the change of the response over the change of the quantity, in units of its box.
+
+    Parameters
+    ----------
+    design : Design
+        From `morris`.
+    values : sequence of length ``design.size``
+        The response of every row; margins where runs failed: see `censored`.
+    confidence : float, optional
+        Of the bootstrap interval (percentiles, trajectories resampled) of mu_star.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per quantity; mu: mean effect, mu_star: mean magnitude, its interval low and high,
+        sigma: standard deviation.  mu_star near 0: does not matter; sigma far from 0: not linear,
+        or not on its own.
+
+    Raises
+    ------
+    ParameterError
+        If the design is another, or a value is not finite.
+    """
+    y = _checked(design, values, "Morris", "morris")
+    space, r = design.space, design.details["trajectories"]
+    width = np.array([high - low for low, high in (q.box for q in space.quantities)]) * space.scale
+    x = design.table.to_numpy(dtype=float).reshape(r, -1, len(width)) / width
+    steps, changes = np.diff(x, axis=1), np.diff(y.reshape(r, -1), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        effects = np.where(steps != 0, changes[:, :, None] / steps, 0.0).sum(axis=1)
+    interval = stats.bootstrap(
+        (np.abs(effects),), np.mean, axis=0, vectorized=True, method="percentile",
+        confidence_level=checked_confidence(confidence), rng=np.random.default_rng(design.entropy),
+    ).confidence_interval  # fmt: skip
+    return pd.DataFrame(
+        {
+            "mu": effects.mean(axis=0),
+            "mu_star": np.abs(effects).mean(axis=0),
+            "low": interval.low,
+            "high": interval.high,
+            "sigma": effects.std(axis=0, ddof=1),
+        },
+        index=pd.Index(space.names, name="quantity"),
+    )
+
+
+def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
+    """Make the rows that `sobol_indices` needs: size (number of names + 2) of them.
+
+    Two independent sets A and B of `size` rows each from one scrambled Sobol' sequence, and for
+    every name A with that column of B (Saltelli et al., Comput. Phys. Commun. 181, 2010).
+
+    Parameters
+    ----------
+    space : Space
+        With at least two quantities or choices.
+    size : int
+        A power of 2.
+    entropy : int, optional
+
+    Raises
+    ------
+    ParameterError
+        If `size` is no power of 2, or there is one name only, whose share is 1.
+    """
+    d, entropy = len(space.names), checked_entropy(entropy)
+    if d < 2:
+        raise ParameterError(f"shares of the variance need two quantities, got {space.names}")
+    affordable(_WHO, whole_number(_WHO, "size", size, at_least=1) * (d + 2), d)
+    both = sobol_points(2 * d, size, entropy)
+    a, b = both[:, :d], both[:, d:]
+    mixed = np.tile(a, (d, 1, 1))
+    for i in range(d):
+        mixed[i, :, i] = b[:, i]
+    points = sampled(space, np.concatenate([a, b, mixed.reshape(-1, d)]))
+    return listed(space, "Saltelli", points, entropy, {"size": size})
+
+
+def sobol_indices(
+    design: Design,
+    values: Sequence[float] | np.ndarray,
+    confidence: float = 0.95,
+    resamples: int = 999,
+) -> pd.DataFrame:
+    """Return which share of a response's variance comes from each quantity.
+
+    Parameters
+    ----------
+    design : Design
+        From `saltelli`.
+    values : sequence of length ``design.size``
+        The response of every row; margins where runs failed: see `censored`.
+    confidence : float, optional
+        Of the bootstrap intervals (percentiles; rows of all sets resampled together).
+    resamples : int, optional
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per name; S1: share by itself, ST: share with all interactions, each with its
+        interval S1_low, S1_high, ST_low, ST_high.  All 0 for a constant response.
+
+    Raises
+    ------
+    ParameterError
+        If the design is another, or a value is not finite.
+    """
+    y = _checked(design, values, "Saltelli", "saltelli")
+    resamples = whole_number(_WHO, "resamples", resamples, at_least=1)
+    d, n = len(design.space.names), design.details["size"]
+    f_a, f_b, f_ab = y[:n], y[n : 2 * n], y[2 * n :].reshape(d, 1, n)
+
+    def indices(rows: np.ndarray) -> np.ndarray:
+        parts = {"f_A": f_a[rows][None], "f_B": f_b[rows][None], "f_AB": f_ab[..., rows]}
+        made = stats.sobol_indices(func=parts, n=n)
+        return np.stack([made.first_order, made.total_order])
+
+    s1, st = indices(np.arange(n))
+    interval = stats.bootstrap(
+        (np.arange(n),), indices, vectorized=False, n_resamples=resamples, method="percentile",
+        confidence_level=checked_confidence(confidence), rng=np.random.default_rng(design.entropy),
+    ).confidence_interval  # fmt: skip
+    columns = {"S1": s1, "S1_low": interval.low[0], "S1_high": interval.high[0]}
+    columns |= {"ST": st, "ST_low": interval.low[1], "ST_high": interval.high[1]}
+    return pd.DataFrame(columns, index=pd.Index(design.space.names, name="quantity"))
+
+
+def _checked(design: Design, values: Sequence[float] | np.ndarray, kind: str, maker: str) -> Any:
+    if of_type("this analysis", "design", design, Design).kind != kind:
+        raise ParameterError(
+            f"this analysis needs a design from {maker}(space, ...), got one of kind "
+            f"'{design.kind}'"
+        )
+    y = series_of(values, "the response").sort_index().to_numpy()
+    bad = np.nonzero(~np.isfinite(y))[0]
+    if y.size != design.size or bad.size:
+        what = f"row {bad[0]} has {y[bad[0]]}" if bad.size else f"got {y.size}"
+        raise ParameterError(
+            f"this analysis needs a finite value for each of {design.size} rows, {what}; margins "
+            "are finite for runs that diverged as well"
+        )
+    return y
+
+
+def regional(design: Design, margins: Margins) -> pd.DataFrame:
+    """Return how far values in failing runs differ from those in passing ones.
+
+    For numbers the statistic is the largest distance between the two empirical distributions
+    (Kolmogorov-Smirnov), for choices Cramér's V of the table of options; 0: alike, 1: apart.
+
+    Parameters
+    ----------
+    design : Design
+        Any; p-values are given for independent draws only.
+    margins : sequence of length ``design.size``
+        A run passes if its margin is > 0.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per name: statistic, p, and p_holm, adjusted for the number of names.
+
+    Raises
+    ------
+    ParameterError
+        If a margin is missing, or all runs pass or all fail.
+    """
+    of_type("regional sensitivity", "design", design, Design)
+    passed = series_of(margins, "margins").sort_index().to_numpy() > 0
+    if passed.size != design.size or passed.all() or not passed.any():
+        raise ParameterError(
+            f"regional sensitivity needs a margin for each of {design.size} rows with passing and "
+            f"failing runs among them, got {passed.size} rows and {passed.sum()} that pass"
+        )
+    table = design.table
+    rows = []
+    for name in design.space.names:
+        column = table[name].to_numpy()
+        if name in [choice.name for choice in design.space.choices]:
+            rows.append(_cramer(column, passed))
+        else:
+            test: Any = stats.ks_2samp(column[passed].astype(float), column[~passed].astype(float))
+            rows.append((float(test.statistic), float(test.pvalue)))
+    statistic, p = np.array(rows).T
+    p = p if design.is_iid else np.full(p.shape, np.nan)
+    columns = {"statistic": statistic, "p": p, "p_holm": holm(p)}
+    return pd.DataFrame(columns, index=pd.Index(design.space.names, name="quantity"))
+
+
+def _cramer(labels: np.ndarray, passed: np.ndarray) -> tuple[float, float]:
+    """Cramér's V between options and passing, and the p-value of the chi-square test."""
+    counts = pd.crosstab(labels, passed).to_numpy()
+    if counts.shape[0] == 1:
+        return 0.0, 1.0
+    test: Any = stats.chi2_contingency(counts, correction=False)
+    return float(np.sqrt(test.statistic / counts.sum())), float(test.pvalue)

@@ -1,0 +1,204 @@
+"""Watching a study while it runs: bounds that hold at every moment, and stopping when decided."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from scipy import optimize, special
+
+from nlctl._arguments import fraction
+
+from ..uncertainty.design import Design
+from .guarantee import (
+    Margins,
+    Violation,
+    assumptions,
+    checked_confidence,
+    checked_counts,
+    violations_of,
+)
+
+__all__ = [
+    "SequentialTest",
+    "confidence_sequence",
+    "decide",
+    "decision",
+    "log_evidence",
+    "sequence_bounds",
+]
+
+PRIOR = 0.5
+"""Both parameters of the Beta distribution that alternatives are mixed with (Jeffreys')."""
+
+
+def log_evidence(violations: Any, runs: Any, p: float) -> Any:
+    """Return log M of the evidence against a probability p of a violation.
+
+        M_n(p) = int q^k (1-q)^(n-k) dBeta(q) / (p^k (1-p)^(n-k))
+               = B(k + 1/2, n - k + 1/2) / B(1/2, 1/2) / (p^k (1-p)^(n-k))
+
+    the likelihood of k violations in n runs, mixed over all probabilities by Beta(1/2, 1/2), over
+    that of p.  Under p it is a nonnegative martingale that starts from 1, so that it ever reaches
+    1/a with probability at most a (Ville's inequality): the p with M_n(p) < 1/a at all times n are
+    a confidence sequence (Robbins, Ann. Math. Stat. 41, 1970; Howard, Ramdas, McAuliffe, Sekhon,
+    Ann. Statist. 49, 2021).
+
+    Parameters
+    ----------
+    violations, runs : int or ndarray of int
+        k and n.
+    p : float
+    """
+    k, n = violations, runs
+    mixed = special.betaln(k + PRIOR, n - k + PRIOR) - special.betaln(PRIOR, PRIOR)
+    return mixed - special.xlogy(k, p) - special.xlog1py(n - k, -p)
+
+
+def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tuple[float, float]:
+    """Return bounds of the probability of a violation that may be looked at after every run.
+
+    With this confidence they hold at all numbers of runs at once, so a study may stop whenever it
+    likes, for any reason.  They are the p with ``log_evidence < -log(1 - confidence)``, an interval
+    about violations / runs, since the evidence is convex in p on a logarithmic scale.
+
+    Parameters
+    ----------
+    violations, runs : int
+        Of the first runs in the order of the design.
+    confidence : float, optional
+
+    Raises
+    ------
+    ParameterError
+        If not 0 <= violations <= runs with at least one run, or the confidence is none.
+    """
+    k, n = checked_counts(violations, runs)
+    limit = -np.log(1 - checked_confidence(confidence))
+
+    def excess(p: float) -> float:
+        return log_evidence(k, n, p) - limit
+
+    lower = _zero(excess, np.log(k / n), -700.0, np.exp) * (1 - 1e-9) if k else 0.0
+    upper = _zero(excess, k / n, 1 - 2.0**-53, float) * (1 + 1e-9) if k < n else 1.0
+    return lower, min(upper, 1.0)
+
+
+def _zero(
+    excess: Callable[[float], float],
+    inside: float,
+    outside: float,
+    scale: Callable[[float], float],
+) -> float:
+    """Return where excess(p) changes sign between two places; p = scale(place)."""
+    if excess(scale(outside)) <= 0:  # a confidence next to 1
+        return scale(outside)
+    root: Any = optimize.brentq(lambda place: excess(scale(place)), inside, outside, xtol=1e-15)
+    return scale(root)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SequentialTest:
+    """Whether a probability lies below or above a threshold; printed, it is a sentence.
+
+    Attributes
+    ----------
+    threshold : float
+    decision : {"below", "above", "undecided"}
+    statement : Violation
+        What is known when it was decided, or now.
+    """
+
+    threshold: float
+    decision: Literal["below", "above", "undecided"]
+    statement: Violation
+
+    def __str__(self) -> str:
+        runs = f"after {self.statement.runs} runs"
+        if self.decision == "undecided":
+            return f"Undecided {runs} whether it is below {self.threshold:g}. {self.statement}"
+        return f"Decided {runs}: {self.decision} {self.threshold:g}. {self.statement}"
+
+
+def confidence_sequence(
+    design: Design,
+    margins: Margins,
+    confidence: float = 0.99,
+) -> Violation:
+    """Bound the probability of a violation from the runs that are done, at any time.
+
+    Parameters
+    ----------
+    design : Design
+    margins : sequence of at most ``design.size`` numbers
+        Margin of the first rows in order, see `guarantee.violation_probability`.
+    confidence : float, optional
+        That the bounds hold at every moment of the study.
+
+    Raises
+    ------
+    NoGuaranteeError
+        If the rows are no independent draws, or not the first ones without a gap.
+    """
+    violated = violations_of(design, margins)
+    return _statement(design, int(np.count_nonzero(violated)), violated.size, confidence)
+
+
+def _statement(design: Design, k: int, n: int, confidence: float) -> Violation:
+    lower, upper = sequence_bounds(k, n, confidence)
+    return Violation(
+        violations=k,
+        runs=n,
+        confidence=confidence,
+        lower=lower,
+        upper=upper,
+        side="both",
+        singly=(lower, upper),
+        method="beta-binomial confidence sequence, valid at every number of runs",
+        assumptions=(*assumptions(design), "rows are counted in the order of the design"),
+    )
+
+
+def decide(
+    design: Design,
+    margins: Margins,
+    threshold: float,
+    confidence: float = 0.99,
+) -> SequentialTest:
+    """Test whether the probability of a violation is below or above a threshold.
+
+    It goes through the rows in order and stops at the first at which the confidence sequence
+    leaves the threshold out; the decision is wrong with probability at most 1 - confidence,
+    however many rows there are.  Near the threshold it may take any number of runs.
+
+    Arguments and errors as in `confidence_sequence`.
+
+    Raises
+    ------
+    ParameterError
+        If the threshold is not between 0 and 1.
+    """
+    threshold = fraction("a test", "threshold", threshold)
+    limit = -np.log(1 - checked_confidence(confidence))
+    k = np.cumsum(violations_of(design, margins))
+    n = np.arange(1, k.size + 1)
+    decided = np.nonzero(log_evidence(k, n, threshold) >= limit)[0]
+    i = int(decided[0]) if decided.size else k.size - 1
+    return decision(design, int(k[i]), int(n[i]), threshold, confidence)
+
+
+def decision(
+    design: Design, violations: int, runs: int, threshold: float, confidence: float = 0.99
+) -> SequentialTest:
+    """Return what these counts of the first rows of a design decide, as in `decide`."""
+    k, n = checked_counts(violations, runs)
+    threshold = fraction("a test", "threshold", threshold)
+    is_decided = log_evidence(k, n, threshold) >= -np.log(1 - checked_confidence(confidence))
+    side: Literal["below", "above"] = "below" if k / n < threshold else "above"
+    return SequentialTest(
+        threshold=threshold,
+        decision=side if is_decided else "undecided",
+        statement=_statement(design, k, n, confidence),
+    )

@@ -1,0 +1,1 @@
+"""Signal temporal logic: formulas over signals, requirements, their margins."""

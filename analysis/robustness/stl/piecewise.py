@@ -1,0 +1,164 @@
+"""Piecewise linear functions of time, and their least and largest values over sliding windows.
+
+The trace of a formula is one: signals are joined by lines between samples, and minimum, maximum and
+windows of piecewise linear functions are piecewise linear again, so nothing is lost on the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nlctl.native.codegen.machine_code import kept
+
+from ...metrics import differences, vertex
+
+__all__ = ["Trace", "extremes", "higher", "joined", "largest", "with_vertices"]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A continuous function, linear between its points.
+
+    Attributes
+    ----------
+    t : ndarray of shape (m,)
+        Increasing times (s); one is enough.
+    y : ndarray of shape (m,)
+    """
+
+    t: np.ndarray
+    y: np.ndarray
+
+    def __neg__(self) -> Trace:
+        return Trace(self.t, -self.y)
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Values at times between the first and the last."""
+        return np.interp(t, self.t, self.y)
+
+    def between(self, low: float, high: float) -> Trace:
+        """The part with low <= t <= high."""
+        i, j = np.searchsorted(self.t, low, "right"), np.searchsorted(self.t, high, "left")
+        ends = np.array([low, high] if low < high else [low])
+        first, last = np.split(self.at(ends), [1])
+        t = np.concatenate([ends[:1], self.t[i:j], ends[1:]])
+        return Trace(t, np.concatenate([first, self.y[i:j], last]))
+
+    def refined(self, t: np.ndarray) -> Trace:
+        """The same function with more points."""
+        if t is self.t:
+            return self
+        t = np.union1d(self.t, t)
+        return Trace(t, self.at(t))
+
+
+def with_vertices(t: np.ndarray, y: np.ndarray) -> Trace:
+    """Join samples by lines, through the parabola's vertex at every strict local extremum.
+
+    Peaks between samples are then seen as `analysis.metrics.highest` sees them.
+    """
+    at, place, value = _vertices(t, y)
+    return Trace(np.insert(t, at, place), np.insert(y, at, value)) if at.size else Trace(t, y)
+
+
+@kept(nogil=True, error_model="numpy")
+def _vertices(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the vertices between samples: before which sample each is, when, and its value."""
+    d = differences(y)
+    i = np.nonzero(d[:-1] * d[1:] < 0)[0] + 1
+    if i.size == 0:
+        return i, t[:0], y[:0]
+    offset, value = vertex(t[i] - t[i - 1], t[i + 1] - t[i], y[i - 1], y[i], y[i + 1])
+    place = t[i] + offset
+    new = (place != t[i]) & (place > t[i - 1]) & (place < t[i + 1])
+    return (i + (offset > 0))[new], place[new], value[new]
+
+
+def extremes(t: np.ndarray, y: np.ndarray, low: float, high: float) -> tuple[float, float]:
+    """Return the least and the largest value of ``with_vertices(t, y)`` in [low, high]."""
+    i, j = np.searchsorted(t, low, "left"), np.searchsorted(t, high, "right")
+    if t[i] != low or t[j - 1] != high:  # ends between samples
+        inside = with_vertices(t, y).between(low, high).y
+        return float(np.min(inside)), float(np.max(inside))
+    _, place, value = _vertices(t, y)
+    inside = np.concatenate([y[i:j], value[(place > low) & (place < high)]])
+    return float(np.min(inside)), float(np.max(inside))
+
+
+def crossings(t0, t1, a0, a1, b0, b1) -> tuple[np.ndarray, np.ndarray]:
+    """Return where two lines cross inside an interval, and in which intervals they do.
+
+    Parameters
+    ----------
+    t0, t1 : ndarray of shape (n,)
+        Ends of the intervals.
+    a0, a1, b0, b1 : ndarray of shape (n,)
+        Values of the two lines there.
+    """
+    d0, d1 = a0 - b0, a1 - b1
+    k = np.nonzero(((d0 < 0) & (d1 > 0)) | ((d0 > 0) & (d1 < 0)))[0]
+    share = 1 / (1 - d1[k] / d0[k])
+    return t0[k] + share * (t1[k] - t0[k]), k
+
+
+def higher(one: Trace, other: Trace) -> Trace:
+    """Return the larger of two functions over the same interval."""
+    one, other = one.refined(other.t), other.refined(one.t)
+    t, a, b = one.t, one.y, other.y
+    at, k = crossings(t[:-1], t[1:], a[:-1], a[1:], b[:-1], b[1:])
+    y = np.maximum(a, b)
+    return (
+        Trace(np.insert(t, k + 1, at), np.insert(y, k + 1, one.at(at))) if k.size else Trace(t, y)
+    )
+
+
+def largest(part: Trace, low: float, high: float, start: float, end: float) -> Trace:
+    """Return max of `part` over [t + start, t + end], for t in [low, high].
+
+    Parameters
+    ----------
+    part : Trace
+        Known on [low + start, high + end], or to the end of all windows where `end` is infinite.
+    """
+    last = part.t[-1]
+    if low == high:  # one window: nothing slides
+        window = part.between(low + start, min(low + end, last))
+        return Trace(np.array([low]), np.max(window.y, keepdims=True))
+    events = np.concatenate([part.t - start, part.t - end])
+    events = np.unique(np.append(events[(events > low) & (events < high)], [low, high]))
+    t0, t1 = events[:-1], events[1:]
+
+    def ends(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return part.at(t + start), part.at(np.minimum(t + end, last))
+
+    middle = (t0 + t1) / 2
+    inner = _inner_largest(part, middle + start, np.minimum(middle + end, last))
+    (a0, b0), (a1, b1) = ends(t0), ends(t1)
+    times, values = [t0, t1], [np.maximum(a0, b0), np.maximum(a1, b1)]
+    intervals = [np.arange(t0.size)] * 2
+    for p0, p1, q0, q1 in ((a0, a1, b0, b1), (a0, a1, inner, inner), (b0, b1, inner, inner)):
+        t, k = crossings(t0, t1, p0, p1, q0, q1)
+        times.append(t)
+        values.append(np.maximum(*ends(t)))
+        intervals.append(k)
+    t, first = np.unique(np.concatenate(times), return_index=True)
+    y = np.maximum(np.concatenate(values), inner[np.concatenate(intervals)])
+    return Trace(t, y[first])
+
+
+def _inner_largest(part: Trace, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Largest value at the points strictly between; -inf where there is none."""
+    i, j = np.searchsorted(part.t, low, "right"), np.searchsorted(part.t, high, "left")
+    pairs = np.stack([i, np.maximum(j, i)], axis=1).ravel()
+    padded = np.append(part.y, -np.inf)  # a pair may point one past the end
+    return np.where(j > i, np.maximum.reduceat(padded, pairs)[::2], -np.inf)
+
+
+def joined(traces: list[Trace]) -> Trace:
+    """Return the largest of several functions over the same interval."""
+    result = traces[0]
+    for trace in traces[1:]:
+        result = higher(result, trace)
+    return result

@@ -1,0 +1,168 @@
+"""Requirements as text: the words that `str(formula)` prints, read back.
+
+    formula  = both ("or" both)*
+    both     = part ("and" part)*
+    part     = "not" part | ("always" | "eventually") [window] part | "(" formula ")" | band
+    window   = "in" "[" number "," number "]" "s" | "from" number "s" "on"
+    band     = "|" signal "|" "<=" number | signal ("<=" | ">=") number
+             | number "<=" signal "<=" number
+
+"not", "always" and "eventually" hold for the next part only; use parentheses for more.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from analysis.robustness.stl.formula import And, Formula, always, eventually, in_band
+from nlctl._errors import ParameterError
+
+__all__ = ["parse_formula"]
+
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+NAME = r"[A-Za-z_][\w.]*(?:\[\d+\])?"
+TOKEN = re.compile(rf"\s*(?:(?P<number>{NUMBER})|(?P<name>{NAME})|(?P<sign><=|>=|[|()\[\],])|(\S))")
+WORDS = ("always", "and", "eventually", "from", "in", "not", "on", "or", "s")
+DEPTH = 50
+EXAMPLE = "always from 10 s on |e| <= 0.15"
+
+
+def parse_formula(text: str) -> Formula:
+    """Read a requirement such as ``always from 10 s on |e| <= 0.15``.
+
+    It is the inverse of ``str(formula)`` up to the six digits that this prints and to scales other
+    than the default one.
+
+    Raises
+    ------
+    ParameterError
+        With the place in the text, what was expected there, and what stands there.
+    """
+    reader = _Reader(text)
+    formula = _formula(reader, 0)
+    if reader.here:
+        raise reader.error("'and', 'or' or the end")
+    return formula
+
+
+class _Reader:
+    """The words of a formula, and how far they have been read."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.words: list[tuple[str, str, int]] = []  # (kind, word, column)
+        self.next = 0
+        for match in TOKEN.finditer(text.rstrip()):
+            kind = match.lastgroup or "other"
+            word = match[match.lastgroup or 4]
+            self.words.append((kind, word, match.end() - len(word)))
+
+    @property
+    def here(self) -> str:
+        return self.words[self.next][1] if self.next < len(self.words) else ""
+
+    @property
+    def kind(self) -> str:
+        kind = self.words[self.next][0] if self.next < len(self.words) else ""
+        return "word" if kind == "name" and self.here in WORDS else kind
+
+    def took(self, word: str) -> bool:
+        """Step over `word` if it stands here."""
+        found = self.here == word
+        self.next += found
+        return found
+
+    def take(self, words: Sequence[str]) -> None:
+        for word in words:
+            if not self.took(word):
+                raise self.error(f"'{word}'")
+
+    def number(self) -> float:
+        if self.kind != "number":
+            raise self.error("a number")
+        self.next += 1
+        return float(self.words[self.next - 1][1])
+
+    def signal(self) -> str:
+        if self.kind != "name":
+            raise self.error("the name of a signal")
+        self.next += 1
+        return self.words[self.next - 1][1]
+
+    def error(self, wanted: str) -> ParameterError:
+        if self.next < len(self.words):
+            _, word, column = self.words[self.next]
+            found = f"'{word}' at character {column + 1}"
+        else:
+            found = "the end"
+        return ParameterError(
+            f"formula '{self.text}' needs {wanted}, found {found}; write it like '{EXAMPLE}'"
+        )
+
+
+def _formula(reader: _Reader, depth: int) -> Formula:
+    parts = [_both(reader, depth)]
+    while reader.took("or"):
+        parts.append(_both(reader, depth))
+    return parts[0] if len(parts) == 1 else ~And(parts=tuple(~part for part in parts))
+
+
+def _both(reader: _Reader, depth: int) -> Formula:
+    parts = [_part(reader, depth)]
+    while reader.took("and"):
+        parts.append(_part(reader, depth))
+    return parts[0] if len(parts) == 1 else And(parts=tuple(parts))
+
+
+def _part(reader: _Reader, depth: int) -> Formula:
+    if depth > DEPTH:
+        raise ParameterError(f"a formula needs at most {DEPTH} levels, got more: '{reader.text}'")
+    if reader.took("not"):
+        return ~_part(reader, depth + 1)
+    for word, made in (("always", always), ("eventually", eventually)):
+        if reader.took(word):
+            start, end = _window(reader)
+            return made(_part(reader, depth + 1), start, end)
+    if reader.took("("):
+        inner = _formula(reader, depth + 1)
+        reader.take([")"])
+        return inner
+    return _band(reader)
+
+
+def _window(reader: _Reader) -> tuple[float, float]:
+    if reader.took("in"):
+        reader.take(["["])
+        start = reader.number()
+        reader.take([","])
+        end = reader.number()
+        reader.take(["]", "s"])
+        return start, end
+    if reader.took("from"):
+        start = reader.number()
+        reader.take(["s", "on"])
+        return start, float("inf")
+    return 0.0, float("inf")
+
+
+def _band(reader: _Reader) -> Formula:
+    if reader.took("|"):
+        signal = reader.signal()
+        reader.take(["|", "<="])
+        bound = reader.number()
+        return in_band(signal, lower=-bound, upper=bound)
+    if reader.kind == "number":
+        lower = reader.number()
+        reader.take(["<="])
+        signal = reader.signal()
+        reader.take(["<="])
+        return in_band(signal, lower=lower, upper=reader.number())
+    if reader.kind != "name":
+        raise reader.error("a band such as |e| <= 0.15")
+    signal = reader.signal()
+    if reader.took("<="):
+        return in_band(signal, upper=reader.number())
+    if reader.took(">="):
+        return in_band(signal, lower=reader.number())
+    raise reader.error("'<=' or '>='")

@@ -1,0 +1,1 @@
+"""What is uncertain, bound to a diagram, and which of its points are run."""

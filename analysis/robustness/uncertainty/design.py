@@ -1,0 +1,380 @@
+"""Which points of a space are run: independent draws, or rows that were chosen otherwise."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from scipy.stats import qmc
+
+from nlctl._arguments import flag, of_type, whole_number
+from nlctl._errors import ParameterError
+from nlctl._names import unknown
+
+from .space import Space, boxed, nominal, sampled
+
+__all__ = [
+    "Design",
+    "Kind",
+    "affordable",
+    "checked_entropy",
+    "corners",
+    "from_table",
+    "grid",
+    "independent",
+    "latin_hypercube",
+    "listed",
+    "numbered",
+    "one_at_a_time",
+    "row_seed",
+    "rows",
+    "seed_number",
+    "sobol",
+    "sobol_points",
+]
+
+MOST_ROWS = 10**9
+"""Rows of a design at most: what is drawn row by row."""
+MOST_HELD = 10**8
+"""Numbers that a design holds in memory at most, 800 MB: rows times columns."""
+
+Kind = Literal[
+    "i.i.d.", "Sobol'", "Latin hypercube", "grid", "corners", "one at a time", "Saltelli",
+    "Morris", "user's table", "adaptive",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Design:
+    """Rows to run.
+
+    Attributes
+    ----------
+    space : Space
+    kind : str
+        How the rows were chosen.
+    size : int
+        Number of rows.
+    is_iid : bool
+        Whether the rows are independent draws of the space's laws: what a statement about
+        probabilities needs.
+    entropy : int
+        What all random numbers follow from.
+    points : pandas.DataFrame, optional
+        The rows; None for i.i.d. rows, which are drawn when they are asked for.
+    details : mapping
+        Numbers that analyses of this kind of design need.
+    """
+
+    space: Space
+    kind: Kind
+    size: int
+    is_iid: bool
+    entropy: int
+    points: pd.DataFrame | None = None
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """All rows, see `rows`."""
+        return rows(self, range(self.size))
+
+
+def row_seed(design: Design, row: int) -> np.random.SeedSequence:
+    """Return the seed that everything random in a row follows from.
+
+    It depends on the design's entropy and the row's number alone: any row can be run again without
+    the others, and a longer design begins with the same rows.
+    """
+    row = whole_number("a design", "row", row, at_least=0)
+    return np.random.SeedSequence(design.entropy, spawn_key=(row,))
+
+
+def seed_number(design: Design, row: int) -> int:
+    """Return the row's seed as one number of 64 bits, for the table of results."""
+    return int(row_seed(design, row).generate_state(1, np.uint64)[0])
+
+
+def rows(design: Design, numbers: range) -> pd.DataFrame:
+    """Return some rows, indexed by their numbers; one column for each name of the space.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not in the design.
+    """
+    of_type("a design", "numbers", numbers, range)
+    if len(numbers) and not (min(numbers) >= 0 and max(numbers) < design.size):
+        raise ParameterError(
+            f"the design has rows 0 to {design.size - 1}, asked for {min(numbers)} to "
+            f"{max(numbers)}"
+        )
+    index = pd.RangeIndex(numbers.start, numbers.stop, numbers.step, name="row")
+    if design.points is not None:
+        return design.points.iloc[list(numbers)].set_axis(index)
+    unit = np.empty((len(numbers), len(design.space.names)))
+    for i, number in enumerate(numbers):
+        unit[i] = np.random.default_rng(row_seed(design, number)).random(unit.shape[1])
+    return sampled(design.space, unit).set_axis(index)
+
+
+def numbered(table: pd.DataFrame, first: int) -> pd.DataFrame:
+    """Return rows with the numbers `first`, `first` + 1, ... as their index."""
+    return table.set_axis(pd.RangeIndex(first, first + len(table), name="row"))
+
+
+def checked_entropy(entropy: int | None) -> int:
+    """Return the entropy, or fresh one."""
+    if entropy is None:
+        return int(np.random.SeedSequence().entropy)  # type: ignore[arg-type]
+    return whole_number("a design", "entropy", entropy, at_least=0)
+
+
+def independent(space: Space, size: int, entropy: int | None = None) -> Design:
+    """Draw rows from the laws, independent of each other: for statements about probabilities.
+
+    Parameters
+    ----------
+    space : Space
+    size : int
+        Number of rows, see `guarantee.runs_needed`.
+    entropy : int, optional
+        Fresh by default; the design keeps it.
+    """
+    of_type("a design", "space", space, Space)
+    size = whole_number("a design", "size", size, at_least=1)
+    if size > MOST_ROWS:
+        raise ParameterError(f"a design needs size <= {MOST_ROWS:.0e}, got {size}")
+    return Design(
+        space=space, kind="i.i.d.", size=size, is_iid=True, entropy=checked_entropy(entropy)
+    )  # fmt: skip
+
+
+def affordable(what: str, rows: int, columns: int) -> int:
+    """Return the number of rows of a design that is held in memory.
+
+    Raises
+    ------
+    ParameterError
+        If it would be larger than `MOST_HELD` numbers.
+    """
+    if rows * columns > MOST_HELD:
+        raise ParameterError(
+            f"{what} of {rows} rows with {columns} columns needs more memory than a design may: "
+            f"at most {MOST_HELD // columns} rows; independent draws are made row by row"
+        )
+    return rows
+
+
+def from_table(
+    space: Space,
+    table: pd.DataFrame,
+    *,
+    drawn_independently: bool = False,
+    entropy: int | None = None,
+) -> Design:
+    """Run the user's own rows.
+
+    Parameters
+    ----------
+    space : Space
+    table : pandas.DataFrame
+        One column for each name of the space; others are refused.
+    drawn_independently : bool, optional
+        The user's word that rows are independent draws of the space's laws.  Statements about
+        probabilities then quote it.
+    entropy : int, optional
+
+    Raises
+    ------
+    UnknownNameError
+        If a column is no name of the space, or a choice has no such option.
+    ParameterError
+        If a column is missing, there is no row, or a number is not finite.
+    """
+    of_type("a design", "table", table, pd.DataFrame, "pandas.DataFrame(...)")
+    independently = flag("a design", "drawn_independently", drawn_independently)
+    if not table.columns.is_unique:
+        twice = table.columns[table.columns.duplicated()][0]
+        raise ParameterError(f"a table needs each column once, '{twice}' comes twice")
+    for column in table.columns:
+        if column not in space.names:
+            raise unknown("quantity", str(column), space.names, "in the table")
+    missing = [name for name in space.names if name not in table.columns]
+    if missing or not len(table):
+        raise ParameterError(f"a table needs rows and all columns, it lacks {missing or 'rows'}")
+    columns: dict[str, Any] = {}
+    for q in space.quantities:
+        columns[q.name] = np.array(pd.to_numeric(table[q.name], errors="coerce"), dtype=float)
+        bad = np.nonzero(~np.isfinite(columns[q.name]))[0]
+        if bad.size:
+            raise ParameterError(
+                f"'{q.name}' needs finite numbers, row {bad[0]} of the table has "
+                f"{table[q.name].iloc[bad[0]]!r}"
+            )
+    for choice in space.choices:
+        columns[choice.name] = table[choice.name].astype(str).to_numpy()
+        for label in columns[choice.name]:
+            if label not in choice.options:
+                raise unknown("option", label, choice.options, f"of '{choice.name}'")
+    made = listed(space, "user's table", pd.DataFrame(columns), checked_entropy(entropy))
+    return replace(made, is_iid=independently)
+
+
+def listed(
+    space: Space,
+    kind: Kind,
+    points: pd.DataFrame,
+    entropy: int,
+    details: Mapping[str, Any] | None = None,
+) -> Design:
+    """Return a design of these rows; they are not independent draws."""
+    return Design(
+        space=space,
+        kind=kind,
+        size=len(points),
+        is_iid=False,
+        entropy=entropy,
+        points=points,
+        details=details or {},
+    )
+
+
+def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
+    """Fill the space evenly with a scrambled Sobol' sequence: for means, maps and sensitivity.
+
+    Arguments as in `independent`.
+
+    Raises
+    ------
+    ParameterError
+        If `size` is no power of 2, which the sequence's balance needs.
+    """
+    entropy = checked_entropy(entropy)
+    unit = sobol_points(len(space.names), size, entropy)
+    return listed(space, "Sobol'", sampled(space, unit), entropy)
+
+
+def sobol_points(dimension: int, size: int, entropy: int) -> np.ndarray:
+    """Return `size` scrambled Sobol' points of the unit cube, see `sobol`."""
+    size = whole_number("a Sobol' design", "size", size, at_least=1)
+    if size & (size - 1):
+        raise ParameterError(
+            f"a Sobol' design needs a power of 2 as its size, got {size}: take "
+            f"{2 ** (size.bit_length() - 1)} or {2 ** size.bit_length()}"
+        )
+    affordable("a Sobol' design", size, dimension)
+    return qmc.Sobol(dimension, rng=entropy).random_base2(size.bit_length() - 1)
+
+
+def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Design:
+    """Fill the space so that each quantity has one value in each of `size` equally likely parts.
+
+    Arguments as in `independent`.
+    """
+    size = whole_number("a Latin hypercube", "size", size, at_least=1)
+    affordable("a Latin hypercube", size, len(space.names))
+    entropy = checked_entropy(entropy)
+    unit = qmc.LatinHypercube(len(space.names), rng=entropy).random(size)
+    return listed(space, "Latin hypercube", sampled(space, unit), entropy)
+
+
+def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = None) -> Design:
+    """Cross evenly spaced values of every box, ends included, and all options of every choice.
+
+    Parameters
+    ----------
+    space : Space
+    levels : int or mapping
+        Number of values per quantity, at least 1; one value is the middle of the box.  A mapping
+        names every quantity.
+    entropy : int, optional
+
+    Raises
+    ------
+    ParameterError
+        If a number of levels is missing or below 1.
+    UnknownNameError
+        If a level is given for an unknown quantity.
+    """
+    names = [q.name for q in of_type("a grid", "space", space, Space).quantities]
+    given = levels if isinstance(levels, Mapping) else dict.fromkeys(names, levels)
+    for name in given:
+        if name not in names:
+            raise unknown("quantity", str(name), names)
+    counts = [
+        whole_number("a grid", f"levels of '{name}'", given.get(name), at_least=1) for name in names
+    ]
+    affordable("a grid", math.prod([*counts, *_options(space)]), len(space.names))
+    axes = [np.linspace(0, 1, n) if n > 1 else np.array([0.5]) for n in counts]
+    return listed(space, "grid", _crossed(space, axes), checked_entropy(entropy))
+
+
+def corners(space: Space, entropy: int | None = None) -> Design:
+    """Cross both ends of every box, and all options of every choice: 2^d rows for d quantities.
+
+    Raises
+    ------
+    ParameterError
+        If an option of a choice has weight 0.
+    """
+    rows = math.prod([2] * len(space.quantities) + _options(space))
+    affordable("a design of corners", rows, len(space.names))
+    axes = [np.array([0.0, 1.0])] * len(space.quantities)
+    return listed(space, "corners", _crossed(space, axes), checked_entropy(entropy))
+
+
+def _options(space: Space) -> list[int]:
+    return [len(choice.options) for choice in space.choices]
+
+
+def _crossed(space: Space, axes: Sequence[np.ndarray]) -> pd.DataFrame:
+    """Every combination of places in the boxes, and of options."""
+    options = [np.cumsum(c.weights) - np.array(c.weights) / 2 for c in space.choices]
+    impossible = [c.name for c in space.choices if min(c.weights) == 0]
+    if impossible:
+        raise ParameterError(f"options with weight 0 in {impossible}: leave them out of the space")
+    return boxed(space, np.array(list(itertools.product(*axes, *options))))
+
+
+def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> Design:
+    """Vary one quantity over its box, or one choice over its options, the others nominal.
+
+    Row 0 is all nominal; ``details["varied"]`` names what varies in each row.
+
+    Parameters
+    ----------
+    space : Space
+        With nominal values, see `resolve.resolved`.
+    levels : int, optional
+        Number of evenly spaced values per quantity, ends included.
+
+    Raises
+    ------
+    ParameterError
+        If `levels` is below 2.
+    SpaceError
+        If a quantity has no nominal value.
+    """
+    levels = whole_number("one at a time", "levels", levels, at_least=2)
+    affordable("a design", levels * len(space.names), len(space.names))
+    middle = nominal(space)
+    made, varied = [middle], [""]
+    unit = np.tile(np.linspace(0, 1, levels)[:, None], len(space.names))
+    values = boxed(space, unit)
+    for quantity in space.quantities:
+        made += [{**middle, quantity.name: value} for value in values[quantity.name]]
+        varied += [quantity.name] * levels
+    for choice in space.choices:
+        others = [label for label in choice.options if label != choice.nominal]
+        made += [{**middle, choice.name: label} for label in others]
+        varied += [choice.name] * len(others)
+    table = pd.DataFrame(made, columns=space.names)
+    return listed(
+        space, "one at a time", table, checked_entropy(entropy), {"varied": tuple(varied)}
+    )

@@ -1,0 +1,1 @@
+"""The study file: its shapes, what it names, every mistake at once."""

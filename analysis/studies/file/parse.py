@@ -1,0 +1,223 @@
+"""File -> study, held against its loop; every mistake at once."""
+
+from __future__ import annotations
+
+import copy
+import json
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from analysis.robustness import Experiment
+from nlctl._errors import ParameterError
+
+from .errors import Place, Problem, StudyError, line_numbers, located, place_text, schema_problems
+from .schema import Study
+from .toml import check_depth, read_toml
+from .trust import untrusted
+from .validate import bound
+
+__all__ = ["StudyFile", "read_study"]
+
+ROUNDS = 5  # mistakes may stand behind mistakes
+NAMELESS = {"title": "a study", "seed": 0}  # while the rest of a mistaken file is looked at
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyFile:
+    """A study without mistakes.
+
+    Attributes
+    ----------
+    path : Path
+    study : Study
+        What stands in the file, with the settings of the command line.
+    experiment : Experiment
+        What is simulated for each row.
+    """
+
+    path: Path
+    study: Study
+    experiment: Experiment
+
+    @property
+    def folder(self) -> Path:
+        """What paths in the study are relative to."""
+        return self.path.parent
+
+
+def read_study(
+    path: Path,
+    settings: Sequence[str] = (),
+    *,
+    folder: Path | None = None,
+    trust: bool = False,
+) -> StudyFile:
+    """Read a study file, and hold every name in it against the loop.
+
+    The files and modules that it names are run, see `trust`.
+
+    Parameters
+    ----------
+    path : Path
+    settings : sequence of str, optional
+        ``key=value`` that replace what stands there: ``runs.size=100``,
+        ``space."actuator.b_r".uniform=[0.3, 0.6]``, ``analysis.0.confidence=0.9``.
+    folder : Path, optional
+        What paths in the study are relative to; by default the file's folder.
+    trust : bool, optional
+        Whether code may be run from outside of that folder and of installed packages.
+
+    Raises
+    ------
+    StudyError
+        With every mistake: wrong TOML, unknown keys, wrong types, names that the loop lacks.
+    ParameterError
+        If a setting cannot be read.
+    OSError
+        If the file cannot be read.
+    """
+    text = path.read_bytes().decode("utf-8-sig", errors="replace")
+    folder = path.parent if folder is None else folder
+    try:
+        data = read_toml(text)
+        lines = line_numbers(text)
+        given = {_set(data, setting): setting for setting in settings}
+        check_depth(data)
+    except ParameterError:
+        raise
+    except ValueError as error:
+        raise StudyError(str(path), [Problem(place=(), message=str(error))]) from None
+    study, problems, entries = _validated(data)
+    experiment = None
+    if study is not None:
+        more = [] if trust else untrusted(study, folder)
+        if not more:
+            experiment, more = bound(study, folder)
+        more = [replace(p, place=_original(p.place, entries)) for p in more]
+        problems += [p for p in more if not follows(p, problems)]
+    if problems or study is None or experiment is None:
+        placed = [located(p, lines, given) for p in problems]
+        raise StudyError(str(path), sorted(placed, key=lambda p: p.line or 0))
+    return StudyFile(path=folder / path.name, study=study, experiment=experiment)
+
+
+def _validated(data: dict[str, Any]) -> tuple[Study | None, list[Problem], list[int]]:
+    """Return the study, its mistakes, and which entries of ``analysis`` it has.
+
+    Where there are mistakes, it is the study without the mistaken parts, if that is one: so
+    mistakes of form and wrong names are found in one go.
+    """
+    rest, problems = copy.deepcopy(data), None
+    entries: list[int] = []
+    for _ in range(ROUNDS):
+        whole, listed = rest, rest.get("analysis")
+        if isinstance(listed, list):
+            entries = [i for i, entry in enumerate(listed) if entry is not None]
+            whole = {**rest, "analysis": [listed[i] for i in entries]}
+        try:
+            return Study.model_validate(whole), problems or [], entries
+        except ValidationError as error:
+            found = schema_problems(error, Study, whole)
+        found = [replace(p, place=_original(p.place, entries)) for p in found]
+        told = problems or []  # what takes out a mistaken part lets others come to light
+        problems = told + [p for p in found if not follows(p, told)]
+        for problem in reversed(found):
+            _remove(rest, problem.place)
+        if any(problem.place[:1] == ("study",) for problem in found):
+            rest["study"] = NAMELESS
+    return None, problems or [], entries
+
+
+def follows(problem: Problem, told: Sequence[Problem]) -> bool:
+    """Whether a mistake may follow from parts that were taken out because of others."""
+    place = problem.place
+    return any(place and one.place[: len(place)] == place for one in told)
+
+
+def _original(place: Place, entries: Sequence[int]) -> Place:
+    """Return a place with the index that an analysis has in the file."""
+    if len(place) > 1 and place[0] == "analysis" and isinstance(place[1], int):
+        return ("analysis", entries[place[1]], *place[2:])
+    return place
+
+
+def _remove(data: dict[str, Any], place: Place) -> None:
+    """Take out the innermost key or analysis that a mistake belongs to."""
+    target: Any = data
+    steps: list[tuple[Any, str | int]] = []
+    for i, part in enumerate(place):
+        if isinstance(target, list) and i != 1:
+            break  # an element of a value
+        steps.append((target, part))
+        if not isinstance(target, dict | list) or (isinstance(target, dict) and part not in target):
+            steps.pop()  # it is missing: the table around it goes
+            break
+        target = target[part]  # type: ignore[index]
+    if len(place) == 3 and place[2] == "kind":
+        steps = steps[:2]
+    if not steps:
+        return
+    holder, last = steps[-1]
+    if isinstance(holder, list):
+        holder[int(last)] = None
+    else:
+        del holder[last]
+
+
+def _set(data: dict[str, Any], setting: str) -> Place:
+    """Put one setting into the data; return its place."""
+    name, equals, value = setting.partition("=")
+    try:
+        parsed = read_toml(setting)
+    except ValueError:
+        try:  # a text without its quotes
+            parsed = read_toml(f"{name} = {json.dumps(value.strip())}")
+        except ValueError:
+            parsed = {}
+    if not (equals and parsed):
+        told = setting if len(setting) < 200 else f"{setting[:100]} ..."
+        raise ParameterError(f"--set needs KEY=VALUE with a key as in TOML, got '{told}'")
+    place: list[str | int] = []
+    target: Any = data
+    depth = len(_keys(name))
+    for i in range(depth):
+        ((name, parsed),) = parsed.items()
+        key: Any = _entry(target, name, place) if isinstance(target, list) else name
+        place.append(key)
+        if i == depth - 1:
+            target[key] = parsed
+        elif isinstance(target, dict):
+            target = target.setdefault(key, {})
+        else:
+            target = target[key]
+        if not isinstance(target, dict | list):
+            raise ParameterError(f"--set {setting}: {place_text(tuple(place))} is no table")
+    return tuple(place)
+
+
+def _keys(name: str) -> list[str]:
+    """Split a dotted key as TOML does."""
+    keys, parsed = [], tomllib.loads(f"{name} = 0")
+    while isinstance(parsed, dict):
+        ((key, parsed),) = parsed.items()
+        keys.append(key)
+    return keys
+
+
+def _entry(entries: list[Any], key: str, place: Sequence[str | int]) -> int:
+    """Return the index of a list entry that is named by its number, key or kind."""
+    if key.isdigit() and int(key) < len(entries):
+        return int(key)
+    named = [i for i, e in enumerate(entries) if key in (e.get("key"), e.get("kind"))]
+    if len(named) != 1:
+        known = ", ".join(str(e.get("key") or e.get("kind")) for e in entries)
+        raise ParameterError(
+            f"--set needs the number (0 to {len(entries) - 1}), or key or kind of one entry of "
+            f"{place_text(tuple(place))} ({known}), got '{key}'"
+        )
+    return named[0]

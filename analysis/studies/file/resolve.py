@@ -1,0 +1,186 @@
+"""What a study file refers to by name: functions in files and modules, blocks, laws of SciPy."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import cloudpickle
+from scipy import stats
+
+from analysis.robustness import Uncertain
+from analysis.robustness.uncertainty.binding import check_keyword
+from nlctl._catalogue import named_block
+from nlctl._errors import ParameterError, UnknownNameError, UsageError
+from nlctl._names import unknown
+from nlctl.paper import named_example
+
+from .schema import Law
+from .trust import check_function, check_loop_function, check_place
+
+__all__ = ["DEFAULT", "loop_function", "named_function", "option", "uncertain"]
+
+DEFAULT = "default"
+"""The option that leaves a keyword of the loop as it is."""
+
+
+def loop_function(name: str, folder: Path) -> Callable[..., Any]:
+    """Return the function that builds the loop, see `paper.named_example`, `named_function`.
+
+    Raises
+    ------
+    ParameterError
+        If nothing shows that it returns a diagram, see `trust.check_loop_function`.
+    """
+    if ":" in name:
+        function = named_function(name, folder)
+        check_loop_function(function, name)
+        return function
+    try:
+        return named_example(name)
+    except UnknownNameError as error:
+        raise ParameterError(
+            f"{error}; a loop of your own is 'path/to/file.py:function' or 'module:function'"
+        ) from None
+
+
+def named_function(name: str, folder: Path) -> Callable[..., Any]:
+    """Return ``"path/to/file.py:function"``, relative to `folder`, or ``"module:function"``.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such file or module, or what is named is of the standard library.
+    UnknownNameError
+        If it has no such function.
+    """
+    check_place(name)
+    source, _, attribute = name.rpartition(":")
+    module = _from_file(folder / source) if source.endswith(".py") else _from_module(source)
+    functions = [key for key, value in vars(module).items() if callable(value)]
+    if attribute not in functions:
+        raise unknown("function", attribute, functions, f"in '{source}'")
+    function = getattr(module, attribute)
+    check_function(function, name)
+    return function
+
+
+def _from_file(path: Path) -> Any:
+    path = path.resolve()
+    if not path.is_file():
+        raise ParameterError(f"there is no file '{path}'")
+    name = f"{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
+    if name not in sys.modules:
+        spec: Any = importlib.util.spec_from_file_location(name, path)
+        module = sys.modules[name] = importlib.util.module_from_spec(spec)
+        try:
+            spec.loader.exec_module(module)
+        except BaseException:
+            del sys.modules[name]
+            raise
+        cloudpickle.register_pickle_by_value(module)  # worker processes cannot import it
+    return sys.modules[name]
+
+
+def _from_module(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name is None or not f"{name}.".startswith(f"{error.name}."):
+            raise  # it exists, and imports something that does not
+        raise ParameterError(f"there is no module '{name}' ({error})") from None
+
+
+def option(value: Any, folder: Path) -> Any:
+    """Make what a table of the file describes; numbers and texts stay what they are.
+
+    Parameters
+    ----------
+    value : any
+        ``{ block = "DeadZone", b_r = 0.6 }``: a record of nlctl; ``{ function = "place", ... }``:
+        what the function returns for these keywords.  Both may be nested.
+    folder : Path
+        Of the study file.
+
+    Raises
+    ------
+    UsageError
+        If block, function or a field does not exist, or a value is refused.
+    """
+    if isinstance(value, list):
+        return tuple(option(part, folder) for part in value)
+    if not isinstance(value, Mapping):
+        return value
+    if len({"block", "function"} & set(value)) != 1:
+        raise ParameterError(
+            'a block is { block = "DeadZone", b_r = 0.6 } or { function = "file.py:name", ... }, '
+            f"got the keys {sorted(value)}"
+        )
+    arguments = {key: option(part, folder) for key, part in value.items()}
+    name = arguments.pop("block", None)
+    made = (
+        named_function(arguments.pop("function"), folder)
+        if name is None
+        else named_block(str(name))
+    )
+    for key in arguments:
+        check_keyword(made, key)
+    return made(**arguments)
+
+
+def uncertain(name: str, law: Law) -> Uncertain:
+    """Return the quantity that a table under ``[space]`` describes.
+
+    Raises
+    ------
+    UsageError
+        If there is not exactly one law, or it is none.
+    """
+    given = [key for key in ("uniform", "normal", "law") if getattr(law, key) is not None]
+    if len(given) > 1 or not (given or law.bounds):
+        raise ParameterError(
+            f"'{name}' needs one of uniform, normal and law, or bounds alone, got "
+            f"{' and '.join(given) or 'none'}"
+        )
+    if law.parameters and law.law is None:
+        raise ParameterError(f"'{name}' has parameters and no law that takes them")
+    frozen = None
+    if law.uniform is not None:
+        low, high = law.uniform
+        if not low < high:
+            raise ParameterError(f"'{name}' needs uniform = [low, high], got [{low:g}, {high:g}]")
+        frozen = stats.uniform(low, high - low)
+    elif law.normal is not None:
+        frozen = _frozen(name, "norm", dict(zip(("loc", "scale"), law.normal, strict=True)))
+    elif law.law is not None:
+        frozen = _frozen(name, law.law, law.parameters)
+    return Uncertain(
+        name=name, law=frozen, bounds=law.bounds, nominal=law.nominal, unit=law.unit
+    )  # fmt: skip
+
+
+def _frozen(name: str, law: str, parameters: Mapping[str, float]) -> Any:
+    generic = stats.rv_continuous | stats.rv_discrete
+    laws = {key: thing for key, thing in vars(stats).items() if isinstance(thing, generic)}
+    if law not in laws:
+        raise unknown("law", law, laws, "of scipy.stats")
+    shapes = [part.strip() for part in (laws[law].shapes or "").split(",") if part.strip()]
+    known = [*shapes, "loc", *(["scale"] if isinstance(laws[law], stats.rv_continuous) else [])]
+    for key in parameters:
+        if key not in known:
+            raise unknown("parameter", key, known, f"of the law {law}")
+    missing = [shape for shape in shapes if shape not in parameters]
+    if missing:
+        raise ParameterError(f"'{name}': the law {law} needs {', '.join(missing)} as well")
+    frozen = laws[law](**parameters)
+    try:
+        Uncertain(name=name, law=frozen)
+    except UsageError:
+        text = ", ".join(f"{key} = {value:g}" for key, value in parameters.items())
+        raise ParameterError(f"'{name}': the law {law} does not exist for {text}") from None
+    return frozen

@@ -1,0 +1,152 @@
+"""What stands in a study file: shapes and types only.  `check` holds it against the loop."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from ..kinds.analyses import Analysis
+from .field_types import Number, Pair, Strict, Whole
+
+__all__ = [
+    "About",
+    "Choices",
+    "Law",
+    "Measured",
+    "Rows",
+    "Rule",
+    "Solver",
+    "Study",
+    "Times",
+    "keyed",
+]
+
+
+class About(Strict):
+    """What the study is about."""
+
+    title: str = Field(min_length=1, description="Title of the report.")
+    question: str = Field("", description="What the study is to answer, in words.")
+    seed: Whole = Field(ge=0, description="All random numbers of the study follow from it.")
+
+
+class Law(Strict):
+    """An uncertain number: one of uniform, normal, law, or bounds alone."""
+
+    uniform: Pair | None = Field(None, description="[low, high]")
+    normal: Pair | None = Field(None, description="[mean, standard deviation]")
+    law: str | None = Field(None, description="A law of scipy.stats, such as 'lognorm'.")
+    parameters: dict[str, Number] = Field({}, description="Parameters of law, by SciPy's names.")
+    bounds: Pair | None = Field(None, description="The box of corners and searches: [low, high].")
+    nominal: Number | None = Field(None, description="By default the loop's own value.")
+    unit: str = Field("", description="By default the loop's.")
+
+
+class Choices(Strict):
+    """A block or a setting that is one of several.
+
+    An option is a number or a text for the loop's keyword, ``"default"``, a table ``{ block =
+    "DeadZone", b_r = 0.6 }`` or ``{ function = "file.py:name", ... }``.
+    """
+
+    options: dict[str, Any] = Field(min_length=1, description="Label -> option.")
+    nominal: str = Field("", description="Label that holds by default; the first one.")
+    weights: dict[str, Number] = Field({}, description="Label -> probability; all alike.")
+
+
+class Rule(Strict):
+    """A requirement."""
+
+    formula: str = Field(description="For example 'always from 10 s on |e| <= 0.15'.")
+    meaning: str = Field("", description="In words.")
+    until: Number | None = Field(None, description="Where windows end (s); the end of the run.")
+
+
+def _rule(value: Any) -> Any:
+    return {"formula": value} if isinstance(value, str) else value
+
+
+class Times(Strict):
+    """When signals are sampled."""
+
+    end: Number = Field(gt=0, description="Length of a run (s).")
+    step: Number = Field(gt=0, description="Sampling interval (s).")
+
+
+class Measured(Strict):
+    """The usual numbers of a tracking loop, for every row.
+
+    A signal that is not named is the paper's, and left out where the loop lacks it.
+    """
+
+    band: Number = Field(gt=0, description="|e| up to this counts as settled.")
+    start: Number | None = Field(None, ge=0, description="Late errors count from here (s).")
+    swing: Number = Field(0.01, ge=0, description="Swings of u up to this are no reversals.")
+    error: str | None = Field(None, description="Name of the signal e.")
+    control: str | None = Field(None, description="Name of the signal u.")
+    actuated: str | None = Field(None, description="Name of the signal v.")
+    weights: str | None = Field(None, description="Name of the signal |W_hat|.")
+    gain: str | None = Field(None, description="Name of the signal zeta.")
+    more: tuple[dict[str, Any], ...] = Field(
+        (), description="{ function = ... } that return other metrics of a row."
+    )
+
+
+class Solver(Strict):
+    """How runs are integrated."""
+
+    rtol: Number = Field(1e-6, gt=0, description="Relative tolerance.")
+    atol: Number = Field(1e-8, gt=0, description="Absolute tolerance.")
+    max_steps: Whole = Field(
+        1_000_000, ge=1, le=10**15, description="A run that needs more has failed."
+    )
+    method: str = Field("auto", description="As in nlctl.input_output_response.")
+
+
+class Rows(Strict):
+    """The rows that probability, sequential and regional analyses look at."""
+
+    design: Literal[
+        "i.i.d.", "Sobol'", "Latin hypercube", "grid", "corners", "one at a time"
+    ] = "i.i.d."  # fmt: skip
+    size: Whole | None = Field(None, ge=1, description="Number of rows of the first three.")
+    levels: Whole | None = Field(None, ge=1, description="Values per quantity of a grid.")
+
+
+class Study(Strict):
+    """A study file."""
+
+    loop: str = Field(
+        description="'example-1', 'example-2', 'path/to/file.py:function' or 'module:function'."
+    )
+    study: About
+    options: dict[str, Any] = Field({}, description="Keywords of the loop; as options of choices.")
+    space: dict[str, Law] = Field({}, description="Parameter or initial state -> what is known.")
+    inputs: dict[str, Number] = Field(
+        {}, description="Input of the loop from outside -> its value, the same all the time."
+    )
+    choices: dict[str, Choices] = Field({}, description="Keyword of the loop -> its options.")
+    spec: dict[str, Annotated[Rule, BeforeValidator(_rule)]] = Field(
+        min_length=1, description="Name -> requirement."
+    )
+    time: Times
+    metrics: Measured | None = Field(None, description="Without it only margins are taken.")
+    solver: Solver = Solver()  # type: ignore[call-arg]
+    runs: Rows | None = Field(None, description="The main table.")
+    analysis: tuple[Analysis, ...] = Field((), description="What is asked.")
+
+
+def keyed(study: Study) -> dict[str, Any]:
+    """Return the analyses by key: their own, or their kind, numbered where it is not alone."""
+    named: dict[str, Any] = {}
+    taken = {asked.key for asked in study.analysis}
+    for asked in study.analysis:
+        plain = asked.kind.replace(" ", "-")
+        key = asked.key or plain
+        numbers = itertools.count(2)
+        while key in named or (key in taken and not asked.key):
+            key = f"{plain}-{next(numbers)}"
+        named[key] = asked
+    return named

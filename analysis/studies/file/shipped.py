@@ -1,0 +1,26 @@
+"""The study files that come with nlctl."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from nlctl._names import unknown
+
+__all__ = ["shipped"]
+
+# a checkout has them in reports/, a wheel carries copies in its package
+FOLDERS = (Path(__file__).parents[3] / "reports", Path(__file__).parents[1] / "reports")
+
+
+def shipped(name: str) -> Path:
+    """Return the study file of this name, such as ``"example-1-quick"``.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none.
+    """
+    found = {path.stem: path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))}
+    if name not in found:
+        raise unknown("study", name, found)
+    return found[name]

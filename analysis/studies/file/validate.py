@@ -1,0 +1,305 @@
+"""A study held against its loop: every name, every formula, every analysis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import control as ct
+
+from analysis.metrics import Metric
+from analysis.robustness import Choice, Design, Experiment, Requirement, Space, Uncertain, resolved
+from analysis.robustness.search.largest_scale import refusal_of
+from analysis.robustness.statistics.guarantee import check_iid
+from analysis.robustness.uncertainty.binding import check_keyword
+from analysis.robustness.uncertainty.space import combinations
+from nlctl._errors import ParameterError, UsageError
+from nlctl._names import unknown
+
+from ..build import (
+    SIGNALS,
+    choice,
+    experiment,
+    inputs_of,
+    loop,
+    main_design,
+    metrics_of,
+    own_design,
+    requirement,
+    times,
+)
+from ..kinds.analyses import Compare, Degradation, Map, Morris, Sobol
+from ..kinds.comparison import alternatives, widened
+from .errors import Place, Problem
+from .resolve import loop_function, option, uncertain
+from .schema import Study
+
+__all__ = ["bound"]
+
+T = TypeVar("T")
+MOST_ROWS = 10_000_000  # of a design or a search
+MOST_DIAGRAMS = 1000
+NEED_ROWS = ("probability", "sequential", "regional")
+
+
+class _Notes:
+    """Mistakes that are found one after the other."""
+
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
+
+    def add(self, place: Place, message: str) -> None:
+        self.problems.append(Problem(place=place, message=message))
+
+    def attempt(self, place: Place, make: Callable[..., T], *arguments: Any) -> T | None:
+        """Return what `make` returns; a mistake that it names is noted instead."""
+        try:
+            return make(*arguments)
+        except UsageError as error:
+            self.add(place, str(error))
+            return None
+
+
+def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]:
+    """Return the experiment of a study, and all mistakes; None if there are any.
+
+    Errors of another kind than `UsageError` come from the user's own functions and pass.
+    """
+    notes = _Notes()
+    notes.attempt(("time",), times, study)
+    requirements = [
+        made
+        for key in study.spec
+        if (made := notes.attempt(("spec", key), requirement, study, key)) is not None
+    ]
+    quantities = {
+        name: notes.attempt(("space", name), uncertain, name, law)
+        for name, law in study.space.items()
+    }
+    diagrams = _diagrams(study, folder, notes)
+    signals = frozenset.intersection(*(frozenset(d.output_labels) for d in diagrams or [_Empty]))
+    for diagram in diagrams:
+        _check_names(study, diagram, quantities, requirements, notes)
+    large = _too_large(study, notes)
+    metrics = notes.attempt(("metrics",), metrics_of, study, folder, signals) if diagrams else None
+    inputs = notes.attempt(("inputs",), inputs_of, study, diagrams) if diagrams else None
+    _check_analyses(study, metrics, notes)
+    made = None
+    if diagrams and not notes.problems:
+        made = notes.attempt((), experiment, study, folder, signals, inputs or ())
+    if made is None:
+        _check_designs(study, _stand_in(study, quantities), large, notes)
+        _comparable(study, folder, notes)
+    else:
+        space = notes.attempt(("space",), resolved, made.space, diagrams[0])
+        if space is not None:
+            if refusal := notes.attempt(("space",), refusal_of, space, diagrams):
+                notes.add(("space",), f"boxes do not fit together: {refusal}")
+            _check_designs(study, space, large, notes)
+        for i, asked in _comparable(study, folder, notes):
+            notes.attempt(("analysis", i), _check_options, study, made, asked, folder)
+    return made, _unique(notes.problems)
+
+
+def _stand_in(study: Study, quantities: Mapping[str, Uncertain | None]) -> Space:
+    """Return a space of the study's size, whatever its mistakes: designs are held against it."""
+
+    def some(name: str, quantity: Uncertain | None) -> Uncertain:
+        known = quantity if quantity is not None else Uncertain(name=name, bounds=(0.0, 1.0))
+        middle = sum(known.box) / 2 if known.nominal is None else known.nominal
+        return replace(known, nominal=middle)
+
+    return Space(
+        quantities=tuple(some(name, quantity) for name, quantity in quantities.items()),
+        choices=tuple(
+            Choice(name=name, options=dict.fromkeys(map(str, asked.options)) or {"": None})
+            for name, asked in study.choices.items()
+        ),
+    )
+
+
+def _comparable(study: Study, folder: Path, notes: _Notes) -> list[tuple[int, Compare]]:
+    """Return the comparisons whose keyword the loop's function takes; the others are noted."""
+    try:
+        function = loop_function(study.loop, folder)
+    except UsageError:  # noted already
+        return []
+    asked = [(i, one) for i, one in enumerate(study.analysis) if isinstance(one, Compare)]
+    before = len(notes.problems)
+    for i, one in asked:
+        notes.attempt(("analysis", i, "keyword"), check_keyword, function, one.keyword)
+    lost = {problem.place[1] for problem in notes.problems[before:]}
+    return [(i, one) for i, one in asked if i not in lost]
+
+
+class _Empty:
+    """Stands for a loop that could not be built."""
+
+    output_labels = ()
+
+
+def _unique(problems: Sequence[Problem]) -> list[Problem]:
+    """Leave out what several diagrams have in common."""
+    return list(dict.fromkeys(problems))
+
+
+def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputSystem]:
+    """Build the diagram of every combination of options that can be made."""
+    before = len(notes.problems)
+    function = notes.attempt(("loop",), loop_function, study.loop, folder)
+    for key, value in study.options.items():
+        if function is not None:
+            notes.attempt(("options", key), check_keyword, function, key)
+        notes.attempt(("options", key), option, value, folder)
+    if len(notes.problems) > before:
+        return _as_it_comes(function)
+    build = loop(study, folder)
+    made = []
+    for name, asked in study.choices.items():
+        notes.attempt(("choices", name), check_keyword, build, name)
+        found = notes.attempt(("choices", name), choice, name, asked, build, folder)
+        made += [] if found is None else [found]
+    if len(notes.problems) > before:
+        return _as_it_comes(function)
+    options = {c.name: c.options for c in made}
+    count = math.prod(len(c.options) for c in made)
+    if count > MOST_DIAGRAMS:
+        notes.add(
+            ("choices",), f"at most {MOST_DIAGRAMS:,} diagrams can be made, got {_count(count)}"
+        )
+        return []
+    every = combinations(Space(choices=tuple(made))) if made else [{}]
+    built = []
+    for labels in every:
+        chosen = {name: options[name][label] for name, label in labels.items()}
+        system = notes.attempt(("loop",), _diagram, partial(build, **chosen), study.loop)
+        built += [] if system is None else [system]
+    return built or _as_it_comes(function)
+
+
+def _as_it_comes(function: Callable[..., Any] | None) -> list[ct.InputOutputSystem]:
+    """Return the loop without the study's options, so that names can be held against it."""
+    try:
+        return [] if function is None else [_diagram(function, "")]
+    except Exception:  # whatever a function of the user's does without what it was to be given
+        return []
+
+
+def _diagram(build: Callable[[], Any], name: str) -> ct.InputOutputSystem:
+    """Return the diagram that a loop's function returns.
+
+    Raises
+    ------
+    ParameterError
+        If it returns something else.
+    """
+    made = build()
+    if not isinstance(made, ct.InputOutputSystem):
+        raise ParameterError(f"'{name}' returns {type(made).__name__}, and not a diagram")
+    return made
+
+
+def _check_names(
+    study: Study,
+    diagram: ct.InputOutputSystem,
+    quantities: Mapping[str, Uncertain | None],
+    requirements: Sequence[Requirement],
+    notes: _Notes,
+) -> None:
+    for name, quantity in quantities.items():
+        if quantity is not None:
+            alone = Space(quantities=(quantity,))
+            notes.attempt(("space", name), resolved, alone, diagram)
+    for asked in requirements:
+        for signal in asked.signals:
+            if signal not in diagram.output_labels:
+                error = unknown("signal", signal, diagram.output_labels)
+                notes.add(("spec", asked.key), str(error))
+    for key in SIGNALS:
+        signal = getattr(study.metrics, key, None)
+        if signal and signal not in diagram.output_labels:
+            notes.add(("metrics", key), str(unknown("signal", signal, diagram.output_labels)))
+
+
+def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Notes) -> None:
+    """Look at what can be said without the loop; `metrics` are None if they are not known."""
+    columns = ("spec", *study.spec, *(metric.key for metric in metrics or ()))
+    seen = {"rows"}
+    for i, asked in enumerate(study.analysis):
+        if asked.key in seen:
+            notes.add(("analysis", i, "key"), f"needs a key of its own, '{asked.key}' is taken")
+        seen |= {asked.key} - {""}
+        if asked.kind in NEED_ROWS and study.runs is None:
+            notes.add(("analysis", i), f"'{asked.kind}' looks at the main table: add [runs]")
+        of = getattr(asked, "of", "spec")
+        if metrics is not None and of not in columns:
+            notes.add(("analysis", i, "of"), str(unknown("column", of, columns)))
+        for key, name in _quantities_of(asked):
+            if name not in study.space:
+                notes.add(("analysis", i, key), str(unknown("quantity", name, study.space)))
+
+
+def _too_large(study: Study, notes: _Notes) -> set[Place]:
+    """Refuse numbers of runs that no machine can make; return where they are asked for."""
+    wide, options = len(study.space), math.prod(len(c.options) for c in study.choices.values())
+    counts: dict[Place, int] = {
+        ("analysis", i): max(_sizes(asked, wide)) for i, asked in enumerate(study.analysis)
+    }
+    if study.runs is not None:
+        counts["runs",] = study.runs.size or 1
+        if study.runs.design in ("grid", "corners"):
+            counts["runs",] = (study.runs.levels or 2) ** wide * options
+    large = {place: count for place, count in counts.items() if count > MOST_ROWS}
+    for place, count in large.items():
+        what = "rows can be run" if place == ("runs",) else "runs can be made"
+        notes.add(place, f"at most {MOST_ROWS:,} {what}, got {_count(count)}")
+    return set(large)
+
+
+def _sizes(asked: Any, wide: int) -> list[int]:
+    """Return the numbers of runs that an analysis asks for."""
+    sizes = [getattr(asked, key, 0) for key in ("runs", "draws", "levels", "trajectories")]
+    if isinstance(asked, Map):
+        sizes.append((asked.cells + 1) ** 2)
+    if isinstance(asked, Degradation):
+        sizes.append(asked.runs * len(asked.factors))
+    if isinstance(asked, Morris | Sobol):
+        sizes.append((asked.trajectories if isinstance(asked, Morris) else asked.size) * (wide + 2))
+    if isinstance(asked, Compare):
+        sizes.append(asked.runs * len(asked.options))
+    return sizes
+
+
+def _count(rows: int) -> str:
+    return f"{rows:,}" if rows < 10**15 else f"about 10^{math.log10(rows):.0f}"
+
+
+def _check_designs(study: Study, space: Space, large: set[Place], notes: _Notes) -> None:
+    """Make designs that are known in advance, unless too large; hold the analyses against them."""
+    if study.runs is not None and ("runs",) not in large:
+        notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
+    for i, asked in enumerate(study.analysis):
+        if asked.kind in ("probability", "sequential") and study.runs is not None:
+            kind = study.runs.design
+            made = Design(space=space, kind=kind, size=1, is_iid=kind == "i.i.d.", entropy=0)
+            notes.attempt(("analysis", i), check_iid, made)
+        if ("analysis", i) not in large:
+            notes.attempt(("analysis", i), own_design, asked, space, study.study.seed)
+
+
+def _quantities_of(asked: Any) -> list[tuple[str, str]]:
+    """Return the quantities that an analysis names, each with the key that it stands under."""
+    named = [("quantities", name) for name in getattr(asked, "quantities", ())]
+    return [("x", asked.x), ("y", asked.y)] if isinstance(asked, Map) else named
+
+
+def _check_options(study: Study, made: Experiment, asked: Compare, folder: Path) -> None:
+    wide = widened(made, asked, alternatives(asked, made.build, folder), study, folder)
+    columns = [metric.key for metric in wide.metrics]
+    for metric in asked.metrics:
+        if metric not in columns:
+            raise unknown("metric", metric, columns, "of all options")

@@ -1,0 +1,1 @@
+"""The kinds of analysis that a study may ask for."""

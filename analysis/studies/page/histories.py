@@ -1,0 +1,162 @@
+"""Some rows of a study simulated again, with their signals kept: what its fans are drawn from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl.native import Status
+
+from ... import metrics
+from ...figures import Limit
+from ...robustness.runs.experiment import Prepared, by_diagram, simulate
+from ...robustness.search.evaluation import as_table, margins_of
+from ...robustness.stl.formula import Always, And, Band, Formula
+from ...robustness.uncertainty.space import nominal
+
+__all__ = ["Histories", "histories", "limits"]
+
+MOST = 4  # signals
+IN_UNIT = (  # metrics whose unit is that of their signal
+    *(metrics.peak, metrics.rms, metrics.highest, metrics.spread, metrics.ultimate_bound),
+    metrics.total_variation,
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Histories:
+    """Signals of some rows.
+
+    Attributes
+    ----------
+    time : ndarray of shape (m,)
+        In s.
+    signals : dict of ndarray of shape (rows, m)
+        What the spec looks at, NaN after the end of a run.
+    nominal, worst : dict of ndarray of shape (m,)
+        The same of the nominal values, and of the row with the lowest margin that is known.
+    margin : float
+        That margin.
+    ended : int
+        How many of the rows did not reach their end.
+    limits : mapping
+        By signal what the spec always requires: value, and from when to when (s).
+    units : mapping
+        By signal, as far as a metric of the study tells.
+    groups : tuple of str
+        Options of each row, where the study chooses between some; else empty.
+    """
+
+    time: np.ndarray
+    signals: Mapping[str, np.ndarray]
+    nominal: Mapping[str, np.ndarray]
+    worst: Mapping[str, np.ndarray]
+    margin: float
+    ended: int
+    limits: Mapping[str, Sequence[Limit]] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    groups: tuple[str, ...] = ()
+
+
+def histories(
+    prepared: Prepared,
+    table: pd.DataFrame,
+    witness: tuple[Mapping[str, Any], float] | None = None,
+    *,
+    most: int = 200,
+    threads: int | None = None,
+) -> Histories:
+    """Simulate the first rows of a table again, the nominal one, and the worst one.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        With nominal values.
+    table : pandas.DataFrame
+        Rows with their margins ``spec``.  Of independent draws the first ones are such as well.
+    witness : (row, margin), optional
+        Of a search; it is the worst row if its margin is lower than all of the table.  What it
+        leaves out is nominal.
+    most : int, optional
+        Number of rows.
+    threads : int, optional
+
+    Raises
+    ------
+    SpaceError
+        If a quantity has no nominal value.
+    """
+    space = prepared.experiment.space
+    margins = margins_of(table)
+    lowest = int(np.argmin(margins))
+    worst, margin = table.iloc[lowest].to_dict(), float(margins[lowest])
+    if witness is not None and not witness[1] >= margin:
+        worst, margin = nominal(space) | dict(witness[0]), float(witness[1])
+    count = min(most, len(table))
+    both = as_table(space, [nominal(space), {name: worst[name] for name in space.names}])
+    rows = pd.concat([both, table.loc[:, space.names].iloc[:count]], ignore_index=True)
+    signals, status = _kept(prepared, rows, threads)
+    return Histories(
+        time=np.asarray(prepared.experiment.timepts, dtype=float),
+        signals={name: samples[2:] for name, samples in signals.items()},
+        nominal={name: samples[0] for name, samples in signals.items()},
+        worst={name: samples[1] for name, samples in signals.items()},
+        margin=margin,
+        ended=int(np.sum(status[2:] != Status.OK.name)),
+        limits=limits(prepared.experiment.spec.requirements),
+        units={m.signals[0]: m.unit for m in prepared.experiment.metrics if m.function in IN_UNIT},
+        groups=_groups(table.iloc[:count], [choice.name for choice in space.choices]),
+    )
+
+
+def limits(requirements: Sequence[Any]) -> dict[str, list[Limit]]:
+    """Return what requirements always ask of each signal; what they ask else is no line."""
+    found: dict[str, list[Limit]] = {}
+
+    def walk(formula: Formula, start: float, end: float, until: float) -> None:
+        if isinstance(formula, And):
+            for part in formula.parts:
+                walk(part, start, end, until)
+        elif isinstance(formula, Always):
+            walk(formula.part, start + formula.start, end + formula.end, until)
+        elif isinstance(formula, Band) and end > start:
+            for value in (formula.lower, formula.upper):
+                line = (value, start, min(end, until))
+                if np.isfinite(value) and line not in found.setdefault(formula.signal, []):
+                    found[formula.signal].append(line)
+
+    for requirement in requirements:
+        walk(requirement.formula, 0.0, 0.0, requirement.until)
+    return found
+
+
+def _groups(rows: pd.DataFrame, choices: Sequence[str]) -> tuple[str, ...]:
+    """Return the options of each row; nothing if there is nothing to choose."""
+    if not choices:
+        return ()
+    return tuple(rows[list(choices)].astype(str).agg(", ".join, axis=1))
+
+
+def _kept(
+    prepared: Prepared, rows: pd.DataFrame, threads: int | None
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Return signals and status of rows, which are numbered from 0."""
+    study = prepared.experiment
+    names = _signals(study.spec.requirements)
+    kept = {name: np.full((len(rows), len(study.timepts)), np.nan) for name in names}
+    status = np.full(len(rows), "", dtype=object)
+    for loop, same in by_diagram(prepared, rows):
+        found = simulate(study, loop, same, keep=names, threads=threads)
+        status[same.index] = found.table["status"].to_numpy()
+        for name in names:
+            kept[name][same.index] = found.signals[name]
+    return kept, status
+
+
+def _signals(requirements: Sequence[Any]) -> list[str]:
+    """Return the signals that the spec looks at, each once."""
+    return list(dict.fromkeys(s for r in requirements for s in r.signals))[:MOST]

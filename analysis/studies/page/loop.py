@@ -1,0 +1,180 @@
+"""The loop that a study is about, as its page shows it: diagram, parameters, equations, source."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import inspect
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import control as ct
+import numpy as np
+import pandas as pd
+
+from nlctl._diagram import parameters
+from nlctl._errors import UsageError
+from nlctl.drawing import draw
+from nlctl.native import typeset
+
+from ...report.document import Figure, Item, Paragraph, Section, Table
+from ...report.equations import block_items
+from ...robustness.runs.experiment import Prepared
+from . import text as text
+
+if TYPE_CHECKING:
+    from analysis.studies.result import Result
+
+__all__ = ["Loop", "Published", "loop_of", "loop_sections"]
+
+OWN = ("nlctl", "analysis")  # packages whose source comes with nlctl and is not printed
+LONGEST = 60  # characters of a value
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Loop:
+    """The loop of a study, with nominal values.
+
+    Attributes
+    ----------
+    diagram : control.InputOutputSystem
+    maker : str
+        The function that makes it, as ``module:name``.
+    file : str
+        Name of the file that the function stands in; empty if there is none.
+    source : str
+        What is in that file; empty for a loop that comes with nlctl.
+    sha256 : str
+        Of the file.
+    """
+
+    diagram: ct.InputOutputSystem
+    maker: str
+    file: str = ""
+    source: str = ""
+    sha256: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Published:
+    """Where a loop was published, and what its authors print of it.
+
+    Attributes
+    ----------
+    title : str
+        In a line, with authors and year.
+    citation : str
+        For the list of references.
+    items : tuple of Item
+        Equations as printed.
+    """
+
+    title: str
+    citation: str
+    items: tuple[Item, ...] = ()
+
+
+def loop_of(prepared: Prepared) -> Loop:
+    """Return the loop of an experiment; with choices, that of the nominal ones."""
+    nominal = {choice.name: choice.nominal for choice in prepared.experiment.space.choices}
+    compiled = next(
+        (loop for labels, loop in prepared.loops if dict(labels) == nominal), prepared.loops[0][1]
+    )
+    build: Any = prepared.experiment.build
+    while isinstance(build, functools.partial):
+        build = build.func
+    build = inspect.unwrap(build)
+    module = str(getattr(build, "__module__", ""))
+    found = Loop(diagram=compiled.system, maker=str(getattr(build, "__qualname__", build)))
+    try:
+        path = Path(inspect.getsourcefile(build) or "")
+        content = path.read_bytes()
+    except (OSError, TypeError):  # a callable object, or made where there is no file
+        return found
+    return Loop(
+        diagram=found.diagram,
+        maker=found.maker,
+        file=path.name,
+        source="" if module.partition(".")[0] in OWN else content.decode(errors="replace"),
+        sha256=hashlib.sha256(content).hexdigest(),
+    )
+
+
+def loop_sections(loop: Loop, result: Result, prefix: str, level: int) -> Iterator[Section]:
+    """Yield the loop as it was run, its parameters with what was varied, and its source."""
+    from_file = f" in {loop.file} (SHA-256 {loop.sha256})" if loop.file else ""
+    made = Paragraph(text=f"The loop is made by {loop.maker}{from_file}.")
+    yield Section(
+        key=f"{prefix}study_loop",
+        title="The loop",
+        items=[made, *_picture(loop, prefix), *_parameters(loop, result)],
+        level=level,
+    )
+    yield Section(
+        key=f"{prefix}study_equations",
+        title="The equations of the loop",
+        items=[*_equations(loop)],
+        level=level + 1,
+        folded=True,
+    )
+    if loop.source:
+        yield Section(
+            key=f"{prefix}study_source",
+            title=f"The source of the loop: {loop.file}",
+            items=[Paragraph(text=text.SOURCE, code=loop.source)],
+            level=level + 1,
+            folded=True,
+        )
+
+
+def _picture(loop: Loop, prefix: str) -> Iterator[Figure]:
+    """Yield the diagram; a single system is none."""
+    if isinstance(loop.diagram, ct.InterconnectedSystem):
+        blocks = ", ".join(str(system.name) for system in loop.diagram.syslist)
+        yield Figure(
+            key=f"{prefix}study_diagram",
+            caption=text.DIAGRAM,
+            description=f"Block diagram of {loop.diagram.name} with the blocks {blocks}.",
+            figure=draw(loop.diagram, expand=True),
+        )
+
+
+def _parameters(loop: Loop, result: Result) -> Iterator[Item]:
+    """Yield all parameters of the loop, and how each was varied."""
+    laws: dict[Any, str] = result.quantities["law"].to_dict()
+    table: pd.DataFrame = parameters(loop.diagram)
+    if not len(table):
+        return
+    yield Table(
+        caption=text.PARAMETERS,
+        columns=("parameter", "value", "unit", "varied", "meaning"),
+        rows=[
+            (name, _value(row["value"]), text.unit_text(row["unit"]), laws.get(name, ""),
+             row["meaning"])
+            for name, row in table.iterrows()
+        ],
+        folded=True,
+    )  # fmt: skip
+
+
+def _equations(loop: Loop) -> Iterator[Item]:
+    """Yield the equations of every block, read from the functions that are run."""
+    try:
+        blocks = typeset(loop.diagram)
+    except UsageError as refused:  # it was run all the same, by calling a function as it stands
+        yield Paragraph(text=f"There are no formulas of this loop: {refused}")
+        return
+    yield Paragraph(text=text.EQUATIONS)
+    for block in blocks:
+        yield Paragraph(text=f"Block {block.block}:")
+        yield from block_items(block)
+
+
+def _value(value: Any) -> Any:
+    """Return a value as the table shows it; of long ones only the size."""
+    if isinstance(value, bool | int | float | str):
+        return value
+    told = str(value)
+    return told if len(told) <= LONGEST else f"{'×'.join(map(str, np.shape(value)))} numbers"

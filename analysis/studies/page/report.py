@@ -1,0 +1,348 @@
+"""A robustness study as a report, or as sections of another one."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...report.document import Figure, Item, Paragraph, Report, Section, Table
+from ...report.outline import summary
+from ...report.render import file_hashes
+from ...report.versions import versions
+from . import methods as how
+from . import text as text
+from .claims import STATEMENTS, claims, verdict
+from .histories import Histories
+from .loop import Loop, Published, loop_sections
+from .rankings import compare, morris, regional, sobol
+from .rows import (
+    fan_items,
+    margin_items,
+    row_items,
+    running,
+    setup_items,
+    statement_items,
+)
+from .searches import degradation, failure_map, radius, worst_case
+
+if TYPE_CHECKING:
+    from analysis.studies.result import Finding, Result
+
+__all__ = ["study_part", "study_report", "study_sections"]
+
+LISTED = 400  # lines of a table that report.json holds as well; longer ones are files beside it
+Items = Callable[["Finding", "Result", Any, str], Iterator[Item]]
+KINDS: dict[str, Items] = {  # in the order of the report
+    "worst case": worst_case,
+    "radius": radius,
+    "degradation": degradation,
+    "morris": morris,
+    "sobol": sobol,
+    "regional": regional,
+    "failure map": failure_map,
+    "compare": compare,
+}
+OUTCOMES = {  # by the light
+    "pass": "shown",
+    "caution": "not shown yet",
+    "neutral": "no claims",
+}
+
+
+def study_report(
+    result: Result,
+    kept: Histories | None = None,
+    command: str = "nlctl report RUN",
+    loop: Loop | None = None,
+    published: Published | None = None,
+) -> Report:
+    """Compose the report of a study.
+
+    Parameters
+    ----------
+    result : Result
+        Of `analysis.studies`, also an incomplete one.  If ``result.rows`` has its design, the
+        report can say why the rows support no guarantee.
+    kept : Histories, optional
+        Signals of some rows; without them there are no fans.
+    command : str, optional
+        What makes the report again.
+    loop : Loop, optional
+        What was simulated; without it there is no diagram.
+    published : Published, optional
+        Where the loop was published.
+    """
+    paragraphs, sources = how.methods(result, published)
+    return Report(
+        title=result.study.study.title,
+        question=result.study.study.question,
+        verdict=text.without_assumptions(verdict(result)),
+        lead=_lead(result, kept),
+        claims=claims(result),
+        sections=study_sections(result, kept, loop, published, limits=False),
+        command=command,
+        provenance=_provenance(result),
+        numbers=numbers(result),
+        methods=paragraphs,
+        limits=[*how.limits(result), *result.notes],
+        references=sources,
+        inputs=_study_file(result.folder),
+        files=data_files(result.folder),
+    )
+
+
+def _provenance(result: Result) -> dict[str, str]:
+    """Return what made the numbers: the versions of the run, not those that draw the page."""
+    then = {"Python" if k == "python" else k: v for k, v in result.made_with.items()}
+    seed = {"seed": str(result.study.study.seed)}
+    return versions("cma") | then | seed | _table_hash(result)
+
+
+def study_sections(
+    result: Result,
+    kept: Histories | None = None,
+    loop: Loop | None = None,
+    published: Published | None = None,
+    *,
+    prefix: str = "",
+    level: int = 2,
+    limits: bool = True,
+) -> list[Section]:
+    """Compose the sections of a study.
+
+    Parameters
+    ----------
+    result, kept, loop, published
+        As in `study_report`.
+    prefix : str, optional
+        In front of every key, so that several studies can stand in one report.
+    level : int, optional
+        Of the headings.
+    limits : bool, optional
+        Whether what the study does not show is a section as well.
+    """
+    table = None if result.rows is None or not result.rows.done else result.rows.table
+    asked = [
+        Section(key="study_asked", title="What was asked", items=[*setup_items(result, published)])
+    ]
+    if published is not None and published.items:
+        items = [*published.items]
+        title = "The loop as published"
+        asked.append(Section(key="study_published", title=title, items=items, folded=True))
+    if loop is not None:
+        asked += loop_sections(loop, result, "", 2)
+    if kept is not None:
+        shown = [*fan_items(kept, f"{prefix}study")]
+        asked.append(Section(key="study_fans", title="The runs over time", items=shown))
+    if table is not None:
+        key = "study_rows"  # no analysis is called that: keys of these have hyphens only
+        rows = [*row_items(result, table, f"{prefix}{key}")]
+        asked.append(Section(key=key, title="How the runs ended", items=rows))
+        margins = table["spec"].to_numpy(dtype=float)
+        statements = [f for f in _answered(result) if f.kind in STATEMENTS]
+        asked += [_statement(f, result, margins, prefix) for f in statements]
+    asked += _findings(result, prefix)
+    asked += _assumed(result)
+    if limits:
+        told: list[Item] = [Paragraph(text=words) for words in how.limits(result)]
+        asked.append(Section(key="study_limits", title="What this study does not show", items=told))
+    return [
+        replace(made, key=f"{prefix}{made.key}", level=made.level - 2 + level) for made in asked
+    ]
+
+
+def _lead(result: Result, kept: Histories | None) -> Figure | None:
+    """Return the picture of a study: its runs over time, or else their margins."""
+    if kept is not None:
+        name = next(iter([n for n in kept.limits if n in kept.signals] or kept.signals))
+        one = replace(
+            kept,
+            signals={name: kept.signals[name]},
+            nominal={name: kept.nominal[name]},
+            worst={name: kept.worst[name]},
+        )
+        return next(item for item in fan_items(one, "lead") if isinstance(item, Figure))
+    if result.rows is not None and result.rows.done:
+        items = margin_items(result, result.rows.table, "lead")
+        return next(item for item in items if isinstance(item, Figure))
+    return None
+
+
+def _assumed(result: Result) -> list[Section]:
+    """Return the assumptions of all statements, each once; nothing if there are none."""
+    found = text.assumptions_in(finding.sentence for finding in result.findings)
+    items = [Paragraph(text=f"{words[:1].upper()}{words[1:]}.") for words in found]
+    return [Section(key="study_assumed", title=text.ASSUMED, items=items)] if found else []
+
+
+def study_part(
+    studies: Sequence[tuple[Result, Histories | None]],
+    key: str = "robustness",
+    published: Mapping[str, Published] | None = None,
+) -> list[Section]:
+    """Compose several studies, in short, as a part of another report: first the verdicts.
+
+    Parameters
+    ----------
+    studies : sequence of (Result, Histories or None)
+    key : str, optional
+        Anchor of the part; those of the studies begin with it.
+    published : mapping of str to Published, optional
+        Where loops were published, by the name that their studies call them.
+    """
+    rows = []
+    for result, _ in studies:
+        look, told = summary(claims(result))
+        words = f"{told} {text.without_assumptions(verdict(result))}"
+        asked = result.study.study.question
+        rows.append((result.study.study.title, asked, OUTCOMES.get(look, look), words))
+    overview = Table(
+        caption="The studies: what was asked, and what was found.",
+        columns=("study", "asked", "outcome", "found"),
+        rows=rows,
+        status="outcome",
+    )
+    parts = [
+        section
+        for number, (result, kept) in enumerate(studies, 1)
+        for section in _brief(
+            result, kept, f"{key}-{number}", (published or {}).get(result.study.loop)
+        )
+    ]
+    limits = dict.fromkeys(words for result, _ in studies for words in how.limits(result))
+    return [
+        Section(key=key, title="Robustness", items=[Paragraph(text=text.PART), overview]),
+        *parts,
+        Section(
+            key=f"{key}-limits",
+            title="What these studies do not show",
+            items=[Paragraph(text=words) for words in limits],
+            level=3,
+            folded=True,
+        ),
+    ]
+
+
+def _brief(
+    result: Result, kept: Histories | None, key: str, published: Published | None
+) -> Iterator[Section]:
+    """Yield a study in short: what each analysis found, runs over time, and what it rests on."""
+    asked = result.asked
+    found = Table(
+        caption=text.FOUND,
+        columns=("asked", "found"),
+        rows=[(_title(f, result), _told(f, asked[f.key])) for f in result.findings],
+    )
+    fans = () if kept is None else fan_items(kept, key)
+    yield Section(key=key, title=result.study.study.title, items=[found, *fans], level=3)
+    setup = [*setup_items(result, published)]
+    if result.rows is not None and result.rows.done:
+        setup += margin_items(result, result.rows.table, key)
+    title = "What was asked, and of which runs"
+    yield Section(key=f"{key}-asked", title=title, items=setup, level=4, folded=True)
+    for made in _assumed(result):
+        yield replace(made, key=f"{key}-assumed", level=4, folded=True)
+    for finding in result.findings:
+        if finding.kind == "failure map" and finding.is_answered:
+            items = [*failure_map(finding, result, asked[finding.key], f"{key}-{finding.key}")]
+            yield Section(
+                key=f"{key}-map", title=_title(finding, result), items=items, level=4, folded=True
+            )
+
+
+def _statement(finding: Finding, result: Result, margins: np.ndarray, prefix: str) -> Section:
+    limit = result.asked[finding.key].limit
+    shown = statement_items(finding, limit, margins, f"{prefix}{finding.key}")
+    told = Paragraph(text=text.without_assumptions(finding.sentence))
+    return Section(key=finding.key, title=_title(finding, result), items=[told, *shown])
+
+
+def _told(finding: Finding, asked: Any) -> str:
+    """Return what was found, and what was varied if that is not everything."""
+    some, sentence = getattr(asked, "quantities", ()), text.without_assumptions(finding.sentence)
+    if not some:
+        return sentence
+    return f"{sentence} Here only {', '.join(some)} vary, all others are nominal."
+
+
+def _title(finding: Finding, result: Result) -> str:
+    """Return the heading that the study file gives an analysis, or one by its kind."""
+    asked = result.asked[finding.key]
+    of = getattr(asked, "of", "spec")
+    return asked.title or text.TITLES[finding.kind] + ("" if of == "spec" else f" of {of}")
+
+
+def _findings(result: Result, prefix: str) -> list[Section]:
+    """Return a section for every other analysis, in the order of `KINDS`.
+
+    Those without an answer come last, with the sentence that says why.
+    """
+    asked = result.asked
+    made = []
+    for kind, items in KINDS.items():
+        for f in _answered(result):
+            if f.kind == kind:
+                shown = items(f, result, asked[f.key], f"{prefix}{f.key}")
+                told = Paragraph(text=_told(f, asked[f.key]))
+                made.append(Section(key=f.key, title=_title(f, result), items=[told, *shown]))
+    return made + [
+        Section(key=f.key, title=_title(f, result), items=[Paragraph(text=f.sentence)])
+        for f in result.findings
+        if not f.is_answered
+    ]
+
+
+def _answered(result: Result) -> list[Finding]:
+    return [finding for finding in result.findings if finding.is_answered]
+
+
+def numbers(result: Result) -> dict[str, Any]:
+    """Return every number of a study for ``report.json``; long tables are files beside it."""
+    tables = {
+        finding.key: {
+            name: table.reset_index().to_dict("records")
+            for name, table in sorted(finding.tables.items())
+            if len(table) <= LISTED
+        }
+        for finding in result.findings
+    }
+    curves = {}
+    if result.rows is not None and result.rows.done:
+        margins = result.rows.columns("spec")["spec"].to_numpy(dtype=float)
+        for f in _answered(result):
+            if f.kind in STATEMENTS:
+                curve = running(margins[: f.numbers["runs"]], f.numbers["confidence"])
+                curves[f.key] = curve.reset_index().to_dict("records")
+    return {"study": result.plain(), "tables": tables, "running estimate": curves}
+
+
+def data_files(folder: Path) -> dict[str, str]:
+    """Return the files of a run that are the same whenever it is run, with their SHA-256.
+
+    The chunks of the rows hold wall times: their hash without them is in the provenance.
+    """
+    own = [folder / "study.toml", folder / "results.json", *sorted(folder.glob("*/*.parquet"))]
+    return {
+        path.relative_to(folder).as_posix(): file_hashes([path])[path.name]
+        for path in own
+        if path.is_file()
+    }
+
+
+def _study_file(folder: Path) -> dict[str, str]:
+    path = folder / "study.toml"
+    return {path.name: path.read_text(encoding="utf-8")} if path.is_file() else {}
+
+
+def _table_hash(result: Result) -> dict[str, str]:
+    """Return the SHA-256 of the main table as CSV, without the wall times."""
+    if result.rows is None or not result.rows.done:
+        return {}
+    table = result.rows.table.drop(columns="wall_time", errors="ignore")
+    content = table.to_csv(float_format="%.17g", lineterminator="\n").encode()
+    return {"SHA-256 of the rows as CSV, without wall_time": hashlib.sha256(content).hexdigest()}

@@ -1,0 +1,290 @@
+"""The report's sections on the rows of a study: what was asked and how they ended."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl.native import Status
+
+from ... import figures as figures
+from ...report.document import Figure, History, Item, Paragraph, Table
+from ...robustness.search.evaluation import margins_of
+from ...robustness.statistics.guarantee import rounded_down, rounded_up
+from ...robustness.statistics.sequential import sequence_bounds
+from ...robustness.stl.spec import violates
+from . import text as text
+from .claims import refusal
+from .histories import Histories
+from .text import margin_text
+
+if TYPE_CHECKING:
+    from analysis.studies.result import Finding, Result
+
+    from .loop import Published
+
+__all__ = [
+    "fan_items",
+    "known",
+    "margin_items",
+    "row_items",
+    "running",
+    "setup_items",
+    "statement_items",
+    "status_text",
+]
+
+WORST = 10  # rows that are listed
+POINTS = 150  # of the running estimate
+PARTS = {0.5: "median", 0.95: "95 %", 1.0: "largest"}  # quantiles of the metrics
+
+
+def setup_items(result: Result, published: Published | None = None) -> Iterator[Item]:
+    """Yield the loop, the spec, and what is uncertain."""
+    study = result.study
+    about = f" ({published.title})" if published else ""
+    options = ", ".join(f"{key} = {value}" for key, value in study.options.items())
+    changed = f" It is made with {options}." if options else ""
+    inputs = ", ".join(f"{key} = {value:g}" for key, value in study.inputs.items())
+    changed += f" Its inputs are {inputs}." if inputs else ""
+    yield Paragraph(
+        text=f"Loop: {study.loop}{about}.{changed} Runs last {study.time.end:g} s. All random "
+        f"numbers follow from the seed {study.study.seed}."
+    )
+    yield Table(
+        caption=text.SPEC,
+        columns=("requirement", "formula", "until (s)", "meaning"),
+        rows=[
+            (key, row["formula"], row["until"], row["meaning"])
+            for key, row in result.requirements.iterrows()
+        ],
+    )
+    yield Table(
+        caption=text.SPACE,
+        columns=("quantity", "nominal", "unit", "law", "box from", "to"),
+        rows=[*known(result.quantities, "nominal", "unit", "law", "low", "high")],
+    )
+
+
+def known(quantities: pd.DataFrame, *columns: str) -> Iterable[tuple[Any, ...]]:
+    """Return name and columns of every quantity, None where a choice has no such thing."""
+    table = quantities.reindex(columns=list(columns)).astype(object)
+    table = table.where(table.notna(), None)
+    if "unit" in columns:
+        table["unit"] = table["unit"].map(text.unit_text)
+    return table.itertuples(name=None)
+
+
+def row_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item]:
+    """Yield how the rows of the main table ended, and the worst of them."""
+    margins = table["spec"].to_numpy(dtype=float)
+    violated = int(np.sum(violates(margins)))
+    told = text.violate(violated, len(table))
+    if refused := refusal(result):
+        told += f". That is no estimate of a probability: {refused}"
+    yield Paragraph(text=f"{told}.")
+    statuses = table["status"].astype(str)
+    counts = statuses.value_counts().sort_index()
+    yield Table(
+        caption=text.STATUS,
+        columns=("status", "runs", "share"),
+        rows=[
+            (status_text(name), int(n), f"{100 * n / len(table):.4g} %")
+            for name, n in counts.items()
+        ],
+    )
+    yield from margin_items(result, table, key)
+    yield from _worst_rows(result, table)
+    if len(result.metrics):
+        yield _metrics(result, table)
+
+
+def margin_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item]:
+    """Yield the margins of the rows: by requirement, and how they are distributed."""
+    yield _requirements(result, table)
+    margins = table["spec"].to_numpy(dtype=float)
+    violated = int(np.sum(violates(margins)))
+    caption = text.MARGINS + text.VIOLATIONS * bool(violated) + text.clipped(margins)
+    yield Figure(
+        key=f"{key}-margins",
+        caption=caption,
+        description=f"{caption} {text.violate(violated, margins.size)}; the median margin is "
+        f"{margin_text(float(figures.quantile(margins, 0.5, -np.inf)))}.",
+        figure=figures.margins(margins),
+    )
+
+
+def status_text(name: object) -> str:
+    """Return how a run ended, in words."""
+    return "reached the end" if name == Status.OK.name else str(name).lower().replace("_", " ")
+
+
+def _requirements(result: Result, table: pd.DataFrame) -> Table:
+    rows = []
+    for key in [*result.requirements.index, "spec"]:
+        margins = table[key].to_numpy(dtype=float)
+        violated = int(np.sum(violates(margins)))
+        ends = (float(figures.quantile(margins, part, -np.inf)) for part in (0.0, 0.5, 1.0))
+        share = f"{100 * violated / len(table):.4g} %"
+        rows.append((key, violated, share, *map(margin_text, ends)))
+    return Table(
+        caption=text.REQUIREMENTS,
+        columns=("requirement", "violations", "share", "least margin", "median", "largest"),
+        rows=rows,
+    )
+
+
+def _worst_rows(result: Result, table: pd.DataFrame) -> Iterator[Table]:
+    """Yield the rows with the lowest margins: how they ended, how to run them again, values."""
+    worst = table.iloc[np.argsort(margins_of(table), kind="stable")[:WORST]]
+    keys, names = list(result.requirements.index), list(result.quantities.index)
+    folder = shlex.quote(str(result.folder))
+    ended = [
+        (
+            number,
+            margin_text(row["spec"]),
+            min(keys, key=lambda key: np.nan_to_num(row[key], nan=-np.inf)),
+            status_text(row["status"]),
+            row["time"],
+            f"nlctl replay {folder} {number}",
+        )
+        for number, row in worst.to_dict("index").items()
+    ]
+    which = f"The {len(worst)} rows" if len(worst) > 1 else "The row"
+    yield Table(
+        caption=f"{which} with the lowest margins, and the command that runs each again, bit for "
+        "bit.",
+        columns=("row", "margin", "least in", "status", "reached (s)", "again"),
+        rows=ended,
+        folded=True,
+    )
+    values = worst[names].itertuples(name=None)
+    yield Table(
+        caption="The values of these rows.",
+        columns=("row", *names),
+        rows=list(values),
+        folded=True,
+    )
+
+
+def _metrics(result: Result, table: pd.DataFrame) -> Table:
+    rows = []
+    for key, about in result.metrics.iterrows():
+        values = table[key].to_numpy(dtype=float)
+        there = values[~np.isnan(values)]
+        ends = [float(figures.quantile(there, q, np.inf)) if there.size else np.nan for q in PARTS]
+        missing = values.size - there.size
+        rows.append((key, about["meaning"], about["unit"], *ends, missing))
+    return Table(
+        caption=text.METRICS,
+        columns=("metric", "meaning", "unit", *PARTS.values(), "missing"),
+        rows=rows,
+        folded=True,
+    )
+
+
+def fan_items(kept: Histories, key: str) -> Iterator[Item]:
+    """Yield quantile fans of some rows with the nominal and the worst run, and these as charts."""
+    count = len(next(iter(kept.signals.values())))
+    ended = (
+        f" Runs that did not reach their end, {kept.ended} of these, count from there on as lying "
+        "beyond both ends of every band."
+        if kept.ended
+        else ""
+    )
+    worst = margin_text(kept.margin)
+    caption = (
+        f"The first {count} rows simulated again: {_bands(kept)}, the nominal run, and the worst "
+        f"run that is known (margin {worst}).{_limits(kept)}{ended} What leaves the picture is cut "
+        "off."
+    )
+    yield Figure(
+        key=f"{key}-fans",
+        caption=caption,
+        description=f"{caption} {_peaks(kept)}",
+        figure=figures.fans(
+            kept.time, kept.signals, kept.nominal, kept.worst,
+            limits=kept.limits, units=kept.units, groups=kept.groups,
+        ),
+    )  # fmt: skip
+    runs = {"nominal": kept.nominal, "worst": kept.worst}
+    both = {f"{name}, {run}": runs[run][name] for name in kept.nominal for run in runs}
+    yield History(
+        key=f"{key}-history",
+        caption=f"The nominal run and the worst one that is known (margin {worst}).",
+        description=f"Chart of {', '.join(kept.nominal)} in the nominal and in the worst run; the "
+        "figure above shows the same runs, the slider below tells their values.",
+        time=kept.time,
+        signals=both,
+        shown=list(both)[: len(runs)],
+    )
+
+
+def _bands(kept: Histories) -> str:
+    """Say what the bands are; rows of different kinds have one each."""
+    if not kept.groups:
+        return "bands that hold all, 90 % and 50 % of them at each time"
+    shown, every = figures.most_frequent(kept.groups), set(kept.groups)
+    which = "each option" if len(shown) == len(every) else f"the {len(shown)} most frequent options"
+    return f"for {which} the median at each time and a band that holds 90 % of its rows"
+
+
+def _limits(kept: Histories) -> str:
+    shown = any(kept.limits.get(name) for name in kept.signals)
+    return " Straight lines: limits of the spec, where and as long as they count." * shown
+
+
+def _peaks(kept: Histories) -> str:
+    """Say how large each signal becomes; a run that has ended counts as infinite."""
+    told = []
+    for name, samples in kept.signals.items():
+        largest = [
+            float(np.max(np.where(np.isnan(y), np.inf, np.abs(y))))
+            for y in (kept.nominal[name], samples, kept.worst[name])
+        ]
+        told.append(
+            f"Largest magnitude of {name}: nominal {largest[0]:.4g}, of all {largest[1]:.4g}, of "
+            f"the worst run {largest[2]:.4g}."
+        )
+    return " ".join(told)
+
+
+def statement_items(
+    finding: Finding, limit: float | None, margins: np.ndarray, key: str
+) -> Iterator[Item]:
+    """Yield what the estimate did while the rows came in."""
+    confidence = float(finding.numbers["confidence"])
+    curve = running(margins[: int(finding.numbers["runs"])], confidence)
+    last = curve.iloc[-1]
+    caption = text.RUNNING.format(confidence=100 * confidence)
+    fixed = None
+    if finding.kind == "probability":
+        fixed = (float(finding.numbers["singly"][0]), float(finding.numbers["singly"][1]))
+    caption += text.DECIDES_FIXED if fixed else text.DECIDES_SEQUENCE
+    ends = f", exact bounds {rounded_down(fixed[0])} and {rounded_up(fixed[1])}" if fixed else ""
+    yield Figure(
+        key=f"{key}-running",
+        caption=caption,
+        description=f"{caption} After {curve.index[-1]} runs: {last['rate']:.4g}, band from "
+        f"{last['low']:.4g} to {last['high']:.4g}{ends}.",
+        figure=figures.running_estimate(curve, limit, fixed),
+    )
+
+
+def running(margins: np.ndarray, confidence: float) -> pd.DataFrame:
+    """Return the share of violations after n rows with its confidence sequence, for some n.
+
+    Columns violations, rate, low, high; NaN is a violation.
+    """
+    counts = np.cumsum(violates(margins))
+    numbers = np.unique(np.geomspace(1, counts.size, POINTS).round().astype(int))
+    rows = []
+    for n in map(int, numbers):
+        k = int(counts[n - 1])
+        low, high = sequence_bounds(k, n, confidence)
+        rows.append({"violations": k, "rate": k / n, "low": low, "high": high})
+    return pd.DataFrame(rows, index=pd.Index(numbers, name="runs"))
