@@ -95,7 +95,7 @@ def _run_while_busy(command: list[str], errors: Path) -> str:
             except subprocess.TimeoutExpired:
                 before, spent = spent, _cpu_time(process.pid)
                 if spent - before < BUSY:
-                    return f"it has done nothing for {PATIENCE} s"
+                    return f"no sign of work for {PATIENCE} s"
             else:
                 told = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
                 return (told or ["no message"])[-1]
