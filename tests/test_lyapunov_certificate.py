@@ -206,7 +206,7 @@ class TestCertify:
             certify(nlctl.paper.example_1())
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_design_finds_gains_within_the_limit():
     """A smaller proved bound than that of the gains it starts from, for an |u| that is allowed."""
     loop = example_1()
