@@ -307,9 +307,13 @@ def with_overrides(spec: Any, overrides: Mapping[str, Any], block: str) -> Any:
     block : str
         Name of the block, for messages.
     """
-    whole = {k: v for k, v in overrides.items() if "[" not in k}
+    # A diagram hands every block all of its values each time: those that it has are checked.
+    own = {f.name: getattr(spec, f.name) for f in dataclasses.fields(spec)}
+    whole = {
+        k: v for k, v in overrides.items() if "[" not in k and (v is None or v is not own.get(k))
+    }
     try:
-        changed = dataclasses.replace(spec, **whole)
+        changed = dataclasses.replace(spec, **whole) if whole else spec
         for key, value in overrides.items():
             if "[" in key:
                 changed = _replace_element(changed, key, value)

@@ -164,6 +164,17 @@ def test_linear_systems_are_their_own_linearization():
     assert found.input_labels == diagram.input_labels
 
 
+def test_what_python_control_takes_instead_of_a_compiled_diagram():
+    """It is printed with the diagram, and differences agree with the exact derivatives."""
+    loop = nlctl.paper.example_1()
+    compiled, x = nlctl.compile(loop), 0.3 * np.random.default_rng(4).normal(size=loop.nstates)
+    assert ".linearize(x0, u0); python-control's functions take .system" in str(compiled)
+    near = ct.linearize(compiled.system, x, t=0.7)
+    exact = compiled.linearize(x, t=0.7)
+    for name in "AC":
+        np.testing.assert_allclose(getattr(near, name), getattr(exact, name), rtol=1e-4, atol=1e-4)
+
+
 def test_what_has_no_exact_derivatives_is_refused():
     """Opaque functions and algebraic loops, with advice; an operating point is taken."""
     decay = ct.nlsys(

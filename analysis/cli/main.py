@@ -9,7 +9,10 @@ from typing import Annotated
 import typer
 
 from .report import register as register_reports
+from .studies import FAILS, OPEN
 from .studies import register as register_studies
+
+UNPROVED = {"violated": FAILS, "undecided": OPEN}  # exit code by the answer of a ledger
 
 app = typer.Typer(
     name="nlctl",
@@ -122,9 +125,10 @@ def check(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random initial states.")] = 0,
     json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
-    """Check the assumptions and inequalities of the paper's proof; exit 1 if one is violated.
+    """Check the assumptions and inequalities of the paper's proof, line by line.
 
-    Statements that are false only as the paper has them are shown and do not count.
+    Exit codes: 0 every line holds, 1 a line is violated, 5 none is violated, but not all are
+    decided. Statements that are false only as the paper has them are shown and do not count.
     """
     from rich.console import Console
 
@@ -150,8 +154,8 @@ def check(
         for line in worst_lines(found) if ensemble else ():
             print(f"run {line.member}, worst in {line.key}, again (with constants of its own):")
             print(f"  {replay(loop, horizon, set_ or [], start, line.member)}")
-    if not found.holds:
-        raise typer.Exit(1)
+    if found.answer in UNPROVED:
+        raise typer.Exit(UNPROVED[found.answer])
 
 
 @app.command("list")

@@ -10,9 +10,8 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
@@ -20,7 +19,9 @@ from rich.text import Text
 
 from nlctl.errors import ParameterError
 from nlctl.host.files import replace_file
-from nlctl.params import declared_params
+
+if TYPE_CHECKING:
+    import numpy as np
 
 FIGURE_FORMATS = (".svg", ".png", ".pdf")
 
@@ -108,15 +109,15 @@ def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
 
 def show_groups() -> None:
     """Print the blocks in groups, one line each, and the examples."""
-    from analysis.catalogue import block_groups
+    from analysis.catalogue import block_summaries
 
     console = Console()
-    groups = block_groups()
+    groups = block_summaries()
     width = max(len(name) for group in groups.values() for name in group)
     for title, group in groups.items():
         console.print(f"[bold]{title.capitalize()}[/bold]", highlight=False)
-        for name, record in group.items():
-            line = Text(f"  {name:<{width}}  {_summary(record)}")
+        for name, summary in group.items():
+            line = Text(f"  {name:<{width}}  {summary}")
             console.print(line, no_wrap=True, overflow="ellipsis")
     console.print("[bold]Examples[/bold]\n  example-1 (dead zone), example-2 (backlash)")
     console.print("\nnlctl list NAME shows the parameters of a block.", highlight=False)
@@ -130,7 +131,10 @@ def show_block(name: str) -> None:
     UnknownNameError
         If there is no such block.
     """
+    import numpy as np
+
     from analysis.catalogue import named_block
+    from nlctl.params import declared_params
 
     record, console = named_block(name), Console()
     table = Table("parameter", "default", "unit", "bounds", "meaning", title=None)

@@ -45,9 +45,9 @@ class Compiled:
 
     Notes
     -----
-    It is no python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
-    run it, ``compiled.linearize(x0)`` linearizes it with exact derivatives, and for every other
-    function of python-control there is ``compiled.system``.
+    It is not a python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
+    run it, and ``compiled.linearize(x0)`` linearizes it with exact derivatives, in the place of
+    ``ct.linearize``.  Every other function of python-control takes ``compiled.system``.
     """
 
     schedule: Schedule

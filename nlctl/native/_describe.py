@@ -15,6 +15,10 @@ from ._schedule import Node, signal_name
 if TYPE_CHECKING:
     from ._compile import Compiled
 
+USE = (
+    "nlctl.input_output_response, nlctl.ensemble_response, .linearize(x0, u0); "
+    "python-control's functions take .system"
+)
 SHOWN = 8  # names that are listed before the rest is only counted
 
 
@@ -32,6 +36,7 @@ def described(compiled: Compiled) -> str:
         f"{_count(system.ninputs, 'input')}, {_count(system.nstates, 'state')}, "
         f"{_count(system.noutputs, 'output')}",
         f"  order        {' -> '.join(nodes[i].path for i in schedule.order)}",
+        f"  run it by    {USE}",
     ]
     for loop in schedule.loops:
         torn = ", ".join(signal_name(nodes, s) for s in loop.torn)

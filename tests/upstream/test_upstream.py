@@ -22,6 +22,8 @@ FILES = {  # calls that are equal at least, and refused at most: together 190 an
     "response": (0, 0),
     "stochsys": (31, 1),
 }
+LONG = ("iosys", "statefbk", "stochsys")  # two thirds of the time of all: once a week
+CASES = [pytest.param(name, marks=[pytest.mark.weekly] * (name in LONG)) for name in FILES]
 
 
 def upstream_tests():
@@ -31,10 +33,9 @@ def upstream_tests():
 
 
 @pytest.mark.upstream
-@pytest.mark.slow
 @pytest.mark.skipif(upstream_tests() is None, reason="this python-control came without its tests")
 @pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="nothing is compiled without JIT")
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", CASES)
 def test_runs_of_python_controls_own_tests(name, tmp_path):
     """Equal to 1e-6; the few that are refused say why."""
     calls = tmp_path / "calls.jsonl"

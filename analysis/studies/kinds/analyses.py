@@ -33,6 +33,11 @@ class Asked(Strict):
     )
     title: str = Field("", description="Its heading in the report.")
 
+    @property
+    def claim(self) -> str:
+        """What the study claims by asking for it; empty if it asks and claims nothing."""
+        return ""
+
 
 class Probability(Asked):
     """Exact bounds of the probability of a violation, from all rows."""
@@ -48,6 +53,11 @@ class Probability(Asked):
             raise ValueError("a limit needs side = 'upper' or 'both', got 'lower'")
         return self
 
+    @property
+    def claim(self) -> str:
+        limit = self.limit
+        return "" if limit is None else f"a violation has at most probability {limit:g}"
+
 
 class Sequential(Asked):
     """Whether the probability of a violation is below a limit; rows stop when it is decided."""
@@ -55,6 +65,10 @@ class Sequential(Asked):
     kind: Literal["sequential"]
     confidence: Confidence = 0.99
     limit: Confidence = Field(description="Claim: the probability is below this.")
+
+    @property
+    def claim(self) -> str:
+        return f"the probability of a violation is below {self.limit:g}"
 
 
 class Morris(Asked):
@@ -91,6 +105,10 @@ class WorstCase(Asked):
     python_control: Flag = Field(False, description="Whether python-control confirms it as well.")
     limit: Number | None = Field(None, description="Claim: no margin found is this low.")
 
+    @property
+    def claim(self) -> str:
+        return "" if self.limit is None else f"no margin of {self.limit:g} or lower is found"
+
 
 class Degradation(Asked):
     """The probability of a violation against the size of the uncertainty."""
@@ -110,6 +128,12 @@ class Degradation(Asked):
             raise ValueError(f"the claim is about size {self.at:g}, which is not among the factors")
         return self
 
+    @property
+    def claim(self) -> str:
+        if self.limit is None:
+            return ""
+        return f"a violation has at most probability {self.limit:g} at the size {self.at:g}"
+
 
 class Radius(Asked):
     """The smallest size of the uncertainty at which a violation is found."""
@@ -122,6 +146,10 @@ class Radius(Asked):
     draws: Whole = Field(459, ge=0, description="Independent draws for the statement.")
     confidence: Confidence = 0.99
     limit: Size | None = Field(None, description="Claim: none is found below this size.")
+
+    @property
+    def claim(self) -> str:
+        return "" if self.limit is None else f"no violation is found below size {self.limit:g}"
 
 
 class Map(Asked):
@@ -160,6 +188,14 @@ class Compare(Asked):
         description="Claim: the first label is better than the second in the first metric, by the "
         "sign test over all pairs.",
     )
+
+    @property
+    def claim(self) -> str:
+        if self.better is None:
+            return ""
+        a, b = self.better
+        level = f"at the level {1 - self.confidence:.2g}"
+        return f"{a} is better than {b} in {next(iter(self.metrics))}, {level}"
 
 
 Analysis = Annotated[

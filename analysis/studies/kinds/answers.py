@@ -55,12 +55,16 @@ def answer(key: str, asked: Any, ground: Ground) -> Finding | None:
 
 
 def unanswered(key: str, asked: Any, error: UsageError, runs: int = 0) -> Finding:
-    """Return what stands in the place of an analysis that its `runs` or the loop do not admit."""
+    """Return what stands in the place of an analysis that its `runs` or the loop do not admit.
+
+    What the study claims of it is neither shown nor refuted.
+    """
     found = made(
         asked,
         f"Not answered: {error}.",
-        claim="the analysis can be made",
-        answer="refuted",
+        claim=asked.claim or "the analysis has an answer",
+        answer="not shown yet",
+        needs=f"an answer: {error}",
         runs=runs,
         is_answered=False,
     )
@@ -74,14 +78,11 @@ def _headed(key: str, asked: Any, found: Finding) -> Finding:
 def _probability(asked: Probability, ground: Ground) -> Finding:
     design, margins = ground.main
     found = violation_probability(design, margins, asked.confidence, asked.side)
-    claimed: dict[str, Any] = {}
-    if asked.limit is not None:
-        claimed["claim"] = f"a violation has at most probability {asked.limit:g}"
-        claimed |= vars(bound_verdict(found, asked.limit))
+    verdict = {} if asked.limit is None else vars(bound_verdict(found, asked.limit))
     return made(
         asked,
         str(found),
-        **claimed,
+        **verdict,
         runs=found.runs,
         numbers=statement_numbers(found),
     )
@@ -93,7 +94,6 @@ def _sequential(asked: Sequential, ground: Ground) -> Finding:
     return made(
         asked,
         str(test),
-        claim=f"the probability of a violation is below {asked.limit:g}",
         **vars(test_verdict(test)),
         runs=test.statement.runs,
         numbers={"decision": test.decision, **statement_numbers(test.statement)},

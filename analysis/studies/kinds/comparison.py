@@ -132,7 +132,7 @@ def comparison(asked: Compare, ground: Ground) -> Finding | None:
     return made(
         asked,
         _sentence(asked, found),
-        **_claimed(asked, found),
+        **_answer(asked, found),
         runs=len(table),
         numbers={"keyword": asked.keyword, "samples": found.size, "confidence": found.confidence}
         | {"requirements": [r.key for r in experiment.spec.requirements]},
@@ -158,8 +158,8 @@ def _sentence(asked: Compare, found: Comparison) -> str:
     )
 
 
-def _claimed(asked: Compare, found: Comparison) -> dict[str, str]:
-    """Return the claim that one option is better than another, and the answer."""
+def _answer(asked: Compare, found: Comparison) -> dict[str, str]:
+    """Return the answer to the claim that one option is better than another."""
     if asked.better is None:
         return {}
     metric, (a, b), level = next(iter(asked.metrics)), asked.better, 1 - asked.confidence
@@ -167,6 +167,4 @@ def _claimed(asked: Compare, found: Comparison) -> dict[str, str]:
     row = pairs.loc[(a, b) if (a, b) in pairs.index else (b, a)]
     p, adjusted = float(row["p"]), float(row["p_holm"])
     won, lost = (int(found.wins.loc[(metric, x), y]) for x, y in ((a, b), (b, a)))  # type: ignore[arg-type]
-    verdict = better_verdict(won, lost, adjusted, level, adjusted / p)
-    claim = f"{a} is better than {b} in {metric}, at the level {level:.2g}"
-    return {"claim": claim, **vars(verdict)}
+    return vars(better_verdict(won, lost, adjusted, level, adjusted / p))

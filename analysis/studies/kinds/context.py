@@ -79,7 +79,9 @@ def column(rows: Sweep, name: str) -> np.ndarray:
 
 def made(asked: Any, sentence: str, **parts: Any) -> Finding:
     """Return a finding that `answer` gives its key and title."""
-    return Finding(key="", kind=asked.kind, title="", sentence=sentence, **parts)
+    return Finding(
+        key="", kind=asked.kind, title="", sentence=sentence, **{"claim": asked.claim} | parts
+    )
 
 
 def statement_numbers(statement: Violation) -> dict[str, Any]:

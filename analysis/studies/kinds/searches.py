@@ -60,19 +60,15 @@ def lowest_margin(asked: WorstCase, ground: Ground) -> Finding:
 
 
 def _no_low_margin(limit: float | None, margin: float, is_confirmed: bool) -> dict[str, str]:
-    """Return the claim about the lowest margin that was found, and the answer."""
+    """Return the answer to the claim about the lowest margin that was found."""
     if limit is None:
         return {}
-    claim = f"no margin of {limit:g} or lower is found"
     if margin > limit:
-        return {"claim": claim, "answer": "shown"}
+        return {"answer": "shown"}
     if is_confirmed:
-        return {"claim": claim, "answer": "refuted"}
-    return {
-        "claim": claim,
-        "answer": "not shown yet",
-        "needs": "integrators that agree about the lowest margin",
-    }
+        return {"answer": "refuted"}
+    needs = "integrators that agree about the lowest margin"
+    return {"answer": "not shown yet", "needs": needs}
 
 
 def degradation(asked: Degradation, ground: Ground) -> Finding:
@@ -94,16 +90,14 @@ def degradation(asked: Degradation, ground: Ground) -> Finding:
         for factor, one in bounds.items()
     )
     together = "together" if asked.simultaneous else "each by itself"
-    claimed: dict[str, Any] = {}
-    if asked.limit is not None:
-        claim = f"a violation has at most probability {asked.limit:g} at the size {asked.at:g}"
-        claimed = {"claim": claim, **vars(bound_verdict(bounds[asked.at], asked.limit))}
+    limit = asked.limit
+    verdict = {} if limit is None else vars(bound_verdict(bounds[asked.at], limit))
     return made(
         asked,
         f"Violations with all deviations scaled: {told}. The bounds hold with confidence "
         f"{100 * asked.confidence:g} %, {together}. Assumed: "
         f"at each size {'; '.join(assumptions(independent(space, asked.runs, ground.seed)))}.",
-        **claimed,
+        **verdict,
         runs=sum(one.runs for one in found.statements),
         numbers={"confidence": asked.confidence, "simultaneous": asked.simultaneous},
         tables={"curve": found.table},
@@ -140,16 +134,15 @@ def radius(asked: Radius, ground: Ground) -> Finding:
 
 
 def _no_small_violation(limit: float | None, upper: float, largest: float) -> dict[str, str]:
-    """Return the claim about the smallest size with a violation, and the answer."""
+    """Return the answer to the claim about the smallest size with a violation."""
     if limit is None:
         return {}
-    claim = f"no violation is found below size {limit:g}"
     if upper < limit:
-        return {"claim": claim, "answer": "refuted"}
+        return {"answer": "refuted"}
     if min(upper, largest) >= limit:
-        return {"claim": claim, "answer": "shown"}
+        return {"answer": "shown"}
     needs = f"a search up to that size: this one ended at {largest:.4g}"
-    return {"claim": claim, "answer": "not shown yet", "needs": needs}
+    return {"answer": "not shown yet", "needs": needs}
 
 
 def failures(asked: Map, ground: Ground) -> Finding:
