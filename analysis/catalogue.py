@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import nlctl
+from nlctl import errors
 from nlctl.names import unknown
 
 GROUPS = ("plants", "actuators", "references", "controllers")
@@ -57,7 +57,7 @@ def block_summaries() -> dict[str, dict[str, str]]:
 
 def _records(group: str) -> dict[str, str]:
     """Return the public records of a module or of the modules of a package."""
-    folder = Path(nlctl.__file__).parent / group
+    folder = Path(errors.__file__).parent / group
     own = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
     found = dict(
         line

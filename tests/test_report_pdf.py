@@ -8,7 +8,7 @@ import time
 import pytest
 
 from analysis.report import browser, write_pdf
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
