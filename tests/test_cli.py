@@ -15,8 +15,8 @@ import pytest
 from command_line import nlctl, nlctl_here
 from rows import each_row
 
+from analysis.catalogue import block_records
 from analysis.cli.report import _other_process
-from nlctl._catalogue import block_records
 
 
 def refused(*arguments, cwd=None):
@@ -134,7 +134,7 @@ def test_diagram_is_drawn_in_each_format(suffix, tmp_path):
 def test_console_script_points_to_main():
     """pyproject's script is the function that these tests run."""
     text = (Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8")
-    assert 'nlctl = "analysis.cli.main:main"' in text
+    assert 'nlctl = "nlctl.__main__:main"' in text
 
 
 def fail_beside(tasks):

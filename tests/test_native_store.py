@@ -28,9 +28,10 @@ from numba.core.registry import cpu_target
 
 import nlctl
 from nlctl.native import CompileError
+from nlctl.native._called import TAUGHT
 from nlctl.native._integrators import integrator_key
-from nlctl.native._jitted import TAUGHT
 from nlctl.native.codegen import finish, store
+from nlctl.native.codegen.calls import Source
 from nlctl.native.codegen.fingerprint import function_key, module_key, program_key
 from nlctl.native.codegen.machine_code import SETTINGS, Wanted, kept, machine_code
 from nlctl.native.codegen.module import loaded
@@ -301,13 +302,13 @@ class TestMachineCode:
 
     def test_a_program_runs_from_its_own_source(self, folder):
         """Sources on disk are not looked at, and a traceback shows the line."""
-        program = nlctl.compile(ct.ss(-1, 1, 1, 0, name="lag")).program
+        program = Source(source="def rhs(t):\n    return np.sin(t[0])\n", names={}, taught=())
         folder.mkdir(mode=0o700)
         (folder / f"nlctl_program_{program_key(program)}.py").write_text("raise SystemExit")
-        module = loaded(program, program.functions)
+        module = loaded(program, {})
         assert module.__name__ in sys.modules
         with pytest.raises(TypeError) as caught:
-            module.rhs(0.0, None, None, None, None, None)
+            module.rhs(0.0)
         line = traceback.extract_tb(caught.value.__traceback__)[-1].line
         assert line
         assert line in program.source
@@ -428,12 +429,11 @@ class TestKeys:
         script = (
             "import hashlib, nlctl\n"
             "from nlctl.native._lower import lower\n"
-            "from nlctl.native.codegen.fingerprint import program_key\n"
             "for make in (nlctl.paper.example_1, nlctl.paper.example_2):\n"
             "    compiled = nlctl.compile(make())\n"
             "    lowered = lower(compiled.schedule, compiled.program)\n"
             "    text = hashlib.sha256(lowered.text.encode()).hexdigest()\n"
-            "    print(program_key(compiled.program), text)\n"
+            "    print(text, len(lowered.text))\n"
         )
         keys = [
             subprocess.run(
@@ -457,9 +457,7 @@ class TestKeys:
         made = source_text.run(f"def f(t, x, u, params):\n    return [x[0] {sign} u[0]]\n")
         system = ct.nlsys(made["f"], inputs=1, states=1, outputs=1, name="signed")
         base = ct.nlsys(lambda t, x, u, params: [x[0] * u[0]], inputs=1, states=1, name="signed")
-        assert program_key(nlctl.compile(system).program) != program_key(
-            nlctl.compile(base).program
-        )
+        assert nlctl.compile(system).lowered.text != nlctl.compile(base).lowered.text
 
 
 EDITS = {  # module -> what is edited there
@@ -484,7 +482,7 @@ def keys_of_copy(path, edits):
         module.write_text(source.replace(before, after), encoding="utf-8")
     script = (
         "import nlctl; from nlctl.native._integrators import integrator_key\n"
-        "from nlctl.native._jitted import TAUGHT\n"
+        "from nlctl.native._called import TAUGHT\n"
         "from nlctl.native.codegen.fingerprint import module_key\n"
         "print(nlctl.__file__, integrator_key(), module_key(*TAUGHT))"
     )
@@ -525,7 +523,7 @@ class TestSources:
     def test_an_edit_of_a_code_generator(self, tmp_path):
         """Machine code of programs: nothing in them names what generates it."""
         first = "from __future__ import annotations\n"
-        edits = {"_values.py": (first, f"{first}\nEDITED = True\n")}
+        edits = {"thirdparty/vectors.py": (first, f"{first}\nEDITED = True\n")}
         integrators, taught = keys_of_copy(tmp_path, edits)
         assert integrators == integrator_key()
         assert taught != module_key(*TAUGHT)

@@ -16,8 +16,9 @@ import numpy as np
 import user_functions
 
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 from nlctl.native._lower import lower
+from nlctl.native._lower_blocks import equations
 from nlctl.native._routine import plain_functions
 
 LANES = 20
@@ -141,23 +142,16 @@ class Plain:
         p = np.repeat(self.compiled.parameter_vector(params)[:, None], lanes, axis=1)
         sizes = (self.system.nstates, self.compiled.program.events, self.system.noutputs)
         dx, g, y = (np.full((n or 0, lanes), np.nan) for n in sizes)
-        if not lowered.holds_for(p):
-            self._one_by_one(at, p, dx, y)
-            return dx, y
+        if not lowered.holds_for(p):  # an integer has changed: the functions are read again
+            read = self.compiled.schedule
+            found = equations(read, self.compiled.program.layout, p[:, 0])
+            lowered = lower(read, self.compiled.program, lanes, found)
         prepare, rhs, out = plain_functions(lowered)
         c = np.full((lowered.size, lanes), np.nan)
         prepare(p, c)
         rhs(at.t.copy(), at.x.copy(), at.u.copy(), c, dx, g)
         out(at.t.copy(), at.x.copy(), at.u.copy(), c, y)
         return dx, y
-
-    def _one_by_one(self, at: Points, p: np.ndarray, dx: np.ndarray, y: np.ndarray) -> None:
-        rhs, out = self.compiled.interpreted
-        for lane in range(at.t.size):
-            one, two = np.full(len(dx), np.nan), np.full(len(y), np.nan)
-            rhs(*at.at(lane), p[:, lane].copy(), one, np.empty(self.compiled.program.events))
-            out(*at.at(lane), p[:, lane].copy(), two)
-            dx[:, lane], y[:, lane] = one, two
 
 
 def difference(plain: Plain, system: Any, at: Points, params: Any = None) -> str:

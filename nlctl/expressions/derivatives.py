@@ -58,8 +58,8 @@ class _Reader:
         if node.op == "leaf":
             return self.seed(node)
         parts = [self.known[arg] for arg in node.args]
-        if node.op == "call":
-            raise Untraceable(f"{node.data[0]} is opaque: it has no derivative")
+        if node.op in ("call", "solve"):
+            raise Untraceable(f"{node.data[0]} is no expression: it has no derivative")
         if all(part is None for part in parts) or node.op in COMPARISONS or node.op in LOGIC:
             return None
         if node.op in FUNCTIONS:

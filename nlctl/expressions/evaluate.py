@@ -57,8 +57,8 @@ def _value(node: Expr, parts: list[np.ndarray], arrays: Mapping[str, np.ndarray]
         return _joined(node, parts)
     if node.op == "sum":
         return parts[0].sum(axis=0)
-    if node.op == "call":
-        raise Untraceable(f"{node.data[0]} is opaque: it has no expressions")
+    if node.op in ("call", "solve"):
+        raise Untraceable(f"{node.data[0]} is no expression: it has no value by NumPy alone")
     return numpy_function(node.op)(*parts)
 
 

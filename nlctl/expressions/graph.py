@@ -44,11 +44,12 @@ class Expr:
     op : str
         ``"const"``, ``"table"`` (a vector of constants), ``"leaf"`` (read from an array),
         ``"item"``, ``"slice"``, ``"concat"``, ``"sum"``, ``"call"`` (of an opaque function),
+        ``"solve"`` (signals that depend on each other),
         an operation of `NUMPY`, or NumPy's name of a function.
     args : tuple of Expr
     data : object
         What else it needs: a constant, (array, start, step) of a leaf, index or (start, step) of
-        a part, lengths of what is joined, (function, lengths) of a call.
+        a part, lengths of what is joined, (function, lengths) of a call or of what is solved for.
     size : int or None
         Number of elements of a vector, None for a number.
     kind : str
@@ -178,7 +179,7 @@ class Graph:
             array, start, step = data
             ends = (start, start + step * ((size or 1) - 1))
             fits = all(0 <= i < self.lengths[array] for i in ends)
-        elif op in ("const", "table", "leaf", "call", "sum"):
+        elif op in ("const", "table", "leaf", "call", "solve", "sum"):
             fits = True
         else:
             fits = all(a.size in (None, size) for a in args)

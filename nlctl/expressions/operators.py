@@ -144,7 +144,7 @@ def _is_of_arrays(condition: Expr) -> bool:
     waiting = [condition]
     while waiting:
         expr = waiting.pop()
-        if expr.op == "call" or (expr.op == "leaf" and expr.data[0] in ("x", "u")):
+        if expr.op in ("call", "solve") or (expr.op == "leaf" and expr.data[0] in ("x", "u")):
             return True
         waiting.extend(expr.args)
     return False

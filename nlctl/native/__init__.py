@@ -3,9 +3,10 @@
 `compile` reads a diagram (`_schedule`, `_wiring`, `_feedthrough`).  The blocks' functions are run
 once on symbols (`_lower_blocks`), and what they compute is planned for one member or several
 (`_lower`); one generator writes LLVM IR from the plan, and its object code is kept on disk
-(`codegen`).  What cannot be traced is called as it stands, through source that numba compiles
-(`_code`, `_emit`); rings without a state in them are refused or solved in such source (`_tearing`,
-`_algebraic`).  `_machine` holds the functions that come out of it, `_routine` calls them.
+(`codegen`).  What cannot be traced is called as it stands, as numba compiles it or back in Python
+(`_called`); rings without a state in them are refused, or solved by Newton's method with the
+derivatives of their own expressions (`_tearing`, `_newton`).  `_program` says which arrays there
+are, `_machine` holds the functions that come out of it, `_routine` calls them.
 
 `_integrate` moves members side by side through time, each with its own steps: an explicit pair
 (`_tsit5`), a stiff method (`_rodas5p`, `_stiff`), decisions (`_control`), corners and memories
@@ -14,7 +15,7 @@ once on symbols (`_lower_blocks`), and what they compute is planned for one memb
 sampled systems.
 """
 
-from .._errors import CompileError
+from ..errors import CompileError
 from ._ahead import compile_ahead
 from ._compile import Compiled, compile  # noqa: A004 (what it does)
 from ._ensemble import Ensemble, ensemble_response

@@ -33,7 +33,7 @@ def compile_ahead(compiled: Compiled, *, ensemble: bool = False) -> None:
 def compile_for(compiled: Compiled, p: np.ndarray, width: int) -> None:
     """Make the machine code that runs with parameters `p` need, as `machine` takes them."""
     if ct.isctime(compiled.system):
-        machine(compiled, p, width)
+        machine(compiled, np.repeat(p[:, :1], width, axis=1), width)
     else:
         machine(compiled, p[:, :1], 1)
         compile_discrete()

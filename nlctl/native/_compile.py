@@ -13,16 +13,16 @@ import cloudpickle
 import control as ct
 import numpy as np
 
-from .._errors import CompileError, ParameterError, UsageError
-from .._names import unknown
-from .._run_arguments import checked_params
-from ._describe import described
-from ._emit import Program, emit
+from ..errors import CompileError, ParameterError, UsageError
+from ..names import unknown
+from ..responses.arguments import checked_params
+from ._describe import called, described
 from ._jacobians import Tangent, linearize, parameter_jacobian, tangent
 from ._lower import Lowered, lower
 from ._lower_blocks import Equations, equations
 from ._machine import evaluations
 from ._parameters import packed
+from ._program import Program, program
 from ._schedule import Schedule, schedule
 from .thirdparty.captured import changed
 from .thirdparty.checks import check_sizes
@@ -41,7 +41,7 @@ class Compiled:
     schedule : Schedule
         What was read from the diagram.
     program : Program
-        What was written for it.
+        The arrays that machine code takes and fills.
 
     Notes
     -----
@@ -56,7 +56,13 @@ class Compiled:
     def __reduce__(self) -> tuple[Any, ...]:
         # functions made at run time are pickled by value; machine code is found on disk again
         read = replace(self.schedule, captured=())  # modules' names stay where they are
-        return _restored, (cloudpickle.dumps((read, self.program)),)
+        try:
+            return _restored, (cloudpickle.dumps((read, self.program)),)
+        except Exception as error:  # pickle passes on whatever objects raise
+            raise UsageError(
+                f"'{self.system.name}' cannot be sent to another process, since a function of it "
+                f"reads what cannot be pickled ({error}): let it read numbers and arrays"
+            ) from error
 
     @property
     def system(self) -> Any:
@@ -65,11 +71,12 @@ class Compiled:
 
     @property
     def source(self) -> str:
-        """What runs for one member: LLVM IR, and the source of the functions that it calls.
+        """What runs for one member: LLVM IR, in which comments say what each value is.
 
-        Comments in it say what each value is.  With algebraic loops all is in that source.
+        Comments at its end name the functions that it calls as they stand, and why: in machine
+        code of numba, or back in Python.  Names of loops that are solved have their signals.
         """
-        return self.lowered.source
+        return "\n".join([self.lowered.text, *(f"; {line}" for line in called(self)), ""])
 
     @cached_property
     def lowered(self) -> Lowered:
@@ -77,17 +84,9 @@ class Compiled:
         return lower(self.schedule, self.program, 1, self.equations)
 
     @cached_property
-    def equations(self) -> Equations | None:
-        """What the blocks' functions compute as expressions; None where loops are solved."""
-        read = self.schedule
-        return None if read.loops else equations(read, self.program.layout)
-
-    @cached_property
-    def interpreted(self) -> tuple[Rhs, Rhs]:
-        """``(rhs, out)`` of `Program.source`, which calls the blocks, as plain Python."""
-        namespace = self.program.namespace(native=False)
-        exec(self.program.source, namespace)
-        return namespace["rhs"], namespace["out"]
+    def equations(self) -> Equations:
+        """What the blocks' functions compute as expressions."""
+        return equations(self.schedule, self.program.layout)
 
     @cached_property
     def native(self) -> tuple[Rhs, Rhs]:
@@ -209,7 +208,7 @@ class Compiled:
         return result
 
     def __repr__(self) -> str:
-        return described(self.schedule, self.program, self.parameter_vector())
+        return described(self)
 
 
 def compile(  # noqa: A001 (what it does)
@@ -243,8 +242,8 @@ def compile(  # noqa: A001 (what it does)
     AlgebraicLoopError
         If signals depend on each other without a state in between.
     CompileError
-        If a block cannot be compiled: at once where it is of a wrong kind or size, and when the
-        program is first used where numba refuses one of its functions.
+        If a block is of a wrong kind or size, a function depends on more than its arguments, or
+        an algebraic loop goes through a function that has no expressions.
 
     Notes
     -----
@@ -254,6 +253,10 @@ def compile(  # noqa: A001 (what it does)
 
     Functions are read before they are called.  One that remembers something outside of states,
     changes what it was given, draws random numbers, or has ``try ... except`` is refused.
+
+    A function that cannot be written out as expressions (it has a loop that the state ends, reads
+    a table of SciPy) is called as it stands: as machine code that numba makes of it, otherwise
+    back in Python, which is right and as slow as python-control.  ``print(compiled)`` says which.
     """
     if isinstance(system, ct.TransferFunction):
         system = ct.ss(system)
@@ -266,9 +269,9 @@ def compile(  # noqa: A001 (what it does)
     if algebraic_loops not in LOOPS:
         raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
     read = schedule(system, solve_loops=algebraic_loops == "solve")
-    program = emit(read)
+    arrays = program(read)
     check_sizes(system, [node.system for node in read.nodes])
-    made = Compiled(schedule=read, program=program)
+    made = Compiled(schedule=read, program=arrays)
     _ = made.equations  # what expressions would understand otherwise is refused now
     return made
 
@@ -281,5 +284,5 @@ def _short(value: Any) -> str:
 
 def _restored(content: bytes) -> Compiled:
     """Make a compiled diagram of what `Compiled.__reduce__` has written."""
-    read, program = pickle.loads(content)
-    return Compiled(schedule=read, program=program)
+    read, arrays = pickle.loads(content)
+    return Compiled(schedule=read, program=arrays)

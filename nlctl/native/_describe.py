@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
 
-from ._code import code
-from ._emit import Program
 from ._parameters import Slot
-from ._schedule import Node, Schedule
+from ._program import Program, corners, memory
+from ._schedule import Node, signal_name
+
+if TYPE_CHECKING:
+    from ._compile import Compiled
 
 SHOWN = 8  # names that are listed before the rest is only counted
 
 
-def described(schedule: Schedule, program: Program, p: np.ndarray) -> str:
+def described(compiled: Compiled) -> str:
     """Return what was compiled, block by block in the order of evaluation.
 
     Parameters
     ----------
-    schedule : Schedule
-    program : Program
-    p : ndarray
-        The parameter vector whose values are shown.
+    compiled : Compiled
     """
+    schedule, program, p = compiled.schedule, compiled.program, compiled.parameter_vector()
     system, nodes = schedule.system, schedule.nodes
     lines = [
         f"Compiled '{system.name}', {_timebase(system)}: {_count(len(nodes), 'block')}, "
@@ -34,17 +34,28 @@ def described(schedule: Schedule, program: Program, p: np.ndarray) -> str:
         f"  order        {' -> '.join(nodes[i].path for i in schedule.order)}",
     ]
     for loop in schedule.loops:
-        torn = ", ".join(
-            f"{nodes[s.block or 0].path}.{nodes[s.block or 0].system.output_labels[s.index]}"
-            for s in loop.torn
-        )
+        torn = ", ".join(signal_name(nodes, s) for s in loop.torn)
         lines.append(f"  solved for   {torn}")
+    lines += [f"  as it stands {line}" for line in called(compiled)]
     for i in dict.fromkeys(schedule.order):
         lines += [f"  {nodes[i].path}: {_kind(nodes[i])}"]
         lines += [
             f"    {name:<12} {text}" for name, text in _facts(i, nodes[i], program, p) if text
         ]
     return "\n".join(lines)
+
+
+def called(compiled: Compiled) -> Iterator[str]:
+    """Yield which functions are called as they stand, how, and why: a line each.
+
+    Which of the two ways it is, is known as soon as machine code has been made.
+    """
+    made = compiled.__dict__.get("_machines", ())
+    back = {name for each in made for name in each.called_back}
+    for name, call in compiled.equations.calls.items():
+        how = "called back in Python" if name in back else "in machine code of numba"
+        how = how if made else "as it stands"
+        yield f"{call.kind} of block '{call.block}', {how}: {call.reason}"
 
 
 def _timebase(system: Any) -> str:
@@ -62,14 +73,13 @@ def _kind(node: Node) -> str:
 
 
 def _facts(i: int, node: Node, program: Program, p: np.ndarray) -> Iterator[tuple[str, str]]:
-    own = code(i, node, program.layout[i])
     labels, first = node.system.state_labels, node.state_offset
     yield "states", _listed(labels)
     parameters = [f"{name} = {_value(slot, p)}" for name, slot in program.layout[i].items()]
     parameters += [f"{k} = {value!r} (fixed)" for k, value in program.fixed.get(i, {}).items()]
     yield "parameters", _listed(parameters)
-    yield "corners", str(own.corners) if own.corners else ""
-    yield "memory", _listed([labels[j - first] for j in own.memory])
+    yield "corners", str(corners(node) or "")
+    yield "memory", _listed([labels[j - first] for j in memory(node)])
 
 
 def _value(slot: Slot, p: np.ndarray) -> str:

@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any, Protocol
 import control as ct
 import numpy as np
 
-from .._errors import ParameterError
-from .._names import unknown
-from .._param import checked_times, whole_number
-from .._run_arguments import checked_params, input_array
+from ..errors import ParameterError
+from ..names import unknown
+from ..params import checked_times, whole_number
+from ..responses.arguments import checked_params, input_array
 from ._ahead import compile_for
 from ._compile import Compiled
 from ._compile import compile as compile_diagram
 from ._lane import RUNNING, STIFF, Status
-from ._machine import WIDTH
+from ._machine import WIDTH, fitting
 from ._members import Members, members
-from ._simulate import Settings, Trajectory, begin, finish, go_on, made, prepared, trajectory
+from ._simulate import Run, Settings, Trajectory, begin, finish, go_on, made, prepared, trajectory
 from .audit import Audit, Trial
 from .audit import audit as compare
 
@@ -225,17 +225,37 @@ def _group(
                 return
             yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings)
         return
-    with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
-        run = prepared(compiled, times, inputs, x0, p, settings)
-        begin(run)
-        while stop.wanted and np.any(run.lanes["status"] == RUNNING):
-            go_on(run)
-        outputs = finish(run)
+    found: dict[int, tuple[Run, np.ndarray]] = {}
+    while stop.wanted and (left := [j for j in range(len(numbers)) if j not in found]):
+        first = left[0]  # members whose integers steer the equations otherwise run apart
+        fits = np.roll(fitting(compiled, np.roll(p, -first, axis=1), WIDTH), first)
+        # others' places are taken by copies: what runs beside a member changes nothing
+        columns = np.where(fits, np.arange(WIDTH), first)
+        ran = _ran(compiled, times, inputs, (x0[:, columns], p[:, columns]), settings, stop)
+        found |= {int(j): ran for j in np.flatnonzero(fits)}
     for j in range(len(numbers) if stop.wanted else 0):
+        run, outputs = found[j]
         if run.lanes["status"][j] == STIFF:  # the stiff method is for single runs
             yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings)
         else:
             yield made(run, outputs, j)
+
+
+def _ran(
+    compiled: Compiled,
+    times: np.ndarray,
+    inputs: np.ndarray,
+    members: tuple[np.ndarray, np.ndarray],
+    settings: Settings,
+    stop: _Stop,
+) -> tuple[Run, np.ndarray]:
+    """Run as many members as there are lanes; return the run and its outputs."""
+    with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
+        run = prepared(compiled, times, inputs, *members, settings)
+        begin(run)
+        while stop.wanted and np.any(run.lanes["status"] == RUNNING):
+            go_on(run)
+        return run, finish(run)
 
 
 def _row(run: Trajectory, labels: Sequence[str], metrics: Sequence[MetricLike]) -> dict[str, Any]:

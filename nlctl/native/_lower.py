@@ -16,14 +16,15 @@ import numpy as np
 
 from ..expressions.arrays import Tracer
 from ..expressions.graph import Expr, needed
-from ._emit import Program
-from ._lower_blocks import Equations, equations, whole
+from ._lower_blocks import Equations, equations
 from ._parameters import length
+from ._program import Program
 from ._schedule import Schedule
-from .codegen.calls import Calls
+from .codegen.calls import Call
 from .codegen.ir.program import program_text
 from .codegen.plan import Function, Store, plan, split
 from .codegen.rewrite import rewritten
+from .codegen.solver import Solver
 
 ARGUMENTS = {
     "prepare": ("p", "c"),
@@ -45,8 +46,10 @@ class Lowered:
         `out` write to, so members that run at the same time need a `c` each.
     exact : frozenset of Expr
         Operations that are rounded one by one.
-    calls : Calls
-        Functions that are called as they stand.
+    calls : mapping
+        Functions that are called as they stand, by name.
+    solvers : mapping
+        Searches for the signals of algebraic loops, by name.
     rows : mapping
         Rows of every array.
     lanes : int
@@ -58,7 +61,8 @@ class Lowered:
 
     functions: Mapping[str, Function]
     exact: frozenset[Expr]
-    calls: Calls
+    calls: Mapping[str, Call]
+    solvers: Mapping[str, Solver]
     rows: Mapping[str, int]
     lanes: int
     assumed: Mapping[int, int]
@@ -75,18 +79,12 @@ class Lowered:
     @property
     def opaque(self) -> dict[str, str]:
         """Why a function is called and not written out, by its name."""
-        return {name: call.reason for name, call in self.calls.calls.items()}
+        return {name: call.reason for name, call in self.calls.items()}
 
     @cached_property
     def text(self) -> str:
         """The LLVM IR of its functions."""
-        return program_text(self.functions, self.lanes, self.exact)
-
-    @property
-    def source(self) -> str:
-        """All that runs: the IR, and the functions that it calls."""
-        called = self.calls.source if self.opaque else ""
-        return "\n".join([self.text, *(f"; {line}".rstrip() for line in called.splitlines()), ""])
+        return program_text(self.functions, self.lanes, self.exact, self.solvers.values())
 
     def holds_for(self, p: Any) -> bool:
         """Whether the program holds for parameters `p`, an array with a row per number."""
@@ -102,7 +100,7 @@ def lower(
     ----------
     schedule : Schedule
     program : Program
-        What was emitted for it.
+        Its arrays.
     lanes : int, optional
         Number of members.
     found : Equations, optional
@@ -113,7 +111,7 @@ def lower(
     Lowered
     """
     if found is None:
-        found = whole(schedule, program) if schedule.loops else equations(schedule, program.layout)
+        found = equations(schedule, program.layout)
     written = {
         name: [part for row, array in rows for part in _stores(name, row, array)]
         for name, rows in found.results.items()
@@ -127,13 +125,9 @@ def lower(
         "c": max(size, 1), "dx": system.nstates or 0, "g": program.events,
         "y": len(schedule.outputs),
     }  # fmt: skip
-    calls = Calls(
-        calls=found.calls, lanes=lanes, before=found.before, functions=program.functions,
-        constants=program.constants, records=program.records,
-    )  # fmt: skip
     return Lowered(
-        functions=functions, exact=exact, calls=calls if found.calls else Calls(lanes=lanes),
-        rows=rows, lanes=lanes, assumed=found.graph.assumptions,
+        functions=functions, exact=exact, calls=found.calls, solvers=found.solvers, rows=rows,
+        lanes=lanes, assumed=found.graph.assumptions,
     )  # fmt: skip
 
 

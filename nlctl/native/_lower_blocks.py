@@ -1,25 +1,29 @@
-"""A schedule as expressions: blocks traced, wired, and what cannot be traced called."""
+"""A schedule as expressions: blocks traced, wired, loops solved, what cannot be traced called."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field, replace
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any
 
 import control as ct
 import numpy as np
 
-from .._errors import CompileError
+from ..errors import CompileError
 from ..expressions.arrays import Tracer, boxed, concatenated, full, number, traced, vector
-from ..expressions.graph import SMALL, Ambiguous, Graph, Untraceable
+from ..expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable, needed
 from ..expressions.operators import elementwise
 from ..expressions.trace import trace
-from ._code import Code, code
-from ._emit import Program
+from ._called import call_of
+from ._newton import inside, solver
 from ._parameters import length
-from ._schedule import Combination, Node, Schedule, Signal
+from ._program import corners, memory
+from ._schedule import Combination, Loop, Node, Schedule, Signal, signal_name
 from ._trace_block import parameters, time
 from .codegen.calls import Call
+from .codegen.solver import Solver
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,17 +37,17 @@ class Equations:
         For ``"dx"``, ``"g"`` and ``"y"`` pairs of a row and the array that is to be written there.
     calls : dict
         Opaque functions by name.
-    before : str
-        Source that these need.
+    solvers : dict
+        Searches for the signals of algebraic loops, by name.
     """
 
     graph: Graph
     results: dict[str, list[tuple[int, Tracer]]]
     calls: dict[str, Call]
-    before: str = ""
+    solvers: dict[str, Solver]
 
 
-def equations(schedule: Schedule, layout: Any) -> Equations:
+def equations(schedule: Schedule, layout: Any, p: np.ndarray | None = None) -> Equations:
     """Write a schedule as expressions.
 
     Parameters
@@ -51,70 +55,49 @@ def equations(schedule: Schedule, layout: Any) -> Equations:
     schedule : Schedule
     layout : mapping
         Places of the parameters, as in `Program.layout`.
+    p : ndarray, optional
+        The parameter vector whose integers steer what is computed; by default those that the
+        blocks have now.
 
     Returns
     -------
     Equations
+
+    Raises
+    ------
+    CompileError
+        If a function means one thing in Python and another in expressions, or one in an algebraic
+        loop is opaque.
     """
     system = schedule.system
     sizes = {"t": 1, "x": system.nstates or 0, "u": system.ninputs or 0, "p": length(layout)}
-    reader = Reader(graph=Graph(sizes), layout=layout, blocks=schedule.nodes)
+    reader = Reader(graph=Graph(sizes), layout=layout, blocks=schedule.nodes, p=p)
     with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
-        for i, unknown in zip(schedule.order, schedule.unknown, strict=True):
-            reader.signals[i] = reader.outputs(i, unknown)
+        at = 0
+        for loop in schedule.loops:
+            reader.evaluate(schedule, range(at, loop.start))
+            reader.solve(schedule, loop)
+            at = loop.stop
+        reader.evaluate(schedule, range(at, len(schedule.order)))
         results = {
             "dx": [(n.state_offset, reader.derivatives(i)) for i, n in enumerate(schedule.nodes)],
             "g": _events(reader),
             "y": [(0, reader.wired(schedule.outputs))],
         }
-    return Equations(graph=reader.graph, results=results, calls=reader.calls)
-
-
-def whole(schedule: Schedule, program: Program) -> Equations:
-    """Return a program that is called as it stands: what cannot be written out as a whole.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    program : Program
-    """
-    system = schedule.system
-    n, size = system.nstates or 0, length(program.layout)
-    graph = Graph({"t": 1, "x": n, "u": system.ninputs or 0, "p": size})
-    given = [
-        time(graph).reshape(1),
-        *(vector(graph, name, 0, (graph.lengths[name],)) for name in "xup"),
-    ]
-    why = "it has algebraic loops to be solved" if schedule.loops else "an integer has changed"
-    calls = {}
-    found = []
-    for name, count, line in (
-        ("rhs", n + program.events, f"program_rhs(t, x, u, p, y[:{n}], y[{n}:])"),
-        ("out", len(schedule.outputs), "program_out(t, x, u, p, y)"),
-    ):
-        lengths = (*(g.size for g in given), count)
-        call = Call(name=f"{name}_of_one", lines=(line,), lengths=lengths, reason=why)
-        if count:
-            calls[call.name] = call
-        found.append(_results(graph, call, given))
-    dx, y = found
-    source = program.source.replace("def rhs(", "@equation\ndef program_rhs(")
+    if reader.solved:
+        results = {k: [(row, reader.known(a)) for row, a in v] for k, v in results.items()}
     return Equations(
-        graph=graph,
-        results={"dx": [(0, dx[:n])], "g": [(0, dx[n:])], "y": [(0, y)]},
-        calls=calls,
-        before=source.replace("def out(", "@equation\ndef program_out("),
+        graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers
     )
 
 
-def _results(graph: Graph, call: Call, given: Sequence[Tracer]) -> Tracer:
-    """Return what a call with these arguments results in."""
-    count = call.lengths[-1]
+def _results(graph: Graph, op: str, name: str, given: Sequence[Tracer], count: int) -> Tracer:
+    """Return what a call or a search with these arguments results in."""
     pieces = [piece for g in given for piece in g.pieces()]
     args, sizes = [e for e, _ in pieces], tuple(n for _, n in pieces)
     if not count:
-        return concatenated(graph, [given[0][:0]])
-    node = graph.node("call", *args, data=(call.name, sizes), size=count, varies=True)
+        return traced(graph, 0.0).reshape(1)[:0]
+    node = graph.node(op, *args, data=(name, sizes), size=count, varies=True)
     if count > SMALL:
         return Tracer(graph, boxed(node), 0, count)
     items = [number(graph, graph.item(node, k)).reshape(1) for k in range(count)]
@@ -123,28 +106,104 @@ def _results(graph: Graph, call: Call, given: Sequence[Tracer]) -> Tracer:
 
 def _events(reader: Reader) -> list[tuple[int, Tracer]]:
     """Return switching functions of all blocks, then what memories are committed to."""
-    blocks = [reader.code(i) for i in range(len(reader.blocks))]
-    corner, memory, found = 0, sum(own.corners for own in blocks), []
-    for i, own in enumerate(blocks):
-        if own.corners or own.memory:
+    counts = [(corners(node), len(memory(node))) for node in reader.blocks]
+    at, behind, found = 0, sum(count for count, _ in counts), []
+    for i, (own, committed) in enumerate(counts):
+        if own or committed:
             events = reader.events(i)
-            found += [(corner, events[: own.corners]), (memory, events[own.corners :])]
-            corner, memory = corner + own.corners, memory + len(own.memory)
+            found += [(at, events[:own]), (behind, events[own:])]
+            at, behind = at + own, behind + committed
     return found
+
+
+def _labels(blocks: Sequence[Node]) -> list[str]:
+    """Return what names begin with; numbers are added unless all are different."""
+    clean = [re.sub(r"\W|^(?=\d)", "_", node.path) for node in blocks]
+    same = len(set(clean)) < len(clean)
+    return [f"{name}_{i}" for i, name in enumerate(clean)] if same else clean
 
 
 @dataclass(kw_only=True)
 class Reader:
-    """Reads blocks one after the other; `signals` are the outputs of those that have been read."""
+    """Reads blocks one after the other.
+
+    Attributes
+    ----------
+    graph : Graph
+    layout : mapping
+    blocks : sequence of Node
+    p : ndarray or None
+        Values of integer parameters; None for those that the blocks have now.
+    signals : dict
+        Outputs of the blocks that have been read.
+    guesses : dict
+        What stands for signals that are being solved for.
+    solved : list of Tracer
+        Signals that have been.
+    calls, solvers : dict
+        By name.
+    """
 
     graph: Graph
     layout: Any
     blocks: Sequence[Node]
+    p: np.ndarray | None = None
     signals: dict[int, Tracer] = field(default_factory=dict)
+    guesses: dict[Signal, Tracer] = field(default_factory=dict)
+    solved: list[Tracer] = field(default_factory=list)
     calls: dict[str, Call] = field(default_factory=dict)
+    solvers: dict[str, Solver] = field(default_factory=dict)
 
-    def code(self, i: int) -> Code:
-        return code(i, self.blocks[i], self.layout[i])
+    def evaluate(self, schedule: Schedule, places: range) -> None:
+        """Read the outputs of blocks at some places of the order."""
+        for place in places:
+            i = schedule.order[place]
+            self.signals[i] = self.outputs(i, schedule.unknown[place])
+
+    def solve(self, schedule: Schedule, loop: Loop) -> None:
+        """Read the blocks of a loop: with guesses, and then with what these are solved for."""
+        name, places = f"loop{len(self.solvers)}", range(loop.start, loop.stop)
+        leaves = [self.graph.leaf(name, k, None) for k in range(len(loop.torn))]
+        self._guessed(schedule, places, loop.torn, [number(self.graph, leaf) for leaf in leaves])
+        found = [self.taken(signal, 1).reshape(-1)[0].only for signal in loop.torn]
+        try:
+            made, given = solver(name, leaves, found)
+        except Untraceable as error:
+            names = ", ".join(signal_name(self.blocks, signal) for signal in loop.torn)
+            why = _opaque(leaves, found, self.calls) or str(error)
+            raise CompileError(
+                f"the algebraic loop through {names} cannot be solved: {why}; put a state into it"
+            ) from error
+        self.solvers[name] = made
+        pieces = [Tracer(self.graph, boxed(e), 0, e.size) if e.size else
+                  number(self.graph, e).reshape(1) for e in given]  # fmt: skip
+        results = _results(self.graph, "solve", name, pieces, made.count)
+        self.solved.append(results)
+        self._guessed(schedule, places, loop.torn, [results[k] for k in range(made.count)])
+
+    def _guessed(
+        self, schedule: Schedule, places: range, torn: Sequence[Signal], values: Sequence[Tracer]
+    ) -> None:
+        self.guesses = dict(zip(torn, values, strict=True))
+        self.evaluate(schedule, places)
+        self.guesses = {}
+
+    def known(self, array: Tracer) -> Tracer:
+        """Return an array, NaN where a loop was not solved: blocks may turn NaN into numbers."""
+        pairs = [elementwise(self.graph, "eq", z, z) for found in self.solved for z in found]
+        is_known = reduce(lambda a, b: elementwise(self.graph, "and", a, b), pairs)
+        return elementwise(self.graph, "select", is_known, array, np.nan) if array.size else array
+
+    def taken(self, signal: Signal, count: int) -> Tracer:
+        """Return a block's output, or several from that on; of those that are guessed the guess."""
+        own = [Signal(signal.block, signal.index + k) for k in range(count)]
+        if not any(s in self.guesses for s in own):
+            return self.signals[signal.block or 0][signal.index : signal.index + count]
+        parts = [
+            self.guesses[s] if s in self.guesses else self.signals[s.block or 0][s.index]
+            for s in own
+        ]
+        return concatenated(self.graph, [part.reshape(1) for part in parts])
 
     def outputs(self, i: int, unknown: Collection[int]) -> Tracer:
         """Return a block's outputs; those that depend on unknown inputs are asked for again."""
@@ -174,11 +233,11 @@ class Reader:
         return self._function(i, "update", [system.updfcn], inputs, system.nstates)
 
     def events(self, i: int) -> Tracer:
-        own, spec = self.code(i), self.blocks[i].system.spec
-        used = [("corners", own.corners), ("commit", len(own.memory))]
+        node, spec = self.blocks[i], self.blocks[i].system.spec
+        used = [("corners", corners(node)), ("commit", len(memory(node)))]
         functions = [getattr(spec, name) for name, count in used if count]
-        inputs = self.wired(self.blocks[i].inputs)
-        return self._function(i, "events", functions, inputs, own.corners + len(own.memory))
+        inputs = self.wired(node.inputs)
+        return self._function(i, "events", functions, inputs, sum(count for _, count in used))
 
     def wired(self, combinations: Sequence[Combination | None]) -> Tracer:
         """Return linear combinations of signals, NaN for None; neighbours become vectors."""
@@ -199,7 +258,7 @@ class Reader:
             if signal.block is None:
                 part = vector(self.graph, "u", signal.index, (count,))
             else:
-                part = self.signals[signal.block][signal.index : signal.index + count]
+                part = self.taken(signal, count)
             if gain != -1.0:
                 part = elementwise(self.graph, "mul", gain, part)
             total = elementwise(self.graph, "sub" if gain == -1.0 else "add", total, part)
@@ -228,7 +287,7 @@ class Reader:
         node = self.blocks[i]
 
         def arguments() -> tuple[Any, ...]:
-            given = parameters(self.graph, node.system, self.layout[i])
+            given = parameters(self.graph, node.system, self.layout[i], self.p)
             return time(self.graph), self._states(node), inputs.copy(), given
 
         try:
@@ -237,7 +296,7 @@ class Reader:
             if found.size != count:
                 raise Untraceable(f"it returns {found.size} values, not {count}")
         except Untraceable as error:
-            return self._called(i, kind, inputs, count, str(error))
+            return self._called(i, kind, functions, inputs, count, str(error))
         except Ambiguous as error:
             raise CompileError(
                 f"block '{node.path}' cannot be compiled: its {kind} function {error}; "
@@ -245,16 +304,14 @@ class Reader:
             ) from None
         return found
 
-    def _called(self, i: int, kind: str, inputs: Tracer, count: int, reason: str) -> Tracer:
+    def _called(
+        self, i: int, kind: str, functions: list[Any], inputs: Tracer, count: int, reason: str
+    ) -> Tracer:
         """Return the results of an opaque call."""
         node, slots = self.blocks[i], self.layout[i]
-        if node.unbound:
-            raise CompileError(
-                f"block '{node.path}' cannot be compiled: its {kind} function reads "
-                f"'{node.unbound[0]}', which has no value on one of the ways there: give it one "
-                "before; the diagram still runs in python-control"
-            )
-        name = f"{self.code(i).name}_{kind}_of_one"
+        name = f"{_labels(self.blocks)[i]}_{kind}_of_one"
+        if name not in self.calls:
+            self.calls[name] = call_of(name, node, kind, functions, slots, count, reason)
         size = sum(s.size for s in slots.values())
         start = min((s.offset for s in slots.values()), default=0)
         given = [
@@ -263,10 +320,19 @@ class Reader:
             inputs,
             vector(self.graph, "p", start, (size,)),
         ]
-        lengths = (*(g.size for g in given), count)
-        lines = tuple(_lines_of_one(i, node, slots, start, kind, count))
-        self.calls[name] = Call(name=name, lines=lines, lengths=lengths, reason=reason)
-        return _results(self.graph, self.calls[name], given)
+        return _results(self.graph, "call", name, given, count)
+
+
+def _opaque(guesses: Sequence[Expr], found: Sequence[Expr], calls: Mapping[str, Call]) -> str:
+    """Return which opaque functions are in a loop, in words; nothing if there are none."""
+    nodes = inside(needed(found), guesses)
+    names = [n.data[0] for n in sorted(nodes, key=lambda n: n.index) if n.op == "call"]
+    used = [calls[name] for name in dict.fromkeys(names)]
+    return ", ".join(
+        f"the {call.kind} function of block '{call.block}' is called as it stands ({call.reason}) "
+        "and has no derivatives"
+        for call in used
+    )
 
 
 def _is_next(one: Combination | None, other: Combination | None) -> bool:
@@ -275,19 +341,3 @@ def _is_next(one: Combination | None, other: Combination | None) -> bool:
         return one is other
     shifted = {Signal(s.block, s.index + 1): gain for s, gain in one.items()}
     return bool(one) and shifted == other
-
-
-def _lines_of_one(i: int, node: Node, slots: Any, start: int, kind: str, count: int) -> list[str]:
-    """Return the source that evaluates one block alone, with its own t, x, u, p and y."""
-    inputs = tuple({Signal(None, j): 1.0} for j in range(len(node.inputs)))
-    alone = replace(node, state_offset=0, inputs=inputs)
-    own = code(i, alone, {k: replace(s, offset=s.offset - start) for k, s in slots.items()})
-    if kind == "output":
-        body = [*own.output_lines(), *(f"y[{k}] = y{i}[{k}]" for k in range(count))]
-    else:
-        lines = (
-            own.update_lines(ready=False) if kind == "update" else own.event_lines(0, own.corners)
-        )
-        target = "dx" if kind == "update" else "g"
-        body = [f"{target} = y", *lines]
-    return [*own.parameter_lines(), *body]

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._errors import CompileError
 from ._lower import Lowered, lower
-from ._lower_blocks import Equations, whole
-from ._routine import check, entry, lowered_code
-from .thirdparty.errors import explained
+from ._lower_blocks import equations
+from ._routine import called_back, check, entry, lowered_code
 
 if TYPE_CHECKING:
     from ._compile import Compiled
@@ -27,8 +25,8 @@ class Machine:
     Attributes
     ----------
     width : int
-    rows : int
-        Rows of the parameters that `rhs` and `out` take.
+    lowered : Lowered
+        The plan that they are made from.
     prepare : callable
         ``prepare(p, c)`` fills these from the program's parameter vectors.
     rhs, out : callable
@@ -36,10 +34,20 @@ class Machine:
     """
 
     width: int
-    rows: int
+    lowered: Lowered
     prepare: Callable[[np.ndarray, np.ndarray], None]
     rhs: Any
     out: Any
+
+    @property
+    def rows(self) -> int:
+        """Rows of the parameters that `rhs` and `out` take."""
+        return self.lowered.size
+
+    @property
+    def called_back(self) -> tuple[str, ...]:
+        """Names of functions that call back into Python."""
+        return called_back((self.rhs, self.out))
 
     @property
     def entries(self) -> tuple[Any, Any]:
@@ -54,30 +62,28 @@ class Machine:
 def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:
     """Return machine code that holds for parameter vectors `p` of shape (parameters, members).
 
-    The lowered program computes each expression once.  Where it does not hold, because an integer
-    that steers an equation has another value, the blocks' functions are called as they stand.
+    Where an integer that steers an equation has another value, the blocks' functions are read
+    once more.  The first member's values decide: `fitting` says for which members they hold.
     """
-    known: dict[Any, Any] = compiled.__dict__.setdefault("_machines", {})
-    if width not in known:
-        known[width] = _made(compiled, width, compiled.equations)
-    lowered, made = known[width]
-    if lowered.holds_for(p):
-        return made
-    if ("as it stands", width) not in known:
-        found = whole(compiled.schedule, compiled.program)
-        known["as it stands", width] = _made(compiled, width, found)
-    return known["as it stands", width][1]
+    known: list[Machine] = compiled.__dict__.setdefault("_machines", [])
+    for made in known:
+        if made.width == width and made.lowered.holds_for(p):
+            return made
+    found, schedule, program = compiled.equations, compiled.schedule, compiled.program
+    if not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
+        found = equations(schedule, program.layout, p[:, 0])
+    lowered = lower(schedule, program, width, found)
+    if not lowered.holds_for(p):
+        raise ValueError("members whose integers differ have no machine code in common")
+    prepare, rhs, out = lowered_code(lowered)
+    known.append(Machine(width=width, lowered=lowered, prepare=prepare, rhs=rhs, out=out))
+    return known[-1]
 
 
-def _made(compiled: Compiled, width: int, found: Equations | None) -> tuple[Lowered, Machine]:
-    lowered = lower(compiled.schedule, compiled.program, width, found)
-    try:
-        prepare, rhs, out = lowered_code(lowered)
-    except CompileError:
-        raise
-    except Exception as error:  # numba passes on whatever typing raises
-        raise explained(error, compiled.program) from error
-    return lowered, Machine(width=width, rows=lowered.size, prepare=prepare, rhs=rhs, out=out)
+def fitting(compiled: Compiled, p: np.ndarray, width: int) -> np.ndarray:
+    """Return for which members the machine code of the first one holds."""
+    made = machine(compiled, np.repeat(p[:, :1], width, axis=1), width)
+    return np.array([made.lowered.holds_for(column) for column in p.T], dtype=bool)
 
 
 def evaluations(compiled: Compiled) -> tuple[Callable[..., None], Callable[..., None]]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
 
-from .._block import Block
-from .._errors import UsageError
+from ..blocks import Block
+from ..errors import UsageError
 
 if TYPE_CHECKING:
     from ._schedule import Node
@@ -41,6 +41,10 @@ class Slot:
     def size(self) -> int:
         """How many entries of the vector it takes."""
         return math.prod(self.shape)
+
+    def moved(self, by: int) -> Slot:
+        """Return the same, `by` places later."""
+        return replace(self, offset=self.offset + by)
 
     @property
     def expression(self) -> str:

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 from numba.core import config
 
-from .._errors import UsageError
-from ._jitted import TAUGHT, jitted
 from ._lower import Lowered
-from .codegen.calls import FAILED, Call, Native
+from .codegen.calls import FAILED, Call, Native, native_calls, plain_calls
 from .codegen.finish import Loaded, finished
 from .codegen.interpret import interpreted
+from .codegen.solver import plain_solver
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,10 +38,7 @@ class Opaque:
         """Raise what the function has raised for one of the members, if it has."""
         at = self.row + self.call.failed
         for lane in np.flatnonzero(c[at] == FAILED)[:1]:
-            c[at] = 0.0
-            given = c[at + 1 : at + 1 + self.call.given, lane].copy()
-            self.native.raise_again(self.call.name, given, self.call.lengths[-1])
-            raise UsageError(f"a function of the diagram has failed ({self.call.name})")
+            raise self.native.error(self.call, c, self.row, int(lane))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +91,8 @@ Runnable = Callable[..., None]
 
 def plain_functions(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
     """Return ``prepare``, ``rhs`` and ``out`` of a program as plain Python."""
-    calls = lowered.calls.plain()
+    calls = plain_calls(lowered.calls)
+    calls |= {name: plain_solver(solver) for name, solver in lowered.solvers.items()}
     prepare, rhs, out = (interpreted(f, lowered.lanes, calls) for f in lowered.functions.values())
     return prepare, rhs, out
 
@@ -108,11 +105,11 @@ def lowered_code(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
     Raises
     ------
     CompileError
-        If a block's function is no plain function.
+        If the C library lacks a function.
     """
     if getattr(config, "DISABLE_JIT", False):
         return plain_functions(lowered)
-    native = lowered.calls.native(TAUGHT, jitted)
+    native = native_calls(lowered.calls, lowered.lanes)
     loaded = finished(lowered.text, lowered.functions, native.symbols, native.owners)
     prepare, rhs, out = (_routine(lowered, name, loaded, native) for name in lowered.functions)
     return prepare, rhs, out
@@ -121,7 +118,7 @@ def lowered_code(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
 def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Routine:
     function = lowered.functions[name]
     opaque = [
-        Opaque(call=lowered.calls.calls[node.data[0]], row=row, native=native)
+        Opaque(call=lowered.calls[node.data[0]], row=row, native=native)
         for node, (_, row) in function.plan.stored.items()
         if node.op == "call"
     ]
@@ -143,3 +140,10 @@ def check(functions: Sequence[Any], c: np.ndarray) -> None:
     for function in functions:
         if isinstance(function, Routine):
             function.check(c)
+
+
+def called_back(functions: Sequence[Any]) -> tuple[str, ...]:
+    """Return the names of opaque functions that these call back in Python."""
+    found = [each for f in functions if isinstance(f, Routine) for each in f.opaque]
+    names = [each.call.name for each in found if each.call.name in each.native.called_back]
+    return tuple(dict.fromkeys(names))

@@ -10,8 +10,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._errors import ParameterError
-from .._names import unknown
+from ..errors import ParameterError
+from ..names import unknown
 from ._compile import Compiled
 from ._discrete import simulate_discrete
 from ._integrators import integrators

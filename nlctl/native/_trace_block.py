@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._block import Block
+from ..blocks import Block
 from ..expressions.arrays import Tracer, number, vector
 from ..expressions.graph import Expr, Graph, Untraceable
 from ..expressions.operators import elementwise
@@ -20,10 +20,15 @@ def time(graph: Graph) -> Tracer:
     return number(graph, graph.leaf("t", 0, None))
 
 
-def parameters(graph: Graph, system: Any, slots: Mapping[str, Slot]) -> Any:
-    """Return the record or dict that a block's functions take, with arrays for the numbers."""
+def parameters(
+    graph: Graph, system: Any, slots: Mapping[str, Slot], p: np.ndarray | None = None
+) -> Any:
+    """Return the record or dict that a block's functions take, with arrays for the numbers.
+
+    Integers have the values that they have in the parameter vector `p`, or in the block now.
+    """
     values = {
-        name: _parameter(graph, slots[name], value) if name in slots else value
+        name: _parameter(graph, slots[name], value, p) if name in slots else value
         for name, value in current_values(system).items()
     }
     return type(system._current_params)(**values) if isinstance(system, Block) else values
@@ -36,9 +41,10 @@ def arguments(graph: Graph, system: Any, slots: Mapping[str, Slot]) -> tuple[Any
     return time(graph), x, u, parameters(graph, system, slots)
 
 
-def _parameter(graph: Graph, slot: Slot, value: Any) -> Tracer:
+def _parameter(graph: Graph, slot: Slot, value: Any, p: np.ndarray | None) -> Tracer:
     if slot.kind in "ib" and not slot.shape:  # Python's True is an integer, too
-        leaf = graph.leaf("p", slot.offset, None, kind="i", value=int(value))
+        now = int(value if p is None else p[slot.offset])
+        leaf = graph.leaf("p", slot.offset, None, kind="i", value=now)
         return number(graph, leaf)
     whole = vector(graph, "p", slot.offset, slot.shape)
     return elementwise(graph, "ne", whole, 0.0) if slot.kind == "b" else whole

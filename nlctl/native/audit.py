@@ -16,10 +16,10 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from .._errors import ParameterError, UsageError
+from ..errors import ParameterError, UsageError
 from ._compile import Compiled
-from ._emit import emit
 from ._lower import lower
+from ._lower_blocks import equations
 from ._machine import Machine, prepared_parameters
 from ._routine import lowered_code
 from ._schedule import Signal
@@ -176,12 +176,9 @@ def _rounded(t: float, trial: Trial) -> float:
 
 def _shaken(system: Any, point: Any, trial: Trial, base: Values) -> Values:
     """Return how far python-control's values move from `base` when all is rounded."""
-    t, x, u = point
-    rng = np.random.default_rng(0)
     moved = [np.zeros_like(values) for values in base]
-    for _ in range(4):
-        near = [v * (1 + SHAKEN * rng.choice([-1.0, 1.0], size=v.shape)) for v in (x, u)]
-        found = _by_python_control(system, (t + _rounded(t, trial), *near), trial.params)
+    for near in _near(point, trial):
+        found = _by_python_control(system, near, trial.params)
         for total, a, b in zip(moved, base, found, strict=True):
             np.maximum(total, np.abs(a - b), out=total)
     return moved[0], moved[1]
@@ -204,8 +201,9 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
         pairs += [(ours[0][own], block_rates, block.state_labels)] if block.nstates else []
         for a, function, labels in pairs if block.noutputs else pairs[1:]:
             b = function(block, t, x[own], inputs)
-            near = t + _rounded(t, trial), x[own] * (1 + SHAKEN), inputs * (1 - SHAKEN)
-            moved = np.abs(function(block, *near) - b)
+            moved = np.zeros_like(b)
+            for near in _near((t, x[own], inputs), trial):
+                np.maximum(moved, np.abs(function(block, *near) - b), out=moved)
             wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
             if wrong.size:
                 raise _difference(labels[wrong[0]], node.path, (a[wrong[0]], b[wrong[0]]), t)
@@ -219,11 +217,8 @@ def _signals(compiled: Compiled, trial: Trial, point: Any) -> np.ndarray:
     schedule = replace(compiled.schedule, outputs=every)
     t, x, u = point
     y = np.empty((len(every), 1))
-    if schedule.loops:
-        _, out = Compiled(schedule=schedule, program=emit(schedule)).interpreted
-        out(t, x, u, trial.p, y[:, 0])
-        return y[:, 0]
-    lowered = lower(schedule, compiled.program, 1)
+    found = equations(schedule, compiled.program.layout, trial.p)
+    lowered = lower(schedule, compiled.program, 1, found)
     prepare, _, out = lowered_code(lowered)
     c = np.zeros((lowered.size, 1))
     prepare(np.ascontiguousarray(trial.p[:, None]), c)

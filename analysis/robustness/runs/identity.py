@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl import _errors
-from nlctl.native import Compiled
+from nlctl import errors
 
 from ...metrics import Metric
 from ..uncertainty.design import Design
@@ -28,10 +27,10 @@ __all__ = ["differences_of", "experiment_facts", "identity_of", "labels_text", "
 
 VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
 COMPUTING = {
-    Path(_errors.__file__).parent: ("**/*.py",),
+    Path(errors.__file__).parent: ("**/*.py",),
     Path(__file__).parents[2]: ("robustness/**/*.py", "studies/**/*.py", "metrics.py"),
 }
-TOLD = ("_layout", "drawing", "page")  # they compute nothing
+TOLD = ("drawing", "page")  # they compute nothing
 PROBES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])
 
 
@@ -88,17 +87,10 @@ def experiment_facts(prepared: Prepared, space: Space | None = None) -> dict[str
             **{k: getattr(experiment, k) for k in ("rtol", "atol", "max_steps", "method")},
         },
         "diagrams": {
-            labels_text(labels): {"program": _program(loop), **loop_facts(loop.system)}
-            for labels, loop in prepared.loops
+            labels_text(labels): loop_facts(loop.system) for labels, loop in prepared.loops
         },
         "versions": versions(),
     }
-
-
-def _program(loop: Compiled) -> str:
-    """Return a key of the program that was written for a diagram."""
-    parts = loop.program.namespace(native=True)
-    return short_key(loop.program.source, *((name, parts[name]) for name in sorted(parts)))
 
 
 def labels_text(labels: Mapping[str, str]) -> str:

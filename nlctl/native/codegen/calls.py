@@ -1,12 +1,15 @@
 """Opaque functions of a program: called as they stand, for one member at a time.
 
 A call has its arguments in memory, in rows of `c`; its results follow.  Machine code calls a C
-function that numba makes.  An exception cannot pass through that: it is noted in the row behind
-the results, with the arguments behind it, and raised anew by whoever ends the evaluation.
+function: one that numba makes, or, where numba refuses, one that calls back into Python, which is
+slow and right.  An exception cannot pass through machine code: it is noted in the row behind the
+results, with the arguments behind it, and raised by whoever ends the evaluation.  Until then the
+function is not called again for that member.
 """
 
 from __future__ import annotations
 
+import ctypes
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,13 +20,29 @@ import numpy as np
 from numba import carray  # pyright: ignore[reportPrivateImportUsage]
 from numba.core.errors import NumbaWarning
 
-from ..._equation import equation
+from ...equations import equation
+from ...errors import UsageError
 from .fingerprint import module_key
-from .machine_code import Wanted, address_of, machine_code
+from .machine_code import Wanted, address_of, machine_code_if_taken
 from .module import loaded
 
 ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)
+CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
+OPTIONS = {"error_model": "numpy", "nogil": True, "no_cpython_wrapper": True}
 FAILED = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """Source for numba, what it refers to by name, and the modules that teach numba."""
+
+    source: str
+    names: Mapping[str, Any]
+    taught: tuple[Any, ...]
+
+    def namespace(self, *, native: bool) -> dict[str, Any]:
+        """Return everything that the source refers to, by name."""
+        return {"np": np, "carray": carray, "equation": equation, **self.names}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,18 +52,26 @@ class Call:
     Attributes
     ----------
     name : str
-    lines : tuple of str
-        Its source in terms of t, x, u and p of its block alone, which fills y.
+    block, kind : str
+        Whose function it is, and which one.
     lengths : tuple of int
         Sizes of t, x, u, p and y.
     reason : str
         Why it could not be traced.
+    function : callable
+        It in Python: takes t, x, u and p in one array, returns y.
+    source : callable or None
+        Makes the `Source` of ``name(given, y)`` for numba; None where numba would understand it
+        in another way.
     """
 
     name: str
-    lines: tuple[str, ...]
+    block: str
+    kind: str
     lengths: tuple[int, ...]
     reason: str
+    function: Callable[[np.ndarray], np.ndarray]
+    source: Callable[[], Source] | None
 
     @property
     def given(self) -> int:
@@ -56,104 +83,132 @@ class Call:
         """Row in which it says that it has failed, counted from its first."""
         return sum(self.lengths)
 
+    @property
+    def rows(self) -> int:
+        """Rows that it takes: arguments, results, whether it has failed, and with what."""
+        return self.failed + 1 + self.given
+
+    def of_column(self, column: np.ndarray) -> None:
+        """Read its arguments from its rows for one member, and write its results there."""
+        column[self.given : self.failed] = self.function(column[: self.given].copy())
+
 
 @dataclass(frozen=True, kw_only=True)
-class Calls:
-    """All opaque functions of a program, as source, and what that refers to.
+class Native:
+    """C functions of opaque functions.
 
     Attributes
+    ----------
+    symbols : mapping
+        Addresses by name.
+    owners : tuple
+        What these belong to.
+    called_back : tuple of str
+        Names of those that call back into Python.
+    raised : dict
+        What functions in Python have raised, by the place of their rows and the member.
+    """
+
+    symbols: Mapping[str, int] = field(default_factory=dict)
+    owners: tuple[Any, ...] = ()
+    called_back: tuple[str, ...] = ()
+    raised: dict[tuple[int, int], BaseException] = field(default_factory=dict)
+
+    def error(self, call: Call, c: np.ndarray, row: int, lane: int) -> BaseException:
+        """Return what a call has raised that failed; it is forgotten here."""
+        column = c[row : row + call.rows, lane]
+        column[call.failed] = 0.0
+        known = self.raised.pop((_place(c.ctypes.data, row, c.shape[1]), lane), None)
+        if known is not None:
+            return known
+        try:  # machine code knows no exceptions: Python says which one it is
+            call.function(column[call.failed + 1 :].copy())
+        except Exception as error:
+            return error
+        return UsageError(
+            f"the {call.kind} function of block '{call.block}' fails in machine code and does not "
+            "in Python: run it with engine='python-control'"
+        )
+
+
+def plain_calls(calls: Mapping[str, Call]) -> dict[str, Callable[[np.ndarray, int, int], None]]:
+    """Return calls as plain Python, called with c, a row and a member."""
+    return {name: _plain(call) for name, call in calls.items()}
+
+
+def _plain(call: Call) -> Callable[[np.ndarray, int, int], None]:
+    return lambda c, row, lane: call.of_column(c[row : row + call.rows, lane])
+
+
+def native_calls(calls: Mapping[str, Call], lanes: int) -> Native:
+    """Return calls as C functions.
+
+    Parameters
     ----------
     calls : mapping
         By name.
     lanes : int
         Number of members.
-    before : str
-        Source that they need.
-    functions, constants, records : mapping
-        As in `Program`.
     """
-
-    calls: Mapping[str, Call] = field(default_factory=dict)
-    lanes: int = 1
-    before: str = ""
-    functions: Mapping[str, Any] = field(default_factory=dict)
-    constants: Mapping[str, Any] = field(default_factory=dict)
-    records: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def source(self) -> str:
-        """Source of ``name(given, y)``, and of ``at_name(c, at, lane)`` for machine code."""
-        lines = [*self.before.splitlines()]
-        for call in self.calls.values():
-            lines += ["", "", "@equation", f"def {call.name}(given, y):  # {call.reason}"]
-            lines += [f"    {line}" for line in (*_unpacked(call), *call.lines)]
-            lines += ["", "", *_of_member(call, self.lanes)]
-        return "\n".join([*lines, ""])
-
-    def namespace(self, *, native: bool) -> dict[str, Any]:
-        """Return everything that the source refers to, by name."""
-        records = {name: pair[native] for name, pair in self.records.items()}
-        own = {"np": np, "carray": carray, "equation": equation}
-        return {**own, **self.constants, **self.functions, **records}
-
-    def plain(self) -> dict[str, Callable[[np.ndarray, int, int], None]]:
-        """Return them as plain Python, called with c, a row and a member."""
-        namespace = self.namespace(native=False)
-        exec(self.source, namespace)
-        return {name: _plain(call, namespace[name]) for name, call in self.calls.items()}
-
-    def native(self, taught: tuple[Any, ...], jitted: Callable[[Any], Any]) -> Native:
-        """Return them as machine code.
-
-        Parameters
-        ----------
-        taught : tuple of modules
-            What numba was taught, and these may use.
-        jitted : callable
-            What makes a block's function callable from machine code.
-
-        Raises
-        ------
-        numba.core.errors.NumbaError
-            If one cannot be compiled.
-        """
-        if not self.calls:
-            return Native(symbols={}, owners=(), module=None)
-        module = loaded(self, {name: jitted(f) for name, f in self.functions.items()})
-        options = {"error_model": "numpy", "nogil": True, "no_cpython_wrapper": True}
-        wanted = [
-            Wanted(function=getattr(module, f"at_{name}"), signature=ADDRESS, options=options)
-            for name in self.calls
-        ]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NumbaWarning)  # of what the user need not know
-            made = machine_code(f"{module.__name__} {module_key(*taught)}", wanted)
-        symbols = {
-            name: address_of(code, ADDRESS) for name, code in zip(self.calls, made, strict=True)
-        }
-        return Native(symbols=symbols, owners=tuple(made), module=module)
+    symbols, owners, called_back = {}, [], []
+    raised: dict[tuple[int, int], BaseException] = {}
+    for name, call in calls.items():
+        code = _by_numba(call, lanes)
+        if code is not None:
+            symbols[name] = address_of(code, ADDRESS)
+        else:
+            code = CALLBACK(_back(call, lanes, raised))
+            symbols[name] = ctypes.cast(code, ctypes.c_void_p).value or 0
+            called_back.append(name)
+        owners.append(code)
+    return Native(
+        symbols=symbols, owners=tuple(owners), called_back=tuple(called_back), raised=raised
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Native:
-    """Addresses of opaque functions, what they belong to, and the module of their source."""
-
-    symbols: Mapping[str, int]
-    owners: tuple[Any, ...]
-    module: Any
-
-    def raise_again(self, name: str, given: np.ndarray, count: int) -> None:
-        """Call a function with the arguments with which it has failed."""
-        function = numba.njit(error_model="numpy", nogil=True)(getattr(self.module, name))
-        function(given, np.empty(count))
+def _place(address: int, row: int, lanes: int) -> int:
+    return address + 8 * row * lanes
 
 
-def _unpacked(call: Call) -> list[str]:
-    _, x, u, p, _ = np.cumsum(call.lengths)
-    return [
-        "t = given[0]",
-        f"x, u, p = given[1:{x}], given[{x}:{u}], given[{u}:{p}]",
-    ]
+def _back(call: Call, lanes: int, raised: dict[Any, BaseException]) -> Callable[..., None]:
+    """Return what machine code calls: nothing may be raised in it."""
+    memory, shape = ctypes.c_double * (call.rows * lanes), (call.rows, lanes)
+
+    def at(c: int, row: int, lane: int) -> None:
+        place = _place(c, row, lanes)
+        column = np.ctypeslib.as_array(memory.from_address(place)).reshape(shape)[:, lane]
+        results = slice(call.given, call.failed)
+        try:
+            if column[call.failed] == FAILED:
+                column[results] = np.nan
+            else:
+                call.of_column(column)
+        except BaseException as error:  # Ctrl-C too
+            column[results] = np.nan
+            column[call.failed] = FAILED
+            raised[place, lane] = error
+
+    return at
+
+
+def _by_numba(call: Call, lanes: int) -> Any:
+    """Return a call as compiled by numba, None if numba refuses it."""
+    if call.source is None:
+        return None
+    try:
+        known = call.source()
+    except (UsageError, TypeError, ValueError):
+        return None
+    own = Source(
+        source="\n".join(["@equation", known.source, "", *_of_member(call, lanes), ""]),
+        names=known.names,
+        taught=known.taught,
+    )
+    module = loaded(own, {})
+    wanted = Wanted(function=getattr(module, f"at_{call.name}"), signature=ADDRESS, options=OPTIONS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NumbaWarning)  # of what the user need not know
+        return machine_code_if_taken(f"{module.__name__} {module_key(*known.taught)}", wanted)
 
 
 def _of_member(call: Call, lanes: int) -> list[str]:
@@ -161,8 +216,12 @@ def _of_member(call: Call, lanes: int) -> list[str]:
     given, count, failed = call.given, call.lengths[-1], call.failed
     return f"""\
 def at_{call.name}(c, at, lane):
-    table = carray(c, (at + {failed + 1 + given}, {lanes}))
+    table = carray(c, (at + {call.rows}, {lanes}))
     given, y = np.empty({given}), np.empty({count})
+    if table[at + {failed}, lane] == {FAILED}:
+        for i in range({count}):
+            table[at + {given} + i, lane] = np.nan
+        return
     for i in range({given}):
         given[i] = table[at + i, lane]
     try:
@@ -174,12 +233,3 @@ def at_{call.name}(c, at, lane):
             table[at + {failed + 1} + i, lane] = given[i]
     for i in range({count}):
         table[at + {given} + i, lane] = y[i]""".splitlines()
-
-
-def _plain(call: Call, function: Callable[[np.ndarray, np.ndarray], None]) -> Any:
-    def at(c: np.ndarray, row: int, lane: int) -> None:
-        y = np.full(call.lengths[-1], np.nan)
-        function(c[row : row + call.given, lane].copy(), y)
-        c[row + call.given : row + call.failed, lane] = y
-
-    return at

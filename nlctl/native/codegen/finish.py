@@ -24,7 +24,7 @@ from typing import Any
 import llvmlite
 import llvmlite.binding as llvm
 
-from ..._errors import CompileError
+from ...errors import CompileError
 from . import store
 
 PASSES = (

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...expressions.graph import Expr, numpy_function
-from .plan import Function, LoopOfLevel, Plan
+from .plan import CALLS, Function, LoopOfLevel, Plan
 
 Opaque = Callable[[np.ndarray, int, int], None]  # of c, a row of it, and the member
 
@@ -27,7 +27,7 @@ def interpreted(function: Function, lanes: int, calls: Mapping[str, Opaque]) -> 
     lanes : int
         Number of members.
     calls : mapping
-        Opaque functions by name.
+        Opaque functions and searches, by name.
     """
 
     def run(*arrays: np.ndarray) -> None:
@@ -58,7 +58,7 @@ class _Run:
                 self._loop(loop)
 
     def _number(self, node: Expr) -> None:
-        if node.op == "call" and node not in self.plan.known:
+        if node.op in CALLS and node not in self.plan.known:
             _, row = self.plan.stored[node]
             for lane in range(self.lanes):
                 self.calls[node.data[0]](self.memory["c"], row, lane)

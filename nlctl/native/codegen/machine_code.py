@@ -33,6 +33,7 @@ from numba.core import config
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
 
 from . import store
@@ -87,6 +88,27 @@ def machine_code(key: str, wanted: Sequence[Wanted]) -> list[Any]:
     if any(cache.is_new for cache in caches):
         _write(key, [cache.data for cache in caches])
     return made
+
+
+def machine_code_if_taken(key: str, wanted: Wanted) -> Any:
+    """Return a function as machine code, None if numba refuses it; that is kept as well.
+
+    Parameters
+    ----------
+    key : str
+        As in `machine_code`.
+    wanted : Wanted
+    """
+    refused = _full_key(key, "refused", str(wanted.signature), wanted.options)
+    if store.read(refused) is not None:
+        return None
+    try:
+        return machine_code(key, [wanted])[0]
+    except NumbaError:
+        store.write(refused, b"refused")
+    except Exception:  # numba passes on whatever typing raises
+        pass
+    return None
 
 
 def _compiled(wanted: Wanted, cache: NullCache) -> Any:

@@ -15,7 +15,8 @@ from functools import cached_property
 from ...expressions.graph import Expr, needed
 
 Loop = tuple[int, int]  # level and length
-STORED = ("concat", "call")  # vectors that are made in memory
+CALLS = ("call", "solve")  # their arguments lie in memory, in front of their results
+STORED = ("concat", *CALLS)  # vectors that are made in memory
 READ = (*STORED, "leaf", "table", "item", "slice")  # what a loop reads and does not compute
 
 
@@ -68,7 +69,7 @@ class Plan:
                 inner.setdefault((self.level[store.expr], store.size), []).append(store)
         numbers: dict[int, list[Expr]] = {}
         for node in self.nodes:
-            called = node.op == "call" and node not in self.known
+            called = node.op in CALLS and node not in self.known
             if (node.size is None and not self.summed(node)) or called:
                 numbers.setdefault(self.level[node], []).append(node)
         loops: dict[int, list[LoopOfLevel]] = {}
@@ -109,7 +110,7 @@ class Plan:
         """Return where the elements of a vector in memory are: array, first row, distance."""
         if vector in self.stored:
             array, row = self.stored[vector]
-            return array, row + (sum(vector.data[1]) if vector.op == "call" else 0), 1
+            return array, row + (sum(vector.data[1]) if vector.op in CALLS else 0), 1
         if vector.op == "slice":
             array, row, step = self.elements(vector.args[0])
             return array, row + step * vector.data[0], step * vector.data[1]
@@ -127,7 +128,7 @@ class LoopOfLevel:
 
 @dataclass(frozen=True, kw_only=True)
 class Level:
-    """Numbers (and calls of opaque functions), then loops, whose sums are numbers afterwards."""
+    """Numbers (and calls, and searches), then loops, whose sums are numbers afterwards."""
 
     numbers: tuple[Expr, ...]
     loops: tuple[LoopOfLevel, ...]
@@ -218,10 +219,10 @@ def plan(wanted: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int)
 def _rows(node: Expr) -> int:
     """Rows in memory: a call has its arguments there as well, before its results.
 
-    Behind these are whether it has failed, and with which arguments.
+    Behind these are whether an opaque function has failed, and with which arguments.
     """
-    size = node.size or 1
-    return size + 1 + 2 * sum(node.data[1]) if node.op == "call" else size
+    given = sum(node.data[1]) if node.op in CALLS else 0
+    return (node.size or 1) + given + (1 + given if node.op == "call" else 0)
 
 
 def _in_memory(nodes: Sequence[Expr], known: Collection[Expr]) -> list[Expr]:
@@ -230,7 +231,7 @@ def _in_memory(nodes: Sequence[Expr], known: Collection[Expr]) -> list[Expr]:
     for node in nodes:
         if node in known:
             continue
-        if node.op == "call":
+        if node.op in CALLS:
             found[node] = None
         for arg in node.args:
             apart = node.op in ("item", "slice") or (arg.op in STORED and node.op not in STORED)
@@ -245,8 +246,8 @@ def _levels(nodes: Sequence[Expr], known: Collection[Expr]) -> dict[Expr, int]:
     for node in nodes:
         level[node] = 0
         for arg in node.args if node not in known else ():
-            ready = arg in known or arg.op == "call" or arg.size is None
-            copied = node.op == "call" and arg.size is not None
+            ready = arg in known or arg.op in CALLS or arg.size is None
+            copied = node.op in CALLS and arg.size is not None
             waits = copied or (node.op in ("item", "slice") and not ready)
             joined = arg.op == "concat" and node.op not in STORED and not waits
             later = (node.op == "sum") + waits + joined
@@ -263,10 +264,10 @@ def _written(
     """Return all stores: what lies in memory must get there."""
     inner = []
     for node, (array, row) in stored.items():
-        if node not in known and node.op != "call":
+        if node not in known and node.op not in CALLS:
             inner += split(Store(array=array, row=row, expr=node, size=node.size or 1), known)
     for node in nodes:
-        if node.op == "call" and node in stored:
+        if node.op in CALLS and node in stored:
             row = stored[node][1]
             for arg, size in zip(node.args, node.data[1], strict=True):
                 inner += split(Store(array="c", row=row, expr=arg, size=size), known)

@@ -13,7 +13,7 @@ import functools
 import operator
 import weakref
 from collections import namedtuple
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from types import FunctionType
 from typing import Any
 
@@ -22,26 +22,13 @@ import numpy as np
 from numba import types
 from numba.extending import overload, overload_method, register_jitable
 
-from ..._errors import UsageError
+from ...errors import UsageError
 from .source import Unreadable, definition
 from .values import python_function
 
 RECORDS = (types.NamedTuple, types.NamedUniTuple)
 FILLER = "no_parameters"  # numba cannot call methods of a record without fields
 _LIBRARIES = ("numpy", "scipy", "numba")  # numba has its own versions of their functions
-
-
-def params_dict(names: Sequence[str]) -> Callable[..., dict[str, Any]]:
-    """Return a function that makes a parameter dict of values, for plain Python."""
-    return functools.partial(_named, tuple(names)) if names else _no_parameters
-
-
-def _no_parameters(*_: Any) -> dict[str, Any]:
-    return {}
-
-
-def _named(names: tuple[str, ...], *values: Any) -> dict[str, Any]:
-    return dict(zip(names, values, strict=True))
 
 
 def params_record(path: str, names: Sequence[str]) -> type:

@@ -42,6 +42,14 @@ WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis
            "insort_left", "insort_right"}  # fmt: skip
 IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
             "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
+# functions that draw random numbers inside, read or write files, or change settings for everybody
+OTHERS = {"differential_evolution": DRAW, "basinhopping": DRAW, "dual_annealing": DRAW,
+          "eigs": DRAW, "eigsh": DRAW, "svds": DRAW, "lobpcg": DRAW, "kmeans": DRAW,
+          "kmeans2": DRAW, "estimate_rank": DRAW, "interp_decomp": DRAW}  # fmt: skip
+OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoptions"), MEMORY)
+OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt", "loads",
+                         "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
+                        "read files before the run, and write them after it")  # fmt: skip
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
@@ -220,6 +228,8 @@ def _library(
     name = getattr(thing, "__name__", "")
     if module.startswith(VARYING):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
+    if name in OTHERS:
+        raise Impure(f"calls {module}.{name}, which is more than its result", OTHERS[name])
     _call_functions(walk, [*given, *named.values()])
     for value in (*given, *named.values()):
         if not callable(value.known):

@@ -7,7 +7,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..._param import as_numbers
+from ...params import as_numbers
 from .checks import check_functions
 
 __all__ = ["sized"]

@@ -6,7 +6,7 @@ from collections import Counter
 from typing import Any
 
 from ....expressions.graph import COMPARISONS, LOGIC, Expr
-from ..plan import Plan
+from ..plan import CALLS, Plan
 from .functions import CALLED, applied, sin_cos
 from .memory import load, place, store
 from .text import Body, Value, constant
@@ -45,7 +45,7 @@ class Writer:
 
     def number(self, node: Expr) -> None:
         """Compute or read a number, and write it where it is to lie."""
-        if node.op == "call" and node not in self.plan.known:
+        if node.op in CALLS and node not in self.plan.known:
             self._call(node)
             return
         if node not in self.names:
@@ -65,9 +65,10 @@ class Writer:
             store(self.b, value, place(self.b, array, row * self.lanes))
 
     def _call(self, node: Expr) -> None:
-        """Call an opaque function, member by member; arguments and results are in memory."""
+        """Call a function member by member; arguments and results are in memory."""
         name, _ = node.data
-        self.b.module.declared[f"declare void @{name}(ptr, i64, i64)"] = None
+        if node.op == "call":
+            self.b.module.declared[f"declare void @{name}(ptr, i64, i64)"] = None
         _, row = self.plan.stored[node]
         for lane in range(self.lanes):
             self.b.write(f"call void @{name}(ptr %c, i64 {row}, i64 {lane})")

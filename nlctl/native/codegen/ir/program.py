@@ -9,16 +9,24 @@ No two arrays overlap.  Each has a row per number and an entry per member in eac
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from ....expressions.graph import Expr
 from ..plan import Function
+from ..solver import Solver, solver_text
 from .loops import written
 from .numbers import Writer
 from .text import Body, Module
 
+COPY = "declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"
 
-def program_text(functions: Mapping[str, Function], lanes: int, exact: Collection[Expr]) -> str:
+
+def program_text(
+    functions: Mapping[str, Function],
+    lanes: int,
+    exact: Collection[Expr],
+    solvers: Iterable[Solver] = (),
+) -> str:
     """Return the IR of some functions.
 
     Parameters
@@ -30,18 +38,26 @@ def program_text(functions: Mapping[str, Function], lanes: int, exact: Collectio
         one: with several a call costs nothing, and there would be much more to compile.
     exact : collection of Expr
         Operations that are rounded one by one; of others a product and a sum may be one.
+    solvers : iterable of Solver
+        Searches that they call.
     """
     module = Module(inlined=lanes == 1)
     texts = [_function(module, name, f, lanes, exact) for name, f in functions.items()]
+    for solver in solvers:
+        module.declared[COPY] = None
+        step = f"{solver.name}.step"
+        texts.append(_function(module, step, solver.function, 1, solver.exact, "internal "))
+        texts.append(solver_text(solver, lanes))
     return "\n".join([module.text(), *texts])
 
 
 def _function(
-    module: Module, name: str, function: Function, lanes: int, exact: Collection[Expr]
-) -> str:
+    module: Module, name: str, function: Function, lanes: int, exact: Collection[Expr],
+    linkage: str = "",
+) -> str:  # fmt: skip
     b = Body(module)
     if function.copied:
-        module.declared["declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"] = None
+        module.declared[COPY] = None
         source, target = function.arguments[:2]
         size = 8 * function.copied * lanes
         b.write(f"call void @llvm.memcpy.p0.p0.i64(ptr %{target}, ptr %{source}, i64 {size}, i1 0)")
@@ -52,4 +68,4 @@ def _function(
             written(writer, loop)
     b.write("ret void")
     given = ", ".join(f"ptr noalias %{argument}" for argument in function.arguments)
-    return f"define void @{name}({given}) nounwind {{\nentry:\n{b.text()}}}\n"
+    return f"define {linkage}void @{name}({given}) nounwind {{\nentry:\n{b.text()}}}\n"

@@ -14,7 +14,7 @@ from typing import Any
 
 import control as ct
 
-from ._errors import AmbiguousNameError, UnknownNameError
+from .errors import AmbiguousNameError, UnknownNameError
 
 LISTED = 24  # names that a message lists; it says how many more there are
 

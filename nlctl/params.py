@@ -15,8 +15,8 @@ from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 
-from ._errors import ParameterError, UnknownKeywordError
-from ._names import unknown
+from .errors import ParameterError, UnknownKeywordError
+from .names import unknown
 
 T = TypeVar("T")
 _KEY = "nlctl"
