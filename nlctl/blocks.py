@@ -10,15 +10,9 @@ from typing import Any, Protocol
 import control as ct
 import numpy as np
 
-from ._errors import BlockError, ParameterError
-from ._names import Parameters, base_name, unknown
-from ._param import (
-    declared_params,
-    ensure_checked,
-    equation_arguments,
-    is_checked,
-    with_overrides,
-)
+from .errors import BlockError, ParameterError
+from .names import Parameters, base_name, unknown
+from .params import declared_params, ensure_checked, equation_arguments, is_checked, with_overrides
 
 
 class Spec(Protocol):

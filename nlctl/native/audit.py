@@ -174,6 +174,18 @@ def _rounded(t: float, trial: Trial) -> float:
     return SHAKEN * max(abs(t), float(np.max(np.diff(trial.time), initial=0.0)))
 
 
+def _near(point: Any, trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+    """Yield points as far as rounding may move them.
+
+    Sums may cancel: any two numbers are moved apart at one of the points, all alike at another.
+    """
+    t, x, u = point
+    places = np.arange(x.size + u.size)
+    for bit in range(int(places.size).bit_length() + 1):
+        factors = 1 + SHAKEN * (1 - 2 * (places >> bit & 1))
+        yield t + _rounded(t, trial), x * factors[: x.size], u * factors[x.size :]
+
+
 def _shaken(system: Any, point: Any, trial: Trial, base: Values) -> Values:
     """Return how far python-control's values move from `base` when all is rounded."""
     moved = [np.zeros_like(values) for values in base]

@@ -16,7 +16,7 @@ from pathlib import Path
 import llvmlite.binding as llvm
 import numba
 
-from .._files import replace_file
+from ..host.files import replace_file
 from ._integrators import HERE, SHIPPED, WANTED, sources_key
 from .codegen.export import exported
 

@@ -99,7 +99,7 @@ def machine_code_if_taken(key: str, wanted: Wanted) -> Any:
         As in `machine_code`.
     wanted : Wanted
     """
-    refused = _full_key(key, "refused", str(wanted.signature), wanted.options)
+    refused = full_key(key, "refused", str(wanted.signature), wanted.options)
     if store.read(refused) is not None:
         return None
     try:
