@@ -14,6 +14,7 @@ import numpy as np
 from .problem import Problem, Solver, UnavailableError
 
 BATCH = 4  # doubles in a register of AVX2; more where there is more
+LARGEST = 125
 RIGHT, LEFT = 0, 1  # parameters: 1 where u is beyond this corner
 CORNERS = (0.5, -0.3)
 
@@ -26,6 +27,8 @@ def solvers(problem: Problem) -> list[Solver]:
         raise UnavailableError("heyoka is not installed (pip install heyoka)") from None
     if problem.example != 1:
         raise UnavailableError("where a backlash turns round is no event of heyoka's here")
+    if problem.nodes > LARGEST:
+        raise UnavailableError(f"more than {LARGEST} nodes take it minutes to compile")
     variables, rates, u = _loop(heyoka, problem.centres)
     system = list(zip(variables, rates, strict=True))
     evaluate = heyoka.cfunc([*rates, u], vars=variables)
@@ -83,6 +86,7 @@ def solvers(problem: Problem) -> list[Solver]:
         Solver(
             name="heyoka", rhs=lambda t, x: values(t, x, branch(t, x))[:-1], run=run,
             ensemble=ensemble, tolerances=tuple(10 ** -(k / 2) for k in range(6, 20)), cores=1,
+            prepare=integrator,
         )
     ]  # fmt: skip
 

@@ -126,6 +126,8 @@ class Solver:
         Relative tolerances to choose from, falling.
     cores : int
         Number of cores that an ensemble can use.
+    prepare : callable
+        ``prepare(rtol)``: what is done once for a tolerance, such as compiling; it is not timed.
     """
 
     name: str
@@ -134,6 +136,7 @@ class Solver:
     ensemble: Callable[[float, Array, int], Array] | None
     tolerances: Sequence[float] = tuple(10 ** -(k / 2) for k in range(10, 24))
     cores: int = 2
+    prepare: Callable[[float], object] = bool
 
 
 def wrong_equations(problem: Problem, solver: Solver, points: int = 50) -> float:
