@@ -24,6 +24,7 @@ COMPETITORS = {
     "scipy": "scipy_ivp",
     "numbalsoda": "numbalsoda_cfunc",
     "diffrax": "diffrax_tsit5",
+    "heyoka": "heyoka_taylor",
     "boost": "boost_odeint",
     "tuned": "tuned_cpp",
 }

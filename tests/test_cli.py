@@ -15,8 +15,8 @@ import pytest
 from command_line import nlctl, nlctl_here
 from rows import each_row
 
+from analysis.catalogue import block_records
 from analysis.cli.report import _other_process
-from nlctl._catalogue import block_records
 
 
 def refused(*arguments, cwd=None):

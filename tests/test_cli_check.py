@@ -15,8 +15,8 @@ from rows import each_row
 from analysis.cli.check import random_start, replay, show_ledger, summary, worst_lines
 from analysis.lyapunov.ledger import ledger
 from nlctl import paper
-from nlctl._diagram import initial_state, state_names
-from nlctl._errors import ParameterError, UnknownNameError
+from nlctl.diagrams import initial_state, state_names
+from nlctl.errors import ParameterError, UnknownNameError
 
 
 @pytest.fixture(scope="module")

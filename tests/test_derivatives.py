@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from user_function_checks import quiet
 
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 from nlctl.expressions.functions import FUNCTIONS, MATH
 from nlctl.native import CompileError
 

@@ -6,7 +6,7 @@ import pytest
 from numba.core import config
 
 import nlctl
-from nlctl._errors import ParameterError, UsageError
+from nlctl.errors import ParameterError, UsageError
 from nlctl.expressions.graph import Graph
 from nlctl.native import AuditError
 from nlctl.native._lower_blocks import Reader

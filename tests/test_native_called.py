@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline, RegularGridInterpolator
 from scipy.special import erfcx
 
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 from nlctl.native import CompileError
 from nlctl.native.codegen.calls import Call, native_calls
 

@@ -36,7 +36,7 @@ from analysis.studies.page.report import study_part, study_report, study_section
 from analysis.studies.page.rows import margin_items, row_items, running
 from analysis.studies.page.searches import deviations
 from analysis.studies.page.text import TITLES, margin_text, violate, without_assumptions
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 SPACE = """
 loop = "loop.py:scaled"

@@ -12,7 +12,7 @@ from analysis.studies import Study, StudyError, from_toml, read_study, to_toml
 from analysis.studies.file.errors import line_numbers, place_text
 from analysis.studies.file.schema import keyed
 from nlctl import ParameterError, paper
-from nlctl._names import unknown
+from nlctl.names import unknown
 
 
 def mistakes(path, *settings):

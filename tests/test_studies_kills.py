@@ -12,7 +12,7 @@ from processes import alive, descendants, wait_until
 from studies_example import HEAD, write
 
 from analysis.studies import RunFolderError, load_result, read_study, run
-from nlctl._workers import process_pool
+from nlctl.host.workers import process_pool
 
 pytestmark = [
     pytest.mark.slow,

@@ -11,9 +11,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from nlctl._diagram import initial_state, state_names
-from nlctl._errors import ParameterError
-from nlctl._names import find_name
+from nlctl.diagrams import initial_state, state_names
+from nlctl.errors import ParameterError
+from nlctl.names import find_name
 
 if TYPE_CHECKING:
     from analysis.lyapunov.ledger import Ledger, Line

@@ -129,7 +129,7 @@ def check(
     from rich.console import Console
 
     from analysis.lyapunov.ledger import ledger
-    from nlctl._errors import ParameterError
+    from nlctl.errors import ParameterError
 
     from .check import random_start, replay, show_ledger, summary, worst_lines
     from .loops import assignments, named_loop
@@ -171,7 +171,7 @@ def diagram(
     expand: Annotated[bool, typer.Option(help="Show what is inside nested diagrams.")] = False,
 ) -> None:
     """Draw the block diagram of a loop."""
-    from nlctl.drawing import draw
+    from nlctl.drawing.picture import draw
 
     from .loops import named_loop
     from .terminal import check_figure, write_figure
@@ -184,7 +184,7 @@ def diagram(
 def _write_csv(path: Path, times, signals) -> None:
     import pandas as pd
 
-    from nlctl._files import replace_file
+    from nlctl.host.files import replace_file
 
     table = pd.DataFrame({"time": times} | signals)
     replace_file(path, lambda file: table.to_csv(file, index=False))
@@ -199,7 +199,7 @@ def main() -> None:
 
     An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
     """
-    from nlctl._errors import DivergedError, UsageError
+    from nlctl.errors import DivergedError, UsageError
 
     try:
         app()

@@ -18,9 +18,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 from rich.text import Text
 
-from nlctl._errors import ParameterError
-from nlctl._files import replace_file
-from nlctl._param import declared_params
+from nlctl.errors import ParameterError
+from nlctl.host.files import replace_file
+from nlctl.params import declared_params
 
 FIGURE_FORMATS = (".svg", ".png", ".pdf")
 
@@ -108,7 +108,7 @@ def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
 
 def show_groups() -> None:
     """Print the blocks in groups, one line each, and the examples."""
-    from nlctl._catalogue import block_groups
+    from analysis.catalogue import block_groups
 
     console = Console()
     groups = block_groups()
@@ -130,7 +130,7 @@ def show_block(name: str) -> None:
     UnknownNameError
         If there is no such block.
     """
-    from nlctl._catalogue import named_block
+    from analysis.catalogue import named_block
 
     record, console = named_block(name), Console()
     table = Table("parameter", "default", "unit", "bounds", "meaning", title=None)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
-from nlctl._errors import UnknownKeywordError
-from nlctl._names import unknown
+from nlctl.errors import UnknownKeywordError
+from nlctl.names import unknown
 
 from ..json_values import as_json
 from ..metrics import peak

@@ -9,8 +9,8 @@ import tempfile
 import webbrowser
 from pathlib import Path
 
-from nlctl._errors import UsageError
-from nlctl._files import replace_file
+from nlctl.errors import UsageError
+from nlctl.host.files import replace_file
 
 __all__ = ["find_browser", "open_page", "write_pdf"]
 

@@ -13,9 +13,9 @@ import cloudpickle
 import control as ct
 import numpy as np
 
-from .._errors import CompileError, ParameterError, UsageError
-from .._names import unknown
-from .._run_arguments import checked_params
+from ..errors import CompileError, ParameterError, UsageError
+from ..names import unknown
+from ..responses.arguments import checked_params
 from ._describe import called, described
 from ._jacobians import Tangent, linearize, parameter_jacobian, tangent
 from ._lower import Lowered, lower

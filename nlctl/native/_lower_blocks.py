@@ -11,7 +11,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._errors import CompileError
+from ..errors import CompileError
 from ..expressions.arrays import Tracer, boxed, concatenated, full, number, traced, vector
 from ..expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable, needed
 from ..expressions.operators import elementwise

@@ -16,7 +16,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._diagram import places
+from ..diagrams import places
 from ._feedthrough import closer_feedthrough, feedthrough
 from ._tearing import first_loop, tear
 from ._wiring import AlgebraicLoopError, Combination, Signal, Wiring

@@ -20,7 +20,7 @@ from analysis.robustness import (
 )
 from analysis.robustness.runs.sweep import Sweep
 from analysis.robustness.statistics.sensitivity import censored
-from nlctl._errors import ParameterError, UsageError
+from nlctl.errors import ParameterError, UsageError
 from nlctl.native import Status
 
 from ..build import own_design

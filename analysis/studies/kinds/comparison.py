@@ -21,8 +21,8 @@ from analysis.robustness import (
 )
 from analysis.robustness.statistics.comparison import Comparison, compare, crossed
 from analysis.robustness.statistics.verdict import better_verdict
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 from ..build import choice, inputs_of, metrics_of
 from ..file.resolve import option

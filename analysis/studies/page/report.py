@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...report.document import Figure, Item, Paragraph, Report, Section, Table
+from ...report.document import Figure, Item, Paragraph, Report, Section, Table, versions
 from ...report.outline import summary
 from ...report.render import file_hashes
-from ...report.versions import versions
 from . import methods as how
 from . import text as text
 from .claims import STATEMENTS, claims, verdict

@@ -8,9 +8,9 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..._block import Block
-from ..._errors import CompileError
-from ..._param import as_numbers
+from ...blocks import Block
+from ...errors import CompileError
+from ...params import as_numbers
 from .._parameters import current_values
 from .purity import Reading, check_pure
 from .values import FRESH, VECTOR, Impure, captured

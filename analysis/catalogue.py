@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from . import actuators, controllers, plants, references
-from ._names import unknown
+from nlctl import actuators, controllers, plants, references
+from nlctl.names import unknown
 
 
 def block_records() -> dict[str, type]:
