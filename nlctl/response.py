@@ -226,7 +226,7 @@ def _native(run: Run) -> ct.TimeResponseData:
     from .native import compile as compile_diagram
     from .native._response import respond
     from .native._solver_arguments import solver_settings
-    from .native.thirdparty.sizes import sized
+    from .native.thirdparty.checks import sized
 
     settings = solver_settings(**run.solver)
     compiled = run.system

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba.core import config
 from plain_plan import interpreted
 from scipy.optimize import brentq
 from scipy.special import erfcx
@@ -18,6 +19,10 @@ import nlctl
 from nlctl.native import CompileError
 from nlctl.native._newton import MOST, SINGULAR, STARTS, improved, newton_step
 from nlctl.native.codegen.solver import DONE, GUESS
+
+needs_jit = pytest.mark.skipif(
+    getattr(config, "DISABLE_JIT", False), reason="thousands of searches"
+)
 
 
 def static(name, function, inputs, outputs, **params):
@@ -132,6 +137,7 @@ def test_loops_behind_each_other(k, x):
     np.testing.assert_allclose(compiled.dynamics(0.0, [x], (), {"k": k}), -x + w, rtol=1e-14)
 
 
+@needs_jit
 def test_members_with_loops_run_side_by_side():
     """Each as alone, bit for bit, and as in python-control with the loop solved by hand."""
     k = np.linspace(-0.4, 0.45, 11)  # at k = 0.5 the matrix is singular at each start
@@ -147,6 +153,7 @@ def test_members_with_loops_run_side_by_side():
     assert np.ptp(samples[:, -1]) > 1e-3
 
 
+@needs_jit
 def test_a_member_without_a_solution_leaves_the_others_alone():
     """y = a + y^2 has one for a <= 1/4."""
     square = static("f", lambda t, x, u, params: params["a"] + u[0] ** 2, ["v"], ["y"], a=0.1)

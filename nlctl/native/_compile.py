@@ -231,7 +231,9 @@ def compile(  # noqa: A001 (what it does)
         diagram, or solve for them by Newton's method in every evaluation.  A linear loop is then
         exact to rounding.  Of several solutions the one is found that the search from 0 (then
         from 1 and -1) reaches first.  Where there is none, or the loop's matrix is singular to
-        1e-7, the results are NaN, and a run ends as diverged.
+        1e-7, the results are NaN, and a run ends as diverged.  The derivatives are exact, so a
+        function in a loop must be one that is made of expressions; at most 16 signals of a
+        loop can be solved for together.
 
     Returns
     -------
