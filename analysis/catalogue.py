@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from nlctl import errors
-from nlctl.names import unknown
 
 GROUPS = ("plants", "actuators", "references", "controllers")
 
@@ -41,6 +40,8 @@ def named_block(name: str) -> type:
     UnknownNameError
         With the nearest ones.
     """
+    from nlctl.names import unknown  # it imports python-control
+
     records = block_records()
     if name not in records:
         raise unknown("block", name, records)
