@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._arguments import a_function, number, text
-from nlctl._equation import equation
-from nlctl._errors import ParameterError
+from nlctl.arguments import a_function, number, text
+from nlctl.equations import equation
+from nlctl.errors import ParameterError
 from nlctl.native.codegen.machine_code import kept
 
 from . import metrics

@@ -11,8 +11,8 @@ Example 2 has backlash.  "play" is the exact operator; "relaxed" is a memory sta
 at 1000 1/s, which is what solvers without events can do: its errors are then taken against the
 accurate solution of the relaxed loop, and the distance to the exact play is printed beside them.
 
-The C++ programs need a compiler (and Boost's headers); numbalsoda and diffrax are used if they are
-installed (extra "benchmark").  What is missing is skipped.
+The C++ programs need a compiler (and Boost's headers); heyoka, numbalsoda and diffrax are used if
+they are installed (extra "benchmark").  What is missing is skipped.
 """
 
 from __future__ import annotations
@@ -42,6 +42,13 @@ def arguments(given: list[str] | None = None) -> argparse.Namespace:
         help="the paper's example; may be repeated (default: both)",
     )
     parser.add_argument(
+        "--nodes",
+        type=int,
+        choices=(27, 125, 1000),
+        default=27,
+        help="of the network of Example 1 (default: %(default)s)",
+    )
+    parser.add_argument(
         "--only",
         nargs="+",
         choices=list(measure.COMPETITORS),
@@ -68,12 +75,15 @@ def arguments(given: list[str] | None = None) -> argparse.Namespace:
     if chosen.quick:
         chosen.example, chosen.members, chosen.rounds = [1], min(chosen.members, 1000), 3
         chosen.only = [name for name in chosen.only if name != "python-control"]
+    if chosen.nodes != 27:
+        chosen.example = [1]
     return chosen
 
 
 def compare(problem: Problem, chosen: argparse.Namespace, console: Console) -> None:
     """Print both tables of one example."""
-    console.print(f"\n[bold]Example {problem.example}[/bold], {problem.x0.size} states, 20 s")
+    sizes = f"{problem.nodes} nodes, {problem.x0.size} states"
+    console.print(f"\n[bold]Example {problem.example}[/bold], {sizes}, 20 s")
     solvers = measure.available(problem, chosen.only, console.print)
     single = measure.single_runs(problem, solvers, chosen.rounds)
     console.print(tables.comparison(problem, "One run", single))
@@ -87,7 +97,7 @@ def main() -> None:
     chosen, console = arguments(), Console(width=140)
     console.print(tables.machine(), soft_wrap=True)
     for example in chosen.example or (1, 2):
-        compare(Problem(example), chosen, console)
+        compare(Problem(example, chosen.nodes), chosen, console)
     if not chosen.no_growth:
         largest = chosen.members
         console.print(growth.members((largest // 100, largest // 10, largest), THREADS))

@@ -24,11 +24,12 @@ COMPETITORS = {
     "scipy": "scipy_ivp",
     "numbalsoda": "numbalsoda_cfunc",
     "diffrax": "diffrax_tsit5",
+    "heyoka": "heyoka_taylor",
     "boost": "boost_odeint",
     "tuned": "tuned_cpp",
 }
 TARGET = 1e-6  # largest error in the plant's states
-SAME = 1e-9  # right-hand sides differ by less: a few roundings, amplified by exp(zeta^2)
+SAME = 1e-9 / 27  # of right-hand sides, a node: a few roundings, amplified by exp(zeta^2)
 PATIENCE = 1.5  # s: what takes longer is timed once
 
 
@@ -70,7 +71,7 @@ def available(problem: Problem, names: Iterable[str], say: Callable[[str], objec
             continue
         for solver in solvers:
             difference = wrong_equations(problem, solver)
-            if difference < SAME:  # false for NaN
+            if difference < SAME * problem.nodes:  # false for NaN
                 found.append(solver)
             else:
                 say(f"refused {solver.name}: its equations differ from nlctl's by {difference:.1e}")
@@ -113,6 +114,7 @@ def _tolerance(problem: Problem, solver: Solver) -> tuple[float, Accuracy, float
     """
     tried = []
     for rtol in solver.tolerances:
+        solver.prepare(rtol)
         seconds, states = _timed(solver.run, rtol)
         tried.append((rtol, accuracy(problem, states, problem.answers), seconds))
         if len(tried) > 1 and all(t[1].plant <= TARGET for t in tried[-2:]):

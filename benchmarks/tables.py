@@ -14,7 +14,7 @@ from competitors.problem import Problem
 from measure import TARGET, Row
 from rich.table import Table
 
-PACKAGES = ("nlctl", "control", "numpy", "scipy", "numba", "numbalsoda", "diffrax", "jax")
+PACKAGES = ("nlctl", "control", "numpy", "scipy", "numba", "heyoka", "numbalsoda", "diffrax", "jax")
 
 
 def machine() -> str:

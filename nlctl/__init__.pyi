@@ -1,18 +1,7 @@
 from . import actuators, controllers, functions, native, paper, plants, references
-from ._block import Block, Spec, block
-from ._diagram import initial_state, interconnect, parameters, state_names
-from ._equation import equation
-from ._errors import (
-    AmbiguousNameError,
-    BlockError,
-    DiagramError,
-    DivergedError,
-    ParameterError,
-    UnknownNameError,
-)
-from ._param import param, record
 from ._version import __version__ as __version__
 from .actuators import Backlash, DeadZone, Gain, Saturation, cascade
+from .blocks import Block, Spec, block
 from .controllers import (
     PID,
     AdaptiveWeights,
@@ -35,7 +24,17 @@ from .controllers import (
     replaced,
     sliding_mode,
 )
-from .drawing import draw
+from .diagrams import initial_state, interconnect, parameters, state_names
+from .drawing.picture import draw
+from .equations import equation
+from .errors import (
+    AmbiguousNameError,
+    BlockError,
+    DiagramError,
+    DivergedError,
+    ParameterError,
+    UnknownNameError,
+)
 from .native import (
     AlgebraicLoopError,
     BlockEquations,
@@ -47,6 +46,7 @@ from .native import (
     ensemble_response,
     typeset,
 )
+from .params import param, record
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response

@@ -7,7 +7,7 @@ import importlib.util
 import sys
 from pathlib import Path
 
-from ._errors import UsageError
+from .errors import UsageError
 
 
 def check_analysis() -> None:

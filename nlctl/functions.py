@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ._equation import equation
-from ._errors import ParameterError
+from .equations import equation
+from .errors import ParameterError
 
 __all__ = [
     "band_limited",

@@ -11,9 +11,6 @@ from typing import Any, Literal
 
 import control as ct
 
-from ._diagram import as_system, interconnect
-from ._errors import ParameterError
-from ._names import unknown
 from .actuators import Backlash, DeadZone
 from .controllers import (
     AdaptiveWeights,
@@ -25,6 +22,9 @@ from .controllers import (
     diagonal_centres,
     grid_centres,
 )
+from .diagrams import as_system, interconnect
+from .errors import ParameterError
+from .names import unknown
 from .plants import ForcedDuffing, Genesio, coordinate_names
 from .references import SumOfSines
 

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from ._arguments import a_function
-from ._equation import equation
-from ._errors import ParameterError
-from ._names import unknown
-from ._param import param, record, whole_number
+from .arguments import a_function
+from .equations import equation
+from .errors import ParameterError
+from .names import unknown
+from .params import param, record, whole_number
 
 __all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "integrator_chain"]
 

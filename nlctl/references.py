@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ._equation import equation
-from ._errors import ParameterError
-from ._param import param, record, whole_number
+from .equations import equation
+from .errors import ParameterError
 from .functions import noise_spectrum, noise_value
+from .params import param, record, whole_number
 
 __all__ = ["BandLimitedNoise", "FilteredStep", "FunctionReference", "SumOfSines"]
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import control as ct
 
-from ._arguments import number
-from ._errors import ParameterError
-from ._interpreted import METHODS, interpreted
-from ._names import unknown
-from ._param import checked_times
-from ._run_arguments import Run, checked_params, unified, with_aliases
+from .arguments import number
+from .errors import ParameterError
+from .names import unknown
+from .params import checked_times
+from .responses.arguments import Run, checked_params, unified, with_aliases
+from .responses.interpreted import METHODS, interpreted
 
 if TYPE_CHECKING:
     from .native import Compiled
@@ -226,7 +226,7 @@ def _native(run: Run) -> ct.TimeResponseData:
     from .native import compile as compile_diagram
     from .native._response import respond
     from .native._solver_arguments import solver_settings
-    from .native.thirdparty.sizes import sized
+    from .native.thirdparty.checks import sized
 
     settings = solver_settings(**run.solver)
     compiled = run.system

@@ -26,20 +26,21 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
-    """Count as slow what needs a browser, a cluster or other people's tests.
+    """Count as slow what needs a browser, a cluster or other people's tests, unless it is weekly.
 
     So is the machine code, ``native=True``, of what the same test compares as plain Python.
     """
     for item in items:
         values = item.callspec.params if hasattr(item, "callspec") else {}
         marked = any(item.get_closest_marker(name) for name in ("browser", "cluster", "upstream"))
-        if marked or values.get("native") is True:
+        weekly = item.get_closest_marker("weekly")
+        if not weekly and (marked or values.get("native") is True):
             item.add_marker("slow")
 
 
 def many(examples):
-    """Number of examples of a test of random programs: a fifth where CI is not set."""
-    return examples if os.environ.get("CI") else examples // 5
+    """Number of examples of a test of random programs: a fifth, but all of them once a week."""
+    return examples if os.environ.get("ALL_EXAMPLES") else examples // 5
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nlctl
-from nlctl._param import equation_arguments
-from nlctl.actuators import play, play_band
+from nlctl.actuators.backlash import play, play_band
+from nlctl.params import equation_arguments
 
 inputs = st.floats(-20, 20)
 

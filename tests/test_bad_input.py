@@ -11,8 +11,8 @@ from rows import each_row
 
 import nlctl
 from nlctl import AmbiguousNameError, DiagramError, ParameterError, UnknownNameError
-from nlctl._param import check_params
 from nlctl.paper import example_1, example_2
+from nlctl.params import check_params
 
 MAKERS = [ct.interconnect, nlctl.interconnect]
 makers = pytest.mark.parametrize("join", MAKERS, ids=["control", "nlctl"])

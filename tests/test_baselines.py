@@ -13,7 +13,7 @@ from analysis.metrics import Metric, absolute_integral, final, peak
 from analysis.paper import loops
 from analysis.paper.controllers import baselines, contenders, sensor
 from analysis.paper.tuning import tune
-from nlctl._param import equation_arguments
+from nlctl.params import equation_arguments
 
 numbers = st.floats(-50, 50)
 T = np.linspace(0, 20, 2001)

@@ -10,8 +10,8 @@ import pytest
 from rows import each_row
 
 import nlctl
-from nlctl._catalogue import block_records
-from nlctl._param import declared_params, equation_arguments
+from analysis.catalogue import block_records
+from nlctl.params import declared_params, equation_arguments
 
 
 @nlctl.equation

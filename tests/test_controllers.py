@@ -10,8 +10,8 @@ from numpy.polynomial import Polynomial
 from rows import each_row
 
 import nlctl
-from nlctl._param import equation_arguments
 from nlctl.controllers import binomial_lambdas
+from nlctl.params import equation_arguments
 
 numbers = st.floats(-3, 3)
 orders = st.integers(2, 6)

@@ -90,7 +90,7 @@ def test_scalar_loops():
         assert covered(*scalar_loop(rng))
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_the_burst_lies_in_its_range_in_nine_of_ten_loops():
     """Over 40 loops whose burst was simulated, of both kinds."""
     rng = np.random.default_rng(5)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from user_function_checks import quiet
 
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 from nlctl.expressions.functions import FUNCTIONS, MATH
 from nlctl.native import CompileError
 
@@ -162,6 +162,17 @@ def test_linear_systems_are_their_own_linearization():
     w = 1j * np.logspace(-1, 1, 5)
     np.testing.assert_allclose(found(w), both(w), rtol=1e-9)
     assert found.input_labels == diagram.input_labels
+
+
+def test_what_python_control_takes_instead_of_a_compiled_diagram():
+    """It is printed with the diagram, and differences agree with the exact derivatives."""
+    loop = nlctl.paper.example_1()
+    compiled, x = nlctl.compile(loop), 0.3 * np.random.default_rng(4).normal(size=loop.nstates)
+    assert ".linearize(x0, u0); python-control's functions take .system" in str(compiled)
+    near = ct.linearize(compiled.system, x, t=0.7)
+    exact = compiled.linearize(x, t=0.7)
+    for name in "AC":
+        np.testing.assert_allclose(getattr(near, name), getattr(exact, name), rtol=1e-4, atol=1e-4)
 
 
 def test_what_has_no_exact_derivatives_is_refused():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import nlctl
 from nlctl import AmbiguousNameError, UnknownNameError
-from nlctl._diagram import leaves
+from nlctl.diagrams import leaves
 from nlctl.paper import example_1, example_2
 
 MAKERS = [ct.interconnect, nlctl.interconnect]

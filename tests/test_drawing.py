@@ -18,7 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from rows import each_row
 
 import nlctl
-from nlctl.drawing import draw, lay_out, signal_graph
+from nlctl.drawing.picture import draw, lay_out, signal_graph
 
 
 def block(name, inputs, outputs):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import nlctl
-from nlctl._catalogue import block_records
-from nlctl._errors import UsageError
+from analysis.catalogue import block_records
+from nlctl.errors import UsageError
 
 TIMES = np.linspace(0, 0.1, 6)
 

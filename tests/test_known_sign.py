@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nlctl
-from nlctl._param import equation_arguments
 from nlctl.controllers.known_sign import damped_base
+from nlctl.params import equation_arguments
 
 numbers = st.floats(-20, 20)
 widths = st.floats(1e-3, 10)

@@ -8,35 +8,22 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
-    [
-        "nlctl._errors",
-        "nlctl._version",
-        "nlctl._files",
-        "nlctl._equation",
-        "nlctl._param",
-        "nlctl._names",
-        "nlctl._arguments",
-        "nlctl._workers",
-        "nlctl._block",
-        "nlctl._diagram",
-        "nlctl._run_arguments",
-        "nlctl._time_response",
-        "nlctl.functions",
-        "nlctl._layout",
-        "nlctl.drawing",
-    ],
+    ["nlctl._version", "nlctl.host"],
+    ["nlctl.errors", "nlctl.names", "nlctl.arguments", "nlctl.params", "nlctl.equations"],
+    ["nlctl.blocks", "nlctl.diagrams", "nlctl.functions", "nlctl.drawing", "nlctl.responses"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers"],
-    ["nlctl._catalogue", "nlctl.paper"],
+    ["nlctl.paper"],
     ["nlctl.expressions"],
-    ["nlctl.native", "nlctl._interpreted", "nlctl.response"],
-    ["nlctl.__main__", "analysis.json_values", "analysis.metrics", "analysis.intervals"],
+    ["nlctl.native"],
+    ["nlctl.response", "nlctl.__main__"],
+    ["analysis.json_values", "analysis.catalogue", "analysis.metrics", "analysis.intervals"],
     ["analysis.lyapunov", "analysis.robustness"],
     ["analysis.figures", "analysis.report"],
     ["analysis.studies"],
     ["analysis.paper"],
     ["analysis.cli"],
 ]
-BLOCK_MODULES = LAYERS[1]
+BLOCK_MODULES = LAYERS[3]
 FILES = sorted(p for package in ("nlctl", "analysis") for p in (ROOT / package).rglob("*.py"))
 
 
@@ -47,7 +34,7 @@ def module_name(path):
 
 MODULES = {module_name(path): ast.parse(path.read_text(encoding="utf-8")) for path in FILES}
 PACKAGES = {module_name(path) for path in FILES if path.name == "__init__.py"}
-MEMBERS = [name for name in MODULES if name not in ("nlctl", "analysis")]  # they only re-export
+MEMBERS = [name for name in MODULES if name not in ("nlctl", "analysis")]  # these only re-export
 
 
 def runtime_nodes(tree):
@@ -101,10 +88,10 @@ def test_imports_go_downwards_only():
 
 def test_there_are_imports_to_look_at():
     """The reader of imports sees relative, absolute and lazy ones."""
-    assert "nlctl._param" in imports("nlctl.plants")
+    assert "nlctl.params" in imports("nlctl.plants")
     assert "nlctl.functions" in imports("nlctl.controllers.rbf")
     assert "nlctl.controllers" in imports("nlctl.paper")
-    assert layer("nlctl.controllers.rbf") == 1
+    assert layer("nlctl.controllers.rbf") == 3
 
 
 def test_no_module_imports_itself_in_a_ring():
@@ -122,9 +109,9 @@ def test_nlctl_knows_nothing_of_analysis():
 
 def test_drawing_and_native_code_know_no_blocks():
     """They treat any python-control diagram alike, with or without our blocks."""
-    for name in ("nlctl.drawing", "nlctl._layout", "nlctl.native"):
+    for name in ("nlctl.drawing", "nlctl.native"):
         assert [m for m in MEMBERS if within(m, [name])], f"{name} does not exist"
-    readers = [m for m in MEMBERS if within(m, ["nlctl.drawing", "nlctl._layout", "nlctl.native"])]
+    readers = [m for m in MEMBERS if within(m, ["nlctl.drawing", "nlctl.native"])]
     blocks = (*BLOCK_MODULES, "nlctl.paper")
     known = {name: {m for m in imports(name) if m.startswith(blocks)} for name in readers}
     assert {name: found for name, found in known.items() if found} == {}
@@ -132,8 +119,11 @@ def test_drawing_and_native_code_know_no_blocks():
 
 def test_layout_is_independent_of_python_control():
     """Geometry needs sizes and connections only."""
-    assert imports("nlctl._layout") == set()
-    assert "import control" not in ast.unparse(MODULES["nlctl._layout"])
+    geometry = [m for m in MEMBERS if within(m, ["nlctl.drawing"]) and "picture" not in m]
+    for name in geometry[1:]:  # the first is the package, which re-exports
+        assert all(within(m, ["nlctl.drawing"]) for m in imports(name))
+        assert "import control" not in ast.unparse(MODULES[name])
+    assert len(geometry) > 4
 
 
 def lines_of_functions(path, lines):
@@ -155,6 +145,22 @@ def test_modules_and_functions_are_small():
             large.append((name, len(lines)))
         large += [(f"{name}: {f}", n) for f, n in lines_of_functions(path, lines) if n > 40]
     assert large == []
+
+
+NOT_COUNTED = ("__init__", "__main__", "_version")
+
+
+def test_rooms_are_small():
+    """At most 12 modules a folder, and a package says in its docstring what is in it."""
+    rooms = {path.parent for path in FILES}
+    counts = {
+        str(room.relative_to(ROOT)): len(
+            [p for p in room.glob("*.py") if p.stem not in NOT_COUNTED]
+        )
+        for room in rooms
+    }
+    assert {room: n for room, n in counts.items() if n > 12} == {}
+    assert [name for name in PACKAGES if not ast.get_docstring(MODULES[name])] == []
 
 
 def test_importing_is_cheap():

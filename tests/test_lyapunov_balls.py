@@ -10,9 +10,9 @@ from rows import each_row
 import nlctl
 from analysis.intervals.arithmetic import JUMPS, Ball, as_ball
 from analysis.intervals.branch_and_bound import Box, Undecided, enclose, prove
-from nlctl._errors import ParameterError, UnknownNameError
-from nlctl._param import equation_arguments
+from nlctl.errors import ParameterError, UnknownNameError
 from nlctl.expressions.functions import FUNCTIONS as TABLE
+from nlctl.params import equation_arguments
 
 FUNCTIONS = {
     "sin": (np.sin, np.cos),

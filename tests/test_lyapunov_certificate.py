@@ -121,9 +121,11 @@ class TestCertify:
     @pytest.mark.parametrize(
         ("loop", "k", "known"),
         [
-            (example_1(gamma=1e5, sigma_2=1e-4), TIGHT, 0.46703),
+            pytest.param(
+                example_1(gamma=1e5, sigma_2=1e-4), TIGHT, 0.46703, marks=pytest.mark.slow
+            ),
             (example_1(), TIGHT, 0.48346),
-            (example_2(), None, 1.44794),
+            pytest.param(example_2(), None, 1.44794, marks=pytest.mark.slow),
             (example_2(tau=0.05), None, 0.51938),
         ],
     )
@@ -204,7 +206,7 @@ class TestCertify:
             certify(nlctl.paper.example_1())
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_design_finds_gains_within_the_limit():
     """A smaller proved bound than that of the gains it starts from, for an |u| that is allowed."""
     loop = example_1()

@@ -9,7 +9,7 @@ import nlctl
 from analysis.intervals.branch_and_bound import Box
 from analysis.lyapunov.bounds.constants import constants, disturbance, kappa, visited_box
 from analysis.lyapunov.bounds.decomposition import DecompositionError
-from nlctl._errors import DiagramError, ParameterError, UnknownNameError
+from nlctl.errors import DiagramError, ParameterError, UnknownNameError
 
 BOX_1 = Box.of(x1=(-0.85, 1.0), x2=(-0.55, 1.1), v=(-12, 6))
 BOX_2 = Box.of(x1=(-0.85, 1.1), x2=(-0.55, 0.75), x3=(-0.6, 0.6), v=(-2.5, 4.5))

@@ -15,7 +15,7 @@ from analysis.lyapunov.bounds.decomposition import (
     clipped_split,
     decompose,
 )
-from nlctl._param import equation_arguments
+from nlctl.params import equation_arguments
 
 
 @nlctl.record

@@ -158,7 +158,13 @@ def test_the_ledger_prints_tabulates_and_is_json():
 
 class TestFaults:
     @pytest.mark.parametrize(
-        ("member", "broken"), [(1, {"Omega"}), (2, {"A2"}), (3, {"A3"}), (4, {"decay"})]
+        ("member", "broken"),
+        [
+            (1, {"Omega"}),
+            pytest.param(2, {"A2"}, marks=pytest.mark.slow),  # in the ensemble every day
+            pytest.param(3, {"A3"}, marks=pytest.mark.slow),
+            (4, {"decay"}),
+        ],
     )
     def test_planted_faults_are_named(self, member, broken):
         """A state out of the box, a larger disturbance, a gain out of its sector, no decay."""

@@ -13,7 +13,7 @@ from analysis.intervals.arithmetic import Ball
 from analysis.intervals.branch_and_bound import Box, Undecided
 from analysis.intervals.quotient import slope_in
 from analysis.lyapunov.bounds.sector import plant_terms, sector
-from nlctl._errors import DiagramError, UnknownNameError
+from nlctl.errors import DiagramError, UnknownNameError
 
 QUOTIENTS = {  # q(v), and (q(v) - q(0))/v in closed form
     "sine": (np.sin, lambda v: np.sinc(v / np.pi)),

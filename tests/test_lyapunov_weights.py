@@ -18,7 +18,7 @@ from analysis.lyapunov.bounds.weights import (
     network_on_grid,
     tightest_weights,
 )
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 from nlctl.paper import paper_centres
 
 DUFFING, GENESIO = nlctl.ForcedDuffing(), nlctl.Genesio()

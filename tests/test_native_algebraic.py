@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 from scipy.special import lambertw
 
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 from nlctl.native._compile import compile as compile_diagram
 from nlctl.native._schedule import AlgebraicLoopError, schedule
 from nlctl.native._tearing import first_loop, tear

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline, RegularGridInterpolator
 from scipy.special import erfcx
 
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 from nlctl.native import CompileError
 from nlctl.native.codegen.calls import Call, native_calls
 
@@ -87,6 +87,7 @@ def test_right_hand_sides_are_python_controls_own(function):
         np.testing.assert_allclose(found, made.dynamics(t, x, u, {"k": 2.5}), rtol=1e-15)
 
 
+@needs_jit
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_members_do_not_depend_on_threads_or_on_each_other(function):
     """The same bits with one thread and with three, and alone."""
@@ -275,6 +276,7 @@ def powers(t, x, u, params):
     return [-value]
 
 
+@needs_jit
 @pytest.mark.parametrize("wrapped", [False, True])
 def test_members_whose_integers_differ(wrapped):
     """x' = -x^n: each member has the solution of its own n, the same bits as alone."""

@@ -6,8 +6,8 @@ import pytest
 
 import nlctl
 from analysis.metrics import Metric, final
-from nlctl._diagram import state_names
-from nlctl._errors import ParameterError
+from nlctl.diagrams import state_names
+from nlctl.errors import ParameterError
 from nlctl.native import ensemble_response
 from nlctl.native._compile import compile as compile_diagram
 from nlctl.native._discrete import simulate_discrete

@@ -7,7 +7,7 @@ import scipy.special
 from numba.core import config
 
 import nlctl
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 from nlctl.response import EngineWarning
 
 TIMES = np.linspace(0, 1, 5)

@@ -8,7 +8,7 @@ import pytest
 from test_native_rhs import compare
 
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 from nlctl.native._compile import compile as compile_diagram
 
 TOLERANCES = {"rtol": 1e-9, "atol": 1e-11}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from test_native_rhs import compare
 
-from nlctl._errors import ParameterError, UsageError
+from nlctl.errors import ParameterError, UsageError
 from nlctl.native import CompileError
 from nlctl.native._compile import compile as compile_diagram
 from nlctl.native.codegen.calls import Source

@@ -17,7 +17,7 @@ from numba.core import config
 from scipy.optimize import brentq
 
 import nlctl
-from nlctl.actuators import play
+from nlctl.actuators.backlash import play
 
 run: Any = nlctl.input_output_response
 needs_jit = pytest.mark.skipif(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from typing import NamedTuple
 
 import numba
@@ -12,10 +13,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numba.core import config
 
-from nlctl.native._pointed import pointed, with_table
+from nlctl.native._pointed import type_of, with_table
 
 
-@pointed
 class Record(NamedTuple):
     line: np.ndarray
     grid: np.ndarray
@@ -45,26 +45,64 @@ RECORDS = st.builds(
 )
 
 
-@numba.njit
-def copied(record, line, grid, cube, places):
-    line[:], grid[:], cube[:], places[:] = record.line, record.grid, record.cube, record.places
-    return record.number, record.count, record.line.shape, record.grid.shape, record.cube.shape
+class Found(NamedTuple):
+    line: np.ndarray
+    grid: np.ndarray
+    cube: np.ndarray
+    places: np.ndarray
+    number: np.ndarray
+    whole: np.ndarray
+    table: np.ndarray
+
+
+def run(function, *given):
+    """Run a function of records and integers as machine code that is given their tables."""
+    if getattr(config, "DISABLE_JIT", False):
+        function(*given)
+        return
+    is_record = [isinstance(g, tuple) for g in given]
+    kinds = [type_of(g) if r else numba.intp for g, r in zip(given, is_record, strict=True)]
+    code = COMPILED.setdefault(function, numba.cfunc(numba.void(*kinds))(function))
+    call = ctypes.CFUNCTYPE(
+        None, *[ctypes.c_void_p if record else ctypes.c_ssize_t for record in is_record]
+    )(code.address)
+    call(*(g.table.ctypes.data if isinstance(g, tuple) else g for g in given))
+
+
+COMPILED = {}
+
+
+def copied(record, found):
+    for i in range(record.line.size):
+        found.line[i] = record.line[i]
+    found.grid[:] = record.grid
+    found.cube[:], found.places[:] = record.cube, record.places
+    found.number[0] = record.number
+    found.whole[0], found.whole[1] = record.count, record.line.shape[0]
+    for i in range(2):
+        found.whole[2 + i] = record.grid.shape[i]
+    for i in range(3):
+        found.whole[4 + i] = record.cube.shape[i]
 
 
 @pytest.mark.slow
 @given(RECORDS)
 def test_every_field_is_the_same_in_machine_code(record):
     """All bits of all numbers, and all shapes, empty arrays included."""
-    found = [np.empty_like(a) for a in record[:4]]
-    number, count, *shapes = copied(record, *found)
-    for array, original in zip(found, record, strict=False):
+    arrays = [np.empty_like(a) for a in record[:4]]
+    names = ("line", "grid", "cube", "places")
+    found = with_table(
+        Found, **dict(zip(names, arrays, strict=True)), number=np.zeros(1),
+        whole=np.zeros(7, dtype=np.int64),
+    )  # fmt: skip
+    run(copied, record, found)
+    for array, original in zip(arrays, record, strict=False):
         assert array.tobytes() == original.tobytes()
-    assert np.float64(number).tobytes() == np.float64(record.number).tobytes()
-    assert count == record.count
-    assert shapes == [a.shape for a in record[:3]]
+    assert found.number.tobytes() == np.float64(record.number).tobytes()
+    shapes = [length for a in record[:3] for length in a.shape]
+    assert found.whole.tolist() == [record.count, *shapes]
 
 
-@numba.njit
 def through(record, i, value):
     slab = record.cube[i]  # a view of a view
     for j in range(slab.shape[0]):
@@ -86,7 +124,7 @@ def sample():
 
 def test_what_machine_code_writes_is_seen_in_python():
     record = sample()
-    through(record, 1, 10.0)
+    run(through, record, 1, 10)
     assert record.cube[1, :, 0].tolist() == [13.0, 14.0, 15.0]
     assert not record.cube[0].any()
     assert not record.cube[1, :, 1].any()
@@ -103,25 +141,32 @@ def inner(record, times):
     return total
 
 
-@numba.njit
 def outer(record, times):
-    return inner(record, times) + record.line[0]
+    record.cube[0, 0, 0] = inner(record, times) + record.line[0]
 
 
 def test_a_record_is_passed_on_between_functions():
     """sum of 2^-k for k = 1 .. n, twice, and the last of them."""
-    assert outer(sample(), 10) == 2 * (1 - 2.0**-10) + 2.0**-10
+    record = sample()
+    run(outer, record, 10)
+    assert record.cube[0, 0, 0] == 2 * (1 - 2.0**-10) + 2.0**-10
 
 
-@pytest.mark.skipif(
-    getattr(config, "DISABLE_JIT", False), reason="plain Python has no types to refuse"
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("line", np.ones(2, dtype=np.float32), "1 dimensions of float64, got 1 of float32"),
+        ("grid", np.ones(2), "2 dimensions of float64, got 1 of float64"),
+        ("number", 1, "0 dimensions of float64, got 0 of int64"),
+        ("count", 1.0, "0 dimensions of int64, got 0 of float64"),
+    ],
 )
-def test_an_array_of_another_type_is_refused():
+def test_a_field_of_another_type_is_refused(field, value, message):
     """What is compiled for one type is not run on another."""
-    compiled = numba.njit(numba.float64(numba.typeof(sample()), numba.int64))(inner.py_func)
-    assert compiled(sample(), 1) == 1.0
-    with pytest.raises(TypeError, match="No matching definition"):
-        compiled(changed(line=np.ones(2, dtype=np.float32)), 1)
+    kept = sample()._asdict() | {field: value}
+    kept.pop("table")
+    with pytest.raises(TypeError, match=f"'{field}' of Record needs {message}"):
+        with_table(Record, like=type_of(sample()), **kept)
 
 
 @pytest.mark.parametrize("array", [np.ones(4)[::2], np.ones((2, 3)).T])

@@ -14,7 +14,7 @@ import pytest
 import source_text
 
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 from nlctl.native import CompileError
 from nlctl.native.thirdparty.purity import check_pure
 from nlctl.native.thirdparty.source import Unreadable, definition

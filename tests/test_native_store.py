@@ -29,7 +29,7 @@ from numba.core.registry import cpu_target
 import nlctl
 from nlctl.native import CompileError
 from nlctl.native._called import TAUGHT
-from nlctl.native._integrate import integrator_key
+from nlctl.native._integrators import integrator_key
 from nlctl.native.codegen import finish, store
 from nlctl.native.codegen.calls import Source
 from nlctl.native.codegen.fingerprint import function_key, module_key, program_key
@@ -481,7 +481,7 @@ def keys_of_copy(path, edits):
         assert source.count(before) == 1
         module.write_text(source.replace(before, after), encoding="utf-8")
     script = (
-        "import nlctl; from nlctl.native._integrate import integrator_key\n"
+        "import nlctl; from nlctl.native._integrators import integrator_key\n"
         "from nlctl.native._called import TAUGHT\n"
         "from nlctl.native.codegen.fingerprint import module_key\n"
         "print(nlctl.__file__, integrator_key(), module_key(*TAUGHT))"

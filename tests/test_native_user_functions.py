@@ -11,7 +11,7 @@ PURE = [entry for entry in ENTRIES.values() if entry.pure]
 IMPURE = [entry for entry in ENTRIES.values() if not entry.pure]
 # in the everyday tests the size at which arrays become loops
 SIZES = [n if n == 9 else pytest.param(n, marks=pytest.mark.slow) for n in user_functions.SIZES]
-GROUPS = 8  # of entries that are compiled one by one
+GROUPS = 16  # of entries that are compiled one by one
 
 machine_code = pytest.mark.skipif(
     getattr(config, "DISABLE_JIT", False), reason="nothing is compiled without JIT"
@@ -76,9 +76,13 @@ def report(job, n, names):
     return found
 
 
+def size(n):
+    """The size at which arrays become loops in each `.ci/run`, the others once a week."""
+    return pytest.param(n, marks=pytest.mark.slow if n == 9 else pytest.mark.weekly)
+
+
 @machine_code
-@pytest.mark.slow
-@pytest.mark.parametrize("n", user_functions.SIZES)
+@pytest.mark.parametrize("n", [size(n) for n in user_functions.SIZES])
 def test_traced_functions_in_one_diagram_in_machine_code(n):
     """Alone, side by side, and in a short run."""
     found = report("joint", n, accepted(n, opaque=False))
@@ -86,8 +90,8 @@ def test_traced_functions_in_one_diagram_in_machine_code(n):
 
 
 def part(group):
-    """The first groups in each run of all tests, the others once a week."""
-    return pytest.param(group, marks=pytest.mark.slow if group < 2 else pytest.mark.weekly)
+    """The first group in each `.ci/run`, the others once a week."""
+    return pytest.param(group, marks=pytest.mark.slow if group == 0 else pytest.mark.weekly)
 
 
 @machine_code

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from rows import each_row
 
 import nlctl
-from nlctl._errors import UnknownNameError
-from nlctl._param import (
+from nlctl.errors import UnknownNameError
+from nlctl.params import (
     ParameterError,
     declared_params,
     equation_arguments,

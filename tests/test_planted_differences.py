@@ -24,7 +24,7 @@ import nlctl
 from analysis.lyapunov.bounds.decomposition import Decomposition, DecompositionError
 from analysis.lyapunov.certificate.certify import certify
 from nlctl import DiagramError
-from nlctl._equation import equation
+from nlctl.equations import equation
 
 C_0 = 0.47662  # of the loop without a difference
 K = (0.9, 1.1)

@@ -274,10 +274,15 @@ def test_faults_are_named(what):
     assert_caught(what)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("what", [what for what in FAULTS if what not in QUICK])
+OTHERS = [what for what in FAULTS if what not in QUICK]
+PARTS = [pytest.mark.slow, pytest.mark.weekly, pytest.mark.weekly]  # a third in every `.ci/run`
+
+
+@pytest.mark.parametrize(
+    "what", [pytest.param(what, marks=PARTS[i % 3]) for i, what in enumerate(OTHERS)]
+)
 def test_all_faults_are_named(what):
-    """Each of them by the line that it breaks."""
+    """Each of them by the line that it breaks; two thirds once a week."""
     assert_caught(what)
 
 

@@ -9,7 +9,7 @@ from rows import each_row
 from scipy.integrate import quad
 
 import nlctl
-from nlctl._param import equation_arguments
+from nlctl.params import equation_arguments
 
 numbers = st.floats(-3, 3)
 times = st.floats(0, 30)

@@ -68,7 +68,7 @@ def test_the_other_blocks_of_code_run():
     assert record.calm < 0.06
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_the_run_of_10000_seconds_bursts():
     """As the block of code says, and where the text says."""
     late = ran()["late"]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rows import each_row
 
 import nlctl
-from nlctl._param import equation_arguments
+from nlctl.params import equation_arguments
 
 times = st.floats(-20, 20)
 seeds = st.integers(0, 10_000)

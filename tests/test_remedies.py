@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.integrate import cumulative_trapezoid
 
 import nlctl
-from nlctl._param import equation_arguments
 from nlctl.functions import nussbaum_integral
+from nlctl.params import equation_arguments
 
 numbers = st.floats(-3, 3)
 signals = st.tuples(numbers, numbers, numbers, numbers)

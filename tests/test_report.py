@@ -26,7 +26,7 @@ from analysis.report import (
     render_json,
     write_report,
 )
-from nlctl._files import replace_file
+from nlctl.host.files import replace_file
 
 
 def made_up_runs():

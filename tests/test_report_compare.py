@@ -29,7 +29,7 @@ from analysis.report import (
     write_report,
 )
 from analysis.report.compare import ABSENT, _row_names, _same
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 
 def small(**changes):

@@ -24,7 +24,7 @@ from analysis.report import Figure, History, Report, Section, render_html, write
 from analysis.report.history import chart, thinned
 from analysis.studies.page.histories import Histories
 from analysis.studies.page.rows import fan_items
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 VENDOR = Path(__file__).parents[1] / "analysis" / "report" / "vendor" / "uplot"
 

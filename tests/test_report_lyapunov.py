@@ -132,7 +132,6 @@ def test_commands_in_the_text_are_python():
         compile(command, "command", "exec")
 
 
-@pytest.mark.slow
 def test_the_part_is_in_the_papers_report_when_there_is_evidence():
     """With it: sections, figures, valid page, the same numbers in JSON.  Without: as before."""
     report = paper_report(made_up_runs(), proofs=found())

@@ -50,7 +50,7 @@ from analysis.report.outline import (
 from analysis.report.page import fill
 from analysis.report.svg import draw_ahead, shapes_svg, short_path, svg, svg_files
 from analysis.report.typography import pieces
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 HOSTILE = {
     "markup": "</script></style></title><img src=x onerror=\"window.__pwned='markup'\">",

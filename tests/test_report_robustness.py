@@ -37,7 +37,7 @@ from analysis.studies.page.report import study_part, study_report, study_section
 from analysis.studies.page.rows import margin_items, row_items
 from analysis.studies.page.running import running
 from analysis.studies.page.text import margin_text, violate, without_assumptions
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 SPACE = """
 loop = "loop.py:scaled"
@@ -325,7 +325,10 @@ def test_a_refused_guarantee_is_shown_with_its_reason(tmp_path, kind):
 
 
 def test_an_analysis_without_an_answer_says_why(result):
-    """Of whatever kind: its section and its claim have the reason, and the others are as ever."""
+    """Of whatever kind: its section and its claim have the reason, and the others are as ever.
+
+    What the study claims of it is not refuted by that: it is not shown yet.
+    """
     of = dict(zip((f.key for f in result.findings), result.study.analysis, strict=True))
     error = UsageError("the rows do not admit it")
     lost = {key: unanswered(key, asked, error) for key, asked in of.items()}
@@ -340,7 +343,13 @@ def test_an_analysis_without_an_answer_says_why(result):
             assert words.text == "Not answered: the rows do not admit it."
         told = {claim.evidence: claim for claim in made.claims if claim.evidence in gone}
         assert told.keys() == gone
-        assert all(claim_status(claim) == ("refuted", "refuted") for claim in told.values())
+        assert all(claim_status(c) == ("not shown yet", "caution") for c in told.values())
+        own = {f.key: f.claim for f in result.findings if f.claim}
+        assert {k: c.text for k, c in told.items() if k in own} == {
+            k: claim for k, claim in own.items() if k in gone
+        }
+        lost_claims = [f for f in part.claims if f.key in gone]
+        assert all(f.needs == "an answer: the rows do not admit it" for f in lost_claims)
         (found,) = tables_of(study_part([(part, None)])[1])
         said = dict(zip((f.key for f in findings), column(found, "found"), strict=True))
         assert all("do not admit it" in said[key] for key in gone)

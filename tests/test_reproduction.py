@@ -55,7 +55,7 @@ def measure(result):
     return measured(result.case, result.time, result.signals)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_example_1_holds_to_the_digits_given():
     """States at the end agree in every digit given, peaks to 1e-6 (read between samples)."""
     tight = {"method": "DOP853", "solve_ivp_kwargs": {"rtol": 1e-13, "atol": 1e-14}}
@@ -71,8 +71,13 @@ RELAXED = 5e-5  # what python-control's relaxed play allows
 LSODA = {"method": "LSODA", "solve_ivp_kwargs": {"rtol": 1e-8, "atol": 1e-10}}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("key", ["1", "2", "2-dead-zone"])
+@pytest.mark.parametrize(
+    "key",
+    [
+        pytest.param("1", marks=pytest.mark.slow),
+        *(pytest.param(key, marks=pytest.mark.weekly) for key in ("2", "2-dead-zone")),
+    ],
+)
 def test_diagrams_as_they_stand_reach_their_figures_in_python_control(key):
     """With LSODA at rtol 1e-8 every figure is within the tolerance of its method."""
     result = measure(plain_run(CASE[key], **LSODA))
@@ -90,7 +95,7 @@ def test_every_case_reaches_its_figures():
         assert check.passed, (check.metric.key, check.value, check.expectation)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 @pytest.mark.parametrize(
     ("example", "max_e", "rms_e", "max_u", "zeta", "tolerance"),
     [

@@ -195,5 +195,5 @@ def test_every_combination_of_choices_is_built_and_checked():
 )
 def test_contradictions_are_refused_by_name(make, message):
     """Where they are born, with rule and value."""
-    with pytest.raises(nlctl._errors.UsageError, match=message):
+    with pytest.raises(nlctl.errors.UsageError, match=message):
         make()

@@ -13,7 +13,7 @@ from analysis.studies.file.errors import line_numbers, place_text
 from analysis.studies.file.own_kinds import model_of
 from analysis.studies.file.schema import keyed
 from nlctl import ParameterError, paper
-from nlctl._names import unknown
+from nlctl.names import unknown
 
 
 def mistakes(path, *settings):

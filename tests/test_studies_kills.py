@@ -12,12 +12,9 @@ from processes import alive, descendants, wait_until
 from studies_example import HEAD, write
 
 from analysis.studies import RunFolderError, load_result, read_study, run
-from nlctl._workers import process_pool
+from nlctl.host.workers import process_pool
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
-]
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 STUDY = f"""{HEAD}
 [runs]
@@ -149,7 +146,13 @@ def assert_same(one, other):
         pd.testing.assert_frame_equal(*frames)
 
 
-@pytest.mark.parametrize("number", range(len(KILLS)))
+def kill(number):
+    """A third of them, of every sort, in each `.ci/run`; the others once a week."""
+    mark = pytest.mark.slow if number % 3 == 1 else pytest.mark.weekly
+    return pytest.param(number, marks=mark)
+
+
+@pytest.mark.parametrize("number", [kill(number) for number in range(len(KILLS))])
 def test_a_kill_leaves_one_run_or_a_refusal(server, whole, tmp_path, number):
     """Whoever is killed, whenever: the processes end, and what is made is of one loop."""
     who, study, moment, edit = KILLS[number]
@@ -190,5 +193,10 @@ def assert_finished(path, out, straight):
 
 
 def test_there_are_thirty():
-    """Of workers, of the parent, between analyses, with the loop edited in between."""
+    """Of workers, of the parent, between analyses, with the loop edited in between.
+
+    Those of each `.ci/run` are of every sort as well.
+    """
     assert len(KILLS) >= 30
+    sorts = {(who, study, edit) for who, study, _, edit in KILLS}
+    assert {(who, study, edit) for who, study, _, edit in KILLS[1::3]} == sorts

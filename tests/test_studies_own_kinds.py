@@ -13,7 +13,7 @@ from analysis.studies import Asked, Kind, StudyError, load_result, plan, read_st
 from analysis.studies.folder import remove_run
 from analysis.studies.page.report import study_part, study_report
 from nlctl import DeadZone
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 LOOP = '''
 import nlctl
@@ -70,21 +70,24 @@ class Spread(Asked):
     of: str = Field("spec", description="Column of the main table.")
     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
 
+    @property
+    def claim(self):
+        return "" if self.limit is None else f"the spread is at most {self.limit:g}"
+
 
 def run(asked, ground):
     values = ground.rows.columns(asked.of)[asked.of].to_numpy()
     spread = float(np.std(values))
-    claimed = {}
+    answer = ""
     if asked.limit is not None:
         answer = "shown" if spread <= asked.limit else "refuted"
-        claimed = {"claim": f"the spread is at most {asked.limit:g}", "answer": answer}
     return made(
         asked,
         f"'{asked.of}' has the standard deviation {spread:.4g} in {values.size} runs.",
         runs=values.size,
         numbers={"spread": spread},
         tables={"values": ground.rows.columns(asked.of)},
-        **claimed,
+        answer=answer,
     )
 
 
@@ -261,7 +264,7 @@ def test_a_kind_needs_the_main_table_where_it_says_so(tmp_path):
 def test_what_a_kind_refuses_costs_its_analysis_alone(tmp_path):
     """The others keep their answers."""
     kind = KIND.replace("    values = ", "    raise UsageError('no way')\n    values = ", 1)
-    path = written(tmp_path, kind=f"from nlctl._errors import UsageError\n{kind}")
+    path = written(tmp_path, kind=f"from nlctl.errors import UsageError\n{kind}")
     found = run(read_study(path), tmp_path / "run")
     assert found["spread"].sentence == "Not answered: no way."
     assert found["probability"].is_answered

@@ -327,6 +327,8 @@ def test_an_analysis_that_cannot_be_made_costs_no_other(folder):
     assert (found["sobol"].is_answered, found["sobol"].holds) == (False, False)
     assert found["sobol"].runs == 32
     assert found["probability"].holds is True
+    assert (found.answer, found["sobol"].claim) == ("not shown yet", "the analysis has an answer")
+    assert f"not shown yet: sobol (needs an answer: {endless} of 32 rows" in found.verdict
 
 
 FAILING = (

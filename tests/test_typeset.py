@@ -10,7 +10,7 @@ from test_derivatives import quiet
 import nlctl
 from analysis.report.document import Equation
 from analysis.report.mathml import mathml
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 from nlctl.expressions.latex import number_text, symbol
 from nlctl.native._typeset import _dotted
 

@@ -9,13 +9,13 @@ import threading
 import pytest
 from processes import alive, descendants, wait_until
 
-from nlctl._workers import process_pool
+from nlctl.host.workers import process_pool
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 PARENT = """\
 import sys, time
-from nlctl._workers import process_pool
+from nlctl.host.workers import process_pool
 
 def main():
     pool = process_pool(2)

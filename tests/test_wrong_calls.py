@@ -9,7 +9,7 @@ from wrong_calls import GROUPS
 
 import analysis
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 OWN = [Path(package.__file__).parent for package in (nlctl, analysis)]  # wherever it is installed
 

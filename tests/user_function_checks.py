@@ -16,7 +16,7 @@ import numpy as np
 import user_functions
 
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 from nlctl.native._lower import lower
 from nlctl.native._lower_blocks import equations
 from nlctl.native._routine import plain_functions

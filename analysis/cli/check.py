@@ -11,9 +11,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from nlctl._diagram import initial_state, state_names
-from nlctl._errors import ParameterError
-from nlctl._names import find_name
+from nlctl.diagrams import initial_state, state_names
+from nlctl.errors import ParameterError
+from nlctl.names import find_name
 
 if TYPE_CHECKING:
     from analysis.lyapunov.ledger import Ledger, Line
@@ -127,6 +127,7 @@ def summary(found: Ledger) -> str:
     told = ", ".join(f"{number} {status}" for status, number in count.items() if number)
     paper = ", ".join(line.key for line in found.failing)
     own = ", ".join(line.key for line in found.violated)
+    open_ = "; ".join(f"{line.key} ({line.evidence})" for line in found.undecided)
     lost = found["run"]
     until = f" until it is lost at {lost.time:.5g} s" if lost.status == "violated" else ""
     lines = [
@@ -135,7 +136,9 @@ def summary(found: Ledger) -> str:
         f"{len(found.lines)} lines: {told}",
         f"violated: {own or 'none of the corrected statements'}",
     ]
-    return "\n".join([*lines, f"false as the paper has it: {paper}"] if paper else lines)
+    lines += [f"undecided: {open_}"] if open_ else []
+    lines += [f"false as the paper has it: {paper}"] if paper else []
+    return "\n".join(lines)
 
 
 def _number(value: float) -> str:

@@ -6,15 +6,12 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from nlctl._catalogue import block_groups, block_records
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
-from nlctl._param import declared_params
+from analysis.catalogue import block_summaries, named_block
+from nlctl.errors import ParameterError
 
 if TYPE_CHECKING:
     from analysis.studies.kind import Kind
@@ -23,17 +20,16 @@ __all__ = ["show", "show_all"]
 
 KINDS = "kinds"
 HELP = """
-nlctl list NAME shows the parameters of a block, nlctl list kinds the kinds of analysis of a study,
-and nlctl list file.py:NAME a block or a kind of your own."""
+nlctl list NAME shows the parameters of a block, nlctl list kinds the
+kinds of analysis of a study, nlctl list file.py:NAME one of your own."""
 
 
 def show_all() -> None:
     """Print the blocks in groups, one line each, and the examples."""
     console = Console()
-    groups = block_groups()
+    groups = block_summaries()
     width = max(len(name) for group in groups.values() for name in group)
-    for title, group in groups.items():
-        lines = {name: _summary(record) for name, record in group.items()}
+    for title, lines in groups.items():
         _show_group(title.capitalize(), lines, width)
     console.print("[bold]Examples[/bold]\n  example-1 (dead zone), example-2 (backlash)")
     console.print(HELP, highlight=False)
@@ -57,8 +53,9 @@ def show(name: str) -> None:
         from analysis.studies.file.resolve import named
 
         return _show(name, named(name, Path.cwd()))
-    if name in block_records():
-        return _show(name, block_records()[name])
+    blocks = [block for group in block_summaries().values() for block in group]
+    if name in blocks:
+        return _show_block(name, named_block(name))
     from analysis.studies.kinds import KINDS as STUDIED  # takes a second
 
     kinds = {kind.name: kind for kind in STUDIED}
@@ -66,8 +63,10 @@ def show(name: str) -> None:
         lines = {name: _plain(kind.answers) for name, kind in kinds.items()}
         return _show_group("Kinds of analysis", lines, max(map(len, lines)))
     if name not in kinds:
-        raise unknown("block", name, [*block_records(), *kinds, KINDS])
-    return _show(name, kinds[name])
+        from nlctl.names import unknown
+
+        raise unknown("block", name, [*blocks, *kinds, KINDS])
+    return _show_kind(name, kinds[name])
 
 
 def _show(name: str, thing: Any) -> None:
@@ -94,6 +93,10 @@ def _show_group(title: str, lines: dict[str, str], width: int) -> None:
 
 def _show_block(name: str, record: type) -> None:
     """Print the parameter table of a block."""
+    import numpy as np
+
+    from nlctl.params import declared_params
+
     table = Table("parameter", "default", "unit", "bounds", "meaning", title=None)
     defaults = {f.name: f.default for f in dataclasses.fields(record)}
     for field, rule in declared_params(record).items():

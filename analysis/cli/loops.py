@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from nlctl._errors import ParameterError, UsageError
+from nlctl.errors import ParameterError, UsageError
 
 MOST_SAMPLES = 2_000_000  # times of one run: 16 MB a signal
 
@@ -76,8 +76,8 @@ def input_values(diagram: Any, texts: Sequence[str]) -> Any:
     """
     import numpy as np
 
-    from nlctl._arguments import number
-    from nlctl._names import unknown
+    from nlctl.arguments import number
+    from nlctl.names import unknown
 
     labels = list(diagram.input_labels)
     values = dict.fromkeys(labels, 0.0)
@@ -97,8 +97,8 @@ def assignments(diagram: Any, texts: Sequence[str]) -> tuple[dict[str, Any], dic
     UsageError
         If a text is none, or a name does not exist.
     """
-    from nlctl._diagram import parameter_names
-    from nlctl._names import base_name, find_name
+    from nlctl.diagrams import parameter_names
+    from nlctl.names import base_name, find_name
 
     params, initial = {}, {}
     known = dict.fromkeys([*parameter_names(diagram), *diagram.params])

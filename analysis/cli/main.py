@@ -9,7 +9,10 @@ from typing import Annotated
 import typer
 
 from .report import register as register_reports
+from .studies import FAILS, OPEN
 from .studies import register as register_studies
+
+UNPROVED = {"violated": FAILS, "undecided": OPEN}  # exit code by the answer of a ledger
 
 app = typer.Typer(
     name="nlctl",
@@ -122,14 +125,15 @@ def check(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random initial states.")] = 0,
     json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
-    """Check the assumptions and inequalities of the paper's proof; exit 1 if one is violated.
+    """Check the assumptions and inequalities of the paper's proof, line by line.
 
-    Statements that are false only as the paper has them are shown and do not count.
+    Exit codes: 0 every line holds, 1 a line is violated, 5 none is violated, but not all are
+    decided. Statements that are false only as the paper has them are shown and do not count.
     """
     from rich.console import Console
 
     from analysis.lyapunov.ledger import ledger
-    from nlctl._errors import ParameterError
+    from nlctl.errors import ParameterError
 
     from .check import random_start, replay, show_ledger, summary, worst_lines
     from .loops import assignments, named_loop
@@ -150,8 +154,8 @@ def check(
         for line in worst_lines(found) if ensemble else ():
             print(f"run {line.member}, worst in {line.key}, again (with constants of its own):")
             print(f"  {replay(loop, horizon, set_ or [], start, line.member)}")
-    if not found.holds:
-        raise typer.Exit(1)
+    if found.answer in UNPROVED:
+        raise typer.Exit(UNPROVED[found.answer])
 
 
 @app.command("list")
@@ -177,7 +181,7 @@ def diagram(
     expand: Annotated[bool, typer.Option(help="Show what is inside nested diagrams.")] = False,
 ) -> None:
     """Draw the block diagram of a loop."""
-    from nlctl.drawing import draw
+    from nlctl.drawing.picture import draw
 
     from .loops import named_loop
     from .terminal import check_figure, write_figure
@@ -190,7 +194,7 @@ def diagram(
 def _write_csv(path: Path, times, signals) -> None:
     import pandas as pd
 
-    from nlctl._files import replace_file
+    from nlctl.host.files import replace_file
 
     table = pd.DataFrame({"time": times} | signals)
     replace_file(path, lambda file: table.to_csv(file, index=False))
@@ -205,7 +209,7 @@ def main() -> None:
 
     An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
     """
-    from nlctl._errors import DivergedError, UsageError
+    from nlctl.errors import DivergedError, UsageError
 
     try:
         app()

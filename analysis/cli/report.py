@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from analysis.report.document import Report
     from analysis.report.svg import Drawn
-    from nlctl._errors import UsageError
+    from nlctl.errors import UsageError
 
 QUICK = ("example-1-quick", "example-2-quick")  # the studies of the paper's report
 
@@ -151,7 +151,7 @@ def _other_process() -> Iterator[Executor]:
     """Lend a process for the other core; it ends when the body fails, whatever it is doing."""
     from multiprocessing import active_children
 
-    from nlctl._workers import process_pool
+    from nlctl.host.workers import process_pool
 
     with process_pool(1) as pool:
         try:
@@ -323,7 +323,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
 
 def _no_report(path: Path) -> UsageError:
     """Return what is said of a path that cannot be compared, with the next step."""
-    from nlctl._errors import UsageError
+    from nlctl.errors import UsageError
 
     if not path.exists():
         return UsageError(f"there is no '{path}': compare needs two reports, or two runs")

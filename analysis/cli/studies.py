@@ -209,7 +209,7 @@ def _told_how_to_go_on(
 @contextmanager
 def exit_codes(json: bool) -> Iterator[None]:
     """Turn what goes wrong into one message and an exit code."""
-    from nlctl._errors import DivergedError, UsageError
+    from nlctl.errors import DivergedError, UsageError
 
     try:
         yield
@@ -254,12 +254,12 @@ def _is_full(error: BaseException | None) -> bool:
 @contextmanager
 def _executor(text: str, jobs: int) -> Iterator[Any]:
     """Yield the executor that an option names; None for the engine's own threads."""
-    from nlctl._errors import ParameterError
+    from nlctl.errors import ParameterError
 
     if text == "threads":
         yield None
     elif text == "processes":
-        from nlctl._workers import process_pool
+        from nlctl.host.workers import process_pool
         from nlctl.native._ensemble import cores
 
         with process_pool(jobs or cores()) as pool:
@@ -273,7 +273,7 @@ def _executor(text: str, jobs: int) -> Iterator[Any]:
 
 def _dask_client(address: str) -> Any:
     """Return a client of the scheduler at an address; it is to be closed."""
-    from nlctl._errors import ParameterError
+    from nlctl.errors import ParameterError
 
     try:
         from distributed import Client

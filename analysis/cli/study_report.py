@@ -163,7 +163,7 @@ def _prepared(result: Result, trust: bool) -> Prepared | None:
     """
     from analysis.studies import RunFolderError
     from analysis.studies.run import reopened
-    from nlctl._errors import UsageError
+    from nlctl.errors import UsageError
 
     try:
         run = reopened(result.folder, trust=trust)

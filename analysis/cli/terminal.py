@@ -9,15 +9,17 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from nlctl._errors import ParameterError
-from nlctl._files import replace_file
+from nlctl.errors import ParameterError
+from nlctl.host.files import replace_file
+
+if TYPE_CHECKING:
+    import numpy as np
 
 FIGURE_FORMATS = (".svg", ".png", ".pdf")
 

@@ -9,8 +9,8 @@ from typing import Literal
 import control as ct
 import numpy as np
 
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 __all__ = ["Box", "Cell", "visited_box"]
 

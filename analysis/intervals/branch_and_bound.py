@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from nlctl._arguments import a_function, of_type, whole_number
-from nlctl._errors import ParameterError
+from nlctl.arguments import a_function, of_type, whole_number
+from nlctl.errors import ParameterError
 
 from .arithmetic import Ball, as_ball, common
 from .box import Box, Cell

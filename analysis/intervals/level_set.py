@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 
 from .arithmetic import Ball, as_ball
 from .box import Box

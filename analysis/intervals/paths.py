@@ -8,7 +8,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
-from nlctl._errors import DiagramError, UsageError
+from nlctl.errors import DiagramError, UsageError
 
 __all__ = ["Decisions", "Undecided", "branch", "every_way", "on_balls", "take"]
 

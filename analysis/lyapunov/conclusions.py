@@ -8,9 +8,9 @@ import control as ct
 import numpy as np
 from flint import arb
 
-from nlctl._diagram import leaves
-from nlctl._errors import ParameterError
-from nlctl._param import equation_arguments
+from nlctl.diagrams import leaves
+from nlctl.errors import ParameterError
+from nlctl.params import equation_arguments
 from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
 

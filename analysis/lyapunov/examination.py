@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native
-from nlctl._arguments import one_of, whole_number
+from nlctl.arguments import one_of, whole_number
 
 from ..intervals.box import Box, visited_box
 from .bounds.constants import constants

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
-from nlctl._errors import UnknownKeywordError
-from nlctl._names import unknown
+from nlctl.errors import UnknownKeywordError
+from nlctl.names import unknown
 
 from ..json_values import as_json
 from ..metrics import peak
@@ -70,9 +70,20 @@ class Ledger:
         return tuple(x for x in self.lines if x.status == "violated" and x.reading == "paper")
 
     @property
+    def undecided(self) -> tuple[Line, ...]:
+        """Corrected statements that are neither found to hold nor violated."""
+        return tuple(x for x in self.lines if x.status == "undecided" and x.reading == "corrected")
+
+    @property
     def holds(self) -> bool:
         """Whether no corrected statement is violated."""
         return not self.violated
+
+    @property
+    def answer(self) -> str:
+        """Of all corrected statements: "violated" if one is, else "undecided" if one is, else
+        "holds"."""
+        return "violated" if self.violated else "undecided" if self.undecided else "holds"
 
     def __getitem__(self, key: str) -> Line:
         for line in self.lines:
@@ -93,6 +104,7 @@ class Ledger:
                 {
                     "loop": self.loop,
                     "holds": self.holds,
+                    "answer": self.answer,
                     "horizon": self.horizon,
                     "members": self.members,
                     "Q": self.Q,

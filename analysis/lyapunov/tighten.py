@@ -11,9 +11,9 @@ import numpy as np
 from scipy.optimize import minimize
 
 from nlctl import native
-from nlctl._arguments import number, whole_number
-from nlctl._errors import DivergedError, ParameterError
-from nlctl._names import unknown
+from nlctl.arguments import number, whole_number
+from nlctl.errors import DivergedError, ParameterError
+from nlctl.names import unknown
 from nlctl.plants import coordinate_names
 from nlctl.response import input_output_response
 

@@ -10,7 +10,6 @@ import control as ct
 import numpy as np
 
 from nlctl import paper
-from nlctl._names import unknown
 from nlctl.controllers import (
     PID,
     AdaptiveWeights,
@@ -24,6 +23,7 @@ from nlctl.controllers import (
     replaced,
     sliding_mode,
 )
+from nlctl.names import unknown
 from nlctl.native import compile as compiled_loop
 from nlctl.native import ensemble_response
 from nlctl.references import BandLimitedNoise

@@ -12,8 +12,8 @@ from typing import Any
 import control as ct
 
 from nlctl import paper
-from nlctl._names import unknown
 from nlctl.actuators import Backlash, DeadZone, Gain, Saturation, cascade
+from nlctl.names import unknown
 
 from .controllers import contenders, sensor
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import differential_evolution
 
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 from nlctl.native import Compiled, ensemble_response
 
 from ..metrics import Metric

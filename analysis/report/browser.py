@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import webbrowser
 from pathlib import Path
 
-from nlctl._errors import UsageError
-from nlctl._files import replace_file
+from nlctl.errors import UsageError
+from nlctl.host.files import replace_file
 
 __all__ = ["find_browser", "open_page", "write_pdf"]
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-PATIENCE = 300  # s
+PATIENCE = 300  # s after which it is looked at whether the browser does anything
+BUSY = 1.0  # s of CPU time in that time are a sign of life, also on a machine with other work
 FLAGS = (
     *("--headless", "--disable-gpu", "--disable-quic", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
@@ -54,7 +57,8 @@ def write_pdf(page: str | os.PathLike[str], path: str | os.PathLike[str]) -> Pat
     Raises
     ------
     UsageError
-        If no browser is installed, or it prints nothing.
+        If no browser is installed, it prints nothing, or it hangs.  How long a print takes is
+        not limited as long as the browser computes.
     """
     browser = find_browser()
     flags = [*FLAGS, "--no-sandbox"] if _is_root() else FLAGS
@@ -68,18 +72,50 @@ def write_pdf(page: str | os.PathLike[str], path: str | os.PathLike[str]) -> Pat
             "--no-pdf-header-footer",
             Path(page).resolve().as_uri(),
         ]
-        try:
-            run = subprocess.run(
-                command, capture_output=True, text=True, timeout=PATIENCE, check=False
-            )
-        except subprocess.TimeoutExpired:
-            raise UsageError(
-                f"'{browser}' printed no PDF of '{page}' within {PATIENCE} s"
-            ) from None
+        reason = _run_while_busy(command, Path(folder, "errors.txt"))
         if not made.exists():
-            reason = (run.stderr.strip().splitlines() or ["no message"])[-1]
             raise UsageError(f"'{browser}' printed no PDF of '{page}': {reason}")
         return replace_file(path, lambda file: file.write(made.read_bytes()))
+
+
+def _run_while_busy(command: list[str], errors: Path) -> str:
+    """Run a program until it ends or hangs; return the last line of its errors.
+
+    They go to a file: a pipe would stay open as long as any process that it has started.
+    """
+    with errors.open("wb") as file:
+        process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=file, start_new_session=True
+        )
+    spent = 0.0
+    try:
+        while True:
+            try:
+                process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                before, spent = spent, _cpu_time(process.pid)
+                if spent - before < BUSY:
+                    return f"no sign of work for {PATIENCE} s"
+            else:
+                told = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+                return (told or ["no message"])[-1]
+    finally:
+        if hasattr(os, "killpg"):
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
+        process.wait()
+
+
+def _cpu_time(session: int) -> float:
+    """Return the CPU time (s) of all processes of a session; 0 where it cannot be had."""
+    ticks = 0
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # it has just ended
+            fields = path.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+            if int(fields[3]) == session:
+                ticks += sum(map(int, fields[11:15]))  # user, system, and of children that ended
+    return ticks / os.sysconf("SC_CLK_TCK") if ticks else 0.0
 
 
 def open_page(page: str | os.PathLike[str]) -> bool:

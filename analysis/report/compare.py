@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nlctl._errors import ParameterError, UsageError
+from nlctl.errors import ParameterError, UsageError
 
 from .outline import sort_key
 from .page import PARTS

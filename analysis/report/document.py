@@ -8,16 +8,18 @@ A report is data until the last step; `analysis.report.render` turns it into a p
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure as MatplotlibFigure
 
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
-from nlctl._param import checked_times
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
+from nlctl.params import checked_times
 
 __all__ = [
     "Claim",
@@ -29,6 +31,7 @@ __all__ = [
     "Report",
     "Section",
     "Table",
+    "versions",
 ]
 
 
@@ -221,3 +224,19 @@ class Report:
     files: Mapping[str, str] = field(default_factory=dict)
     question: str = ""
     lead: Figure | None = None
+
+
+PACKAGES = ("nlctl", "control", "numpy", "scipy", "pandas", "numba", "matplotlib")
+
+
+def versions(*others: str) -> dict[str, str]:
+    """Return the machine, Python, and the versions of the packages that every report needs.
+
+    Parameters
+    ----------
+    *others : str
+        Names of further packages.
+    """
+    own = {"system": f"{platform.system()} {platform.machine()}"}
+    own["Python"] = platform.python_version()
+    return own | {name: version(name) for name in (*PACKAGES, *others)}

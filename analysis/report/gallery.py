@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 from .compare import read_report
 from .document import Claim

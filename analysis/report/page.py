@@ -15,8 +15,8 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from nlctl._errors import UsageError
-from nlctl._files import replace_file
+from nlctl.errors import UsageError
+from nlctl.host.files import replace_file
 
 from .mathml import font_face, inline, mathml
 from .outline import cells, claim_status, is_long, is_short, numeric

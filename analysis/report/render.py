@@ -16,7 +16,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 
 from ..json_values import as_json
 from .document import Figure, History, Item, Report, Table

@@ -16,7 +16,7 @@ import matplotlib as mpl
 from markupsafe import Markup
 from matplotlib.figure import Figure as MatplotlibFigure
 
-from nlctl import drawing
+from nlctl.drawing import picture
 
 from ..figures import axes
 from .document import Figure, Section
@@ -27,9 +27,9 @@ __all__ = ["compact", "draw_ahead", "shapes_svg", "shared_shape", "short_path", 
 # Colours of the figures that follow the page's theme, by the page's own names for them.
 THEME = {
     "#000000": "currentColor",
-    drawing.INK: "currentColor",
-    drawing.GREY: "var(--soft)",
-    drawing.FILL: "var(--panel)",
+    picture.INK: "currentColor",
+    picture.GREY: "var(--soft)",
+    picture.FILL: "var(--panel)",
     axes.GREY: "var(--soft)",
     axes.BLUE.lower(): "var(--blue)",
     axes.ORANGE.lower(): "var(--orange)",

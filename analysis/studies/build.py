@@ -28,8 +28,8 @@ from analysis.robustness import (
     sobol,
     tracking_metrics,
 )
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 from ..robustness.stl.text import parse_formula
 from .file.resolve import DEFAULT, loop_function, option, uncertain

@@ -25,7 +25,7 @@ from analysis.robustness import Design, Space
 from analysis.robustness.runs.identity import differences_of
 from analysis.robustness.runs.store import opened
 from analysis.robustness.runs.sweep import Sweep, load
-from nlctl._files import replace_file
+from nlctl.host.files import replace_file
 
 from .build import labels, main_design
 from .file.own_kinds import own_kinds, stand_ins

@@ -27,7 +27,7 @@ from pydantic import Field, create_model
 from analysis.robustness import Design, Experiment, Prepared, Space
 from analysis.robustness.runs.progress import Progress
 from analysis.robustness.runs.sweep import Sweep
-from nlctl._errors import ParameterError, UsageError
+from nlctl.errors import ParameterError, UsageError
 
 from .file.field_types import Names, Strict
 from .finding import Finding
@@ -65,6 +65,11 @@ class Asked(Strict):
     title: str = Field("", description="Its heading in the report.")
     kind: str
     definition: ClassVar[Kind]
+
+    @property
+    def claim(self) -> str:
+        """What the study claims by asking for it; empty if it asks and claims nothing."""
+        return ""
 
 
 class Varied(Asked):
@@ -169,7 +174,8 @@ class Kind:
     name : str
         As in a study file: lower-case words.
     schema : type of Asked
-        The keys of its table, each with a description, as a pydantic model.
+        The keys of its table, each with a description, as a pydantic model; its property ``claim``
+        is what the study claims with them.
     run : callable
         ``run(asked, ground)`` returns a `Finding`, see `made`; None if its rows are incomplete.
     title : str
@@ -304,9 +310,10 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
     sentence : str
         What was found.
     **parts
-        Other fields of `Finding`: ``runs``, ``numbers``, ``tables``, and with a claim ``claim``,
-        ``answer``, ``needs``.
+        Other fields of `Finding`: ``runs``, ``numbers``, ``tables``, and ``answer`` and ``needs``
+        where `asked` claims something.
     """
+    parts = {"claim": asked.claim} | parts
     return Finding(key="", kind=asked.kind, title="", sentence=sentence, **parts)
 
 
@@ -332,12 +339,16 @@ def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
 
 
 def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Finding:
-    """Return what stands in the place of an analysis that its `runs` or the loop do not admit."""
+    """Return what stands in the place of an analysis that its `runs` or the loop do not admit.
+
+    What the study claims of it is neither shown nor refuted.
+    """
     found = made(
         asked,
         f"Not answered: {error}.",
-        claim="the analysis can be made",
-        answer="refuted",
+        claim=asked.claim or "the analysis has an answer",
+        answer="not shown yet",
+        needs=f"an answer: {error}",
         runs=runs,
         is_answered=False,
     )

@@ -15,7 +15,7 @@ from analysis.figures.axes import BLUE, ORANGE, TIME, stacked_axes
 from analysis.robustness import Experiment, Prepared, evaluate, prepare
 from analysis.robustness.runs.experiment import by_diagram, simulate
 from analysis.robustness.stl.formula import Band, parts_of
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 
 from .file.parse import StudyFile
 from .file.schema import keyed

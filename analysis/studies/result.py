@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.robustness.runs.sweep import Sweep
-from nlctl._names import unknown
+from nlctl.names import unknown
 
 from .file.schema import Study, keyed
 from .finding import Finding

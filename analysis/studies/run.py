@@ -16,8 +16,8 @@ from analysis.robustness import Design, Prepared, evaluate, nominal, prepare
 from analysis.robustness.runs.progress import Progress
 from analysis.robustness.runs.store import StoreError, locked
 from analysis.robustness.runs.sweep import Sweep, load, sweep
-from nlctl._errors import UsageError
-from nlctl._files import replace_file
+from nlctl.errors import UsageError
+from nlctl.host.files import replace_file
 
 from .build import main_design
 from .file.parse import StudyFile, read_study

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from analysis.json_values import as_json, from_json
-from nlctl._errors import UsageError
-from nlctl._files import replace_file
+from nlctl.errors import UsageError
+from nlctl.host.files import replace_file
 
 __all__ = [
     "ANEW",

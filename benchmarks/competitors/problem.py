@@ -14,6 +14,7 @@ import nlctl
 from . import reference
 from .fused import in_place
 
+LAYOUTS = {27: "diagonal", 125: "5x25", 1000: "25x40"}  # of Example 1
 Array = NDArray[np.float64]
 
 
@@ -29,18 +30,23 @@ class Problem:
     ----------
     example : int
         1 or 2.
+    nodes : int
+        Of the network: 27, in Example 1 also 125 or 1000.
     times, coarse : ndarray
         Times (s) at which a run, and each member of an ensemble, is sampled.
     """
 
     example: int
+    nodes: int = 27
     times = np.linspace(0, 20, 201)
     coarse = np.linspace(0, 20, 21)
 
     @cached_property
     def loop(self):
         """The python-control diagram."""
-        return nlctl.paper.example_1() if self.example == 1 else nlctl.paper.example_2()
+        if self.example == 2:
+            return nlctl.paper.example_2()
+        return nlctl.paper.example_1(centres=LAYOUTS[self.nodes])
 
     @cached_property
     def compiled(self):
@@ -54,8 +60,8 @@ class Problem:
 
     @cached_property
     def centres(self) -> Array:
-        """The 27 centres, shape (27, n)."""
-        layout = "diagonal" if self.example == 1 else "3x3x3"
+        """The centres of the network, shape (nodes, n)."""
+        layout = LAYOUTS[self.nodes] if self.example == 1 else "3x3x3"
         return np.array(nlctl.paper.paper_centres(layout, self.order), dtype=float)
 
     @cached_property
@@ -120,6 +126,8 @@ class Solver:
         Relative tolerances to choose from, falling.
     cores : int
         Number of cores that an ensemble can use.
+    prepare : callable
+        ``prepare(rtol)``: what is done once for a tolerance, such as compiling; it is not timed.
     """
 
     name: str
@@ -128,6 +136,7 @@ class Solver:
     ensemble: Callable[[float, Array, int], Array] | None
     tolerances: Sequence[float] = tuple(10 ** -(k / 2) for k in range(10, 24))
     cores: int = 2
+    prepare: Callable[[float], object] = bool
 
 
 def wrong_equations(problem: Problem, solver: Solver, points: int = 50) -> float:

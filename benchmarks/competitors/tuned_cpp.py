@@ -8,4 +8,5 @@ FLAGS = ("-O3", "-march=native", "-ffast-math", "-fopenmp-simd")
 
 def solvers(problem: Problem) -> list[Solver]:
     """Return the tuned program; its ensembles run eight members side by side."""
-    return [solver(problem, built("tuned", FLAGS), "C++ tuned", 8)]
+    flags = (*FLAGS, f"-DNODE_COUNT={problem.nodes}")
+    return [solver(problem, built("tuned", flags), "C++ tuned", 8)]

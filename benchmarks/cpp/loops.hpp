@@ -14,7 +14,7 @@ template <int K> double cosine_of(double angle) {
 
 #define LANES _Pragma("omp simd")
 
-constexpr int NODES = 27;
+constexpr int NODES = NODE_COUNT;
 
 template <int EXAMPLE> struct Shape {
     static constexpr int n = EXAMPLE + 1;

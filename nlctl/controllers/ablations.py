@@ -6,9 +6,9 @@ from typing import Any
 
 import control as ct
 
-from .._arguments import of_type
-from .._equation import equation
-from .._param import param, record
+from ..arguments import of_type
+from ..equations import equation
+from ..params import param, record
 from .adaptive import Zero, adaptive_neural
 from .nussbaum import control_base
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import control as ct
 
-from .._diagram import as_system, interconnect
-from .._equation import equation
-from .._errors import ParameterError
-from .._param import record, whole_number
+from ..diagrams import as_system, interconnect
+from ..equations import equation
+from ..errors import ParameterError
+from ..params import record, whole_number
 from ..plants import coordinate_names
 from ..references import derivative_names
 from .filtered_error import FilteredError, binomial_lambdas

@@ -7,9 +7,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from .._equation import equation
-from .._errors import ParameterError
-from .._param import param, record
+from ..equations import equation
+from ..errors import ParameterError
+from ..params import param, record
 from ..plants import coordinate_names
 from ..references import derivative_names
 

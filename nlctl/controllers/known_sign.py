@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .._equation import equation
-from .._param import param, record
+from ..equations import equation
 from ..functions import smooth_sign
+from ..params import param, record
 
 __all__ = ["KnownSignLaw"]
 

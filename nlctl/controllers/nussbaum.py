@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 
-from .._equation import equation
-from .._param import param, record
+from ..equations import equation
 from ..functions import nussbaum
+from ..params import param, record
 
 __all__ = ["NussbaumLaw"]
 

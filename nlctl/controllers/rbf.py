@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._arguments import number, tuple_of, whole_number
-from .._equation import equation
-from .._errors import ParameterError
-from .._param import param, record
+from ..arguments import number, tuple_of, whole_number
+from ..equations import equation
+from ..errors import ParameterError
 from ..functions import gaussian
+from ..params import param, record
 from ..plants import coordinate_names
 
 __all__ = [

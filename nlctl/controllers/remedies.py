@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 
-from .._equation import equation
-from .._param import param, record
+from ..equations import equation
 from ..functions import clip
+from ..params import param, record
 from .known_sign import damped_base
 from .nussbaum import NussbaumLaw, control_base, gained
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import control as ct
 
-from .._diagram import as_system, interconnect
-from .._equation import equation
-from .._param import param, record
+from ..diagrams import as_system, interconnect
+from ..equations import equation
 from ..functions import clip
+from ..params import param, record
 from .filtered_error import FilteredError
 
 __all__ = ["SlidingModeLaw", "sliding_mode"]

@@ -15,7 +15,7 @@ are, `_machine` holds the functions that come out of it, `_routine` calls them.
 sampled systems.
 """
 
-from .._errors import CompileError
+from ..errors import CompileError
 from ._ahead import compile_ahead
 from ._compile import Compiled, compile  # noqa: A004 (what it does)
 from ._ensemble import Ensemble, ensemble_response

@@ -18,8 +18,8 @@ import numba
 import numpy as np
 from numba.core.registry import CPUDispatcher
 
-from .._block import Block
-from .._errors import CompileError
+from ..blocks import Block
+from ..errors import CompileError
 from ._parameters import Slot, current_values
 from .codegen.calls import Call, Source
 from .thirdparty import dicts, vectors

@@ -13,9 +13,9 @@ import cloudpickle
 import control as ct
 import numpy as np
 
-from .._errors import CompileError, ParameterError, UsageError
-from .._names import unknown
-from .._run_arguments import checked_params
+from ..errors import CompileError, ParameterError, UsageError
+from ..names import unknown
+from ..responses.arguments import checked_params
 from ._describe import called, described
 from ._jacobians import Tangent, linearize, parameter_jacobian, tangent
 from ._lower import Lowered, lower
@@ -45,9 +45,9 @@ class Compiled:
 
     Notes
     -----
-    It is no python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
-    run it, ``compiled.linearize(x0)`` linearizes it with exact derivatives, and for every other
-    function of python-control there is ``compiled.system``.
+    It is not a python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
+    run it, and ``compiled.linearize(x0)`` linearizes it with exact derivatives, in the place of
+    ``ct.linearize``.  Every other function of python-control takes ``compiled.system``.
     """
 
     schedule: Schedule
@@ -231,7 +231,9 @@ def compile(  # noqa: A001 (what it does)
         diagram, or solve for them by Newton's method in every evaluation.  A linear loop is then
         exact to rounding.  Of several solutions the one is found that the search from 0 (then
         from 1 and -1) reaches first.  Where there is none, or the loop's matrix is singular to
-        1e-7, the results are NaN, and a run ends as diverged.
+        1e-7, the results are NaN, and a run ends as diverged.  The derivatives are exact, so a
+        function in a loop must be one that is made of expressions; at most 16 signals of a
+        loop can be solved for together.
 
     Returns
     -------

@@ -10,11 +10,15 @@ import numpy as np
 
 from ._parameters import Slot
 from ._program import Program, corners, memory
-from ._schedule import Node
+from ._schedule import Node, signal_name
 
 if TYPE_CHECKING:
     from ._compile import Compiled
 
+USE = (
+    "nlctl.input_output_response, nlctl.ensemble_response, .linearize(x0, u0); "
+    "python-control's functions take .system"
+)
 SHOWN = 8  # names that are listed before the rest is only counted
 
 
@@ -32,12 +36,10 @@ def described(compiled: Compiled) -> str:
         f"{_count(system.ninputs, 'input')}, {_count(system.nstates, 'state')}, "
         f"{_count(system.noutputs, 'output')}",
         f"  order        {' -> '.join(nodes[i].path for i in schedule.order)}",
+        f"  run it by    {USE}",
     ]
     for loop in schedule.loops:
-        torn = ", ".join(
-            f"{nodes[s.block or 0].path}.{nodes[s.block or 0].system.output_labels[s.index]}"
-            for s in loop.torn
-        )
+        torn = ", ".join(signal_name(nodes, s) for s in loop.torn)
         lines.append(f"  solved for   {torn}")
     lines += [f"  as it stands {line}" for line in called(compiled)]
     for i in dict.fromkeys(schedule.order):

@@ -9,7 +9,7 @@ import control as ct
 import numba
 import numpy as np
 
-from .._errors import ParameterError
+from ..errors import ParameterError
 from . import _address
 from ._address import call_out, call_rhs
 from ._compile import Compiled

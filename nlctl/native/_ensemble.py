@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import control as ct
 import numpy as np
 
-from .._errors import ParameterError
-from .._names import unknown
-from .._param import checked_times, whole_number
-from .._run_arguments import checked_params, input_array
+from ..errors import ParameterError
+from ..names import unknown
+from ..params import checked_times, whole_number
+from ..responses.arguments import checked_params, input_array
 from ._ahead import compile_for
 from ._compile import Compiled
 from ._compile import compile as compile_diagram

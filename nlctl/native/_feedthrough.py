@@ -7,7 +7,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._block import Block
+from ..blocks import Block
 from ..expressions.graph import Ambiguous
 from ._parameters import slots_of
 from ._trace_block import dependence

@@ -8,26 +8,17 @@ interrupted after any number of rounds and go on.
 
 from __future__ import annotations
 
-import functools
-import threading
-from collections.abc import Callable
-
 import numba
 import numpy as np
 
-from . import _address, _rodas5p, _tsit5
+from . import _rodas5p, _tsit5
 from ._address import call_rhs
 from ._control import choose_method, choose_step, next_step, rejected
 from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
-from ._lane import INNER, LANES, RUNNING
-from ._restart import memory_rates, restart, start
+from ._lane import INNER, RUNNING
+from ._restart import memory_rates, restart
 from ._stiff import stiff_attempt
-from ._work import AUTO, OUT, RESTART, RHS, STIFF_ATTEMPT, TASK, WORK, inputs_at, outputs
-from .codegen.fingerprint import function_key, module_key
-from .codegen.machine_code import Wanted
-from .codegen.machine_code import machine_code as stored_code
-
-_ONCE = threading.Lock()  # of several threads that begin at the same time one compiles
+from ._work import AUTO, inputs_at
 
 
 @numba.njit(**INNER)
@@ -81,7 +72,7 @@ def _stop(times, lane, u):
 
 
 @numba.njit(**INNER)
-def _judge(task, lanes, w, states, done, passed):
+def _judge(task, lanes, w, done, passed):
     """Accept or reject the step just tried in every lane, and propose the next.
 
     ``done`` becomes whether it was accepted, ``passed`` whether it ended with an event or set a
@@ -108,7 +99,7 @@ def _judge(task, lanes, w, states, done, passed):
             continue
         t_new = _stop(task.times, lane, w.u) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
-            _sample(lane, j, task.times, t_new, w.x, w.x_new, w.k, w.U, states)
+            _sample(lane, j, task.times, t_new, w.x, w.x_new, w.k, w.U, w.samples)
         step_accepted(lane, found == EVENT)
         lane.t = t_new
         next_step(lane, w.error[j], w.rate[j], task.fixed, memories)
@@ -155,12 +146,12 @@ def _take(task, w, done):
             w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
 
 
-def advance(rhs, restart, stiff_attempt, task, lanes, w, states, rounds):
-    """Try at most `rounds` steps in every lane; fill ``states[m, :, lane]`` for passed times.
+def advance(rhs, task, w, rounds):
+    """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
-    A run's ``lane.status`` is RUNNING until it has ended.  What is rarely called is an argument,
-    and so machine code of its own: it is compiled once and not into this function too.
+    A run's ``lane.status`` is RUNNING until it has ended.
     """
+    lanes = w.lanes
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     for _ in range(rounds):
         running = 0
@@ -182,46 +173,7 @@ def advance(rhs, restart, stiff_attempt, task, lanes, w, states, rounds):
         for i in range(task.corners):
             for j in range(lanes.size):
                 w.e[i, j] = w.g[i, j]
-        any_passed = _judge(task, lanes, w, states, done, passed)
+        any_passed = _judge(task, lanes, w, done, passed)
         _take(task, w, done)
         if task.memory.size and any_passed:
             restart(rhs, task, lanes, w, passed)
-
-
-def machine_code() -> dict[str, Callable[..., None]]:
-    """Return the compiled functions: made when first needed, kept for later sessions."""
-    with _ONCE:
-        return _machine_code()
-
-
-def integrator_key() -> str:
-    """Return a key that changes with whatever the integrators' machine code is made of."""
-    wanted = ((each.function, each.signature.args) for each in _wanted())
-    return function_key(module_key(_address), *wanted)
-
-
-def _wanted() -> list[Wanted]:
-    def code(function, *arguments, **options):
-        signature = numba.void(*arguments)
-        options = {"error_model": "numpy", **options}
-        return Wanted(function=function, signature=signature, options=options)
-
-    rarely, often = {"no_cpython_wrapper": True}, {"nogil": True}
-    common, samples = (TASK, LANES, WORK), numba.float64[:, :, ::1]
-    return [
-        code(restart, *RESTART.signature.args, **rarely),
-        code(stiff_attempt, *STIFF_ATTEMPT.signature.args, **rarely),
-        code(start, RHS, RESTART, *common, **often),
-        code(advance, RHS, RESTART, STIFF_ATTEMPT, *common, samples, numba.int64, **often),
-        code(outputs, RHS, OUT, TASK, WORK, samples, samples, **often),
-    ]
-
-
-@functools.cache
-def _machine_code() -> dict[str, Callable[..., None]]:
-    again, stiff, begin, go_on, fill = stored_code(integrator_key(), _wanted())
-    return {
-        "start": lambda rhs, *rest: begin(rhs, again, *rest),
-        "advance": lambda rhs, *rest: go_on(rhs, again, stiff, *rest),
-        "outputs": fill,
-    }

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
-from .._errors import CompileError, ParameterError, UsageError
-from .._names import unknown
-from .._run_arguments import state_array
+from ..errors import CompileError, ParameterError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate
 from ..expressions.graph import Expr, Graph, Untraceable
+from ..names import unknown
+from ..responses.arguments import state_array
 from ._lower_blocks import equations
 from ._parameters import length
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-import numba
 import numpy as np
 
 
@@ -54,7 +53,6 @@ _FIELDS = [
     ("ends", "i8"),  # the step being tried ends at a corner of the inputs or at the end
 ]
 LANE = np.dtype((np.record, _FIELDS))
-LANES = numba.from_dtype(LANE)[::1]
 
 
 def new_lanes(times: np.ndarray, count: int) -> np.ndarray:

@@ -11,16 +11,16 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._errors import CompileError
+from ..errors import CompileError
 from ..expressions.arrays import Tracer, boxed, concatenated, full, number, traced, vector
 from ..expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable, needed
 from ..expressions.operators import elementwise
 from ..expressions.trace import trace
 from ._called import call_of
-from ._newton import solver
+from ._newton import inside, solver
 from ._parameters import length
 from ._program import corners, memory
-from ._schedule import Combination, Loop, Node, Schedule, Signal
+from ._schedule import Combination, Loop, Node, Schedule, Signal, signal_name
 from ._trace_block import parameters, time
 from .codegen.calls import Call
 from .codegen.solver import Solver
@@ -169,9 +169,10 @@ class Reader:
         try:
             made, given = solver(name, leaves, found)
         except Untraceable as error:
+            names = ", ".join(signal_name(self.blocks, signal) for signal in loop.torn)
+            why = _opaque(leaves, found, self.calls) or str(error)
             raise CompileError(
-                f"an algebraic loop cannot be solved: {_opaque(found, self.calls)}, and has no "
-                "derivatives; put a state into the loop"
+                f"the algebraic loop through {names} cannot be solved: {why}; put a state into it"
             ) from error
         self.solvers[name] = made
         pieces = [Tracer(self.graph, boxed(e), 0, e.size) if e.size else
@@ -322,12 +323,16 @@ class Reader:
         return _results(self.graph, "call", name, given, count)
 
 
-def _opaque(found: Sequence[Expr], calls: Mapping[str, Call]) -> str:
-    """Return which opaque functions are in a loop, in words."""
-    names = [node.data[0] for node in needed(found) if node.op == "call"]
-    texts = [f"the {calls[n].kind} function of block '{calls[n].block}' is called as it stands "
-             f"({calls[n].reason})" for n in dict.fromkeys(names)]  # fmt: skip
-    return ", ".join(texts)
+def _opaque(guesses: Sequence[Expr], found: Sequence[Expr], calls: Mapping[str, Call]) -> str:
+    """Return which opaque functions are in a loop, in words; nothing if there are none."""
+    nodes = inside(needed(found), guesses)
+    names = [n.data[0] for n in sorted(nodes, key=lambda n: n.index) if n.op == "call"]
+    used = [calls[name] for name in dict.fromkeys(names)]
+    return ", ".join(
+        f"the {call.kind} function of block '{call.block}' is called as it stands ({call.reason}) "
+        "and has no derivatives"
+        for call in used
+    )
 
 
 def _is_next(one: Combination | None, other: Combination | None) -> bool:

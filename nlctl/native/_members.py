@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._block import Block
-from .._diagram import initial_state, state_names
-from .._errors import ParameterError, UsageError
-from .._names import Parameters, base_name, find_name
-from .._param import as_numbers, equation_arguments, with_overrides
+from ..blocks import Block
+from ..diagrams import initial_state, state_names
+from ..errors import ParameterError, UsageError
+from ..names import Parameters, base_name, find_name
+from ..params import as_numbers, equation_arguments, with_overrides
 from ._compile import Compiled
 from ._parameters import Slot, filled
 

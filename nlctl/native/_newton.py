@@ -18,7 +18,7 @@ import numpy as np
 
 from ..expressions.arrays import Tracer, number
 from ..expressions.derivatives import tangents
-from ..expressions.graph import Expr, Graph, needed
+from ..expressions.graph import Expr, Graph, Untraceable, needed
 from ..expressions.stage import Stage
 from .codegen.plan import Function, Store, plan
 from .codegen.rewrite import rewritten
@@ -26,6 +26,7 @@ from .codegen.solver import DONE, GUESS, PASS, Solver
 
 BASE, TRIAL = 0.0, 1.0  # phases of a search besides DONE
 STARTS = (0.0, 1.0, -1.0)
+MOST = 16  # signals of one loop; elimination is written out, and grows with their third power
 STEPS = 60.0  # trials from one start, halvings included
 SMALL_STEP = 1e-9  # relative; the next one, of about its square, would not be seen
 ROUNDING = 4 * 2.0**-52
@@ -46,14 +47,21 @@ def solver(name: str, guesses: Sequence[Expr], found: Sequence[Expr]) -> tuple[S
     Raises
     ------
     Untraceable
-        If an opaque function is in the loop: it has no derivative.
+        If an opaque function is in the loop, which has no derivative, or there are too many
+        signals.
     """
+    if len(guesses) > MOST:
+        raise Untraceable(f"{len(guesses)} signals have to be found together, {MOST} can be")
     nodes = needed(found)
-    inside = _inside(nodes, guesses)
+    within = inside(nodes, guesses)
     outside = dict.fromkeys(
-        arg for node in inside for arg in node.args if arg not in inside and _is_given(arg)
+        arg
+        for node in nodes  # in an order that is the same in every process
+        if node in within
+        for arg in node.args
+        if arg not in within and _is_given(arg)
     )
-    outside |= dict.fromkeys(e for e in found if e not in inside and _is_given(e))
+    outside |= dict.fromkeys(e for e in found if e not in within and _is_given(e))
     places: dict[Expr, int] = {}
     for expr in outside:
         places[expr] = sum(e.size or 1 for e in places)
@@ -67,16 +75,16 @@ def solver(name: str, guesses: Sequence[Expr], found: Sequence[Expr]) -> tuple[S
     return made, list(places)
 
 
-def _inside(nodes: Sequence[Expr], guesses: Sequence[Expr]) -> set[Expr]:
+def inside(nodes: Sequence[Expr], guesses: Sequence[Expr]) -> set[Expr]:
     """Return what depends on a guess, and the truth values beside it: no array holds these."""
-    inside = set(guesses)
+    found = set(guesses)
     for node in nodes:
-        if any(arg in inside for arg in node.args):
-            inside.add(node)
+        if any(arg in found for arg in node.args):
+            found.add(node)
     for node in reversed(nodes):
-        if node in inside:
-            inside.update(arg for arg in node.args if arg.kind == "b")
-    return inside
+        if node in found:
+            found.update(arg for arg in node.args if arg.kind == "b")
+    return found
 
 
 def _within(

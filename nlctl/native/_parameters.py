@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
-from .._block import Block
-from .._errors import UsageError
+from ..blocks import Block
+from ..errors import UsageError
 
 if TYPE_CHECKING:
     from ._schedule import Node

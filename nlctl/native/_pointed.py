@@ -7,7 +7,8 @@ time of a run.
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+import functools
+from typing import Any
 
 import numba
 import numpy as np
@@ -15,19 +16,11 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import (
-    NativeValue,
-    lower_getattr_generic,
-    models,
-    register_model,
-    typeof_impl,
-    unbox,
-)
+from numba.extending import lower_getattr_generic, models, register_model
 from numba.np.arrayobj import populate_array
+from numba.np.numpy_support import as_dtype
 
-R = TypeVar("R", bound=type)
 _INT = ir.IntType(64)
-_TABLE = types.Array(types.int64, 2, "C")
 _ENTRY = 4  # numbers in the table for each field: a number, or an address and up to three lengths
 
 
@@ -39,28 +32,48 @@ class Pointed(types.Type):
         text = ", ".join(f"{name}: {kind}" for name, kind in fields.items())
         super().__init__(name=f"Pointed({text})")
 
+    @functools.cached_property
+    def formats(self) -> dict[str, tuple[np.dtype, int]]:
+        """Data type and number of dimensions of each field."""
+        return {
+            name: (as_dtype(getattr(kind, "dtype", kind)), getattr(kind, "ndim", 0))
+            for name, kind in self.fields.items()
+        }
 
-def pointed(record: R) -> R:
-    """Let a class of named tuples, made by `with_table`, be pointers in machine code.
+
+def type_of(value: Any) -> Pointed:
+    """Return the type of a record that `with_table` has made, in machine code."""
+    return Pointed({name: numba.typeof(getattr(value, name)) for name in _named(value)})
+
+
+def with_table(record: Any, like: Any = None, **values: Any) -> Any:
+    """Return a named tuple of these values; its table holds as long as it does.
 
     Its last field is ``table``, the others are C-contiguous arrays, floats and integers.
-    """
 
-    @typeof_impl.register(record)
-    def typed(value: Any, context: Any) -> Pointed:
-        return Pointed({name: numba.typeof(getattr(value, name)) for name in _named(record)})
-
-    return record
-
-
-def with_table(record: Any, **values: Any) -> Any:
-    """Return a record of these values; its table holds as long as it does.
+    Parameters
+    ----------
+    record : class
+        Of named tuples.
+    like : Pointed, optional
+        What machine code takes it for.
+    **values
+        Its fields.
 
     Raises
     ------
+    TypeError
+        If a field has another type than machine code takes it for.
     ValueError
         If an array is not C-contiguous: the table has no strides.
     """
+    for name, wanted in like.formats.items() if like else ():
+        found = np.asarray(values[name])
+        if (found.dtype, found.ndim) != wanted:
+            raise TypeError(
+                f"'{name}' of {record.__name__} needs {wanted[1]} dimensions of {wanted[0]}, got "
+                f"{found.ndim} of {found.dtype}"
+            )
     rows = []
     for name in _named(record):
         value = values[name]
@@ -82,17 +95,6 @@ def _named(record: Any) -> tuple[str, ...]:
 class _PointedModel(models.PrimitiveModel):
     def __init__(self, manager, fe_type):
         super().__init__(manager, fe_type, _INT.as_pointer())
-
-
-@unbox(Pointed)
-def _unboxed(kind, value, c):
-    """Return the address of the table, which the caller's record keeps alive."""
-    table = c.pyapi.object_getattr_string(value, "table")
-    array = c.unbox(_TABLE, table)
-    pointer = c.context.make_array(_TABLE)(c.context, c.builder, array.value).data
-    c.context.nrt.decref(c.builder, _TABLE, array.value)
-    c.pyapi.decref(table)
-    return NativeValue(pointer, is_error=array.is_error)
 
 
 @infer_getattr

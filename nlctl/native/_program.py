@@ -8,8 +8,8 @@ from typing import Any
 
 import control as ct
 
-from .._block import Block, event_count, memory_states
-from .._errors import CompileError
+from ..blocks import Block, event_count, memory_states
+from ..errors import CompileError
 from ._parameters import Slot, current_values, slots
 from ._schedule import Node, Schedule
 

@@ -8,9 +8,9 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._errors import DivergedError
-from .._run_arguments import evaluation_array, input_array, interpolated, state_array
-from .._time_response import Response
+from ..errors import DivergedError
+from ..responses.arguments import evaluation_array, input_array, interpolated, state_array
+from ..responses.time_response import Response
 from ._compile import Compiled
 from ._lane import Status
 from ._simulate import Settings, Statistics, Trajectory, trajectory

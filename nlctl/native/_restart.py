@@ -38,6 +38,7 @@ def memory_rates(rhs, task, lanes, w, x, dx):
                 w.e[i, j] = 0.0  # memories are committed step by step for a while
 
 
+@numba.njit(**INNER)
 def restart(rhs, task, lanes, w, chosen):
     """Make the chosen lanes' derivatives, event functions and memories those of their state."""
     _refresh(rhs, task, lanes, w, chosen)
@@ -214,8 +215,9 @@ def _first_step(rhs, task, lanes, w):
         lanes[j].h = task.fixed if task.fixed > 0.0 else (h if np.isfinite(h) else h0)
 
 
-def start(rhs, restart, task, lanes, w):
+def start(rhs, task, w):
     """Begin at the initial states in w.x: commit the memories, propose first steps."""
+    lanes = w.lanes
     everyone = np.ones(lanes.size, np.bool_)
     restart(rhs, task, lanes, w, everyone)
     _first_step(rhs, task, lanes, w)

@@ -8,7 +8,7 @@ evaluated more than once and is no algebraic loop.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._diagram import places
+from ..diagrams import places
 from ._feedthrough import closer_feedthrough, feedthrough
 from ._tearing import first_loop, tear
 from ._wiring import AlgebraicLoopError, Combination, Signal, Wiring
@@ -245,14 +245,17 @@ def _signals_before(nodes: tuple[Node, ...], signals: set[Signal]) -> dict[Signa
     return before
 
 
+def signal_name(nodes: Sequence[Node], signal: Signal) -> str:
+    """Return the qualified name of a block's output."""
+    node = nodes[signal.block or 0]
+    return f"{node.path}.{node.system.output_labels[signal.index]}"
+
+
 def _ring_text(nodes: tuple[Node, ...], before: Mapping[Signal, set[Signal]]) -> str:
     """Print a ring of signals in the order in which they act on each other."""
     try:
         TopologicalSorter(before).prepare()
     except CycleError as error:
         ring = error.args[1]
-        labels = (
-            f"{nodes[s.block].path}.{nodes[s.block].system.output_labels[s.index]}" for s in ring
-        )
-        return " -> ".join(labels)
+        return " -> ".join(signal_name(nodes, s) for s in ring)
     raise AssertionError("signals that cannot be ordered form a ring")

@@ -10,15 +10,15 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._errors import ParameterError
-from .._names import unknown
+from ..errors import ParameterError
+from ..names import unknown
 from ._compile import Compiled
 from ._discrete import simulate_discrete
-from ._integrate import machine_code
-from ._lane import RUNNING, Status, new_lanes
+from ._integrators import integrators
+from ._lane import RUNNING, Status
 from ._machine import Machine, machine
 from ._pointed import with_table
-from ._work import AUTO, EXPLICIT, IMPLICIT, Task, new_work
+from ._work import AUTO, EXPLICIT, IMPLICIT, TASK, Task, new_work
 
 METHODS = {"auto": AUTO, "tsit5": EXPLICIT, "rodas5p": IMPLICIT}
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
@@ -146,43 +146,38 @@ class Run:
     machine : Machine
     task, work : Task, Work
         See `_work`.
-    lanes : ndarray
-        One record per member, see `_lane`.
-    states : ndarray of shape (m, states, members)
-        Samples, NaN beyond the time that a member has reached.
-    signals : int
-        Number of outputs.
     """
 
     machine: Machine
     task: Any
     work: Any
-    lanes: np.ndarray
-    states: np.ndarray
-    signals: int
+
+    @property
+    def lanes(self) -> np.ndarray:
+        """One record per member, see `_lane`."""
+        return self.work.lanes
 
 
 def begin(run: Run) -> None:
     """Commit the memories and propose first steps."""
     rhs, _ = run.machine.entries
-    machine_code()["start"](rhs, run.task, run.lanes, run.work)
+    integrators()["start"](rhs, run.task, run.work)
     run.machine.check(run.task.p)
-    run.states[0] = run.work.x
+    run.work.samples[0] = run.work.x
 
 
 def go_on(run: Run, rounds: int = ROUNDS) -> None:
     """Try up to `rounds` steps in every lane that is still running."""
     rhs, _ = run.machine.entries
-    machine_code()["advance"](rhs, run.task, run.lanes, run.work, run.states, rounds)
+    integrators()["advance"](rhs, run.task, run.work, rounds)
     run.machine.check(run.task.p)
 
 
 def finish(run: Run) -> np.ndarray:
     """Return the outputs, shape (m, outputs, members); memories get their values in the samples."""
-    y = np.full((run.task.times.size, run.signals, run.lanes.size), np.nan)
-    machine_code()["outputs"](*run.machine.entries, run.task, run.work, run.states, y)
+    integrators()["outputs"](*run.machine.entries, run.task, run.work)
     run.machine.check(run.task.p)
-    return y
+    return run.work.y
 
 
 def prepared(
@@ -194,12 +189,13 @@ def prepared(
     settings: Settings,
 ) -> Run:
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
-    program, (n, count) = compiled.program, x0.shape
+    program, count = compiled.program, x0.shape[1]
     code = machine(compiled, p, count)
     c = np.zeros((code.rows, count))
     code.prepare(np.ascontiguousarray(p), c)
     task = with_table(
         Task,
+        like=TASK,
         times=times,
         inputs=inputs,
         p=c,
@@ -212,18 +208,10 @@ def prepared(
         method=METHODS[settings.method],
         alone=int(count == 1),
     )
-    lanes, work = new_lanes(times, count), new_work(n, inputs.shape[0], program.events, count)
-    lanes["stiff"] = settings.method == "rodas5p"
-    work.x[:] = x0
-    states = np.full((times.size, n, count), np.nan)
-    return Run(
-        machine=code,
-        task=task,
-        work=work,
-        lanes=lanes,
-        states=states,
-        signals=compiled.system.noutputs or 0,
-    )
+    signals = compiled.system.noutputs or 0
+    work = new_work(x0, times, inputs.shape[0], program.events, signals)
+    work.lanes["stiff"] = settings.method == "rodas5p"
+    return Run(machine=code, task=task, work=work)
 
 
 def made(run: Run, outputs: np.ndarray, j: int) -> Trajectory:
@@ -231,7 +219,7 @@ def made(run: Run, outputs: np.ndarray, j: int) -> Trajectory:
     lane, times, states, outputs = (
         run.lanes[j],
         run.task.times,
-        run.states[:, :, j],
+        run.work.samples[:, :, j],
         outputs[:, :, j],
     )
     status, reached = Status(int(lane["status"])), float(lane["t"])

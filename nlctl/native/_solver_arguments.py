@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .._errors import ParameterError
-from .._names import unknown
+from ..errors import ParameterError
+from ..names import unknown
 from ._simulate import Settings
 
 STIFF = "method='rodas5p' is its stiff method"

@@ -59,6 +59,7 @@ def _spectral_radius(w):
     return rate
 
 
+@numba.njit(**INNER)
 def stiff_attempt(rhs, task, lanes, w):
     """Try a step of Rodas5P in the only lane."""
     n, lane, h = w.x.shape[0], lanes[0], lanes[0].step

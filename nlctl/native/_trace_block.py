@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .._block import Block
+from ..blocks import Block
 from ..expressions.arrays import Tracer, number, vector
 from ..expressions.graph import Expr, Graph, Untraceable
 from ..expressions.operators import elementwise

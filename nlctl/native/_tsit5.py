@@ -117,11 +117,18 @@ def errors(parts, x_new, x_stage, k, error, rate):
 @numba.njit(**INNER)
 def interpolate(theta, h, x, k, lane, result):
     """Fill column `lane` of `result` with the solution at the fraction theta of its step."""
-    weights = np.empty(STAGES)
-    for s in range(STAGES):
-        weights[s] = theta * (B[s, 0] + theta * (B[s, 1] + theta * (B[s, 2] + theta * B[s, 3])))
+    w0, w1, w2, w3 = _weight(theta, 0), _weight(theta, 1), _weight(theta, 2), _weight(theta, 3)
+    w4, w5, w6 = _weight(theta, 4), _weight(theta, 5), _weight(theta, 6)
     for i in range(x.shape[0]):
-        slope = 0.0
-        for s in range(STAGES):
-            slope += weights[s] * k[s, i, lane]
+        slope = w0 * k[0, i, lane] + w1 * k[1, i, lane] + w2 * k[2, i, lane]
+        slope += w3 * k[3, i, lane]
+        slope += w4 * k[4, i, lane]
+        slope += w5 * k[5, i, lane]
+        slope += w6 * k[6, i, lane]
         result[i, lane] = x[i, lane] + h * slope
+
+
+@numba.njit(**INNER)
+def _weight(theta, s):
+    """Return the share of a stage's derivative in the solution at the fraction theta of a step."""
+    return theta * (B[s, 0] + theta * (B[s, 1] + theta * (B[s, 2] + theta * B[s, 3])))

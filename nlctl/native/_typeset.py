@@ -14,12 +14,12 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._block import Block
-from .._errors import CompileError
-from .._param import declared_params
+from ..blocks import Block
+from ..errors import CompileError
 from ..expressions.arrays import Tracer
 from ..expressions.graph import Expr, Graph, needed
 from ..expressions.latex import Index, Writer, index_text, number_text, symbol
+from ..params import declared_params
 from ._lower_blocks import Reader
 from ._parameters import Slot, slots_of
 from ._schedule import Node, Schedule, Signal, schedule

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 
-from .._diagram import Place, places
-from .._errors import UsageError
+from ..diagrams import Place, places
+from ..errors import UsageError
 
 Combination = Mapping["Signal", float]
 

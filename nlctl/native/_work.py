@@ -14,15 +14,12 @@ import numpy as np
 
 from . import _rodas5p, _tsit5
 from ._address import call_out, call_rhs
-from ._lane import INNER, LANES
-from ._pointed import pointed, with_table
-
-RHS = OUT = numba.intp  # addresses
+from ._lane import INNER, new_lanes
+from ._pointed import type_of, with_table
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
 
 
-@pointed
 class Task(NamedTuple):
     """What is to be integrated, and how."""
 
@@ -40,10 +37,12 @@ class Task(NamedTuple):
     table: np.ndarray
 
 
-@pointed
 class Work(NamedTuple):
     """The arrays for integrating members side by side: (states, lanes), (events, lanes), ..."""
 
+    lanes: np.ndarray  # a record for each member, see `_lane`
+    samples: np.ndarray  # the states at the task's times: (times, states, lanes)
+    y: np.ndarray  # the outputs there: (times, outputs, lanes)
     t: np.ndarray  # the times at which the right-hand side is evaluated
     h: np.ndarray
     hh: np.ndarray  # steps, repeated for every state
@@ -80,8 +79,9 @@ class Work(NamedTuple):
     table: np.ndarray
 
 
-def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
-    """Return the arrays for integrating members with `n` states."""
+def new_work(x0: np.ndarray, times: np.ndarray, inputs: int, events: int, outputs: int) -> Work:
+    """Return the arrays for integrating members from `x0` (states, lanes) on."""
+    n, lanes = x0.shape
     stiff = n if lanes == 1 else 0  # the stiff method is for single runs
     shapes: dict[str, tuple[int, ...]] = {
         **dict.fromkeys(("x", "x_new", "x_stage", "x_ahead", "dx_ahead"), (n, lanes)),
@@ -96,22 +96,24 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
         "U": (_rodas5p.STAGES, stiff),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    arrays["x"][:] = x0
+    for name, rows in (("samples", n), ("y", outputs)):
+        arrays[name] = np.full((times.size, rows, lanes), np.nan)
     flat = {f"{x}_flat": arrays[x].reshape(-1) for x in ("x", "x_new", "x_stage", "x_ahead")}
     k_flat = arrays["k"].reshape(_tsit5.STAGES, n * lanes)
     pivots = np.zeros(stiff, dtype=np.int64)
-    return with_table(Work, **arrays, **flat, k_flat=k_flat, pivots=pivots)
+    records = new_lanes(times, lanes)
+    return with_table(Work, lanes=records, **arrays, **flat, k_flat=k_flat, pivots=pivots)
 
 
 _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
-TASK = numba.typeof(  # only the types of these matter
+TASK = type_of(  # only the types of these matter
     with_table(
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
         fixed=0.0, max_steps=0, method=0, alone=0,
     )
 )  # fmt: skip
-WORK = numba.typeof(new_work(1, 1, 1, 1))
-STIFF_ATTEMPT = numba.types.FunctionType(numba.void(RHS, TASK, LANES, WORK))
-RESTART = numba.types.FunctionType(numba.void(RHS, TASK, LANES, WORK, numba.boolean[::1]))
+WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
 
 
 @numba.njit(**INNER)
@@ -135,11 +137,12 @@ def evaluate(rhs, task, lanes, w, x, dx, g):
             dx[i, j] = 0.0
 
 
-def outputs(rhs, out, task, w, states, y):
-    """Fill ``y[m, :, lane]`` with the outputs at ``states[m, :, lane]``.
+def outputs(rhs, out, task, w):
+    """Fill ``w.y[m, :, lane]`` with the outputs at ``w.samples[m, :, lane]``.
 
     Samples inside a step have the memory of its beginning; here they get their own.
     """
+    states, y = w.samples, w.y
     for m in range(task.times.size):
         for j in range(w.t.size):
             w.t[j] = task.times[m]

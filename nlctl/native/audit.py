@@ -16,7 +16,7 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from .._errors import ParameterError, UsageError
+from ..errors import ParameterError, UsageError
 from ._compile import Compiled
 from ._lower import lower
 from ._lower_blocks import equations
@@ -144,7 +144,7 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
             )
     if all(np.all(_close(a, b)) for a, b in zip(ours, theirs, strict=True)):
         return
-    shaken = _shaken(compiled.system, point, trial)
+    shaken = _shaken(compiled.system, point, trial, theirs)
     for what, a, b, moved in zip(("state", "output"), ours, theirs, shaken, strict=True):
         wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
         if wrong.size:
@@ -186,9 +186,8 @@ def _near(point: Any, trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndar
         yield t + _rounded(t, trial), x * factors[: x.size], u * factors[x.size :]
 
 
-def _shaken(system: Any, point: Any, trial: Trial) -> Values:
-    """Return how far python-control's values move when time, states and inputs are rounded."""
-    base = _by_python_control(system, point, trial.params)
+def _shaken(system: Any, point: Any, trial: Trial, base: Values) -> Values:
+    """Return how far python-control's values move from `base` when all is rounded."""
     moved = [np.zeros_like(values) for values in base]
     for near in _near(point, trial):
         found = _by_python_control(system, near, trial.params)

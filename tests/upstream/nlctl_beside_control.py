@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import nlctl
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 ORIGINAL = control.input_output_response
 SIGNATURE = inspect.signature(ORIGINAL)

@@ -8,8 +8,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from nlctl._arguments import number, of_type, vector
-from nlctl._errors import ParameterError
+from nlctl.arguments import number, of_type, vector
+from nlctl.errors import ParameterError
 from nlctl.functions import smooth_sign
 from nlctl.plants import coordinate_names
 

@@ -14,11 +14,12 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from flint import arb
 
-from nlctl._arguments import number, vector
-from nlctl._errors import ParameterError, UsageError
-from nlctl._param import equation_arguments
-from nlctl.actuators import Backlash, DeadZone, play_band
+from nlctl.actuators import Backlash, DeadZone
+from nlctl.actuators.backlash import play_band
+from nlctl.arguments import number, vector
+from nlctl.errors import ParameterError, UsageError
 from nlctl.functions import clip
+from nlctl.params import equation_arguments
 
 from ...intervals.arithmetic import Ball, as_ball, common
 from ...intervals.branch_and_bound import Box, Range, Undecided, enclose

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from flint import arb, fmpz_poly
 
-from nlctl._errors import ParameterError
-from nlctl._param import equation_arguments
+from nlctl.errors import ParameterError
+from nlctl.params import equation_arguments
 from nlctl.references import SumOfSines
 
 __all__ = ["error_bounds", "filter_poles", "reference_bounds"]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._param import equation_arguments
+from nlctl.params import equation_arguments
 from nlctl.plants import ForcedDuffing, duffing_forcing
 
 from ...intervals.branch_and_bound import enclose

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from nlctl._names import unknown
+from nlctl.names import unknown
 
 from ...intervals.arithmetic import as_ball
 from ...intervals.box import Box

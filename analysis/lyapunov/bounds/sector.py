@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._arguments import of_type
-from nlctl._errors import DiagramError, ParameterError
-from nlctl._param import equation_arguments
+from nlctl.arguments import of_type
+from nlctl.errors import DiagramError, ParameterError
+from nlctl.params import equation_arguments
 from nlctl.plants import PureFeedback, coordinate_names
 
 from ...intervals.box import Box

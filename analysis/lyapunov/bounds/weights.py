@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._errors import ParameterError
-from nlctl._param import equation_arguments
 from nlctl.controllers import AdaptiveWeights
+from nlctl.errors import ParameterError
+from nlctl.params import equation_arguments
 
 from ...intervals.branch_and_bound import Box, Range, enclose
 from .final_bound import Gains, alpha_0, alpha_1, initial_V

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from nlctl._errors import ParameterError
-from nlctl._param import whole_number
+from nlctl.errors import ParameterError
+from nlctl.params import whole_number
 
 from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper

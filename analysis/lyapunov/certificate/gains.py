@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from nlctl._arguments import number, whole_number
-from nlctl._errors import DivergedError, ParameterError
+from nlctl.arguments import number, whole_number
+from nlctl.errors import DivergedError, ParameterError
 from nlctl.native import compile as compiled_loop
 from nlctl.response import input_output_response
 

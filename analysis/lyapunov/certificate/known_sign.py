@@ -9,11 +9,7 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from nlctl._block import block
-from nlctl._diagram import Place, initial_state, interconnect
-from nlctl._errors import DiagramError, ParameterError
-from nlctl._names import unknown
-from nlctl._param import as_numbers, equation_arguments
+from nlctl.blocks import block
 from nlctl.controllers import (
     AdaptiveWeights,
     FilteredError,
@@ -22,6 +18,10 @@ from nlctl.controllers import (
     RobustTerm,
     Zero,
 )
+from nlctl.diagrams import Place, initial_state, interconnect
+from nlctl.errors import DiagramError, ParameterError
+from nlctl.names import unknown
+from nlctl.params import as_numbers, equation_arguments
 from nlctl.references import SumOfSines
 
 from ...intervals.branch_and_bound import upper

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._diagram import Place
+from nlctl.diagrams import Place
 from nlctl.expressions.graph import Ambiguous, Graph, Untraceable
 from nlctl.expressions.trace import trace
 from nlctl.native._parameters import slots_of

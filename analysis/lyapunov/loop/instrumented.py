@@ -13,10 +13,10 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from nlctl._block import Block, block
-from nlctl._diagram import interconnect
-from nlctl._equation import equation
-from nlctl._errors import DiagramError
+from nlctl.blocks import Block, block
+from nlctl.diagrams import interconnect
+from nlctl.equations import equation
+from nlctl.errors import DiagramError
 
 from ..bounds.decomposition import Decomposition
 from .declared_terms import terms_with_parameters

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._equation import equation
-from nlctl._param import param, record
+from nlctl.equations import equation
+from nlctl.params import param, record
 
 from ..bounds.decomposition import Decomposition, clipped_split
 

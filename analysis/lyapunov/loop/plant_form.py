@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from nlctl._diagram import Place
-from nlctl._errors import DiagramError
+from nlctl.diagrams import Place
+from nlctl.errors import DiagramError
 from nlctl.plants import coordinate_names
 
 from ...intervals.arithmetic import Ball, as_ball

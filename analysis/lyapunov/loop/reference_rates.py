@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._diagram import Place
+from nlctl.diagrams import Place
 from nlctl.native.thirdparty.python_control import block_outputs, block_rates
 from nlctl.references import derivative_names
 

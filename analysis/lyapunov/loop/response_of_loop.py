@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._diagram import state_names
-from nlctl._errors import DiagramError, ParameterError
+from nlctl.diagrams import state_names
+from nlctl.errors import DiagramError, ParameterError
 
 from ..nussbaum.property import Function
 from .roles import read_parts

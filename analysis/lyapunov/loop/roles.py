@@ -14,10 +14,10 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from nlctl._block import Block
-from nlctl._diagram import Place, initial_state, interconnect
-from nlctl._errors import CompileError, DiagramError
+from nlctl.blocks import Block
 from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
+from nlctl.diagrams import Place, initial_state, interconnect
+from nlctl.errors import CompileError, DiagramError
 from nlctl.native._wiring import Combination, Signal, Wiring
 from nlctl.native.thirdparty.checks import check_functions, check_sizes
 from nlctl.plants import coordinate_names

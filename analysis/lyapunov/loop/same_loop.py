@@ -13,8 +13,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from nlctl._diagram import state_names
-from nlctl._errors import DiagramError, UsageError
+from nlctl.diagrams import state_names
+from nlctl.errors import DiagramError, UsageError
 
 __all__ = ["check_same", "points_around"]
 

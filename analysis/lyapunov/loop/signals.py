@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 __all__ = ["Margin", "Signals", "equality", "inequality", "signals_of"]
 

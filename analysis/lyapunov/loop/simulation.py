@@ -10,10 +10,10 @@ import control as ct
 import numpy as np
 
 from nlctl import native
-from nlctl._arguments import number
-from nlctl._diagram import initial_state
-from nlctl._diagram import state_names as all_states
-from nlctl._errors import ParameterError
+from nlctl.arguments import number
+from nlctl.diagrams import initial_state
+from nlctl.diagrams import state_names as all_states
+from nlctl.errors import ParameterError
 from nlctl.response import input_output_response
 
 from ..bounds.decomposition import Decomposition

@@ -21,9 +21,9 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from nlctl import functions
-from nlctl._arguments import number
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.arguments import number
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 from .property import Function, antiderivative, lobes
 

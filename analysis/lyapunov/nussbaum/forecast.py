@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from nlctl import functions
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 
 from .property import lobe_around
 from .slow_drift import creep

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq, minimize_scalar
 
 from nlctl import functions
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 
 __all__ = [
     "Antiderivative",

@@ -26,8 +26,8 @@ import numpy as np
 from scipy.integrate import quad, trapezoid
 
 from nlctl import functions
-from nlctl._arguments import number, of_type, whole_number
-from nlctl._errors import ParameterError
+from nlctl.arguments import number, of_type, whole_number
+from nlctl.errors import ParameterError
 
 from ..loop.response_of_loop import law_of_response
 from .energy import Drift, drift

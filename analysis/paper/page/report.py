@@ -8,14 +8,13 @@ import control as ct
 import numpy as np
 import pandas as pd
 
-from nlctl._diagram import leaves
-from nlctl.drawing import draw
+from nlctl.diagrams import leaves
+from nlctl.drawing.picture import draw
 
 from ... import figures
 from ...lyapunov.nussbaum.long_run import LongRun
-from ...report.document import Figure, History, Item, Paragraph, Report, Section, Table
+from ...report.document import Figure, History, Item, Paragraph, Report, Section, Table, versions
 from ...report.equations import equations_of
-from ...report.versions import versions
 from .. import CASES, HORIZON, TAIL, Check, Run, checks
 from .. import figures as histories
 from . import text as text

@@ -24,8 +24,8 @@ import cloudpickle
 import numpy as np
 import pandas as pd
 
-from nlctl._errors import UsageError
-from nlctl._workers import end_with_parent
+from nlctl.errors import UsageError
+from nlctl.host.workers import end_with_parent
 from nlctl.native._ensemble import cores
 
 from ..uncertainty.design import Design, rows, seed_number

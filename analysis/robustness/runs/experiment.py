@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 
 from nlctl import native
-from nlctl._arguments import a_function, of_type
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
-from nlctl._param import as_numbers, checked_times
-from nlctl._run_arguments import input_array
+from nlctl.arguments import a_function, of_type
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 from nlctl.native import Compiled, Ensemble, Status, ensemble_response
 from nlctl.native import compile as compiled
 from nlctl.native._simulate import Settings
+from nlctl.params import as_numbers, checked_times
+from nlctl.responses.arguments import input_array
 
 from ...metrics import Metric, machine_code
 from ..stl.piecewise import with_vertices

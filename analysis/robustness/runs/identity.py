@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl import _errors
+from nlctl import errors
 
 from ...metrics import Metric
 from ..uncertainty.design import Design
@@ -27,10 +27,10 @@ __all__ = ["differences_of", "experiment_facts", "identity_of", "labels_text", "
 
 VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
 COMPUTING = {
-    Path(_errors.__file__).parent: ("**/*.py",),
+    Path(errors.__file__).parent: ("**/*.py",),
     Path(__file__).parents[2]: ("robustness/**/*.py", "studies/**/*.py", "metrics.py"),
 }
-TOLD = ("_layout", "drawing", "page")  # they compute nothing
+TOLD = ("drawing", "page")  # they compute nothing
 PROBES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])
 
 

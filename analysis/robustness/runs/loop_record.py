@@ -18,10 +18,10 @@ from typing import Any, TypeVar
 import control as ct
 import numpy as np
 
-from nlctl._block import Block
-from nlctl._diagram import all_parameter_rows, initial_state, leaves, places, state_names
-from nlctl._param import declared_params
+from nlctl.blocks import Block
+from nlctl.diagrams import all_parameter_rows, initial_state, leaves, places, state_names
 from nlctl.native.codegen.fingerprint import content_key
+from nlctl.params import declared_params
 
 __all__ = ["array_text", "loop_facts", "loop_values", "short_key", "values_differ"]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlctl._arguments import fraction
+from nlctl.arguments import fraction
 
 from ..statistics.guarantee import check_iid, checked_confidence
 from ..statistics.sequential import SequentialTest, decision, sequence_bounds

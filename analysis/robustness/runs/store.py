@@ -26,8 +26,8 @@ import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
-from nlctl._errors import UsageError
-from nlctl._files import replace_file
+from nlctl.errors import UsageError
+from nlctl.host.files import replace_file
 
 from .experiment import Columns, typed
 from .identity import differences_of

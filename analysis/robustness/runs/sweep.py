@@ -16,9 +16,9 @@ from typing import Any
 
 import pandas as pd
 
-from nlctl._arguments import of_type, whole_number
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.arguments import of_type, whole_number
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 from ..uncertainty.design import Design
 from .executors import LostChunkError, chunk_table, computed_elsewhere, computed_here

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl._arguments import flag, of_type
-from nlctl._errors import DivergedError
+from nlctl.arguments import flag, of_type
+from nlctl.errors import DivergedError
 from nlctl.native import Status
 from nlctl.response import input_output_response
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from nlctl._arguments import flag, of_type, vector, whole_number
-from nlctl._errors import ParameterError
+from nlctl.arguments import flag, of_type, vector, whole_number
+from nlctl.errors import ParameterError
 
 from ..statistics.guarantee import Violation, checked_confidence, violation_probability
 from ..uncertainty.design import checked_entropy, independent

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl._arguments import a_function
-from nlctl._errors import ParameterError
+from nlctl.arguments import a_function
+from nlctl.errors import ParameterError
 
 from ..uncertainty.quantity import Uncertain
 from ..uncertainty.space import Space, moved, nominal

@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import Delaunay
 
-from nlctl._arguments import number, of_type, whole_number
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.arguments import number, of_type, whole_number
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 from ..uncertainty.design import affordable, numbered
 from ..uncertainty.space import Space, boxed, ends, nominal

@@ -10,10 +10,10 @@ from typing import Any
 
 import control as ct
 
-from nlctl._arguments import number, of_type
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
-from nlctl._param import with_overrides
+from nlctl.arguments import number, of_type
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
+from nlctl.params import with_overrides
 
 from ..runs.experiment import Prepared
 from ..uncertainty.binding import owner_of

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl._arguments import fraction, number, of_type, whole_number
-from nlctl._errors import UsageError
+from nlctl.arguments import fraction, number, of_type, whole_number
+from nlctl.errors import UsageError
 
 from ..statistics.guarantee import Violation, violation_probability
 from ..uncertainty.design import checked_entropy, independent

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from nlctl._arguments import of_type, whole_number
-from nlctl._errors import ParameterError
+from nlctl.arguments import of_type, whole_number
+from nlctl.errors import ParameterError
 
 from ..uncertainty.space import Space, checked_row, nominal
 from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl._arguments import number, of_type, whole_number
+from nlctl.arguments import number, of_type, whole_number
 
 from ..uncertainty.design import Design, checked_entropy, listed
 from ..uncertainty.space import Space

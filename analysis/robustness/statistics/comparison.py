@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nlctl._arguments import fraction, of_type, one_of
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.arguments import fraction, of_type, one_of
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 from ..stl.spec import violates
 from ..uncertainty.design import Design

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nlctl._arguments import fraction, of_type, one_of, whole_number
-from nlctl._errors import ParameterError, UsageError
+from nlctl.arguments import fraction, of_type, one_of, whole_number
+from nlctl.errors import ParameterError, UsageError
 
 from ..stl.spec import violates
 from ..uncertainty.design import Design

@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nlctl._arguments import of_type, one_of
-from nlctl._errors import ParameterError
-from nlctl._param import as_numbers
+from nlctl.arguments import of_type, one_of
+from nlctl.errors import ParameterError
+from nlctl.params import as_numbers
 
 from ..stl.spec import violates
 from ..uncertainty.design import Design

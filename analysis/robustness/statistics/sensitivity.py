@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nlctl._arguments import of_type, whole_number
-from nlctl._errors import ParameterError
+from nlctl.arguments import of_type, whole_number
+from nlctl.errors import ParameterError
 
 from ..stl.spec import FAILED
 from ..uncertainty.design import Design, affordable, checked_entropy, listed, sobol_points

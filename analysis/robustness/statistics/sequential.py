@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import optimize, special
 
-from nlctl._arguments import fraction
+from nlctl.arguments import fraction
 
 from ..uncertainty.design import Design
 from .guarantee import (

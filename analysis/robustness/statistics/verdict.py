@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from scipy import stats
 
-from nlctl._arguments import fraction
-from nlctl._errors import ParameterError
+from nlctl.arguments import fraction
+from nlctl.errors import ParameterError
 
 from .guarantee import MOST_RUNS, Violation, least_count, runs_needed
 from .sequential import SequentialTest, log_evidence

@@ -19,9 +19,9 @@ from functools import cache
 
 import numpy as np
 
-from nlctl._arguments import number, of_type, text
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.arguments import number, of_type, text
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 from .piecewise import Trace, extremes, joined, largest, with_vertices
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nlctl._arguments import number, of_type, text, tuple_of
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
-from nlctl._param import as_numbers
+from nlctl.arguments import number, of_type, text, tuple_of
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
+from nlctl.params import as_numbers
 
 from .formula import HOW, Formula, Signals, horizon, signals_of, trace
 

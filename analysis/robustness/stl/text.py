@@ -16,7 +16,7 @@ import re
 from collections.abc import Sequence
 
 from analysis.robustness.stl.formula import And, Formula, always, eventually, in_band
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 
 __all__ = ["parse_formula"]
 

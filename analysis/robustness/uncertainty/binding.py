@@ -12,13 +12,13 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from nlctl._arguments import a_function, of_type
-from nlctl._block import Block
-from nlctl._diagram import Place, all_parameter_rows, initial_state, leaves, state_names
-from nlctl._errors import ParameterError, UsageError
-from nlctl._names import Parameters, base_name, find_name, unknown
-from nlctl._param import with_overrides
+from nlctl.arguments import a_function, of_type
+from nlctl.blocks import Block
+from nlctl.diagrams import Place, all_parameter_rows, initial_state, leaves, state_names
+from nlctl.errors import ParameterError, UsageError
+from nlctl.names import Parameters, base_name, find_name, unknown
 from nlctl.native import Compiled
+from nlctl.params import with_overrides
 
 from .quantity import SpaceError, Uncertain
 from .space import Space, combinations

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
-from nlctl._arguments import flag, of_type, whole_number
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.arguments import flag, of_type, whole_number
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 from .space import Space, boxed, nominal, sampled
 

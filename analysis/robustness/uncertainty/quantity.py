@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from nlctl._arguments import number, of_type, text, vector
-from nlctl._errors import UsageError
-from nlctl._param import as_numbers
+from nlctl.arguments import number, of_type, text, vector
+from nlctl.errors import UsageError
+from nlctl.params import as_numbers
 
 __all__ = ["QUANTILES", "Choice", "SpaceError", "Uncertain"]
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl._arguments import number, of_type, tuple_of
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.arguments import number, of_type, tuple_of
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 from .quantity import Choice, SpaceError, Uncertain
 

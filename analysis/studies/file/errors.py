@@ -9,8 +9,8 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from nlctl._errors import UsageError
-from nlctl._names import unknown
+from nlctl.errors import UsageError
+from nlctl.names import unknown
 
 from .toml import statements
 

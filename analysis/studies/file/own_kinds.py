@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ConfigDict
 
-from nlctl._errors import ParameterError, UsageError
+from nlctl.errors import ParameterError, UsageError
 
 from ..finding import Finding
 from ..kind import Asked, Ground, Kind

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from analysis.robustness import Experiment
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 
 from .errors import Place, Problem, StudyError, line_numbers, located, place_text, schema_problems
 from .own_kinds import model_of, own_kinds

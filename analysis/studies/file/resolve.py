@@ -13,11 +13,11 @@ from typing import Any
 import cloudpickle
 from scipy import stats
 
+from analysis.catalogue import named_block
 from analysis.robustness import Uncertain
 from analysis.robustness.uncertainty.binding import check_keyword
-from nlctl._catalogue import named_block
-from nlctl._errors import ParameterError, UnknownNameError, UsageError
-from nlctl._names import unknown
+from nlctl.errors import ParameterError, UnknownNameError, UsageError
+from nlctl.names import unknown
 from nlctl.paper import named_example
 
 from ..kind import Kind

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from nlctl._names import unknown
+from nlctl.names import unknown
 
 __all__ = ["shipped"]
 

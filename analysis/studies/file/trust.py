@@ -24,8 +24,8 @@ from urllib.parse import unquote, urlparse
 
 import control as ct
 
-from nlctl import _errors
-from nlctl._errors import ParameterError
+from nlctl import errors
+from nlctl.errors import ParameterError
 
 from .errors import Place, Problem
 from .schema import Study
@@ -38,7 +38,7 @@ __all__ = [
     "untrusted_names",
 ]
 
-OWN = (Path(_errors.__file__).parent, Path(__file__).parents[2])  # nlctl, analysis
+OWN = (Path(errors.__file__).parent, Path(__file__).parents[2])  # nlctl, analysis
 MAKERS = ("control", "nlctl")  # whoever makes a diagram calls one of these
 NO_DIAGRAMS = {"None", "bool", "int", "float", "complex", "str", "bytes", "list", "tuple", "dict"}
 SITES = ("site-packages", "dist-packages")

@@ -17,8 +17,8 @@ from analysis.robustness.search.largest_scale import refusal_of
 from analysis.robustness.statistics.guarantee import check_iid
 from analysis.robustness.uncertainty.binding import check_keyword
 from analysis.robustness.uncertainty.space import combinations
-from nlctl._errors import ParameterError, UsageError
-from nlctl._names import unknown
+from nlctl.errors import ParameterError, UsageError
+from nlctl.names import unknown
 
 from ..build import (
     SIGNALS,

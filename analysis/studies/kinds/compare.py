@@ -22,8 +22,8 @@ from analysis.robustness import (
 )
 from analysis.robustness.statistics.comparison import Comparison, compare, crossed
 from analysis.robustness.statistics.verdict import better_verdict
-from nlctl._errors import ParameterError
-from nlctl._names import unknown
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
 
 from ... import figures as figures
 from ...figures.labels import plain
@@ -99,6 +99,14 @@ class Compare(Asked):
         description="Claim: the first label is better than the second in the first metric, by the "
         "sign test over all pairs.",
     )
+
+    @property
+    def claim(self) -> str:
+        if self.better is None:
+            return ""
+        a, b = self.better
+        level = f"at the level {1 - self.confidence:.2g}"
+        return f"{a} is better than {b} in {next(iter(self.metrics))}, {level}"
 
 
 def _options(asked: Compare, setup: Setup) -> Choice:
@@ -197,7 +205,7 @@ def _run(asked: Compare, ground: Ground) -> Finding | None:
     return made(
         asked,
         _sentence(asked, found),
-        **_claimed(asked, found),
+        **_answer(asked, found),
         runs=len(table),
         numbers={"keyword": asked.keyword, "samples": found.size, "confidence": found.confidence}
         | {"requirements": [r.key for r in experiment.spec.requirements]},
@@ -223,8 +231,8 @@ def _sentence(asked: Compare, found: Comparison) -> str:
     )
 
 
-def _claimed(asked: Compare, found: Comparison) -> dict[str, str]:
-    """Return the claim that one option is better than another, and the answer."""
+def _answer(asked: Compare, found: Comparison) -> dict[str, str]:
+    """Return the answer to the claim that one option is better than another."""
     if asked.better is None:
         return {}
     metric, (a, b), level = next(iter(asked.metrics)), asked.better, 1 - asked.confidence
@@ -232,9 +240,7 @@ def _claimed(asked: Compare, found: Comparison) -> dict[str, str]:
     row = pairs.loc[(a, b) if (a, b) in pairs.index else (b, a)]
     p, adjusted = float(row["p"]), float(row["p_holm"])
     won, lost = (int(found.wins.loc[(metric, x), y]) for x, y in ((a, b), (b, a)))  # type: ignore[arg-type]
-    verdict = better_verdict(won, lost, adjusted, level, adjusted / p)
-    claim = f"{a} is better than {b} in {metric}, at the level {level:.2g}"
-    return {"claim": claim, **vars(verdict)}
+    return vars(better_verdict(won, lost, adjusted, level, adjusted / p))
 
 
 def _runs(asked: Compare, setup: Setup) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from analysis.robustness import Violation
 from analysis.robustness.runs.sweep import Sweep
 from analysis.robustness.statistics.sensitivity import censored
-from nlctl._errors import ParameterError
+from nlctl.errors import ParameterError
 from nlctl.native import Status
 
 from ..kind import Ground, column

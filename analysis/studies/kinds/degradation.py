@@ -48,6 +48,12 @@ class Degradation(Varied):
             raise ValueError(f"the claim is about size {self.at:g}, which is not among the factors")
         return self
 
+    @property
+    def claim(self) -> str:
+        if self.limit is None:
+            return ""
+        return f"a violation has at most probability {self.limit:g} at the size {self.at:g}"
+
 
 def _run(asked: Degradation, ground: Ground) -> Finding:
     """Bound the probability of a violation at every size."""
@@ -68,16 +74,14 @@ def _run(asked: Degradation, ground: Ground) -> Finding:
         for factor, one in bounds.items()
     )
     together = "together" if asked.simultaneous else "each by itself"
-    claimed: dict[str, Any] = {}
-    if asked.limit is not None:
-        claim = f"a violation has at most probability {asked.limit:g} at the size {asked.at:g}"
-        claimed = {"claim": claim, **vars(bound_verdict(bounds[asked.at], asked.limit))}
+    limit = asked.limit
+    verdict = {} if limit is None else vars(bound_verdict(bounds[asked.at], limit))
     return made(
         asked,
         f"Violations with all deviations scaled: {told}. The bounds hold with confidence "
         f"{100 * asked.confidence:g} %, {together}. Assumed: "
         f"at each size {'; '.join(assumptions(independent(space, asked.runs, ground.seed)))}.",
-        **claimed,
+        **verdict,
         runs=sum(one.runs for one in found.statements),
         numbers={"confidence": asked.confidence, "simultaneous": asked.simultaneous},
         tables={"curve": found.table},

@@ -42,18 +42,20 @@ class Probability(Asked):
             raise ValueError("a limit needs side = 'upper' or 'both', got 'lower'")
         return self
 
+    @property
+    def claim(self) -> str:
+        limit = self.limit
+        return "" if limit is None else f"a violation has at most probability {limit:g}"
+
 
 def _run(asked: Probability, ground: Ground) -> Finding:
     design, margins = ground.main
     found = violation_probability(design, margins, asked.confidence, asked.side)
-    claimed: dict[str, Any] = {}
-    if asked.limit is not None:
-        claimed["claim"] = f"a violation has at most probability {asked.limit:g}"
-        claimed |= vars(bound_verdict(found, asked.limit))
+    verdict = {} if asked.limit is None else vars(bound_verdict(found, asked.limit))
     return made(
         asked,
         str(found),
-        **claimed,
+        **verdict,
         runs=found.runs,
         numbers=statement_numbers(found),
     )

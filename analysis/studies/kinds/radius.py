@@ -42,6 +42,10 @@ class Radius(Varied):
     confidence: Confidence = 0.99
     limit: Size | None = Field(None, description="Claim: none is found below this size.")
 
+    @property
+    def claim(self) -> str:
+        return "" if self.limit is None else f"no violation is found below size {self.limit:g}"
+
 
 def _run(asked: Radius, ground: Ground) -> Finding:
     """Search for the smallest size with a violation."""
@@ -73,16 +77,15 @@ def _run(asked: Radius, ground: Ground) -> Finding:
 
 
 def _no_small_violation(limit: float | None, upper: float, largest: float) -> dict[str, str]:
-    """Return the claim about the smallest size with a violation, and the answer."""
+    """Return the answer to the claim about the smallest size with a violation."""
     if limit is None:
         return {}
-    claim = f"no violation is found below size {limit:g}"
     if upper < limit:
-        return {"claim": claim, "answer": "refuted"}
+        return {"answer": "refuted"}
     if min(upper, largest) >= limit:
-        return {"claim": claim, "answer": "shown"}
+        return {"answer": "shown"}
     needs = f"a search up to that size: this one ended at {largest:.4g}"
-    return {"claim": claim, "answer": "not shown yet", "needs": needs}
+    return {"answer": "not shown yet", "needs": needs}
 
 
 def _runs(asked: Radius, setup: Setup) -> int:

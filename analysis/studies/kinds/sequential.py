@@ -32,6 +32,10 @@ class Sequential(Asked):
     confidence: Confidence = 0.99
     limit: Confidence = Field(description="Claim: the probability is below this.")
 
+    @property
+    def claim(self) -> str:
+        return f"the probability of a violation is below {self.limit:g}"
+
 
 def _run(asked: Sequential, ground: Ground) -> Finding:
     design, margins = ground.main
@@ -39,7 +43,6 @@ def _run(asked: Sequential, ground: Ground) -> Finding:
     return made(
         asked,
         str(test),
-        claim=f"the probability of a violation is below {asked.limit:g}",
         **vars(test_verdict(test)),
         runs=test.statement.runs,
         numbers={"decision": test.decision, **statement_numbers(test.statement)},

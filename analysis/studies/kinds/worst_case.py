@@ -48,6 +48,10 @@ class WorstCase(Varied):
     python_control: Flag = Field(False, description="Whether python-control confirms it as well.")
     limit: Number | None = Field(None, description="Claim: no margin found is this low.")
 
+    @property
+    def claim(self) -> str:
+        return "" if self.limit is None else f"no margin of {self.limit:g} or lower is found"
+
 
 def _run(asked: WorstCase, ground: Ground) -> Finding:
     """Search for the lowest margin; confirm and shrink a violation."""
@@ -83,19 +87,15 @@ def _run(asked: WorstCase, ground: Ground) -> Finding:
 
 
 def _no_low_margin(limit: float | None, margin: float, is_confirmed: bool) -> dict[str, str]:
-    """Return the claim about the lowest margin that was found, and the answer."""
+    """Return the answer to the claim about the lowest margin that was found."""
     if limit is None:
         return {}
-    claim = f"no margin of {limit:g} or lower is found"
     if margin > limit:
-        return {"claim": claim, "answer": "shown"}
+        return {"answer": "shown"}
     if is_confirmed:
-        return {"claim": claim, "answer": "refuted"}
-    return {
-        "claim": claim,
-        "answer": "not shown yet",
-        "needs": "integrators that agree about the lowest margin",
-    }
+        return {"answer": "refuted"}
+    needs = "integrators that agree about the lowest margin"
+    return {"answer": "not shown yet", "needs": needs}
 
 
 def _runs(asked: WorstCase, setup: Setup) -> int:

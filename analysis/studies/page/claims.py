@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nlctl._errors import UsageError
+from nlctl.errors import UsageError
 
 from ...report.document import Claim
 from ...robustness.statistics.guarantee import check_iid

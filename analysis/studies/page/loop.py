@@ -14,9 +14,9 @@ import control as ct
 import numpy as np
 import pandas as pd
 
-from nlctl._diagram import parameters
-from nlctl._errors import UsageError
-from nlctl.drawing import draw
+from nlctl.diagrams import parameters
+from nlctl.drawing.picture import draw
+from nlctl.errors import UsageError
 from nlctl.native import typeset
 
 from ...report.document import Figure, Item, Paragraph, Section, Table

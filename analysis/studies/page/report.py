@@ -8,10 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...report.document import Figure, Item, Paragraph, Report, Section, Table
+from ...report.document import Figure, Item, Paragraph, Report, Section, Table, versions
 from ...report.outline import summary
 from ...report.render import file_hashes
-from ...report.versions import versions
 from ..kind import Varied
 from ..kinds import KINDS
 from . import methods as how

@@ -20,8 +20,8 @@ import numpy as np
 from numba import carray  # pyright: ignore[reportPrivateImportUsage]
 from numba.core.errors import NumbaWarning
 
-from ..._equation import equation
-from ..._errors import UsageError
+from ...equations import equation
+from ...errors import UsageError
 from .fingerprint import module_key
 from .machine_code import Wanted, address_of, machine_code_if_taken
 from .module import loaded

@@ -1,7 +1,9 @@
 """From LLVM IR to code that can be called: optimised, made for this processor, kept on disk.
 
-Seven passes are enough: what O2 does beyond them takes five times as long and gains nothing on
-straight arithmetic.  The object code is kept under a key of all that it is made from.
+For diagrams seven passes are enough: what O2 does beyond them takes five times as long and gains
+nothing on straight arithmetic.  Bitcode of `export` has loops, and gets O3 without unrolling and
+interleaving, which take twice as long and gain nothing.  The object code is kept under a key of
+all that it is made from.
 
 Relied on in llvmlite: text is parsed by `parse_assembly`, which reads what other versions of LLVM
 write; symbols that are added to the process are found by MCJIT before those of libraries.
@@ -11,22 +13,28 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import lzma
 import re
 import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import llvmlite
 import llvmlite.binding as llvm
 
-from ..._errors import CompileError
+from ...errors import CompileError
 from . import store
 
 PASSES = (
     "always_inliner", "sroa", "instruction_combine", "simplify_cfg", "new_gvn",
     "dead_code_elimination", "global_dead_code_eliminate",
 )  # fmt: skip
+TUNING = {
+    "loop_vectorization": True, "slp_vectorization": False, "loop_unrolling": False,
+    "loop_interleaving": False,
+}  # fmt: skip
 _ONE_AT_A_TIME = threading.Lock()  # symbols are the process's
 
 
@@ -47,13 +55,17 @@ class Loaded:
 
 
 def finished(
-    text: str, names: Iterable[str], symbols: Mapping[str, int], owners: Iterable[Any] = ()
+    source: str | bytes,
+    names: Iterable[str],
+    symbols: Mapping[str, int] = MappingProxyType({}),
+    owners: Iterable[Any] = (),
 ) -> Loaded:
     """Return the functions of some IR, ready to be called.
 
     Parameters
     ----------
-    text : str
+    source : str or bytes
+        IR as text, or bitcode that `export` has made.
     names : iterable of str
         Functions whose addresses are wanted.
     symbols : mapping
@@ -67,15 +79,16 @@ def finished(
         If it calls what is nowhere.
     """
     with _ONE_AT_A_TIME:
-        key = _key(text)
+        key = _key(source)
         code = store.read(key)
         if code is None:
-            code = _object_code(text)
+            code = _object_code(source)
             store.write(key, code)
         for name, address in symbols.items():
             llvm.add_symbol(name, address)
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
-        _check_symbols(text)  # now LLVM looks into this process too
+        if isinstance(source, str):
+            _check_symbols(source)  # now LLVM looks into this process too
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
         addresses = {name: engine.get_function_address(name) for name in names}
@@ -89,22 +102,36 @@ def _check_symbols(text: str) -> None:
             raise CompileError(f"this machine's C library has no function '{name}'")
 
 
-def _object_code(text: str) -> bytes:
+def _object_code(source: str | bytes) -> bytes:
     machine = _machine()
-    module = llvm.parse_assembly(text)
+    if isinstance(source, str):
+        module = llvm.parse_assembly(source)
+        builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options())
+        passes = llvm.create_new_module_pass_manager()
+        for name in PASSES:
+            getattr(passes, f"add_{name}_pass")()
+    else:
+        module = llvm.parse_bitcode(lzma.decompress(source))
+        builder = llvm.create_pass_builder(machine, _tuning())
+        passes = builder.getModulePassManager()
+        passes.add_refprune_pass()
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     module.verify()
-    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options())
-    passes = llvm.create_new_module_pass_manager()
-    for name in PASSES:
-        getattr(passes, f"add_{name}_pass")()
     passes.run(module, builder)
     return machine.emit_object(module)
 
 
-def _key(text: str) -> str:
+def _tuning() -> Any:
+    options = llvm.create_pipeline_tuning_options(3)
+    for name, value in TUNING.items():
+        setattr(options, name, value)
+    return options
+
+
+def _key(source: str | bytes) -> str:
     """Return a key of IR and of what object code is made of besides."""
-    parts = (text, *_processor(), llvmlite.__version__, llvm.llvm_version_info, PASSES)
+    versions = llvmlite.__version__, llvm.llvm_version_info
+    parts = (source, *_processor(), *versions, PASSES, TUNING)
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 

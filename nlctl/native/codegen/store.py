@@ -21,7 +21,7 @@ from pathlib import Path
 
 import platformdirs
 
-from ..._files import replace_file
+from ...host.files import replace_file
 
 MARK = b"nlctl machine code 1\n"  # the number is that of the format
 DIGEST = hashlib.sha256().digest_size

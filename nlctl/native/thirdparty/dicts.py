@@ -22,7 +22,7 @@ import numpy as np
 from numba import types
 from numba.extending import overload, overload_method, register_jitable
 
-from ..._errors import UsageError
+from ...errors import UsageError
 from .source import Unreadable, definition
 from .values import python_function
 

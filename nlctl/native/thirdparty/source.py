@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from types import CodeType, FunctionType
 
 Definition = ast.FunctionDef | ast.Lambda
+Places = dict[tuple[str, int], list[Definition]]
 _NAMED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
 _LOOPS = ("<listcomp>", "<setcomp>", "<dictcomp>", "<genexpr>")  # code of its own in some Pythons
 
@@ -47,25 +48,30 @@ def definition(function: FunctionType) -> Definition:
     if not text:
         raise Unreadable("its source cannot be found: define it in a file or a notebook")
     try:
-        tree, codes = _compiled(text, code.co_filename, code.co_flags & _FUTURES)
+        places, codes = _compiled(text, code.co_filename, code.co_flags & _FUTURES)
     except (SyntaxError, ValueError) as error:
         raise Unreadable(f"its source cannot be parsed ({error})") from error
     if code not in codes:
         raise Unreadable("its source is not what it was made of: was the file edited since?")
-    found = [node for node in _candidates(tree, code) if _contains(node, code)]
+    found = [node for node in _candidates(places, code) if _contains(node, code)]
     if not found or len({ast.dump(node) for node in found}) > 1:
         raise Unreadable("its source cannot be told from others on the same line")
     return found[0]
 
 
 @functools.lru_cache(maxsize=128)
-def _compiled(text: str, file: str, flags: int) -> tuple[ast.Module, frozenset[CodeType]]:
-    """Return the syntax tree of a module and all code inside it."""
+def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeType]]:
+    """Return the functions of a module by their names and first lines, and all code inside it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python has said once what it thinks of this text
         tree = ast.parse(text, file)
         module = compile(text, file, "exec", flags=flags, dont_inherit=True)
-    return tree, frozenset(_inside(module))
+    places: Places = {}
+    for node in ast.walk(tree):
+        if isinstance(node, Definition):
+            first = min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
+            places.setdefault((_name(node), first), []).append(node)
+    return places, frozenset(_inside(module))
 
 
 def _inside(code: CodeType) -> Iterator[CodeType]:
@@ -75,17 +81,12 @@ def _inside(code: CodeType) -> Iterator[CodeType]:
             yield from _inside(constant)
 
 
-def _candidates(tree: ast.Module, code: CodeType) -> Iterator[Definition]:
+def _candidates(places: Places, code: CodeType) -> Iterator[Definition]:
     """Yield the functions that begin on this line, with this name and these functions inside."""
     inside = sorted(c.co_name for c in list(_inside(code))[1:] if c.co_name not in _LOOPS)
     arguments = code.co_varnames[: code.co_argcount]
-    for node in ast.walk(tree):
-        if not isinstance(node, Definition):
-            continue
-        decorators = getattr(node, "decorator_list", [])
-        first = min([node.lineno, *(d.lineno for d in decorators)])
-        here = (_name(node), first, tuple(a.arg for a in node.args.posonlyargs + node.args.args))
-        if here == (code.co_name, code.co_firstlineno, arguments):
+    for node in places.get((code.co_name, code.co_firstlineno), ()):
+        if tuple(a.arg for a in node.args.posonlyargs + node.args.args) == arguments:
             body = node.body if isinstance(node.body, list) else [node.body]
             nested = (n for part in body for n in ast.walk(part))
             if sorted(_name(n) for n in nested if isinstance(n, _NAMED)) == inside:

@@ -9,10 +9,10 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ._errors import DivergedError, ParameterError
-from ._names import unknown
-from ._run_arguments import Run, evaluation_array, input_array, state_array
-from ._time_response import as_response
+from ..errors import DivergedError, ParameterError
+from ..names import unknown
+from .arguments import Run, evaluation_array, input_array, state_array
+from .time_response import as_response
 
 METHODS = ("LSODA", "RK23", "RK45", "DOP853", "Radau", "BDF")  # of scipy.integrate.solve_ivp
 STANDSTILL = 200  # steps in a row that do not advance the time

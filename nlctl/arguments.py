@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ._errors import ParameterError
-from ._param import as_numbers, whole_number
+from .errors import ParameterError
+from .params import as_numbers, whole_number
 
 __all__ = [
     "a_function",

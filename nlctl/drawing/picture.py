@@ -16,9 +16,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Polygon, Rectangle
 
-from ._layout.figure import Drawing
-from ._layout.records import FONT, Box, Layout, Node, Route, Text, Wire, bundle, measured, strokes
-from ._layout.routes import arrange
+from .figure import Drawing
+from .records import FONT, Box, Layout, Node, Route, Text, Wire, bundle, measured, strokes
+from .routes import arrange
 
 WIDTH, MARGIN = 648.0, 12.0  # of the figure, in points
 NAME, SMALL, TITLE = 9.0, 8.0, 11.0  # type sizes

@@ -14,7 +14,7 @@ from typing import Any
 
 import control as ct
 
-from ._errors import AmbiguousNameError, UnknownNameError
+from .errors import AmbiguousNameError, UnknownNameError
 
 LISTED = 24  # names that a message lists; it says how many more there are
 
@@ -170,13 +170,17 @@ class Parameters(dict[str, Any]):
     def _inherit(self, outer: Parameters) -> None:
         """Take over the values that the enclosing diagram has for these parameters."""
         self.table = outer
+        prefix = self.prefix
         for key in list(self):
-            if key != base_name(key) and self.prefix + base_name(key) in outer:
+            if "[" in key and key != base_name(key) and prefix + base_name(key) in outer:
                 del self[key]  # an element's default gives way to what the outside says
-        for name, value in outer.items():
-            own = name.removeprefix(self.prefix)
-            is_own = name.startswith(self.prefix) and base_name(own) in self
-            if (is_own and base_name(name) not in outer.clashes) or "." not in name:
+        for name, value in outer.items():  # of all blocks, for each block: nothing twice
+            own = name.removeprefix(prefix)
+            if "." not in name:
+                dict.__setitem__(self, own, value)
+                continue
+            is_own = name.startswith(prefix) and (base_name(own) if "[" in own else own) in self
+            if is_own and not (outer.clashes and base_name(name) in outer.clashes):
                 dict.__setitem__(self, own, value)
 
     def _override(self, name: str, value: Any) -> None:

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from numba.extending import register_jitable
 
-from ._errors import ParameterError
+from .errors import ParameterError
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

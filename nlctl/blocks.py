@@ -10,9 +10,9 @@ from typing import Any, Protocol
 import control as ct
 import numpy as np
 
-from ._errors import BlockError, ParameterError
-from ._names import Parameters, base_name, unknown
-from ._param import declared_params, ensure_checked, equation_arguments, with_overrides
+from .errors import BlockError, ParameterError
+from .names import Parameters, base_name, unknown
+from .params import declared_params, ensure_checked, equation_arguments, is_checked, with_overrides
 
 
 class Spec(Protocol):
@@ -107,7 +107,7 @@ class Block(ct.NonlinearIOSystem):
     """
 
     def __init__(self, spec: Any, name: str, **kwargs: Any) -> None:
-        self.spec = spec
+        self.spec, self.current_spec = spec, None
         super().__init__(
             spec.update if spec.states else None,
             spec.output,
@@ -144,12 +144,18 @@ class Block(ct.NonlinearIOSystem):
 
     def _update_params(self, params: Mapping[str, Any] | None) -> None:
         # python-control calls this before a run; its equations then get the result as `p`.
-        self.current_spec = self._resolved(params or {})
-        self._current_params = equation_arguments(self.current_spec)
+        before, self.current_spec = self.current_spec, self._resolved(params or {})
+        if self.current_spec is not before:
+            self._current_params = equation_arguments(self.current_spec)
 
     def _resolved(self, params: Mapping[str, Any]) -> Any:
-        """Return the record with overrides; they must not change the number of signals."""
-        spec = with_overrides(self.spec, self._own(params), self.name)
+        """Return the record with overrides; they must not change the number of signals.
+
+        Without any it is the record itself, which was checked when it was made.
+        """
+        spec, own = self.spec, self._own(params)
+        if not (is_checked(spec) and all(v is getattr(spec, k, own) for k, v in own.items())):
+            spec = with_overrides(spec, own, self.name)
         for kind in ("inputs", "outputs", "states"):
             had, has = getattr(self, f"n{kind}"), len(getattr(spec, kind))
             if had != has:

@@ -10,17 +10,10 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
-from ._block import (
-    Block,
-    ParameterRow,
-    block,
-    default_state,
-    parameter_rows,
-    record_rows,
-)
-from ._errors import DiagramError, ParameterError
-from ._names import Parameters, find_name, unknown
-from ._param import as_numbers, declared_params
+from .blocks import Block, ParameterRow, block, default_state, parameter_rows, record_rows
+from .errors import DiagramError, ParameterError
+from .names import Parameters, find_name, unknown
+from .params import as_numbers, declared_params
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,11 +10,11 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ._diagram import initial_state as state_of
-from ._diagram import state_names
-from ._errors import ParameterError, UnknownKeywordError
-from ._names import unknown
-from ._param import as_numbers
+from ..diagrams import initial_state as state_of
+from ..diagrams import state_names
+from ..errors import ParameterError, UnknownKeywordError
+from ..names import unknown
+from ..params import as_numbers
 
 ALIASES = {  # python-control's short names
     **{"T": "timepts", "U": "inputs", "X0": "initial_state"},

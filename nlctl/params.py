@@ -15,8 +15,8 @@ from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 
-from ._errors import ParameterError, UnknownKeywordError
-from ._names import unknown
+from .errors import ParameterError, UnknownKeywordError
+from .names import unknown
 
 T = TypeVar("T")
 _KEY = "nlctl"
@@ -178,13 +178,23 @@ def _default_text(value: Any) -> str:
 
 def ensure_checked(spec: Any) -> None:
     """Check a record that was not checked when it was made, such as a plain dataclass."""
-    if not getattr(type(spec), "__checked_at_birth__", False):
+    if not is_checked(spec):
         check_params(spec)
+
+
+def is_checked(spec: Any) -> bool:
+    """Whether a record was checked, and made of numbers and tuples, when it was made."""
+    return getattr(type(spec), "__checked_at_birth__", False)
 
 
 def declared_params(spec: Any) -> dict[str, Param]:
     """Return ``{field name: Param}`` of a record or record class, in order of definition."""
-    return {f.name: f.metadata[_KEY] for f in dataclasses.fields(spec) if _KEY in f.metadata}
+    return _declared(spec if isinstance(spec, type) else type(spec))
+
+
+@functools.cache
+def _declared(cls: type) -> dict[str, Param]:
+    return {f.name: f.metadata[_KEY] for f in dataclasses.fields(cls) if _KEY in f.metadata}
 
 
 def check_params(spec: Any) -> None:
@@ -297,9 +307,13 @@ def with_overrides(spec: Any, overrides: Mapping[str, Any], block: str) -> Any:
     block : str
         Name of the block, for messages.
     """
-    whole = {k: v for k, v in overrides.items() if "[" not in k}
+    # A diagram hands every block all of its values each time: those that it has are checked.
+    own = {f.name: getattr(spec, f.name) for f in dataclasses.fields(spec)}
+    whole = {
+        k: v for k, v in overrides.items() if "[" not in k and (v is None or v is not own.get(k))
+    }
     try:
-        changed = dataclasses.replace(spec, **whole)
+        changed = dataclasses.replace(spec, **whole) if whole else spec
         for key, value in overrides.items():
             if "[" in key:
                 changed = _replace_element(changed, key, value)

@@ -1,1 +1,0 @@
-"""Geometry of block diagrams: `records` on paper, `order` of blocks, `heights`, `routes`."""

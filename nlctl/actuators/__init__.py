@@ -1,0 +1,11 @@
+"""Actuators with uncertain nonlinearity, v = k(u, t) u + eps_u (2): dead zone and backlash.
+
+Saturation does not obey (2), and a gain of the wrong sign breaks Assumption 1: both are here to
+see what a controller makes of them.
+"""
+
+from .backlash import Backlash
+from .cascade import cascade
+from .static import DeadZone, Gain, Saturation
+
+__all__ = ["Backlash", "DeadZone", "Gain", "Saturation", "cascade"]

@@ -1,0 +1,55 @@
+"""Actuators one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import control as ct
+
+from ..diagrams import as_system, interconnect
+from ..errors import DiagramError
+
+__all__ = ["cascade"]
+
+
+def cascade(stages: Mapping[str, Any], *, name: str = "actuator") -> ct.InterconnectedSystem:
+    """Join actuators in series: the output v of each is the input u of the next.
+
+    Parameters
+    ----------
+    stages : mapping
+        ``{"limit": Saturation(), "dead_zone": DeadZone()}``, in the order of the signal flow;
+        each has the input u and the output v.  Parameters are then
+        ``"actuator.dead_zone.b_r"``.
+    name : str, optional
+
+    Returns
+    -------
+    control.InterconnectedSystem
+        From u to v; it stands in the place of an actuator.
+
+    Raises
+    ------
+    DiagramError
+        If there is no stage, or one has other signals.
+    """
+    if not isinstance(stages, Mapping):
+        raise DiagramError(
+            f"cascade needs stages with their names, {{'limit': ...}}, got {type(stages).__name__}"
+        )
+    systems, last = [], len(stages) - 1
+    for i, (key, stage) in enumerate(stages.items()):
+        system = as_system(stage, key).copy(name=key)
+        if (system.input_labels, system.output_labels) != (["u"], ["v"]):
+            raise DiagramError(
+                f"cascade needs stages from u to v, '{key}' goes from "
+                f"{system.input_labels} to {system.output_labels}"
+            )
+        system.update_names(
+            inputs=[f"v{i}" if i else "u"], outputs=["v" if i == last else f"v{i + 1}"]
+        )
+        systems.append(system)
+    if not systems:
+        raise DiagramError("cascade needs at least one stage, got none")
+    return interconnect(systems, inputs=["u"], outputs=["v"], name=name)

@@ -1,0 +1,113 @@
+"""Actuators without memory: dead zone, saturation, gain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..equations import equation
+from ..errors import ParameterError
+from ..functions import clip
+from ..params import param, record
+
+__all__ = ["DeadZone", "Gain", "Saturation"]
+
+
+@record
+class DeadZone:
+    """Asymmetric dead zone with slopes that depend on the input (Lv et al. 2017, Example 1).
+
+    v = (1 + 0.3 sin u) (u - b_r)      u >= b_r
+        0                              b_l < u < b_r
+        (0.8 + 0.2 cos u) (u - b_l)    u <= b_l
+    """
+
+    slope_r: float = param(1.0, unit="1", meaning="mean slope on the right", above=0)
+    ripple_r: float = param(0.3, unit="1", meaning="ripple of the right slope, sin u")
+    slope_l: float = param(0.8, unit="1", meaning="mean slope on the left", above=0)
+    ripple_l: float = param(0.2, unit="1", meaning="ripple of the left slope, cos u")
+    b_r: float = param(0.5, unit="1", meaning="right break point", above=0)
+    b_l: float = param(-0.3, unit="1", meaning="left break point", below=0)
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ()
+    feedthrough = True
+
+    def check(self) -> None:
+        """Assumption 1 wants a positive slope everywhere."""
+        for side in ("r", "l"):
+            slope, ripple = getattr(self, f"slope_{side}"), getattr(self, f"ripple_{side}")
+            if abs(ripple) >= slope:
+                raise ParameterError(
+                    f"DeadZone needs |ripple_{side}| < slope_{side}, so that the slope stays "
+                    f"positive, got {ripple:g} and {slope:g}"
+                )
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The characteristic v(u)."""
+        (u1,) = u
+        if p.b_l < u1 < p.b_r:  # false for NaN, which then reaches v
+            return (0.0,)
+        if u1 > 0:
+            return ((p.slope_r + p.ripple_r * np.sin(u1)) * (u1 - p.b_r),)
+        return ((p.slope_l + p.ripple_l * np.cos(u1)) * (u1 - p.b_l),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """The break points."""
+        (u1,) = u
+        return u1 - p.b_l, u1 - p.b_r
+
+
+@equation
+@record
+class Gain:
+    """Linear actuator.
+
+    v = k u
+
+    With k = -1 behind another actuator the sign of the input gain is turned round.
+    """
+
+    k: float = param(1.0, unit="1", meaning="gain")
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ()
+    feedthrough = True
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The gain."""
+        return (p.k * u[0],)
+
+
+@record
+class Saturation:
+    """Symmetric saturation, v = min(max(u, -limit), limit).
+
+    No k >= k_1 > 0 keeps eps_u of (2) bounded for it: the paper's theory does not cover it.
+    """
+
+    limit: float = param(10.0, unit="1", meaning="largest |v|", above=0)
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ()
+    feedthrough = True
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The characteristic v(u)."""
+        return (clip(u[0], -p.limit, p.limit),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where it begins to saturate."""
+        return u[0] + p.limit, u[0] - p.limit

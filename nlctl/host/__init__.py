@@ -1,0 +1,1 @@
+"""What the host machine gives: files replaced in one step, processes that end with their parent."""

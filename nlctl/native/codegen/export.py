@@ -1,0 +1,174 @@
+"""What numba makes of functions, as LLVM bitcode that llvmlite alone can finish on any machine.
+
+numba optimises and emits each function with all that it calls, and again for each caller.  Here
+its IR is taken before that, linked once, and simplified as far as no processor matters: function
+by function, without vectorisation and inlining.  `finish` does the rest, in a tenth of the time.
+
+Relied on in numba, and held by a test each:
+
+- `CPUCodeLibrary.add_ir_module` is given each function's own IR, and ``_linking_libraries`` are
+  the libraries that it calls;
+- ``fndesc.llvm_func_name`` takes pointers for the result and for an exception, then the arguments,
+  and returns `RETURNED` or `NONE`, or the number of an exception;
+- memory of arrays is asked for by ``NRT_MemInfo_alloc_aligned`` and given back by
+  ``NRT_MemInfo_call_dtor``; `MEMORY` has both in terms of the C library, with numba's layout.
+"""
+
+from __future__ import annotations
+
+import lzma
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+from numba.core import cgutils
+from numba.core.codegen import CPUCodeLibrary
+from numba.core.compiler_lock import global_compiler_lock
+
+from .machine_code import Wanted
+
+RETURNED, NONE = 0, -2
+LONG = 80  # lines of IR from which on a function is not inlined: twice the compile time, no gain
+MEMORY = """
+declare ptr @malloc(i64)
+declare void @free(ptr)
+
+define ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %align) {
+  %most = add i64 %size, 128
+  %info = call ptr @malloc(i64 %most)
+  %none = icmp eq ptr %info, null
+  br i1 %none, label %failed, label %made
+made:
+  %address = ptrtoint ptr %info to i64
+  %behind = add i64 %address, 127
+  %aligned = and i64 %behind, -64
+  %data = inttoptr i64 %aligned to ptr
+  store i64 1, ptr %info
+  %place = getelementptr i8, ptr %info, i64 24
+  store ptr %data, ptr %place
+  ret ptr %info
+failed:
+  ret ptr null
+}
+
+define void @NRT_MemInfo_call_dtor(ptr %info) {
+  call void @free(ptr %info)
+  ret void
+}
+"""
+
+
+def exported(wanted: Sequence[Wanted]) -> bytes:
+    """Return compressed bitcode of functions, each with its Python name.
+
+    Parameters
+    ----------
+    wanted : sequence of Wanted
+        Their arguments are numbers and pointers.
+
+    Raises
+    ------
+    numba.core.errors.NumbaError
+        If a function cannot be compiled.
+    """
+    names, libraries = {}, []
+    with _own_ir() as texts:
+        for each in wanted:
+            code: Any = numba.njit(each.signature, **each.options)(each.function)
+            (made,) = code.overloads.values()
+            names[made.fndesc.llvm_func_name] = each.function.__name__
+            libraries.append(made.library)
+    found: dict[int, Any] = {}
+    for library in libraries:
+        _reach(library, found)
+    linked = llvm.parse_assembly(MEMORY)
+    for key, library in found.items():
+        for text in texts.get(key) or [library.get_llvm_str()]:  # what was compiled before has none
+            linked.link_in(llvm.parse_assembly(text))
+    module = _named(linked, names)
+    _simplify(module)
+    return lzma.compress(_apart(module, names.values()).as_bitcode(), preset=9)
+
+
+@contextmanager
+def _own_ir() -> Iterator[dict[int, list[str]]]:
+    """Keep the IR of each function that is compiled inside, by the identity of its library."""
+    texts: dict[int, list[str]] = {}
+    add = CPUCodeLibrary.add_ir_module
+
+    def keep(self: Any, module: Any) -> None:
+        texts.setdefault(id(self), []).append(cgutils.normalize_ir_text(str(module)))
+        add(self, module)
+
+    with global_compiler_lock:  # nobody else compiles
+        CPUCodeLibrary.add_ir_module = keep  # type: ignore[method-assign]
+        try:
+            yield texts
+        finally:
+            CPUCodeLibrary.add_ir_module = add  # type: ignore[method-assign]
+
+
+def _reach(library: Any, found: dict[int, Any]) -> None:
+    """Add a library and all that it calls."""
+    if id(library) not in found:
+        found[id(library)] = library
+        for other in library._linking_libraries:
+            _reach(other, found)
+
+
+def _named(module: Any, names: dict[str, str]) -> Any:
+    """Return a module in which only functions of these names can be called from outside."""
+    for function in module.functions:
+        if not function.is_declaration:
+            function.linkage = "external" if function.name in names else "internal"
+    text = str(module)
+    for mangled, name in names.items():
+        text = re.sub(rf'@"?{re.escape(mangled)}"?(?![\w.$"])', f"@{name}", text)
+    made = llvm.parse_assembly(text)
+    made.verify()
+    return made
+
+
+def _simplify(module: Any) -> None:
+    """Simplify each function; reference counts that cancel go."""
+    target = llvm.Target.from_triple(llvm.get_process_triple())
+    machine = target.create_target_machine(cpu="", features="", opt=3)
+    each = _builder(machine, 3)
+    passes = each.getFunctionPassManager()
+    passes.add_refprune_pass()
+    for function in module.functions:
+        if not function.is_declaration:
+            passes.run(function, each)
+    all_of_it = _builder(machine, 0)
+    passes = all_of_it.getModulePassManager()
+    passes.add_loop_rotate_pass()
+    passes.add_instruction_combine_pass()
+    passes.add_jump_threading_pass()
+    passes.add_refprune_pass()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.run(module, all_of_it)
+    module.verify()
+
+
+def _apart(module: Any, entries: Iterable[str]) -> Any:
+    """Return a module whose long functions are not inlined.
+
+    As text: some versions of llvmlite give the attribute to the result.
+    """
+    text = str(module)
+    for function in module.functions:
+        short = str(function).count("\n") < LONG
+        if not (function.is_declaration or short or function.name in entries):
+            place = rf'(\ndefine [^\n]*@"?{re.escape(function.name)}"?\([^\n]*\)[^\n{{]*)\{{'
+            text, count = re.subn(place, r"\1noinline {", text)
+            assert count == 1, function.name
+    return llvm.parse_assembly(text)
+
+
+def _builder(machine: Any, speed: int) -> Any:
+    options = llvm.create_pipeline_tuning_options(speed)
+    options.loop_vectorization = options.slp_vectorization = False
+    return llvm.create_pass_builder(machine, options)

@@ -1,0 +1,158 @@
+"""The integrators that are shipped are those of the sources, and compute what numba's do."""
+
+import hashlib
+import json
+import subprocess
+import sys
+
+import control as ct
+import llvmlite.binding as llvm
+import numba
+import numpy as np
+import pytest
+from numba.core import config, event
+
+import nlctl
+from nlctl import paper
+from nlctl.native import _integrators, _simulate
+from nlctl.native._integrators import SHIPPED, WANTED, shipped, sources_key
+from nlctl.native.ship import source_files
+
+pytestmark = pytest.mark.skipif(
+    getattr(config, "DISABLE_JIT", False), reason="without JIT the sources run as they stand"
+)
+REMEDY = "the integrators were changed: run python -m nlctl.native.ship, and commit what it writes"
+
+
+def header():
+    return json.loads(SHIPPED.read_bytes().partition(b"\n")[0])
+
+
+def test_what_is_shipped_is_of_these_sources():
+    assert header()["files"] == source_files(), REMEDY
+    assert header()["sources"] == sources_key(source_files()), REMEDY
+    if header()["llvm"] <= list(llvm.llvm_version_info):
+        assert shipped() is not None
+
+
+def test_all_that_is_compiled_belongs_to_these_sources():
+    """Also by what the functions are, not by their imports only."""
+    modules = {each.function.__module__ for each in WANTED}
+    assert {f"{name.rpartition('.')[2]}.py" for name in modules} <= set(source_files())
+    assert {"_tsit5.py", "_rodas5p.py", "_events.py", "_pointed.py"} <= set(source_files())
+
+
+def changed(**entries):
+    first, _, code = SHIPPED.read_bytes().partition(b"\n")
+    return json.dumps(json.loads(first) | entries).encode() + b"\n" + code
+
+
+UNFIT = {
+    "nothing": b"",
+    "cut short": SHIPPED.read_bytes()[:-1],
+    "one bit": SHIPPED.read_bytes()[:-1] + bytes([SHIPPED.read_bytes()[-1] ^ 1]),
+    "no header": SHIPPED.read_bytes().partition(b"\n")[2],
+    "another header": b"[]\n" + SHIPPED.read_bytes().partition(b"\n")[2],
+    "other sources": changed(sources=hashlib.sha256(b"").hexdigest()),
+    "a file less": changed(files=source_files()[1:]),
+    "a file that is not there": changed(files=["_gone.py", *source_files()]),
+    "newer LLVM": changed(llvm=[llvm.llvm_version_info[0] + 1, 0, 0]),
+}
+
+
+@pytest.mark.parametrize("name", UNFIT)
+def test_what_does_not_fit_is_not_used(name, tmp_path, monkeypatch):
+    path = tmp_path / "integrators.bitcode"
+    path.write_bytes(UNFIT[name])
+    monkeypatch.setattr(_integrators, "SHIPPED", path)
+    assert shipped() is None
+
+
+def test_without_the_file_there_is_none(tmp_path, monkeypatch):
+    monkeypatch.setattr(_integrators, "SHIPPED", tmp_path / "none")
+    assert shipped() is None
+
+
+def test_with_checked_indices_numba_makes_its_own(monkeypatch):
+    monkeypatch.setattr(config, "BOUNDSCHECK", 1)
+    assert shipped() is None
+
+
+def test_the_first_run_compiles_nothing_by_numba(tmp_path, monkeypatch):
+    """With an empty cache; numba's compiler alone would take ten times as long as all the rest."""
+    if shipped() is None:
+        pytest.skip("another LLVM")
+    monkeypatch.setenv("NLCTL_CACHE_DIR", str(tmp_path))
+    made = _integrators._integrators.__wrapped__()
+    monkeypatch.setattr(_simulate, "integrators", lambda: made)
+    with event.install_recorder("numba:compile") as recorded:
+        nlctl.input_output_response(nlctl.compile(paper.example_1()), [0.0, 0.1])
+    assert not recorded.buffer
+
+
+def by_numba():
+    """The integrators as numba itself compiles, optimises and loads them."""
+    found = {}
+    for each in WANTED:
+        code = numba.njit(each.signature, **each.options)(each.function)
+        (made,) = code.overloads.values()
+        address = made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
+        name, arguments = each.function.__name__, each.signature.args
+        found[name] = _integrators._callable(address, arguments, code)
+    return found
+
+
+def results():
+    """States and outputs of runs of all kinds."""
+    times = np.linspace(0, 3, 200)
+    loops = [nlctl.compile(make()) for make in (paper.example_1, paper.example_2)]
+    for loop in loops:
+        for settings in ({}, {"rtol": 1e-5}, {"method": "rodas5p", "rtol": 1e-5}, {"step": 1e-3}):
+            run = nlctl.input_output_response(loop, times, audit=False, **settings)
+            yield run.states
+            yield run.outputs
+    varied = {"actuator.b_r": np.linspace(0.1, 1, 11)}
+    kept = list(loops[0].system.output_labels)
+    many = nlctl.ensemble_response(loops[0], times, params=varied, keep=kept, audit=False)
+    yield from many.signals.values()
+    loop = nlctl.compile(ct.ss([[0.0, 1.0], [-9.0, -0.1]], [[0.0], [1.0]], [[1.0, 0.0]], 0.0))
+    u = np.sin(7 * times)
+    yield nlctl.input_output_response(loop, times, u, audit=False).states
+
+
+@pytest.mark.slow
+def test_the_same_bits_as_by_numba(monkeypatch):
+    """Another order of passes and no vectors of the host, but no liberties with arithmetic."""
+    ours = [array.tobytes() for array in results()]
+    code = by_numba()
+    monkeypatch.setattr(_simulate, "integrators", lambda: code)
+    theirs = [array.tobytes() for array in results()]
+    assert ours == theirs
+
+
+@pytest.mark.slow
+def test_made_anew_it_is_the_same_file(tmp_path):
+    """Whoever makes it, on whatever machine, with the same numba."""
+    if header()["numba"] != numba.__version__:
+        pytest.skip("another numba")
+    path = tmp_path / "integrators.bitcode"
+    script = (
+        "import sys, pathlib; from nlctl.native.ship import ship; ship(pathlib.Path(sys.argv[1]))"
+    )
+    subprocess.run([sys.executable, "-c", script, path], check=True)
+    assert path.read_bytes() == SHIPPED.read_bytes()
+
+
+@pytest.mark.slow
+def test_edited_sources_are_compiled_and_kept(tmp_path, monkeypatch):
+    """Without what is shipped: numba once, then from the cache, and the same bits."""
+    monkeypatch.setenv("NLCTL_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(_integrators, "SHIPPED", tmp_path / "none")
+    expected = [array.tobytes() for array in results()]
+    for compiles in (True, False):
+        with event.install_recorder("numba:compile") as recorded:
+            code = _integrators._integrators.__wrapped__()
+        assert bool(recorded.buffer) == compiles
+        with monkeypatch.context() as context:
+            context.setattr(_simulate, "integrators", lambda code=code: code)
+            assert [array.tobytes() for array in results()] == expected
