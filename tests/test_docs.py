@@ -9,7 +9,7 @@ from rows import each_row
 
 from analysis.robustness.stl.text import parse_formula
 from analysis.robustness.uncertainty.quantity import QUANTILES
-from analysis.studies import read_study
+from analysis.studies import StudyError, read_study
 from analysis.studies.file.resolve import uncertain
 from analysis.studies.file.schema import Law
 from analysis.studies.kinds import KINDS
@@ -49,6 +49,20 @@ def test_every_law_of_the_guide_is_one(text):
 def test_the_guide_cuts_laws_off_where_the_boxes_end():
     """Its two quantiles are those of the code."""
     assert f"quantiles {QUANTILES[0]:g} and {QUANTILES[1]:g}" in GUIDE
+
+
+def test_the_kind_of_the_guide_is_one(tmp_path):
+    """Beside the study of the guide its claim is read, and a mistake in its table is told."""
+    (own,) = (text for text in blocks("python") if "Kind(" in text)
+    (asked,) = (text for text in blocks("toml") if "spread.py" in text)
+    (tmp_path / "arm.py").write_text(blocks("python")[0], encoding="utf-8")
+    (tmp_path / "spread.py").write_text(own, encoding="utf-8")
+    path = tmp_path / "arm.toml"
+    path.write_text(blocks("toml")[0] + asked, encoding="utf-8")
+    assert read_study(path).study.analysis[-1].claim == "the spread is at most 0.5"
+    path.write_text(blocks("toml")[0] + asked.replace("limit", "limits"), encoding="utf-8")
+    with pytest.raises(StudyError, match="nearest: 'limit'"):
+        read_study(path)
 
 
 def test_the_table_of_kinds_is_that_of_the_list():
