@@ -18,7 +18,7 @@ import numpy as np
 from nlctl.arguments import a_function, number, text
 from nlctl.equations import equation
 from nlctl.errors import ParameterError
-from nlctl.native.codegen.machine_code import kept
+from nlctl.native.machine.machine_code import kept
 
 from . import metrics
 

@@ -18,8 +18,8 @@ import numba
 import numpy as np
 
 import nlctl
-from nlctl.native._address import call_rhs
-from nlctl.native._machine import WIDTH, Machine, prepared_parameters
+from nlctl.native.machine.address import call_rhs
+from nlctl.native.machine.evaluations import WIDTH, Machine, prepared_parameters
 
 ROUNDS, EVALUATIONS = 15, 5000
 

@@ -224,8 +224,8 @@ def _asks_for_scipy(run: Run) -> bool:
 def _native(run: Run) -> ct.TimeResponseData:
     """Run a compiled diagram, or one that is compiled for this run, as machine code."""
     from .native import compile as compile_diagram
-    from .native._response import respond
-    from .native._solver_arguments import solver_settings
+    from .native.response import respond
+    from .native.settings import solver_settings
     from .native.thirdparty.checks import sized
 
     settings = solver_settings(**run.solver)

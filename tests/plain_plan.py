@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from nlctl.native._lower import lower
-from nlctl.native._lower_blocks import equations
-from nlctl.native._program import corners, memory
-from nlctl.native._routine import plain_functions
+from nlctl.native.codegen.blocks import equations
+from nlctl.native.codegen.lower import lower
+from nlctl.native.codegen.program import corners, memory
+from nlctl.native.machine.routine import plain_functions
 from nlctl.native.thirdparty.python_control import block_outputs, block_rates
 
 

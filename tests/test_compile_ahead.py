@@ -18,7 +18,7 @@ from analysis.robustness import prepare
 from analysis.robustness.runs.experiment import compile_ahead as rows_ahead
 from analysis.robustness.runs.experiment import evaluate
 from nlctl.native import compile_ahead
-from nlctl.native.codegen import finish
+from nlctl.native.machine import finish
 
 T = np.linspace(0, 1, 11)
 pytestmark = pytest.mark.skipif(

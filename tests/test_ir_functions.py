@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlctl.expressions.functions import FUNCTIONS
-from nlctl.native.codegen.finish import finished
 from nlctl.native.codegen.ir import functions as ir
 from nlctl.native.codegen.ir.memory import load, place, store
 from nlctl.native.codegen.ir.text import Body, Module
+from nlctl.native.machine.finish import finished
 
 WIDTH = 8
 DIGITS = 60

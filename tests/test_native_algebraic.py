@@ -11,9 +11,9 @@ from scipy.special import lambertw
 
 import nlctl
 from nlctl.errors import UsageError
-from nlctl.native._compile import compile as compile_diagram
-from nlctl.native._schedule import AlgebraicLoopError, schedule
-from nlctl.native._tearing import first_loop, tear
+from nlctl.native.compiled import compile as compile_diagram
+from nlctl.native.diagram.schedule import AlgebraicLoopError, schedule
+from nlctl.native.diagram.tearing import first_loop, tear
 
 
 def called(compiled, t=0.0, x=(), u=(), *, native=False):

@@ -9,8 +9,8 @@ import nlctl
 from nlctl.errors import ParameterError, UsageError
 from nlctl.expressions.graph import Graph
 from nlctl.native import AuditError
-from nlctl.native._lower_blocks import Reader
 from nlctl.native.codegen import interpret
+from nlctl.native.codegen.blocks import Reader
 from nlctl.native.codegen.ir import numbers
 from nlctl.response import EngineWarning
 

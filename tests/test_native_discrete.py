@@ -9,8 +9,8 @@ from analysis.metrics import Metric, final
 from nlctl.diagrams import state_names
 from nlctl.errors import ParameterError
 from nlctl.native import ensemble_response
-from nlctl.native._compile import compile as compile_diagram
-from nlctl.native._discrete import simulate_discrete
+from nlctl.native.compiled import compile as compile_diagram
+from nlctl.native.integrate.discrete import simulate_discrete
 
 
 def simulated(system, times, inputs=0.0, x0=None, params=None):

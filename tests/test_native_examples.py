@@ -9,7 +9,7 @@ from test_native_rhs import compare
 
 import nlctl
 from nlctl.errors import UsageError
-from nlctl.native._compile import compile as compile_diagram
+from nlctl.native.compiled import compile as compile_diagram
 
 TOLERANCES = {"rtol": 1e-9, "atol": 1e-11}
 

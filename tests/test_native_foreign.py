@@ -9,9 +9,9 @@ from test_native_rhs import compare
 
 from nlctl.errors import ParameterError, UsageError
 from nlctl.native import CompileError
-from nlctl.native._compile import compile as compile_diagram
 from nlctl.native.codegen.calls import Source
-from nlctl.native.codegen.fingerprint import program_key
+from nlctl.native.compiled import compile as compile_diagram
+from nlctl.native.machine.fingerprint import program_key
 from nlctl.native.thirdparty.objects import frozen
 
 

@@ -14,8 +14,9 @@ from numba.core import config, event
 
 import nlctl
 from nlctl import paper
-from nlctl.native import _integrators, _simulate
-from nlctl.native._integrators import SHIPPED, WANTED, shipped, sources_key
+from nlctl.native.integrate import driver
+from nlctl.native.machine import integrators
+from nlctl.native.machine.integrators import SHIPPED, WANTED, shipped, sources_key
 from nlctl.native.ship import source_files
 
 pytestmark = pytest.mark.skipif(
@@ -38,8 +39,10 @@ def test_what_is_shipped_is_of_these_sources():
 def test_all_that_is_compiled_belongs_to_these_sources():
     """Also by what the functions are, not by their imports only."""
     modules = {each.function.__module__ for each in WANTED}
-    assert {f"{name.rpartition('.')[2]}.py" for name in modules} <= set(source_files())
-    assert {"_tsit5.py", "_rodas5p.py", "_events.py", "_pointed.py"} <= set(source_files())
+    files = {f"{'/'.join(name.split('.')[2:])}.py" for name in modules}
+    assert files <= set(source_files())
+    needed = ("tsit5", "rodas5p", "events", "memory")
+    assert {f"integrate/{name}.py" for name in needed} <= set(source_files())
 
 
 def changed(**entries):
@@ -64,12 +67,12 @@ UNFIT = {
 def test_what_does_not_fit_is_not_used(name, tmp_path, monkeypatch):
     path = tmp_path / "integrators.bitcode"
     path.write_bytes(UNFIT[name])
-    monkeypatch.setattr(_integrators, "SHIPPED", path)
+    monkeypatch.setattr(integrators, "SHIPPED", path)
     assert shipped() is None
 
 
 def test_without_the_file_there_is_none(tmp_path, monkeypatch):
-    monkeypatch.setattr(_integrators, "SHIPPED", tmp_path / "none")
+    monkeypatch.setattr(integrators, "SHIPPED", tmp_path / "none")
     assert shipped() is None
 
 
@@ -83,8 +86,8 @@ def test_the_first_run_compiles_nothing_by_numba(tmp_path, monkeypatch):
     if shipped() is None:
         pytest.skip("another LLVM")
     monkeypatch.setenv("NLCTL_CACHE_DIR", str(tmp_path))
-    made = _integrators._integrators.__wrapped__()
-    monkeypatch.setattr(_simulate, "integrators", lambda: made)
+    made = integrators._integrators.__wrapped__()
+    monkeypatch.setattr(driver, "integrators", lambda: made)
     with event.install_recorder("numba:compile") as recorded:
         nlctl.input_output_response(nlctl.compile(paper.example_1()), [0.0, 0.1])
     assert not recorded.buffer
@@ -98,7 +101,7 @@ def by_numba():
         (made,) = code.overloads.values()
         address = made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
         name, arguments = each.function.__name__, each.signature.args
-        found[name] = _integrators._callable(address, arguments, code)
+        found[name] = integrators._callable(address, arguments, code)
     return found
 
 
@@ -125,7 +128,7 @@ def test_the_same_bits_as_by_numba(monkeypatch):
     """Another order of passes and no vectors of the host, but no liberties with arithmetic."""
     ours = [array.tobytes() for array in results()]
     code = by_numba()
-    monkeypatch.setattr(_simulate, "integrators", lambda: code)
+    monkeypatch.setattr(driver, "integrators", lambda: code)
     theirs = [array.tobytes() for array in results()]
     assert ours == theirs
 
@@ -147,12 +150,12 @@ def test_made_anew_it_is_the_same_file(tmp_path):
 def test_edited_sources_are_compiled_and_kept(tmp_path, monkeypatch):
     """Without what is shipped: numba once, then from the cache, and the same bits."""
     monkeypatch.setenv("NLCTL_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(_integrators, "SHIPPED", tmp_path / "none")
+    monkeypatch.setattr(integrators, "SHIPPED", tmp_path / "none")
     expected = [array.tobytes() for array in results()]
     for compiles in (True, False):
         with event.install_recorder("numba:compile") as recorded:
-            code = _integrators._integrators.__wrapped__()
+            code = integrators._integrators.__wrapped__()
         assert bool(recorded.buffer) == compiles
         with monkeypatch.context() as context:
-            context.setattr(_simulate, "integrators", lambda code=code: code)
+            context.setattr(driver, "integrators", lambda code=code: code)
             assert [array.tobytes() for array in results()] == expected

@@ -19,9 +19,9 @@ from plain_plan import by_blocks
 import nlctl
 from nlctl import controllers
 from nlctl.native import CompileError
-from nlctl.native._compile import compile as compile_diagram
-from nlctl.native._lower import lower
-from nlctl.native._routine import lowered_code, plain_functions
+from nlctl.native.codegen.lower import lower
+from nlctl.native.compiled import compile as compile_diagram
+from nlctl.native.machine.routine import lowered_code, plain_functions
 
 WITH_JIT = not getattr(config, "DISABLE_JIT", False)
 

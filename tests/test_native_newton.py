@@ -17,7 +17,7 @@ from scipy.special import erfcx
 
 import nlctl
 from nlctl.native import CompileError
-from nlctl.native._newton import MOST, SINGULAR, STARTS, improved, newton_step
+from nlctl.native.codegen.newton import MOST, SINGULAR, STARTS, improved, newton_step
 from nlctl.native.codegen.solver import DONE, GUESS
 
 needs_jit = pytest.mark.skipif(

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numba.core import config
 
-from nlctl.native._pointed import type_of, with_table
+from nlctl.native.integrate.memory import type_of, with_table
 
 
 class Record(NamedTuple):

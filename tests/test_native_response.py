@@ -13,8 +13,8 @@ from numba.core import config
 import nlctl
 from analysis.paper import CASES, checks, measured, sample_times
 from nlctl.native import Status
-from nlctl.native._tsit5 import A, B, C, E
-from nlctl.native.codegen.store import cache_folder
+from nlctl.native.integrate.tsit5 import A, B, C, E
+from nlctl.native.machine.store import cache_folder
 
 OSCILLATOR = ct.ss([[0.0, 1.0], [-1.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]], name="osc")
 
@@ -228,7 +228,7 @@ class TestCache:
 
     SCRIPT = (
         "import sys, nlctl, numpy as np\n"
-        "from nlctl.native.codegen import finish\n"
+        "from nlctl.native.machine import finish\n"
         "made, right = [], finish._object_code\n"
         "finish._object_code = lambda text: made.append(text) or right(text)\n"
         "compiled = nlctl.compile(nlctl.block(nlctl.DeadZone(slope_r=float(sys.argv[1])), 'z'))\n"

@@ -11,8 +11,8 @@ from numba.core import config
 from plain_plan import interpreted
 
 import nlctl
-from nlctl.native._compile import compile as compile_diagram
-from nlctl.native._schedule import AlgebraicLoopError, schedule
+from nlctl.native.compiled import compile as compile_diagram
+from nlctl.native.diagram.schedule import AlgebraicLoopError, schedule
 
 
 def evaluated(function, size, t, x, u, p, *more):

@@ -10,7 +10,7 @@ from numba.core import config
 from scipy.integrate import solve_ivp
 
 import nlctl
-from nlctl.native._rodas5p import GAMMA, NODES, A, C, D, H
+from nlctl.native.integrate.rodas5p import GAMMA, NODES, A, C, D, H
 
 run: Any = nlctl.input_output_response
 needs_jit = pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="thousands of steps")

@@ -28,14 +28,14 @@ from numba.core.registry import cpu_target
 
 import nlctl
 from nlctl.native import CompileError
-from nlctl.native._called import TAUGHT
-from nlctl.native._integrators import integrator_key
-from nlctl.native.codegen import finish, store
 from nlctl.native.codegen.calls import Source
-from nlctl.native.codegen.fingerprint import function_key, module_key, program_key
-from nlctl.native.codegen.machine_code import SETTINGS, Wanted, kept, machine_code
-from nlctl.native.codegen.module import loaded
-from nlctl.native.codegen.store import CacheWarning
+from nlctl.native.machine import finish, store
+from nlctl.native.machine.called import TAUGHT
+from nlctl.native.machine.fingerprint import function_key, module_key, program_key
+from nlctl.native.machine.integrators import integrator_key
+from nlctl.native.machine.machine_code import SETTINGS, Wanted, kept, machine_code
+from nlctl.native.machine.module import loaded
+from nlctl.native.machine.store import CacheWarning
 
 PACKAGE = Path(nlctl.__file__).parent
 REAL = numba.float64(numba.float64)
@@ -158,7 +158,7 @@ class TestEntries:
     def test_two_processes_may_write_at_the_same_time(self, folder):
         """Whoever reads finds a whole entry."""
         script = (
-            "from nlctl.native.codegen import store\n"
+            "from nlctl.native.machine import store\n"
             "for i in range(300):\n"
             "    store.write('key', bytes([i % 7]) * 200_000)\n"
             "    body = store.read('key')\n"
@@ -428,7 +428,7 @@ class TestKeys:
         """Whatever the order of sets and the addresses of objects there are."""
         script = (
             "import hashlib, nlctl\n"
-            "from nlctl.native._lower import lower\n"
+            "from nlctl.native.codegen.lower import lower\n"
             "for make in (nlctl.paper.example_1, nlctl.paper.example_2):\n"
             "    compiled = nlctl.compile(make())\n"
             "    lowered = lower(compiled.schedule, compiled.program)\n"
@@ -461,11 +461,11 @@ class TestKeys:
 
 
 EDITS = {  # module -> what is edited there
-    "_control.py": ("SMALLEST = 4e-16", "SMALLEST = 5e-16"),
-    "_tsit5.py": ("STABLE = 3.3", "STABLE = 3.2"),
-    "_pointed.py": ("_ENTRY = 4", "_ENTRY = 5"),
-    "_lane.py": ('"error_model": "numpy"', '"error_model": "python"'),
-    "_address.py": ("ir.VoidType()", "ir.IntType(32)"),
+    "integrate/control.py": ("SMALLEST = 4e-16", "SMALLEST = 5e-16"),
+    "integrate/tsit5.py": ("STABLE = 3.3", "STABLE = 3.2"),
+    "integrate/memory.py": ("_ENTRY = 4", "_ENTRY = 5"),
+    "integrate/state.py": ('"error_model": "numpy"', '"error_model": "python"'),
+    "machine/address.py": ("ir.VoidType()", "ir.IntType(32)"),
 }
 
 
@@ -481,9 +481,9 @@ def keys_of_copy(path, edits):
         assert source.count(before) == 1
         module.write_text(source.replace(before, after), encoding="utf-8")
     script = (
-        "import nlctl; from nlctl.native._integrators import integrator_key\n"
-        "from nlctl.native._called import TAUGHT\n"
-        "from nlctl.native.codegen.fingerprint import module_key\n"
+        "import nlctl; from nlctl.native.machine.integrators import integrator_key\n"
+        "from nlctl.native.machine.called import TAUGHT\n"
+        "from nlctl.native.machine.fingerprint import module_key\n"
         "print(nlctl.__file__, integrator_key(), module_key(*TAUGHT))"
     )
     run = subprocess.run(

@@ -12,7 +12,7 @@ from analysis.report.document import Equation
 from analysis.report.mathml import mathml
 from nlctl.errors import UsageError
 from nlctl.expressions.latex import number_text, symbol
-from nlctl.native._typeset import _dotted
+from nlctl.native.typesetting import _dotted
 
 
 def test_symbols():

@@ -17,9 +17,9 @@ import user_functions
 
 import nlctl
 from nlctl.errors import UsageError
-from nlctl.native._lower import lower
-from nlctl.native._lower_blocks import equations
-from nlctl.native._routine import plain_functions
+from nlctl.native.codegen.blocks import equations
+from nlctl.native.codegen.lower import lower
+from nlctl.native.machine.routine import plain_functions
 
 LANES = 20
 SCALES = (0.1, 1.0, 10.0, 100.0)

@@ -22,7 +22,7 @@ from numba.core.errors import NumbaError
 from user_function_checks import Points, agrees, called, expected, judged, points, quiet, shown
 
 import nlctl
-from nlctl.native._machine import machine
+from nlctl.native.machine.evaluations import machine
 
 JOB = Path(__file__)
 WIDTH = 8  # members side by side in an ensemble

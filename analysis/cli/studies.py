@@ -260,7 +260,7 @@ def _executor(text: str, jobs: int) -> Iterator[Any]:
         yield None
     elif text == "processes":
         from nlctl.host.workers import process_pool
-        from nlctl.native._ensemble import cores
+        from nlctl.native.ensemble import cores
 
         with process_pool(jobs or cores()) as pool:
             yield pool

@@ -16,16 +16,16 @@ sampled systems.
 """
 
 from ..errors import CompileError
-from ._ahead import compile_ahead
-from ._compile import Compiled, compile  # noqa: A004 (what it does)
-from ._ensemble import Ensemble, ensemble_response
-from ._lane import Status
-from ._response import Response, uninterrupted
-from ._schedule import AlgebraicLoopError
-from ._simulate import Settings, Statistics
-from ._typeset import BlockEquations, typeset
 from .audit import AuditError
-from .codegen.store import CacheWarning
+from .compiled import Compiled, compile  # noqa: A004 (what it does)
+from .diagram.schedule import AlgebraicLoopError
+from .ensemble import Ensemble, ensemble_response
+from .integrate.driver import Settings, Statistics
+from .integrate.state import Status
+from .machine.ahead import compile_ahead
+from .machine.store import CacheWarning
+from .response import Response, uninterrupted
+from .typesetting import BlockEquations, typeset
 
 __all__ = [
     "AlgebraicLoopError",

@@ -17,12 +17,12 @@ import control as ct
 import numpy as np
 
 from ..errors import ParameterError, UsageError
-from ._compile import Compiled
-from ._lower import lower
-from ._lower_blocks import equations
-from ._machine import Machine, prepared_parameters
-from ._routine import lowered_code
-from ._schedule import Signal
+from .codegen.blocks import equations
+from .codegen.lower import lower
+from .compiled import Compiled
+from .diagram.schedule import Signal
+from .machine.evaluations import Machine, prepared_parameters
+from .machine.routine import lowered_code
 from .thirdparty.python_control import block_inputs, block_outputs, block_rates
 
 POINTS = 5  # of a trajectory, its start and end among them

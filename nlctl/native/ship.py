@@ -17,8 +17,8 @@ import llvmlite.binding as llvm
 import numba
 
 from ..host.files import replace_file
-from ._integrators import HERE, SHIPPED, WANTED, sources_key
-from .codegen.export import exported
+from .machine.export import exported
+from .machine.integrators import HERE, SHIPPED, WANTED, sources_key
 
 
 def ship(path: Path = SHIPPED) -> None:
@@ -34,8 +34,8 @@ def ship(path: Path = SHIPPED) -> None:
     replace_file(path, lambda file: file.write(json.dumps(header).encode() + b"\n" + code))
 
 
-def source_files(first: str = "_integrate.py") -> list[str]:
-    """Return the files of this folder that a module is made of: itself and all that it imports."""
+def source_files(first: str = "integrate/advance.py") -> list[str]:
+    """Return the files of the engine that a module is made of: itself and all that it imports."""
     found = [first]
     for name in found:  # which grows meanwhile
         found += [other for other in dict.fromkeys(_imported(HERE / name)) if other not in found]
@@ -43,10 +43,17 @@ def source_files(first: str = "_integrate.py") -> list[str]:
 
 
 def _imported(path: Path) -> Iterator[str]:
+    """Yield the files of the engine that a file imports, by their paths inside of it."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.level == 1:
+        if isinstance(node, ast.ImportFrom) and node.level:
+            folder = path.parents[node.level - 1]
             modules = [node.module] if node.module else [each.name for each in node.names]
-            yield from (f"{module.replace('.', '/')}.py" for module in modules)
+            files = [folder / f"{module.replace('.', '/')}.py" for module in modules]
+            yield from (
+                file.relative_to(HERE).as_posix()
+                for file in files
+                if file.is_relative_to(HERE) and file.exists()
+            )
 
 
 if __name__ == "__main__":

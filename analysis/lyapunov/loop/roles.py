@@ -18,7 +18,7 @@ from nlctl.blocks import Block
 from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
 from nlctl.diagrams import Place, initial_state, interconnect
 from nlctl.errors import CompileError, DiagramError
-from nlctl.native._wiring import Combination, Signal, Wiring
+from nlctl.native.diagram.wiring import Combination, Signal, Wiring
 from nlctl.native.thirdparty.checks import check_functions, check_sizes
 from nlctl.plants import coordinate_names
 

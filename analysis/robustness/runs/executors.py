@@ -26,7 +26,7 @@ import pandas as pd
 
 from nlctl.errors import UsageError
 from nlctl.host.workers import end_with_parent
-from nlctl.native._ensemble import cores
+from nlctl.native.ensemble import cores
 
 from ..uncertainty.design import Design, rows, seed_number
 from .experiment import Prepared, columns_of, evaluate, typed

@@ -20,7 +20,7 @@ import numpy as np
 
 from nlctl.blocks import Block
 from nlctl.diagrams import all_parameter_rows, initial_state, leaves, places, state_names
-from nlctl.native.codegen.fingerprint import content_key
+from nlctl.native.machine.fingerprint import content_key
 from nlctl.params import declared_params
 
 __all__ = ["array_text", "loop_facts", "loop_values", "short_key", "values_differ"]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlctl.native.codegen.machine_code import kept
+from nlctl.native.machine.machine_code import kept
 
 from ...metrics import differences, vertex
 

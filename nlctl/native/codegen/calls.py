@@ -22,9 +22,9 @@ from numba.core.errors import NumbaWarning
 
 from ...equations import equation
 from ...errors import UsageError
-from .fingerprint import module_key
-from .machine_code import Wanted, address_of, machine_code_if_taken
-from .module import loaded
+from ..machine.fingerprint import module_key
+from ..machine.machine_code import Wanted, address_of, machine_code_if_taken
+from ..machine.module import loaded
 
 ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)
 CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)

@@ -11,7 +11,7 @@ import numpy as np
 from ...blocks import Block
 from ...errors import CompileError
 from ...params import as_numbers
-from .._parameters import current_values
+from ..parameters import current_values
 from .purity import Reading, check_pure
 from .values import FRESH, VECTOR, Impure, captured
 

@@ -1,0 +1,343 @@
+"""A schedule as expressions: blocks traced, wired, loops solved, what cannot be traced called."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ...errors import CompileError
+from ...expressions.arrays import Tracer, boxed, concatenated, full, number, traced, vector
+from ...expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable, needed
+from ...expressions.operators import elementwise
+from ...expressions.trace import trace
+from ..diagram.schedule import Combination, Loop, Node, Schedule, Signal, signal_name
+from ..machine.called import call_of
+from ..parameters import length
+from .calls import Call
+from .newton import inside, solver
+from .program import corners, memory
+from .solver import Solver
+from .trace import parameters, time
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equations:
+    """What a diagram computes.
+
+    Attributes
+    ----------
+    graph : Graph
+    results : dict
+        For ``"dx"``, ``"g"`` and ``"y"`` pairs of a row and the array that is to be written there.
+    calls : dict
+        Opaque functions by name.
+    solvers : dict
+        Searches for the signals of algebraic loops, by name.
+    """
+
+    graph: Graph
+    results: dict[str, list[tuple[int, Tracer]]]
+    calls: dict[str, Call]
+    solvers: dict[str, Solver]
+
+
+def equations(schedule: Schedule, layout: Any, p: np.ndarray | None = None) -> Equations:
+    """Write a schedule as expressions.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    layout : mapping
+        Places of the parameters, as in `Program.layout`.
+    p : ndarray, optional
+        The parameter vector whose integers steer what is computed; by default those that the
+        blocks have now.
+
+    Returns
+    -------
+    Equations
+
+    Raises
+    ------
+    CompileError
+        If a function means one thing in Python and another in expressions, or one in an algebraic
+        loop is opaque.
+    """
+    system = schedule.system
+    sizes = {"t": 1, "x": system.nstates or 0, "u": system.ninputs or 0, "p": length(layout)}
+    reader = Reader(graph=Graph(sizes), layout=layout, blocks=schedule.nodes, p=p)
+    with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
+        at = 0
+        for loop in schedule.loops:
+            reader.evaluate(schedule, range(at, loop.start))
+            reader.solve(schedule, loop)
+            at = loop.stop
+        reader.evaluate(schedule, range(at, len(schedule.order)))
+        results = {
+            "dx": [(n.state_offset, reader.derivatives(i)) for i, n in enumerate(schedule.nodes)],
+            "g": _events(reader),
+            "y": [(0, reader.wired(schedule.outputs))],
+        }
+    if reader.solved:
+        results = {k: [(row, reader.known(a)) for row, a in v] for k, v in results.items()}
+    return Equations(
+        graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers
+    )
+
+
+def _results(graph: Graph, op: str, name: str, given: Sequence[Tracer], count: int) -> Tracer:
+    """Return what a call or a search with these arguments results in."""
+    pieces = [piece for g in given for piece in g.pieces()]
+    args, sizes = [e for e, _ in pieces], tuple(n for _, n in pieces)
+    if not count:
+        return traced(graph, 0.0).reshape(1)[:0]
+    node = graph.node(op, *args, data=(name, sizes), size=count, varies=True)
+    if count > SMALL:
+        return Tracer(graph, boxed(node), 0, count)
+    items = [number(graph, graph.item(node, k)).reshape(1) for k in range(count)]
+    return concatenated(graph, items)
+
+
+def _events(reader: Reader) -> list[tuple[int, Tracer]]:
+    """Return switching functions of all blocks, then what memories are committed to."""
+    counts = [(corners(node), len(memory(node))) for node in reader.blocks]
+    at, behind, found = 0, sum(count for count, _ in counts), []
+    for i, (own, committed) in enumerate(counts):
+        if own or committed:
+            events = reader.events(i)
+            found += [(at, events[:own]), (behind, events[own:])]
+            at, behind = at + own, behind + committed
+    return found
+
+
+def _labels(blocks: Sequence[Node]) -> list[str]:
+    """Return what names begin with; numbers are added unless all are different."""
+    clean = [re.sub(r"\W|^(?=\d)", "_", node.path) for node in blocks]
+    same = len(set(clean)) < len(clean)
+    return [f"{name}_{i}" for i, name in enumerate(clean)] if same else clean
+
+
+@dataclass(kw_only=True)
+class Reader:
+    """Reads blocks one after the other.
+
+    Attributes
+    ----------
+    graph : Graph
+    layout : mapping
+    blocks : sequence of Node
+    p : ndarray or None
+        Values of integer parameters; None for those that the blocks have now.
+    signals : dict
+        Outputs of the blocks that have been read.
+    guesses : dict
+        What stands for signals that are being solved for.
+    solved : list of Tracer
+        Signals that have been.
+    calls, solvers : dict
+        By name.
+    """
+
+    graph: Graph
+    layout: Any
+    blocks: Sequence[Node]
+    p: np.ndarray | None = None
+    signals: dict[int, Tracer] = field(default_factory=dict)
+    guesses: dict[Signal, Tracer] = field(default_factory=dict)
+    solved: list[Tracer] = field(default_factory=list)
+    calls: dict[str, Call] = field(default_factory=dict)
+    solvers: dict[str, Solver] = field(default_factory=dict)
+
+    def evaluate(self, schedule: Schedule, places: range) -> None:
+        """Read the outputs of blocks at some places of the order."""
+        for place in places:
+            i = schedule.order[place]
+            self.signals[i] = self.outputs(i, schedule.unknown[place])
+
+    def solve(self, schedule: Schedule, loop: Loop) -> None:
+        """Read the blocks of a loop: with guesses, and then with what these are solved for."""
+        name, places = f"loop{len(self.solvers)}", range(loop.start, loop.stop)
+        leaves = [self.graph.leaf(name, k, None) for k in range(len(loop.torn))]
+        self._guessed(schedule, places, loop.torn, [number(self.graph, leaf) for leaf in leaves])
+        found = [self.taken(signal, 1).reshape(-1)[0].only for signal in loop.torn]
+        try:
+            made, given = solver(name, leaves, found)
+        except Untraceable as error:
+            names = ", ".join(signal_name(self.blocks, signal) for signal in loop.torn)
+            why = _opaque(leaves, found, self.calls) or str(error)
+            raise CompileError(
+                f"the algebraic loop through {names} cannot be solved: {why}; put a state into it"
+            ) from error
+        self.solvers[name] = made
+        pieces = [Tracer(self.graph, boxed(e), 0, e.size) if e.size else
+                  number(self.graph, e).reshape(1) for e in given]  # fmt: skip
+        results = _results(self.graph, "solve", name, pieces, made.count)
+        self.solved.append(results)
+        self._guessed(schedule, places, loop.torn, [results[k] for k in range(made.count)])
+
+    def _guessed(
+        self, schedule: Schedule, places: range, torn: Sequence[Signal], values: Sequence[Tracer]
+    ) -> None:
+        self.guesses = dict(zip(torn, values, strict=True))
+        self.evaluate(schedule, places)
+        self.guesses = {}
+
+    def known(self, array: Tracer) -> Tracer:
+        """Return an array, NaN where a loop was not solved: blocks may turn NaN into numbers."""
+        pairs = [elementwise(self.graph, "eq", z, z) for found in self.solved for z in found]
+        is_known = reduce(lambda a, b: elementwise(self.graph, "and", a, b), pairs)
+        return elementwise(self.graph, "select", is_known, array, np.nan) if array.size else array
+
+    def taken(self, signal: Signal, count: int) -> Tracer:
+        """Return a block's output, or several from that on; of those that are guessed the guess."""
+        own = [Signal(signal.block, signal.index + k) for k in range(count)]
+        if not any(s in self.guesses for s in own):
+            return self.signals[signal.block or 0][signal.index : signal.index + count]
+        parts = [
+            self.guesses[s] if s in self.guesses else self.signals[s.block or 0][s.index]
+            for s in own
+        ]
+        return concatenated(self.graph, [part.reshape(1) for part in parts])
+
+    def outputs(self, i: int, unknown: Collection[int]) -> Tracer:
+        """Return a block's outputs; those that depend on unknown inputs are asked for again."""
+        node, system = self.blocks[i], self.blocks[i].system
+        linear = isinstance(system, ct.StateSpace)
+        if not linear and (system.outfcn is None or not system.noutputs):
+            return self._states(node)[: system.noutputs or 0]
+        direct = [bool(column.any()) for column in node.direct.T]
+        missing = [not (d if linear else any(direct)) for d in direct]
+        inputs = self.wired(
+            [
+                None if j in unknown or missing[j] else combination
+                for j, combination in enumerate(node.inputs)
+            ]
+        )
+        if linear:
+            return self._linear(node, system.C, system.D, inputs)
+        return self._function(i, "output", [system.outfcn], inputs, system.noutputs)
+
+    def derivatives(self, i: int) -> Tracer:
+        node, system = self.blocks[i], self.blocks[i].system
+        if not system.nstates:
+            return self._states(node)
+        inputs = self.wired(node.inputs)
+        if isinstance(system, ct.StateSpace):
+            return self._linear(node, system.A, system.B, inputs)
+        return self._function(i, "update", [system.updfcn], inputs, system.nstates)
+
+    def events(self, i: int) -> Tracer:
+        node, spec = self.blocks[i], self.blocks[i].system.spec
+        used = [("corners", corners(node)), ("commit", len(memory(node)))]
+        functions = [getattr(spec, name) for name, count in used if count]
+        inputs = self.wired(node.inputs)
+        return self._function(i, "events", functions, inputs, sum(count for _, count in used))
+
+    def wired(self, combinations: Sequence[Combination | None]) -> Tracer:
+        """Return linear combinations of signals, NaN for None; neighbours become vectors."""
+        parts, at = [traced(self.graph, 0.0).reshape(1)[:0]], 0
+        while at < len(combinations):
+            end = at + 1
+            while end < len(combinations) and _is_next(combinations[end - 1], combinations[end]):
+                end += 1
+            parts.append(self._combined(combinations[at], end - at))
+            at = end
+        return concatenated(self.graph, parts)
+
+    def _combined(self, combination: Combination | None, count: int) -> Tracer:
+        if combination is None:
+            return full(self.graph, count, np.nan)
+        total = full(self.graph, count, 0.0)
+        for signal, gain in combination.items():
+            if signal.block is None:
+                part = vector(self.graph, "u", signal.index, (count,))
+            else:
+                part = self.taken(signal, count)
+            if gain != -1.0:
+                part = elementwise(self.graph, "mul", gain, part)
+            total = elementwise(self.graph, "sub" if gain == -1.0 else "add", total, part)
+        return total
+
+    def _linear(self, node: Node, on_state: Any, on_input: Any, inputs: Tracer) -> Tracer:
+        """Return the products with a system's matrices, without their zeros."""
+        x, rows = self._states(node), []
+        for i in range(on_state.shape[0]):
+            terms = [(on_state[i, j], x[j]) for j in np.flatnonzero(on_state[i])]
+            terms += [(on_input[i, j], inputs[j]) for j in np.flatnonzero(on_input[i])]
+            row = traced(self.graph, 0.0)
+            for factor, value in terms:
+                term = elementwise(self.graph, "mul", float(factor), value)
+                row = elementwise(self.graph, "add", row, term)
+            rows.append(row.reshape(1))
+        return concatenated(self.graph, rows) if rows else x[:0]
+
+    def _states(self, node: Node) -> Tracer:
+        return vector(self.graph, "x", node.state_offset, (node.system.nstates or 0,))
+
+    def _function(
+        self, i: int, kind: str, functions: list[Any], inputs: Tracer, count: int
+    ) -> Tracer:
+        """Return the results of a block's functions, traced if possible."""
+        node = self.blocks[i]
+
+        def arguments() -> tuple[Any, ...]:
+            given = parameters(self.graph, node.system, self.layout[i], self.p)
+            return time(self.graph), self._states(node), inputs.copy(), given
+
+        try:
+            parts = [trace(self.graph, function, arguments) for function in functions]
+            found = concatenated(self.graph, parts)
+            if found.size != count:
+                raise Untraceable(f"it returns {found.size} values, not {count}")
+        except Untraceable as error:
+            return self._called(i, kind, functions, inputs, count, str(error))
+        except Ambiguous as error:
+            raise CompileError(
+                f"block '{node.path}' cannot be compiled: its {kind} function {error}; "
+                "the diagram still runs in python-control"
+            ) from None
+        return found
+
+    def _called(
+        self, i: int, kind: str, functions: list[Any], inputs: Tracer, count: int, reason: str
+    ) -> Tracer:
+        """Return the results of an opaque call."""
+        node, slots = self.blocks[i], self.layout[i]
+        name = f"{_labels(self.blocks)[i]}_{kind}_of_one"
+        if name not in self.calls:
+            self.calls[name] = call_of(name, node, kind, functions, slots, count, reason)
+        size = sum(s.size for s in slots.values())
+        start = min((s.offset for s in slots.values()), default=0)
+        given = [
+            time(self.graph).reshape(1),
+            self._states(node),
+            inputs,
+            vector(self.graph, "p", start, (size,)),
+        ]
+        return _results(self.graph, "call", name, given, count)
+
+
+def _opaque(guesses: Sequence[Expr], found: Sequence[Expr], calls: Mapping[str, Call]) -> str:
+    """Return which opaque functions are in a loop, in words; nothing if there are none."""
+    nodes = inside(needed(found), guesses)
+    names = [n.data[0] for n in sorted(nodes, key=lambda n: n.index) if n.op == "call"]
+    used = [calls[name] for name in dict.fromkeys(names)]
+    return ", ".join(
+        f"the {call.kind} function of block '{call.block}' is called as it stands ({call.reason}) "
+        "and has no derivatives"
+        for call in used
+    )
+
+
+def _is_next(one: Combination | None, other: Combination | None) -> bool:
+    """Whether a combination is another one, of the signals after those."""
+    if one is None or other is None:
+        return one is other
+    shifted = {Signal(s.block, s.index + 1): gain for s, gain in one.items()}
+    return bool(one) and shifted == other

@@ -1,0 +1,182 @@
+"""Lowering: a diagram as a program over members side by side, from the blocks' own functions.
+
+The functions have been run once on symbols.  What they compute is planned here for any number of
+members at a time: each expression once, whatever depends on parameters alone in advance.  One
+generator makes machine code of the plan (`codegen.ir`), and one interpreter carries it out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...expressions.arrays import Tracer
+from ...expressions.graph import Expr, needed
+from ..diagram.schedule import Schedule
+from ..parameters import length
+from .blocks import Equations, equations
+from .calls import Call
+from .ir.program import program_text
+from .plan import Function, Store, plan, split
+from .program import Program
+from .rewrite import rewritten
+from .solver import Solver
+
+ARGUMENTS = {
+    "prepare": ("p", "c"),
+    "rhs": ("t", "x", "u", "c", "dx", "g"),
+    "out": ("t", "x", "u", "c", "y"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lowered:
+    """A program over members side by side ("lanes").
+
+    Attributes
+    ----------
+    functions : mapping
+        Plans of ``prepare(p, c)``, ``rhs(t, x, u, c, dx, g)`` and ``out(t, x, u, c, y)``.  All
+        arrays have a row per number and a column per member, `t` is one row.  `prepare` fills `c`
+        with all that depends on the parameters `p` alone; the rest of `c` is room that `rhs` and
+        `out` write to, so members that run at the same time need a `c` each.
+    exact : frozenset of Expr
+        Operations that are rounded one by one.
+    calls : mapping
+        Functions that are called as they stand, by name.
+    solvers : mapping
+        Searches for the signals of algebraic loops, by name.
+    rows : mapping
+        Rows of every array.
+    lanes : int
+        Number of members.
+    assumed : mapping
+        Integer parameters that steer what is computed: for places in `p` the values for which the
+        program holds.
+    """
+
+    functions: Mapping[str, Function]
+    exact: frozenset[Expr]
+    calls: Mapping[str, Call]
+    solvers: Mapping[str, Solver]
+    rows: Mapping[str, int]
+    lanes: int
+    assumed: Mapping[int, int]
+
+    @property
+    def size(self) -> int:
+        """Rows of `c`."""
+        return self.rows["c"]
+
+    def shape(self, array: str) -> tuple[int, ...]:
+        """Return the shape of one of its arrays."""
+        return (self.lanes,) if array == "t" else (self.rows[array], self.lanes)
+
+    @property
+    def opaque(self) -> dict[str, str]:
+        """Why a function is called and not written out, by its name."""
+        return {name: call.reason for name, call in self.calls.items()}
+
+    @cached_property
+    def text(self) -> str:
+        """The LLVM IR of its functions."""
+        return program_text(self.functions, self.lanes, self.exact, self.solvers.values())
+
+    def holds_for(self, p: Any) -> bool:
+        """Whether the program holds for parameters `p`, an array with a row per number."""
+        return all(bool(np.all(np.asarray(p)[i] == v)) for i, v in self.assumed.items())
+
+
+def lower(
+    schedule: Schedule, program: Program, lanes: int = 8, found: Equations | None = None
+) -> Lowered:
+    """Plan a diagram as a program over members side by side.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    program : Program
+        Its arrays.
+    lanes : int, optional
+        Number of members.
+    found : Equations, optional
+        What the schedule computes, where that has been read already.
+
+    Returns
+    -------
+    Lowered
+    """
+    if found is None:
+        found = equations(schedule, program.layout)
+    written = {
+        name: [part for row, array in rows for part in _stores(name, row, array)]
+        for name, rows in found.results.items()
+    }
+    stores, exact = rewritten(found.graph, written)
+    parameters = length(program.layout)
+    functions, size = _planned(stores, parameters)
+    system = schedule.system
+    rows = {
+        "p": parameters, "t": 1, "x": system.nstates or 0, "u": system.ninputs or 0,
+        "c": max(size, 1), "dx": system.nstates or 0, "g": program.events,
+        "y": len(schedule.outputs),
+    }  # fmt: skip
+    return Lowered(
+        functions=functions, exact=exact, calls=found.calls, solvers=found.solvers, rows=rows,
+        lanes=lanes, assumed=found.graph.assumptions,
+    )  # fmt: skip
+
+
+def _planned(stores: Mapping[str, list[Store]], parameters: int) -> tuple[dict[str, Function], int]:
+    """Return the plans of all functions, and how many rows of `c` they need."""
+    known = _parameters_alone([s.expr for part in stores.values() for s in part], parameters)
+    prepared = [
+        Store(array="c", row=r, expr=e, size=e.size or 1)
+        for e, (_, r) in known.items()
+        if r >= parameters
+    ]
+    wanted = {"prepare": prepared, "rhs": [*stores["dx"], *stores["g"]], "out": stores["y"]}
+    functions, size = {}, parameters + sum(store.size for store in prepared)
+    for name, arguments in ARGUMENTS.items():
+        first = name == "prepare"
+        planned = plan(wanted[name], {} if first else known, size)
+        size = planned.rows
+        copied = parameters if first else 0
+        functions[name] = Function(arguments=arguments, plan=planned, copied=copied)
+    return functions, size
+
+
+def _stores(name: str, row: int, array: Tracer) -> list[Store]:
+    found: list[Store] = []
+    for expr, size in array.pieces():
+        found += split(Store(array=name, row=row, expr=expr, size=size))
+        row += size
+    return found
+
+
+def _parameters_alone(results: list[Expr], rows: int) -> dict[Expr, tuple[str, int]]:
+    """Return what is used and depends on parameters alone, with its place in `c`.
+
+    That is where a parameter has it in `p`, and behind all of them, from `rows` on, what is
+    computed of them.
+    """
+    nodes = needed(results, ())
+    inside = {node for node in nodes if node.varies}
+    used = set(results) - inside
+    for node in reversed(nodes):
+        for arg in node.args if node in inside else ():
+            if arg.kind == "b":  # truth values have no place in an array of floats
+                inside.add(arg)
+            elif not arg.varies:
+                used.add(arg)
+    found = {}
+    for node in nodes:
+        if node in used and node.op == "leaf" and node.size is None:
+            found[node] = ("c", node.data[1])
+        elif node in used and node.op != "const":
+            found[node], rows = ("c", rows), rows + (node.size or 1)
+    return found

@@ -1,0 +1,290 @@
+"""Machine code from a diagram."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import cloudpickle
+import control as ct
+import numpy as np
+
+from ..errors import CompileError, ParameterError, UsageError
+from ..names import unknown
+from ..responses.arguments import checked_params
+from .codegen.blocks import Equations, equations
+from .codegen.lower import Lowered, lower
+from .codegen.program import Program, program
+from .describe import called, described
+from .diagram.schedule import Schedule, schedule
+from .jacobians import Tangent, linearize, parameter_jacobian, tangent
+from .machine.evaluations import evaluations
+from .parameters import packed
+from .thirdparty.captured import changed
+from .thirdparty.checks import check_sizes
+
+_RESOLVING = threading.Lock()
+LOOPS = ("error", "solve")  # what may be done with algebraic loops
+Rhs = Callable[..., None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compiled:
+    """A diagram as machine code; made by `compile`.
+
+    Attributes
+    ----------
+    schedule : Schedule
+        What was read from the diagram.
+    program : Program
+        The arrays that machine code takes and fills.
+
+    Notes
+    -----
+    It is not a python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
+    run it, and ``compiled.linearize(x0)`` linearizes it with exact derivatives, in the place of
+    ``ct.linearize``.  Every other function of python-control takes ``compiled.system``.
+    """
+
+    schedule: Schedule
+    program: Program
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # functions made at run time are pickled by value; machine code is found on disk again
+        read = replace(self.schedule, captured=())  # modules' names stay where they are
+        try:
+            return _restored, (cloudpickle.dumps((read, self.program)),)
+        except Exception as error:  # pickle passes on whatever objects raise
+            raise UsageError(
+                f"'{self.system.name}' cannot be sent to another process, since a function of it "
+                f"reads what cannot be pickled ({error}): let it read numbers and arrays"
+            ) from error
+
+    @property
+    def system(self) -> Any:
+        """The diagram that was compiled."""
+        return self.schedule.system
+
+    @property
+    def source(self) -> str:
+        """What runs for one member: LLVM IR, in which comments say what each value is.
+
+        Comments at its end name the functions that it calls as they stand, and why: in machine
+        code of numba, or back in Python.  Names of loops that are solved have their signals.
+        """
+        return "\n".join([self.lowered.text, *(f"; {line}" for line in called(self)), ""])
+
+    @cached_property
+    def lowered(self) -> Lowered:
+        """The plan of a program for one member."""
+        return lower(self.schedule, self.program, 1, self.equations)
+
+    @cached_property
+    def equations(self) -> Equations:
+        """What the blocks' functions compute as expressions."""
+        return equations(self.schedule, self.program.layout)
+
+    @cached_property
+    def native(self) -> tuple[Rhs, Rhs]:
+        """``(rhs, out)`` as machine code, made when it is first needed or found in the cache.
+
+        With NUMBA_DISABLE_JIT=1 the plan that it is made from is carried out in plain Python.
+        """
+        return evaluations(self)
+
+    def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
+        """Return the flat vector `p` that the program takes.
+
+        Overrides are resolved by python-control itself.
+
+        Raises
+        ------
+        UnknownNameError, ParameterError
+            If a name or a value is refused.
+        UsageError
+            If a value that a function reads from around it has changed since.
+        """
+        other = changed(self.schedule.captured)
+        if other is not None:
+            raise UsageError(
+                f"'{other.name}' was {_short(other.then)} when '{self.system.name}' was compiled "
+                f"and is {_short(other.now)} now: compile again, or make it a parameter"
+            )
+        with _RESOLVING:  # python-control keeps what it has resolved in the blocks
+            self.system._update_params(params)
+            return packed(self.schedule.nodes, self.program.layout, self.program.fixed)
+
+    def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
+        """Return the right-hand side, as ``system.dynamics`` does."""
+        g = np.empty(self.program.events)
+        return self._call(self.native[0], self.system.nstates, t, x, u, params, g)
+
+    def output(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
+        """Return the outputs, as ``system.output`` does."""
+        return self._call(self.native[1], self.system.noutputs, t, x, u, params)
+
+    @cached_property
+    def tangent(self) -> Tangent:
+        """The derivatives of the equations along a direction of states, inputs and parameters."""
+        return tangent(self)
+
+    def linearize(
+        self, x0: Any, u0: Any = None, t: float = 0.0, params: Mapping[str, Any] | None = None
+    ) -> ct.StateSpace:
+        """Return the linearization at a point, with exact derivatives.
+
+        Parameters
+        ----------
+        x0 : mapping, array_like or control.OperatingPoint
+            State, as `initial_state` of `nlctl.input_output_response`.
+        u0 : array_like, optional
+            Inputs, of shape (ninputs,); a number for all of them; 0 if left out.
+        t : float, optional
+            Time in s.
+        params : mapping, optional
+            Parameters that are overridden.
+
+        Returns
+        -------
+        control.StateSpace
+            With the diagram's names.  At a kink it has the slopes of the side that the point
+            belongs to.
+
+        Raises
+        ------
+        CompileError
+            If a function is called as it stands, or there are algebraic loops.
+        ParameterError, UsageError
+            If an argument is refused.
+
+        Notes
+        -----
+        Forward mode on the expressions, so nothing is lost to a step width.
+        """
+        return linearize(self, x0, u0, t, params)
+
+    def parameter_jacobian(
+        self,
+        parameters: Sequence[str],
+        x0: Any,
+        u0: Any = None,
+        t: float = 0.0,
+        params: Mapping[str, Any] | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return how the right-hand side and the outputs change with parameters.
+
+        Parameters
+        ----------
+        parameters : sequence of str
+            Qualified names, such as ``"actuator.b_r"``; with an index for entries of arrays.
+        x0, u0, t, params
+            The point, as in `linearize`.
+
+        Returns
+        -------
+        tuple of ndarray
+            Of shapes (nstates, k) and (noutputs, k) for k parameters.
+
+        Raises
+        ------
+        CompileError, UnknownNameError, ParameterError
+            As `linearize`, and if there is no such parameter.
+        """
+        return parameter_jacobian(self, parameters, x0, u0, t, params)
+
+    def _call(
+        self, function: Rhs, size: int | None, t: float, x: Any, u: Any, params: Any, *more: Any
+    ):
+        x, u = (np.array(v, dtype=float).reshape(-1) for v in (x, u))
+        for what, given, wanted in (("x", x, self.system.nstates), ("u", u, self.system.ninputs)):
+            if given.size != (wanted or 0):
+                raise ParameterError(f"{what} needs {wanted or 0} values, got {given.size}")
+        result = np.empty(size or 0)
+        function(float(t), x, u, self.parameter_vector(params), result, *more)
+        return result
+
+    def __repr__(self) -> str:
+        return described(self)
+
+
+def compile(  # noqa: A001 (what it does)
+    system: Any,
+    *,
+    params: Mapping[str, Any] | None = None,
+    algebraic_loops: Literal["error", "solve"] = "error",
+) -> Compiled:
+    """Turn a python-control system into machine code.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        nlctl's blocks, ``ct.nlsys``, ``ct.ss``, ``ct.tf``, and diagrams of them.
+    params : mapping, optional
+        Parameters that will be overridden although no block declares them, such as those that a
+        foreign function reads with ``params.get``; the values given here are not kept.
+    algebraic_loops : {"error", "solve"}, optional
+        What is done with signals that depend on each other at the same instant: refuse the
+        diagram, or solve for them by Newton's method in every evaluation.  A linear loop is then
+        exact to rounding.  Of several solutions the one is found that the search from 0 (then
+        from 1 and -1) reaches first.  Where there is none, or the loop's matrix is singular to
+        1e-7, the results are NaN, and a run ends as diverged.  The derivatives are exact, so a
+        function in a loop must be one that is made of expressions; at most 16 signals of a
+        loop can be solved for together.
+
+    Returns
+    -------
+    Compiled
+
+    Raises
+    ------
+    AlgebraicLoopError
+        If signals depend on each other without a state in between.
+    CompileError
+        If a block is of a wrong kind or size, a function depends on more than its arguments, or
+        an algebraic loop goes through a function that has no expressions.
+
+    Notes
+    -----
+    What a function reads from around it (``self.gain``, a global, a linear system that it closes
+    over) and parameters that are no numbers are constants of the program: compile again to change
+    them.  A run whose functions would read something else now is an error.
+
+    Functions are read before they are called.  One that remembers something outside of states,
+    changes what it was given, draws random numbers, or has ``try ... except`` is refused.
+
+    A function that cannot be written out as expressions (it has a loop that the state ends, reads
+    a table of SciPy) is called as it stands: as machine code that numba makes of it, otherwise
+    back in Python, which is right and as slow as python-control.  ``print(compiled)`` says which.
+    """
+    if isinstance(system, ct.TransferFunction):
+        system = ct.ss(system)
+    if not isinstance(system, ct.InputOutputSystem):
+        raise CompileError(
+            f"compile needs a diagram or a block, got {type(system).__name__}: nlctl.block makes "
+            "a block of a record"
+        )
+    system._update_params(checked_params(params))  # type: ignore[attr-defined]
+    if algebraic_loops not in LOOPS:
+        raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
+    read = schedule(system, solve_loops=algebraic_loops == "solve")
+    arrays = program(read)
+    check_sizes(system, [node.system for node in read.nodes])
+    made = Compiled(schedule=read, program=arrays)
+    _ = made.equations  # what expressions would understand otherwise is refused now
+    return made
+
+
+def _short(value: Any) -> str:
+    """Return a value in one line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _restored(content: bytes) -> Compiled:
+    """Make a compiled diagram of what `Compiled.__reduce__` has written."""
+    read, arrays = pickle.loads(content)
+    return Compiled(schedule=read, program=arrays)

@@ -1,0 +1,105 @@
+"""A compiled diagram in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import control as ct
+import numpy as np
+
+from .codegen.program import Program, corners, memory
+from .diagram.schedule import Node, signal_name
+from .parameters import Slot
+
+if TYPE_CHECKING:
+    from .compiled import Compiled
+
+USE = (
+    "nlctl.input_output_response, nlctl.ensemble_response, .linearize(x0, u0); "
+    "python-control's functions take .system"
+)
+SHOWN = 8  # names that are listed before the rest is only counted
+
+
+def described(compiled: Compiled) -> str:
+    """Return what was compiled, block by block in the order of evaluation.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    """
+    schedule, program, p = compiled.schedule, compiled.program, compiled.parameter_vector()
+    system, nodes = schedule.system, schedule.nodes
+    lines = [
+        f"Compiled '{system.name}', {_timebase(system)}: {_count(len(nodes), 'block')}, "
+        f"{_count(system.ninputs, 'input')}, {_count(system.nstates, 'state')}, "
+        f"{_count(system.noutputs, 'output')}",
+        f"  order        {' -> '.join(nodes[i].path for i in schedule.order)}",
+        f"  run it by    {USE}",
+    ]
+    for loop in schedule.loops:
+        torn = ", ".join(signal_name(nodes, s) for s in loop.torn)
+        lines.append(f"  solved for   {torn}")
+    lines += [f"  as it stands {line}" for line in called(compiled)]
+    for i in dict.fromkeys(schedule.order):
+        lines += [f"  {nodes[i].path}: {_kind(nodes[i])}"]
+        lines += [
+            f"    {name:<12} {text}" for name, text in _facts(i, nodes[i], program, p) if text
+        ]
+    return "\n".join(lines)
+
+
+def called(compiled: Compiled) -> Iterator[str]:
+    """Yield which functions are called as they stand, how, and why: a line each.
+
+    Which of the two ways it is, is known as soon as machine code has been made.
+    """
+    made = compiled.__dict__.get("_machines", ())
+    back = {name for each in made for name in each.called_back}
+    for name, call in compiled.equations.calls.items():
+        how = "called back in Python" if name in back else "in machine code of numba"
+        how = how if made else "as it stands"
+        yield f"{call.kind} of block '{call.block}', {how}: {call.reason}"
+
+
+def _timebase(system: Any) -> str:
+    if ct.isctime(system):
+        return "continuous time"
+    return "discrete time" if system.dt is True else f"discrete time, dt = {system.dt:g} s"
+
+
+def _kind(node: Node) -> str:
+    spec = getattr(node.system, "spec", node.system)
+    text = "feedthrough" if node.direct.any() else "no feedthrough"
+    if node.direct.any() and not node.direct.all():
+        text = "feedthrough from some inputs to some outputs"
+    return f"{type(spec).__name__}, {text}"
+
+
+def _facts(i: int, node: Node, program: Program, p: np.ndarray) -> Iterator[tuple[str, str]]:
+    labels, first = node.system.state_labels, node.state_offset
+    yield "states", _listed(labels)
+    parameters = [f"{name} = {_value(slot, p)}" for name, slot in program.layout[i].items()]
+    parameters += [f"{k} = {value!r} (fixed)" for k, value in program.fixed.get(i, {}).items()]
+    yield "parameters", _listed(parameters)
+    yield "corners", str(corners(node) or "")
+    yield "memory", _listed([labels[j - first] for j in memory(node)])
+
+
+def _value(slot: Slot, p: np.ndarray) -> str:
+    values = p[slot.offset : slot.offset + slot.size]
+    if not slot.shape:
+        return f"{values[0]:g}"
+    if slot.size > SHOWN:
+        return f"{' x '.join(map(str, slot.shape))} values"
+    return np.array2string(values.reshape(slot.shape), separator=", ").replace("\n", "")
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = len(names) - SHOWN
+    return ", ".join(names if more <= 1 else [*names[:SHOWN], f"and {more} more"])
+
+
+def _count(number: int | None, what: str) -> str:
+    return f"{number or 0} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,1 @@
+"""Reading a diagram: its wiring, the order of evaluation, feedthrough, algebraic loops."""

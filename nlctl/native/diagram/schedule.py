@@ -1,0 +1,261 @@
+"""Reading a diagram: which blocks there are, what feeds them, in which order they are evaluated.
+
+python-control evaluates every output function up to n + 1 times per right-hand side, until no
+signal changes.  A schedule orders the outputs once, so that each is evaluated once.  What counts
+is which output depends on which input: a block that feeds itself through separate channels is
+evaluated more than once and is no algebraic loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from graphlib import CycleError, TopologicalSorter
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ...diagrams import places
+from ..thirdparty.captured import Captured, noted
+from ..thirdparty.checks import check_functions
+from .feedthrough import closer_feedthrough, feedthrough
+from .tearing import first_loop, tear
+from .wiring import AlgebraicLoopError, Combination, Signal, Wiring
+
+__all__ = ["AlgebraicLoopError", "Combination", "Loop", "Node", "Schedule", "Signal", "schedule"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Node:
+    """One block of the schedule.
+
+    Attributes
+    ----------
+    path : str
+        Names of the diagrams around it and its own, joined by dots.
+    system : control.InputOutputSystem
+    state_offset : int
+        Where its states begin in the diagram's state vector.
+    inputs : tuple of mappings
+        For every input the linear combination of signals that feeds it.
+    direct : ndarray of bool, shape (noutputs, ninputs)
+        Which outputs depend on which inputs at the same instant.
+    unbound : tuple of str
+        Names in its functions that have no value on one of the ways: only traced are these right.
+    """
+
+    path: str
+    system: Any
+    state_offset: int
+    inputs: tuple[Combination, ...]
+    direct: np.ndarray
+    unbound: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loop:
+    """Signals that depend on each other at the same instant and are solved for together.
+
+    Attributes
+    ----------
+    start, stop : int
+        The part of the order that is repeated until the signals fit.
+    torn : tuple of Signal
+        Signals that are guessed: with these, all others of the loop follow.
+    """
+
+    start: int
+    stop: int
+    torn: tuple[Signal, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Schedule:
+    """A flattened diagram.
+
+    Attributes
+    ----------
+    system : control.InputOutputSystem
+        The diagram that was read.
+    nodes : tuple of Node
+        Blocks in the order of the state vector.
+    order : tuple of int
+        Indices of the blocks in the order of their evaluation.  A block comes more than once if
+        some of its outputs are needed before all of its inputs are known.
+    unknown : tuple of frozenset of int
+        For every entry of `order` the inputs of the block that are not known yet.
+    outputs : tuple of mappings
+        Linear combination of signals that makes each output of the diagram.
+    loops : tuple of Loop
+        Parts of the order that are solved for; empty unless that was asked for.
+    captured : tuple of Captured
+        What the blocks' functions read from around them.
+    """
+
+    system: Any
+    nodes: tuple[Node, ...]
+    order: tuple[int, ...]
+    unknown: tuple[frozenset[int], ...]
+    outputs: tuple[Combination, ...]
+    loops: tuple[Loop, ...]
+    captured: tuple[Captured, ...]
+
+    @property
+    def simple(self) -> bool:
+        """Whether every block is evaluated exactly once, and nothing is solved for."""
+        return not self.loops and len(self.order) == len(self.nodes)
+
+
+def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Schedule:
+    """Flatten a diagram and order its blocks.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram, nested to any depth, or a single block.
+    solve_loops : bool, optional
+        Whether algebraic loops are scheduled to be solved instead of being an error.
+
+    Returns
+    -------
+    Schedule
+
+    Raises
+    ------
+    AlgebraicLoopError
+        If signals depend on each other without a state in between.
+    CompileError
+        If a block's function does not depend on its arguments alone.
+    """
+    wiring = Wiring(system)
+    read = [note for place in places(system) for note in _equations_of(place.system)]
+    readings = [check_functions(b.path, b.system) for b in wiring.blocks]  # before any is called
+    read += [note for reading in readings for note in reading.captured]
+    nodes = tuple(
+        Node(
+            path=place.path,
+            system=place.system,
+            state_offset=place.state_offset,
+            inputs=tuple(wiring.inputs(place)),
+            direct=feedthrough(place.system),
+            unbound=reading.unbound,
+        )
+        for place, reading in zip(wiring.blocks, readings, strict=True)
+    )
+    outputs = tuple(wiring.output(wiring.top, i) for i in range(system.noutputs or 0))
+    try:
+        order = tuple(TopologicalSorter(_blocks_before(nodes)).static_order())
+        unknown, loops = (frozenset(),) * len(order), ()
+    except CycleError:  # look closer: which output depends on which input
+        nodes = tuple(replace(n, direct=closer_feedthrough(n.system, n.direct)) for n in nodes)
+        ordering = _Ordering(nodes=nodes)
+        ordering.run(solve_loops)
+        order, unknown = tuple(ordering.order), tuple(ordering.unknown)
+        loops = tuple(ordering.loops)
+    return Schedule(
+        system=system,
+        nodes=nodes,
+        order=order,
+        unknown=unknown,
+        outputs=outputs,
+        loops=loops,
+        captured=tuple(read),
+    )
+
+
+def _equations_of(system: Any) -> Iterator[Captured]:
+    """Yield notes of what a block or diagram consists of: it may be changed later."""
+    for name in ("connect_map", "input_map", "output_map", "updfcn", "outfcn", *"ABCD"):
+        if hasattr(system, name):
+            yield noted(system, name, getattr(system, name))
+
+
+def _blocks_before(nodes: tuple[Node, ...]) -> dict[int, set[int]]:
+    """Return for every block the blocks that its outputs depend on."""
+    before: dict[int, set[int]] = {i: set() for i in range(len(nodes))}
+    for i, node in enumerate(nodes):
+        for j, combination in enumerate(node.inputs):
+            if node.direct[:, j].any():
+                before[i] |= {s.block for s in combination if s.block is not None}
+    return before
+
+
+@dataclass(kw_only=True)
+class _Ordering:
+    """Blocks are evaluated as soon as outputs can be had, whole ones first."""
+
+    nodes: tuple[Node, ...]
+    known: set[Signal] = field(default_factory=set)
+    order: list[int] = field(default_factory=list)
+    unknown: list[frozenset[int]] = field(default_factory=list)
+    loops: list[Loop] = field(default_factory=list)
+
+    def run(self, solve_loops: bool) -> None:
+        every = {Signal(i, k) for i, node in enumerate(self.nodes) for k in range(len(node.direct))}
+        self._evaluate(every, ())
+        while every - self.known:
+            before = _signals_before(self.nodes, every - self.known)
+            if not solve_loops:
+                raise AlgebraicLoopError(
+                    f"algebraic loop: {_ring_text(self.nodes, before)} has no state in it; put one "
+                    "in, or compile with algebraic_loops='solve'"
+                )
+            loop = first_loop(before)
+            torn, start = tear({s: before[s] & loop for s in before if s in loop}), len(self.order)
+            self._evaluate(loop, torn)
+            self.loops.append(Loop(start=start, stop=len(self.order), torn=torn))
+            self._evaluate(every, ())
+
+    def _evaluate(self, wanted: set[Signal], guessed: Iterable[Signal]) -> None:
+        """Order blocks until no more of the wanted signals can be had."""
+        while True:
+            given, offers = self.known.union(guessed), []
+            for i in sorted({s.block for s in wanted - self.known if s.block is not None}):
+                unknown, ready = _available(i, self.nodes[i], given)
+                if wanted & ready - self.known:
+                    offers.append((len(ready) < len(self.nodes[i].direct), i, unknown, ready))
+            if not offers:
+                return
+            _, chosen, unknown, ready = min(offers, key=lambda offer: offer[:2])
+            self.order.append(chosen)
+            self.unknown.append(unknown)
+            self.known |= ready
+
+
+def _available(i: int, node: Node, given: set[Signal]) -> tuple[frozenset[int], set[Signal]]:
+    """Return which inputs of a block are not given, and which outputs do not need these."""
+    unknown = frozenset(
+        j
+        for j, combination in enumerate(node.inputs)
+        if any(s.block is not None and s not in given for s in combination)
+    )
+    blocked = node.direct[:, sorted(unknown)].any(axis=1)
+    return unknown, {Signal(i, int(k)) for k in np.flatnonzero(~blocked)}
+
+
+def _signals_before(nodes: tuple[Node, ...], signals: set[Signal]) -> dict[Signal, set[Signal]]:
+    """Return for every signal those among `signals` that it depends on at the same instant."""
+    before: dict[Signal, set[Signal]] = {}
+    for s in sorted(signals, key=lambda s: (s.block or 0, s.index)):
+        assert s.block is not None
+        node = nodes[s.block]
+        sources = (node.inputs[int(j)] for j in np.flatnonzero(node.direct[s.index]))
+        before[s] = {source for combination in sources for source in combination} & signals
+    return before
+
+
+def signal_name(nodes: Sequence[Node], signal: Signal) -> str:
+    """Return the qualified name of a block's output."""
+    node = nodes[signal.block or 0]
+    return f"{node.path}.{node.system.output_labels[signal.index]}"
+
+
+def _ring_text(nodes: tuple[Node, ...], before: Mapping[Signal, set[Signal]]) -> str:
+    """Print a ring of signals in the order in which they act on each other."""
+    try:
+        TopologicalSorter(before).prepare()
+    except CycleError as error:
+        ring = error.args[1]
+        return " -> ".join(signal_name(nodes, s) for s in ring)
+    raise AssertionError("signals that cannot be ordered form a ring")

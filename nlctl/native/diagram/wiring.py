@@ -1,0 +1,104 @@
+"""The wires of a diagram: what feeds every block, nested diagrams flattened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+
+from ...diagrams import Place, places
+from ...errors import UsageError
+
+Combination = Mapping["Signal", float]
+
+
+class AlgebraicLoopError(UsageError):
+    """Signals that depend on each other at the same instant; the message prints the ring."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """An elementary signal: output `index` of block `block`, or external input `index`.
+
+    ``block`` is None for an external input.
+    """
+
+    block: int | None
+    index: int
+
+
+class Wiring:
+    """The symbolic equations of a diagram's wiring, solved on demand."""
+
+    def __init__(self, system: ct.InputOutputSystem) -> None:
+        self.blocks: list[Place] = []
+        self._parts: dict[Place, list[Place]] = {}
+        self._solved: dict[tuple[str, Place, int], dict[Signal, float] | None] = {}
+        for place in places(system):
+            if isinstance(place.system, ct.InterconnectedSystem):
+                self._parts[place] = []
+            else:
+                self.blocks.append(place)
+            if place.parent is None:
+                self.top = place
+            else:
+                self._parts[place.parent].append(place)
+        self._index = {block: i for i, block in enumerate(self.blocks)}
+
+    def inputs(self, here: Place) -> Iterator[Combination]:
+        """Yield what feeds each input of a block."""
+        for i in range(here.system.ninputs or 0):
+            yield self._solve("in", here, i)
+
+    def output(self, here: Place, i: int) -> Combination:
+        """Return what makes output i of a block or diagram."""
+        return self._solve("out", here, i)
+
+    def _solve(self, kind: str, here: Place, i: int) -> dict[Signal, float]:
+        key = (kind, here, i)
+        if key not in self._solved:
+            self._solved[key] = None  # being solved
+            terms = self._input_terms(here, i) if kind == "in" else self._output_terms(here, i)
+            total: dict[Signal, float] = {}
+            for gain, combination in terms:
+                for signal, weight in combination.items():
+                    total[signal] = total.get(signal, 0.0) + gain * weight
+            self._solved[key] = total
+        found = self._solved[key]
+        if found is None:
+            raise AlgebraicLoopError(
+                f"algebraic loop: signal {i} of '{here.system.name}' is wired to itself"
+            )
+        return found
+
+    def _input_terms(self, here: Place, i: int) -> Iterator[tuple[float, dict[Signal, float]]]:
+        if here.parent is None:
+            yield 1.0, {Signal(None, i): 1.0}
+            return
+        diagram = here.parent.system
+        row = diagram.input_offset[here.position] + i
+        for column in np.flatnonzero(diagram.connect_map[row]):
+            yield float(diagram.connect_map[row, column]), self._stacked(here.parent, int(column))
+        for column in np.flatnonzero(diagram.input_map[row]):
+            gain = float(diagram.input_map[row, column])
+            yield gain, self._solve("in", here.parent, int(column))
+
+    def _output_terms(self, here: Place, i: int) -> Iterator[tuple[float, dict[Signal, float]]]:
+        if here not in self._parts:
+            yield 1.0, {Signal(self._index[here], i): 1.0}
+            return
+        for column in np.flatnonzero(here.system.output_map[i]):
+            yield float(here.system.output_map[i, column]), self._stacked(here, int(column))
+
+    def _stacked(self, diagram: Place, column: int) -> dict[Signal, float]:
+        """Solve for an entry of a diagram's stacked outputs, followed by its stacked inputs."""
+        system = diagram.system
+        count = system.connect_map.shape[1]
+        kind, offsets = (
+            ("out", system.output_offset) if column < count else ("in", system.input_offset)
+        )
+        position = column if column < count else column - count
+        part = int(np.searchsorted(offsets, position, side="right")) - 1
+        return self._solve(kind, self._parts[diagram][part], int(position - offsets[part]))

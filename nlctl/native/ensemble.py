@@ -1,0 +1,327 @@
+"""Many runs of one compiled diagram: side by side in SIMD lanes, lanes side by side in threads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Protocol
+
+import control as ct
+import numpy as np
+
+from ..errors import ParameterError
+from ..names import unknown
+from ..params import checked_times, whole_number
+from ..responses.arguments import checked_params, input_array
+from .audit import Audit, Trial
+from .audit import audit as compare
+from .compiled import Compiled
+from .compiled import compile as compile_diagram
+from .integrate.driver import (
+    Run,
+    Settings,
+    Trajectory,
+    begin,
+    finish,
+    go_on,
+    made,
+    prepared,
+    trajectory,
+)
+from .integrate.state import RUNNING, STIFF, Status
+from .machine.ahead import compile_for
+from .machine.evaluations import WIDTH, fitting
+from .members import Members, members
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class MetricLike(Protocol):
+    """What an ensemble asks of a metric; see `analysis.metrics.Metric`."""
+
+    @property
+    def key(self) -> str: ...
+
+    @property
+    def start(self) -> float: ...
+
+    @property
+    def end(self) -> float: ...
+
+    @property
+    def signals(self) -> Sequence[str]: ...
+
+    @property
+    def function(self) -> Callable[..., float]: ...  # (t, samples of the first signal, ...)
+
+
+ROWS = 8
+"""Rows of its table that an ensemble prints."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Ensemble:
+    """Runs of one diagram.
+
+    Attributes
+    ----------
+    table : pandas.DataFrame
+        One row per finished member, by its number: what was varied, ``status`` (text), ``time``
+        reached (s), ``steps``, and the metrics; those of a run that did not end well are NaN.
+    time : ndarray of shape (m,)
+    signals : dict of ndarray of shape (members, m)
+        The signals that were kept, NaN after the end of a run.
+    """
+
+    table: pd.DataFrame
+    time: np.ndarray
+    signals: Mapping[str, np.ndarray]
+
+    def __repr__(self) -> str:
+        ended = self.table["status"].value_counts() if len(self.table) else {}
+        how = ", ".join(f"{count} {status}" for status, count in ended.items()) or "none finished"
+        kept = f"; kept: {', '.join(self.signals)}" if self.signals else ""
+        return (
+            f"Ensemble of {len(self.table)} members: {how}; {self.time.size} times from "
+            f"{self.time[0]:g} to {self.time[-1]:g} s{kept}\n{self.table.head(ROWS)}"
+            + (f"\n... {len(self.table) - ROWS} more in .table" * (len(self.table) > ROWS))
+        )
+
+
+def ensemble_response(
+    compiled: Compiled | ct.InputOutputSystem,
+    timepts: Any,
+    inputs: Any = 0.0,
+    initial_state: Mapping[str, Any] | None = None,
+    *,
+    params: Mapping[str, Any] | None = None,
+    metrics: Sequence[MetricLike] = (),
+    keep: Sequence[str] = (),
+    threads: int | None = None,
+    rtol: float = 1e-6,
+    atol: float = 1e-8,
+    max_steps: int = 1_000_000,
+    method: str | None = None,
+    progress: Callable[[int], object] | None = None,
+    audit: Audit = True,
+) -> Ensemble:
+    """Simulate many members that differ in parameters and initial states.
+
+    Members are independent of each other: the result is the same, bit for bit, for any number of
+    threads, in any order and in any company.  (A single run by `input_output_response` sums in
+    another order and agrees to rounding.)  Metrics are taken as each member ends, and only the
+    signals in `keep` are stored.  After Ctrl-C the members that are finished are returned.
+
+    A diagram in discrete time goes from sample to sample; `rtol`, `atol`, `max_steps` and `method`
+    then mean nothing.
+
+    Parameters
+    ----------
+    compiled : Compiled or control.InputOutputSystem
+        A diagram that is not compiled yet is compiled first.
+    timepts : array_like of shape (m,)
+        Times in s at which signals are sampled.
+    inputs : array_like, list or float, optional
+        Inputs, the same for all members, as in `nlctl.input_output_response`.
+    initial_state, params : mapping, optional
+        ``{"plant.p1": array of shape (members,)}``; a number holds for all members.
+    metrics : sequence, optional
+        Numbers to take of each member, such as `analysis.metrics.Metric`.  A function that was
+        compiled with ``numba.njit(nogil=True)`` keeps no thread waiting.
+    keep : sequence of str, optional
+        Outputs whose samples are kept.
+    threads : int, optional
+        Number of threads; by default one per core.
+    rtol, atol : float, optional
+    max_steps : int, optional
+        A member that needs more steps ends with the status STEP_LIMIT.
+    method : str, optional
+        As in `nlctl.input_output_response`.
+    progress : callable, optional
+        Called with the number of finished members.
+    audit : bool or "every run", optional
+        As in `nlctl.input_output_response`, for some of the members.
+
+    Returns
+    -------
+    Ensemble
+        After Ctrl-C with the members that were finished.
+
+    Raises
+    ------
+    AuditError
+        If machine code and python-control differ.
+    ParameterError
+        If `timepts` is no increasing grid or does not fit a discrete-time diagram, arrays have
+        different lengths, or a value is refused; the message then names the member.  Inputs and
+        initial states must be finite.
+    UnknownNameError
+        If a parameter, state or signal does not exist.
+    """
+    times = checked_times(timepts)
+    if not isinstance(compiled, Compiled):
+        compiled = compile_diagram(compiled)
+    if threads is not None:
+        threads = whole_number("ensemble_response", "threads", threads, at_least=1)
+    for metric in metrics:
+        if not (hasattr(metric, "signals") and hasattr(metric, "function")):
+            raise ParameterError(
+                f"ensemble_response needs metrics such as analysis.metrics.Metric, got {metric!r}"
+            )
+    states = {} if initial_state is None else initial_state
+    every = members(compiled, checked_params(params) or {}, states)
+    labels = compiled.system.output_labels
+    for signal in (*keep, *(s for m in metrics for s in m.signals)):
+        if signal not in labels:
+            raise unknown("signal", signal, labels)
+    u = input_array(compiled.system, inputs, times)
+    settings = Settings(rtol=rtol, atol=atol, max_steps=max_steps, method=method or "auto")
+    kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
+    _, p = every.batch(range(1), WIDTH)  # checks all members before anything runs
+    compile_for(compiled, p, WIDTH)  # once, before the threads start
+
+    audited = {0, every.size // 2, every.size - 1} if audit else ()
+
+    def one(numbers: range, stop: _Stop) -> dict[int, dict[str, Any]]:
+        rows = {}
+        for number, run in zip(
+            numbers, _group(every, numbers, times, u, settings, stop), strict=False
+        ):
+            for signal, samples in kept.items():
+                samples[number, : run.time.size] = run.outputs[labels.index(signal)]
+            rows[number] = _row(run, labels, metrics)
+            if number in audited:
+                _audit(every, number, run, u, audit)
+        return rows
+
+    rows = _run(one, every.size, threads or cores(), progress)
+    return Ensemble(table=_table(every, rows), time=times, signals=kept)
+
+
+def _audit(every: Members, number: int, run: Trajectory, u: np.ndarray, wanted: Audit) -> None:
+    """Compare one member with python-control."""
+    _, p = every.batch(range(number, number + 1), 1)
+    trial = Trial(
+        time=run.time, states=run.states, inputs=u, p=p[:, 0], params=every.given(number),
+        width=WIDTH,
+    )  # fmt: skip
+    compare(every.compiled, trial, wanted)
+
+
+class _Stop:
+    """Set when the members that are running are no longer wanted."""
+
+    wanted = True
+
+
+def _group(
+    every: Members,
+    numbers: range,
+    times: np.ndarray,
+    inputs: np.ndarray,
+    settings: Settings,
+    stop: _Stop,
+) -> Iterator[Trajectory]:
+    """Run up to WIDTH members side by side; yield them in their order."""
+    compiled, (x0, p) = every.compiled, every.batch(numbers, WIDTH)
+    alone = settings.method == "rodas5p" or not ct.isctime(compiled.system)
+    if alone:
+        for j in range(len(numbers)):
+            if not stop.wanted:
+                return
+            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings)
+        return
+    found: dict[int, tuple[Run, np.ndarray]] = {}
+    while stop.wanted and (left := [j for j in range(len(numbers)) if j not in found]):
+        first = left[0]  # members whose integers steer the equations otherwise run apart
+        fits = np.roll(fitting(compiled, np.roll(p, -first, axis=1), WIDTH), first)
+        # others' places are taken by copies: what runs beside a member changes nothing
+        columns = np.where(fits, np.arange(WIDTH), first)
+        ran = _ran(compiled, times, inputs, (x0[:, columns], p[:, columns]), settings, stop)
+        found |= {int(j): ran for j in np.flatnonzero(fits)}
+    for j in range(len(numbers) if stop.wanted else 0):
+        run, outputs = found[j]
+        if run.lanes["status"][j] == STIFF:  # the stiff method is for single runs
+            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings)
+        else:
+            yield made(run, outputs, j)
+
+
+def _ran(
+    compiled: Compiled,
+    times: np.ndarray,
+    inputs: np.ndarray,
+    members: tuple[np.ndarray, np.ndarray],
+    settings: Settings,
+    stop: _Stop,
+) -> tuple[Run, np.ndarray]:
+    """Run as many members as there are lanes; return the run and its outputs."""
+    with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
+        run = prepared(compiled, times, inputs, *members, settings)
+        begin(run)
+        while stop.wanted and np.any(run.lanes["status"] == RUNNING):
+            go_on(run)
+        return run, finish(run)
+
+
+def _row(run: Trajectory, labels: Sequence[str], metrics: Sequence[MetricLike]) -> dict[str, Any]:
+    done = run.statistics
+    row: dict[str, Any] = {
+        "status": done.status.name,
+        "time": done.time,
+        "steps": done.accepted + done.rejected,
+    }
+    if done.status is not Status.OK:
+        return row | {metric.key: np.nan for metric in metrics}
+    asked = {signal for metric in metrics for signal in metric.signals}
+    samples = {signal: run.outputs[labels.index(signal)].copy() for signal in asked}
+    for metric in metrics:
+        first = np.searchsorted(run.time, metric.start, "left")
+        inside = slice(first, np.searchsorted(run.time, metric.end, "right"))
+        given = (samples[signal][inside] for signal in metric.signals)
+        row[metric.key] = metric.function(run.time[inside], *given)
+    return row
+
+
+def _run(
+    one: Callable[[range, _Stop], dict[int, dict[str, Any]]],
+    count: int,
+    threads: int,
+    progress: Callable[[int], object] | None,
+) -> dict[int, dict[str, Any]]:
+    """Run all members in groups; after Ctrl-C return those that are finished."""
+    rows: dict[int, dict[str, Any]] = {}
+    stop = _Stop()
+    groups = iter(range(i, min(i + WIDTH, count)) for i in range(0, count, WIDTH))
+    pool = ThreadPoolExecutor(threads)
+    waiting = {pool.submit(one, group, stop) for group in islice(groups, 2 * threads)}
+    try:
+        while waiting:
+            ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in ready:
+                rows |= future.result()
+                waiting |= {pool.submit(one, group, stop) for group in islice(groups, 1)}
+            if progress is not None:
+                progress(len(rows))
+    except KeyboardInterrupt:
+        stop.wanted = False
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return rows
+
+
+def _table(every: Members, rows: Mapping[int, Mapping[str, Any]]) -> pd.DataFrame:
+    import pandas as pd
+
+    order = sorted(rows)
+    results = pd.DataFrame([rows[i] for i in order], index=order)
+    return pd.concat([every.table(order), results], axis=1).rename_axis("member")
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

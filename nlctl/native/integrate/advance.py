@@ -1,0 +1,179 @@
+"""Integration of members side by side: step control, events, memory, output samples.
+
+Each round tries one step for every member ("lane") that is still running.  Members have their own
+times and step sizes and never see each other.  A single run is one lane, and may also use the
+stiff method.  All of a run's state lies in arrays that the caller holds, so that it can be
+interrupted after any number of rounds and go on.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from ..machine.address import call_rhs
+from . import rodas5p, tsit5
+from .control import choose_method, choose_step, next_step, rejected
+from .events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
+from .restart import memory_rates, restart
+from .state import INNER, RUNNING
+from .stiff import stiff_attempt
+from .workspace import AUTO, inputs_at
+
+
+@numba.njit(**INNER)
+def _explicit_attempt(rhs, task, lanes, w):
+    """Try a step of Tsitouras' pair in all lanes."""
+    x, hh, k, count = w.x_flat, w.hh, w.k_flat, lanes.size
+    for j in range(count):
+        w.h[j] = lanes[j].step
+    for i in range(w.x.shape[0]):
+        for j in range(count):
+            hh[i * count + j] = w.h[j]
+    for s in range(1, tsit5.STAGES):
+        for j in range(count):
+            w.t[j] = lanes[j].t + tsit5.C[s] * w.h[j]
+        if w.u.shape[0]:
+            inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+        if s < 6:
+            tsit5.combined(x, hh, k, s, w.x_stage_flat)
+            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.g)
+        else:
+            tsit5.combined(x, hh, k, s, w.x_new_flat)
+            call_rhs(rhs, w.t, w.x_new, w.u, task.p, w.k[s], w.g)
+        for i in task.memory:
+            for j in range(count):
+                w.k[s, i, j] = 0.0
+    tsit5.weighed_errors(x, w.x_new_flat, k, hh, task.rtol, task.atol, w.x_ahead_flat)
+    tsit5.errors(w.x_ahead, w.x_new, w.x_stage, w.k, w.error, w.rate)
+
+
+@numba.njit(**INNER)
+def _sample(lane, j, times, t_new, x, x_new, k, U, states):
+    """Fill the output samples that the accepted step of a lane has passed."""
+    last = times.size - 1
+    while lane.segment < last and times[lane.segment + 1] <= t_new:
+        lane.segment += 1
+        theta = (times[lane.segment] - lane.t) / lane.step
+        target = states[lane.segment]
+        if theta >= 1.0:
+            for i in range(x.shape[0]):
+                target[i, j] = x_new[i, j]  # exactly the solution, not its interpolant
+        elif lane.stiff:
+            rodas5p.interpolate(theta, x, x_new, U, target)
+        else:
+            tsit5.interpolate(theta, lane.step, x, k, j, target)
+
+
+@numba.njit(**INNER)
+def _stop(times, lane, u):
+    """Return where a step must end: with inputs at the next corner, otherwise at the last time."""
+    return times[lane.segment + 1] if u.shape[0] and lane.segment < times.size - 1 else times[-1]
+
+
+@numba.njit(**INNER)
+def _judge(task, lanes, w, done, passed):
+    """Accept or reject the step just tried in every lane, and propose the next.
+
+    ``done`` becomes whether it was accepted, ``passed`` whether it ended with an event or set a
+    memory in motion.  Return whether any lane has passed.
+    """
+    any_passed = False
+    corners, memories = task.corners, task.memory.size
+    shortest = 1e-7 * (task.times[-1] - task.times[0])
+    for j in range(lanes.size):
+        lane = lanes[j]
+        done[j] = passed[j] = False
+        if lane.status != RUNNING or rejected(lane, w.error[j], task.fixed):
+            continue
+        growing = lane.step > 2.0 * lane.last and lane.step > shortest and lane.tries == 0
+        if memories and growing and task.fixed == 0.0 and unforeseen(w, lane.step, j):
+            lane.rejected += 1
+            lane.h = 0.3 * lane.step
+            continue
+        found = CLEAR
+        if w.e.shape[0]:
+            found = locate(lane, corners, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j)
+        if found == AGAIN:
+            lane.rejected += 1
+            continue
+        t_new = _stop(task.times, lane, w.u) if lane.ends else lane.t + lane.step
+        if t_new >= task.times[lane.segment + 1]:
+            _sample(lane, j, task.times, t_new, w.x, w.x_new, w.k, w.U, w.samples)
+        step_accepted(lane, found == EVENT)
+        lane.t = t_new
+        next_step(lane, w.error[j], w.rate[j], task.fixed, memories)
+        done[j] = True
+        if memories:  # at a corner of the inputs memories may turn round as well
+            at_corner = lane.ends and w.u.shape[0] > 0
+            passed[j] = at_corner or _began_to_move(corners, w.e_start, w.e, j)
+        passed[j] |= found == EVENT
+        any_passed |= passed[j]
+        if task.method == AUTO:
+            choose_method(lane, w.x.shape[0], task.alone)
+    return any_passed
+
+
+@numba.njit(**INNER)
+def _began_to_move(corners, e_start, e, j):
+    """Whether a memory that stood still at the start of the accepted step moves at its end."""
+    for i in range(corners, e.shape[0]):  # noqa: SIM110 (no generators in machine code)
+        if e_start[i, j] == 0.0 and e[i, j] != 0.0:
+            return True
+    return False
+
+
+@numba.njit(**INNER)
+def _take(task, w, done):
+    """Make the ends of the accepted steps the states, and commit the memories."""
+    x, k, corners = w.x, w.k, task.corners
+    for j in range(done.size):
+        if not done[j]:
+            continue
+        for i in range(x.shape[0]):
+            x[i, j] = w.x_new[i, j]
+            k[0, i, j] = k[6, i, j]
+        for i in range(corners):
+            w.behind[i, j] = w.e_start[i, j] * w.e[i, j] < 0.0
+        for i in range(task.memory.size):
+            m, become = task.memory[i], w.g[corners + i, j]
+            if w.e_start[corners + i, j] == 0.0 and x[m, j] != become:  # otherwise locked
+                x[m, j] = become
+                for c in range(w.behind.shape[0]):
+                    w.behind[c, j] = 0.0  # with another memory the way back is an event
+        for i in range(w.e.shape[0]):
+            w.e_start[i, j] = w.e[i, j]
+            w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
+
+
+def advance(rhs, task, w, rounds):
+    """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
+
+    A run's ``lane.status`` is RUNNING until it has ended.
+    """
+    lanes = w.lanes
+    done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
+    for _ in range(rounds):
+        running = 0
+        for j in range(lanes.size):
+            if lanes[j].status == RUNNING:
+                over = lanes[j].segment == task.times.size - 1
+                choose_step(lanes[j], _stop(task.times, lanes[j], w.u), over, task.max_steps)
+                running += lanes[j].status == RUNNING
+        if not running:
+            return
+        if lanes[0].stiff:
+            stiff_attempt(rhs, task, lanes, w)
+        else:
+            _explicit_attempt(rhs, task, lanes, w)
+        if task.memory.size:
+            for j in range(lanes.size):
+                w.t_end[j] = lanes[j].t + lanes[j].step
+            memory_rates(rhs, task, lanes, w, w.x_new, w.k[6])
+        for i in range(task.corners):
+            for j in range(lanes.size):
+                w.e[i, j] = w.g[i, j]
+        any_passed = _judge(task, lanes, w, done, passed)
+        _take(task, w, done)
+        if task.memory.size and any_passed:
+            restart(rhs, task, lanes, w, passed)

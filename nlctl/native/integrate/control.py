@@ -1,0 +1,91 @@
+"""Decisions about one member's steps: how long, accepted or not, by which method.
+
+Each function takes the member's record and a few numbers, never the whole workspace: its arguments
+are all that a decision rests on.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from . import tsit5
+from .state import DIVERGED, FIRST_PATIENCE, INNER, OK, RUNNING, STEP_LIMIT, STEP_TOO_SMALL, STIFF
+
+SMALLEST = 4e-16  # of the time: no shorter step can be told from none
+TRIAL = 20  # steps of the stiff method before it is judged
+MAX_PATIENCE = 2000
+
+
+@numba.njit(**INNER)
+def choose_step(lane, stop, over, max_steps):
+    """Set the step to be tried up to time `stop`, or the status of a run that has ended."""
+    if over:
+        lane.status = OK
+    elif lane.accepted + lane.rejected >= max_steps:
+        lane.status = STEP_LIMIT
+    elif not lane.h > SMALLEST * abs(lane.t):
+        lane.status = STEP_TOO_SMALL
+    if lane.status != RUNNING:
+        lane.step = 0.0
+    elif lane.tries == 0:
+        lane.ends = 1 if lane.t + 1.01 * lane.h >= stop else 0
+        lane.step = stop - lane.t if lane.ends else lane.h
+
+
+@numba.njit(**INNER)
+def rejected(lane, error, fixed):
+    """Whether the error of a step is too large; if so, propose a shorter one."""
+    finite = np.isfinite(error)
+    if error <= 1.0 or (fixed > 0.0 and finite):
+        return False
+    lane.rejected += 1
+    lane.tries = 0
+    lane.h = lane.step * (max(0.2, 0.9 * error**-0.2) if finite else 0.1)
+    if fixed > 0.0 or not (finite or lane.h > SMALLEST * abs(lane.t)):
+        lane.status = DIVERGED
+    return True
+
+
+@numba.njit(**INNER)
+def next_step(lane, error, rate, fixed, memories):
+    """Propose the next step after an accepted one: PI control, and stability."""
+    log_error = np.log(max(error, 1e-10))
+    factor = np.exp(-0.14 * log_error + 0.08 * lane.log_error_before) * 0.9
+    h = lane.step * min(10.0, max(0.2, factor))
+    cut_short = lane.step < lane.h  # by an event or the end: no reason for a smaller one
+    lane.h = max(h, lane.h) if cut_short else h
+    lane.log_error_before = log_error
+    lane.rate = rate
+    if fixed > 0.0:
+        lane.h = fixed
+    elif not lane.stiff:
+        # at the limit of stability the rates of memories are noise
+        limit = 2.0 if memories else 0.8 * tsit5.STABLE
+        lane.slow = lane.slow + 1 if lane.h * rate > limit else 0
+        if memories and lane.slow:
+            lane.h = limit / rate
+
+
+@numba.njit(**INNER)
+def choose_method(lane, states, alone):
+    """Go over to the stiff method where stability limits the step, and back where it does not pay.
+
+    The stiff method is first tried; it stays while its steps are longer than the explicit ones by
+    more than what they cost.
+    """
+    if not lane.stiff:
+        if lane.slow >= lane.patience * (1 if alone else 100):
+            lane.slow = 0
+            lane.stiff = 1 if alone else 0
+            lane.status = RUNNING if alone else STIFF
+        return
+    lane.stiff += 1
+    if lane.stiff % TRIAL == 0:
+        cost = 0.2 * (states + 10)
+        limit = tsit5.STABLE / max(lane.rate, 1e-300)
+        pays = lane.h > cost * limit
+        if lane.stiff == TRIAL:
+            lane.patience = FIRST_PATIENCE if pays else min(2 * lane.patience, MAX_PATIENCE)
+        if not pays:
+            lane.stiff, lane.h = 0, min(lane.h, limit)

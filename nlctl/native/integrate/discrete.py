@@ -1,0 +1,105 @@
+"""Discrete time: a compiled program applied to itself, sample by sample."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import control as ct
+import numba
+import numpy as np
+
+from ...errors import ParameterError
+from ..compiled import Compiled
+from ..machine import address
+from ..machine.address import call_out, call_rhs
+from ..machine.evaluations import prepared_parameters
+from ..machine.fingerprint import function_key, module_key
+from ..machine.machine_code import Wanted, machine_code
+
+MATRIX, COLUMNS = numba.float64[:, ::1], numba.float64[:, :, ::1]
+LOOP = numba.int64(
+    numba.intp, numba.intp, MATRIX, COLUMNS, MATRIX, COLUMNS, COLUMNS, MATRIX
+)  # fmt: skip
+
+
+def simulate_discrete(
+    compiled: Compiled, times: np.ndarray, inputs: np.ndarray, x0: np.ndarray, p: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute x[k+1] = f(t[k], x[k], u[k]) and y[k] = h(t[k], x[k], u[k]).
+
+    Parameters
+    ----------
+    compiled : Compiled
+        A discrete-time system.
+    times : ndarray of shape (m,)
+        Sampling times, ``dt`` apart (s); any equal distance where ``dt`` is True.
+    inputs : ndarray of shape (ninputs, m)
+    x0 : ndarray of shape (nstates,)
+    p : ndarray
+        The program's parameter vector.
+
+    Returns
+    -------
+    outputs : ndarray of shape (noutputs, n)
+    states : ndarray of shape (nstates, n)
+        n = m, or fewer where the run diverged: sample n has a state or output that is not finite.
+
+    Raises
+    ------
+    ParameterError
+        If `times` are not one sampling time apart.
+    """
+    system, count = compiled.system, times.size
+    _check_times(system, times)
+    code, c = prepared_parameters(compiled, p)
+    outputs = np.empty((count, system.noutputs or 0, 1))
+    states = np.empty((count, system.nstates or 0, 1))
+    g = np.empty((compiled.program.events, 1))
+    columns = np.array(inputs.T, dtype=float, order="C")[:, :, None]  # may be written to
+    states[:1, :, 0] = x0
+    each = np.array(times, dtype=float)[:, None]
+    with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the result says
+        n = _loop()(*code.entries, each, columns, c, states, outputs, g)
+    code.check(c)
+    return outputs[:n, :, 0].T, states[:n, :, 0].T
+
+
+def compile_discrete() -> None:
+    """Make the machine code of `simulate_discrete` that all diagrams share."""
+    _loop()
+
+
+def _check_times(system: Any, times: np.ndarray) -> None:
+    steps = np.diff(times)
+    if not ct.isdtime(system, strict=True):
+        raise ParameterError(f"'{system.name}' has dt = {system.dt} and is no discrete-time system")
+    wanted = steps[:1].sum() if system.dt is True else system.dt  # a single time fits any
+    for k in np.flatnonzero(~np.isclose(steps, wanted))[:1]:
+        raise ParameterError(
+            f"'{system.name}' is sampled every {wanted:g} s, but timepts {times[k]:g} and "
+            f"{times[k + 1]:g} are {steps[k]:g} s apart: use np.arange(n) * {wanted:g}"
+        )
+
+
+@functools.cache
+def _loop() -> Any:
+    """Return the loop as machine code; without JIT as it stands."""
+    options = {"error_model": "numpy", "nogil": True}
+    wanted = Wanted(function=_iterate, signature=LOOP, options=options)
+    (loop,) = machine_code(function_key(_iterate, module_key(address)), [wanted])
+    return loop
+
+
+def _iterate(rhs, out, times, inputs, c, states, outputs, g):
+    """Fill states (from the first on) and outputs; return how many samples are finite."""
+    last = len(times) - 1
+    for k in range(len(times)):
+        if not np.isfinite(states[k]).all():
+            return k
+        call_out(out, times[k], states[k], inputs[k], c, outputs[k])
+        if not np.isfinite(outputs[k]).all():
+            return k
+        if k < last:
+            call_rhs(rhs, times[k], states[k], inputs[k], c, states[k + 1], g)
+    return len(times)

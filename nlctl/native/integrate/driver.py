@@ -1,0 +1,239 @@
+"""Runs of a compiled program, from arrays alone: nothing here touches a diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ...errors import ParameterError
+from ...names import unknown
+from ..compiled import Compiled
+from ..machine.evaluations import Machine, machine
+from ..machine.integrators import integrators
+from .discrete import simulate_discrete
+from .memory import with_table
+from .state import RUNNING, Status
+from .workspace import AUTO, EXPLICIT, IMPLICIT, TASK, Task, new_work
+
+METHODS = {"auto": AUTO, "tsit5": EXPLICIT, "rodas5p": IMPLICIT}
+ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How a run is integrated.
+
+    Attributes
+    ----------
+    rtol, atol : float
+        Tolerances; the error of a step is weighed with atol + rtol |x|.
+    max_steps : int
+        Attempted steps after which a run ends as STEP_LIMIT.
+    method : {"auto", "tsit5", "rodas5p"}
+        Explicit pair of orders 5(4), stiff method of orders 5(4), or whichever is faster.
+    step : float
+        Fixed step (s) instead of error control; 0 for error control.
+    """
+
+    rtol: float = 1e-8
+    atol: float = 1e-10
+    max_steps: int = 10_000_000
+    method: str = "auto"
+    step: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
+        for name in ("rtol", "atol", "step", "max_steps"):
+            if not isinstance(getattr(self, name), Real):
+                raise ParameterError(f"{name} must be one number, got {getattr(self, name)!r}")
+        for name in ("rtol", "atol"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise ParameterError(f"{name} must be > 0, got {getattr(self, name)!r}")
+        if not 0 <= self.step < np.inf:
+            raise ParameterError(f"step must be > 0, or 0 for error control, got {self.step!r}")
+        if self.max_steps < 1:
+            raise ParameterError(f"max_steps must be >= 1, got {self.max_steps!r}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statistics:
+    """What a run took.
+
+    Attributes
+    ----------
+    status : Status
+    time : float
+        Time that was reached (s).
+    accepted, rejected : int
+        Steps of the integrator; steps tried to locate events count as rejected.
+    events : int
+        Corners and turning memories at which a step was ended.
+    stiff : bool
+        Whether the run ended with the stiff method.
+    """
+
+    status: Status
+    time: float
+    accepted: int
+    rejected: int
+    events: int = 0
+    stiff: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trajectory:
+    """One run: times that were reached, outputs (outputs, m), states (states, m)."""
+
+    time: np.ndarray
+    outputs: np.ndarray
+    states: np.ndarray
+    statistics: Statistics
+
+
+def trajectory(
+    compiled: Compiled,
+    times: np.ndarray,
+    inputs: np.ndarray,
+    x0: np.ndarray,
+    p: np.ndarray,
+    settings: Settings,
+    progress: Callable[[float], object] | None = None,
+) -> Trajectory:
+    """Run one member.  Ctrl-C ends an integration with the status STOPPED."""
+    if not ct.isctime(compiled.system):
+        return _sampled(compiled, times, inputs, x0, p)
+    run = prepared(compiled, times, inputs, x0[:, None], p[:, None], settings)
+    with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
+        try:
+            begin(run)
+            while run.lanes["status"][0] == RUNNING:
+                go_on(run)
+                if progress is not None:
+                    progress(float(run.lanes["t"][0]))
+        except KeyboardInterrupt:
+            run.lanes["status"] = Status.STOPPED
+        outputs = finish(run)
+    return made(run, outputs, 0)
+
+
+def _sampled(
+    compiled: Compiled, times: np.ndarray, inputs: np.ndarray, x0: np.ndarray, p: np.ndarray
+) -> Trajectory:
+    """Run a discrete-time diagram; there is nothing to be set."""
+    outputs, states = simulate_discrete(compiled, times, inputs, x0, p)
+    done = outputs.shape[1]
+    run = Statistics(
+        status=Status.OK if done == times.size else Status.DIVERGED,
+        time=float(times[max(done - 1, 0)]),
+        accepted=done,
+        rejected=0,
+    )
+    return Trajectory(time=times[:done], outputs=outputs, states=states, statistics=run)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """Members that are integrated side by side, and all arrays that this needs.
+
+    Attributes
+    ----------
+    machine : Machine
+    task, work : Task, Work
+        See `_work`.
+    """
+
+    machine: Machine
+    task: Any
+    work: Any
+
+    @property
+    def lanes(self) -> np.ndarray:
+        """One record per member, see `_lane`."""
+        return self.work.lanes
+
+
+def begin(run: Run) -> None:
+    """Commit the memories and propose first steps."""
+    rhs, _ = run.machine.entries
+    integrators()["start"](rhs, run.task, run.work)
+    run.machine.check(run.task.p)
+    run.work.samples[0] = run.work.x
+
+
+def go_on(run: Run, rounds: int = ROUNDS) -> None:
+    """Try up to `rounds` steps in every lane that is still running."""
+    rhs, _ = run.machine.entries
+    integrators()["advance"](rhs, run.task, run.work, rounds)
+    run.machine.check(run.task.p)
+
+
+def finish(run: Run) -> np.ndarray:
+    """Return the outputs, shape (m, outputs, members); memories get their values in the samples."""
+    integrators()["outputs"](*run.machine.entries, run.task, run.work)
+    run.machine.check(run.task.p)
+    return run.work.y
+
+
+def prepared(
+    compiled: Compiled,
+    times: np.ndarray,
+    inputs: np.ndarray,
+    x0: np.ndarray,
+    p: np.ndarray,
+    settings: Settings,
+) -> Run:
+    """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
+    program, count = compiled.program, x0.shape[1]
+    code = machine(compiled, p, count)
+    c = np.zeros((code.rows, count))
+    code.prepare(np.ascontiguousarray(p), c)
+    task = with_table(
+        Task,
+        like=TASK,
+        times=times,
+        inputs=inputs,
+        p=c,
+        corners=program.corners,
+        memory=np.array(program.memory, dtype=np.int64),
+        rtol=float(settings.rtol),
+        atol=float(settings.atol),
+        fixed=float(settings.step),
+        max_steps=int(settings.max_steps),
+        method=METHODS[settings.method],
+        alone=int(count == 1),
+    )
+    signals = compiled.system.noutputs or 0
+    work = new_work(x0, times, inputs.shape[0], program.events, signals)
+    work.lanes["stiff"] = settings.method == "rodas5p"
+    return Run(machine=code, task=task, work=work)
+
+
+def made(run: Run, outputs: np.ndarray, j: int) -> Trajectory:
+    """Return what became of one member."""
+    lane, times, states, outputs = (
+        run.lanes[j],
+        run.task.times,
+        run.work.samples[:, :, j],
+        outputs[:, :, j],
+    )
+    status, reached = Status(int(lane["status"])), float(lane["t"])
+    done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
+    if status is Status.OK and not np.all(np.isfinite(outputs)):
+        status = Status.DIVERGED
+    statistics = Statistics(
+        status=status,
+        time=reached,
+        accepted=int(lane["accepted"]),
+        rejected=int(lane["rejected"]),
+        events=int(lane["events"]),
+        stiff=bool(lane["stiff"]),
+    )
+    return Trajectory(
+        time=times[:done], outputs=outputs[:done].T, states=states[:done].T, statistics=statistics
+    )

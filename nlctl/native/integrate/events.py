@@ -1,0 +1,139 @@
+"""Events inside a step: corners, and memories that turn round.
+
+A switching function that changes its sign marks a corner; a memory turns round where the rate at
+which it would be carried along changes its sign or becomes zero.  In both cases the step is
+repeated, shorter each time, until it ends right behind the event: all stages but a negligible
+rest then lie on one side, and what the rest costs is below one local error.  Regula falsi with the
+Illinois modification finds the length; every attempt is a step of full order, so nothing rests on
+an interpolant that has seen the other side.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from .state import INNER
+
+STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
+AGAIN, CLEAR, EVENT = 0, 1, 2  # what became of the step just tried
+TRIES = 30
+SHORT = 1e-3  # part of a step: a shorter one between events is no progress
+PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory events
+
+
+@numba.njit(**INNER)
+def triggered(start, end, is_memory, behind):
+    """Whether an event function's values at the ends of a step show an event in between.
+
+    With `behind` its own event was the end of the step before: on a surface that attracts from
+    both sides, going back through it at once is no event.
+    """
+    if is_memory:
+        return start != 0.0 and not start * end > 0.0
+    return start * end < 0.0 and not (behind and abs(start) <= STARTS_BEHIND * abs(end))
+
+
+@numba.njit(**INNER)
+def unforeseen(w, h, j):
+    """Whether an event function has changed over a step otherwise than its slopes say.
+
+    Error control sees the states only.  Where what drives a memory is no state, a step may grow
+    until it passes over turns that both ends know nothing of.
+    """
+    for i in range(w.g.shape[0]):
+        change = w.g[i, j] - w.g_start[i, j]
+        before, after = h * w.slope_start[i, j], h * w.slope[i, j]
+        scale = abs(change) + abs(before) + abs(after)
+        noise = 1e-12 * abs(w.g[i, j])
+        if abs(change - 0.5 * (before + after)) > 0.2 * scale + noise:
+            return True
+    return False
+
+
+@numba.njit(**INNER)
+def first_root(lane, corners, e_start, e_low, e_high, behind, j):
+    """Return where the first event between the lengths low and high lies, -1 if there is none.
+
+    And whether it is a memory's.
+    """
+    first, is_memory = -1.0, False
+    for i in range(e_start.shape[0]):
+        if triggered(e_start[i, j], e_high[i, j], i >= corners, behind[i, j] != 0.0):
+            low, high = e_low[i, j], e_high[i, j]
+            if not low * high < 0.0:
+                high = -low  # a memory that would stand still says no more than that: halve
+            part = 0.5 if low == high else low / (low - high)
+            root = lane.low + part * (lane.high - lane.low)
+            if first < 0.0 or root < first:
+                first, is_memory = root, i >= corners
+    return first, is_memory
+
+
+@numba.njit(**INNER)
+def locate(lane, corners, rtol, e_start, e_low, e_high, e, behind, j):
+    """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT.
+
+    With AGAIN, ``lane.step`` is the next length to try.
+    """
+    if lane.tries == 0:
+        lane.low, lane.high = 0.0, lane.step
+        for i in range(e.shape[0]):
+            e_low[i, j], e_high[i, j] = e_start[i, j], e[i, j]
+    root, memory = _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j)
+    if root < 0.0:
+        return CLEAR
+    lane.tries += 1
+    # behind a corner stages are wrong by the rest; what a memory misses is quadratic in it
+    tolerance = lane.high * (0.3 * np.sqrt(rtol) if memory else min(10.0 * rtol, 1e-4))
+    is_behind = lane.high == lane.step
+    if is_behind and (lane.high - root <= tolerance or lane.tries > TRIES):
+        return EVENT
+    if lane.high - lane.low <= tolerance:
+        lane.step = lane.high
+        lane.tries = TRIES
+    else:
+        aim = root + 0.5 * tolerance
+        width = lane.high - lane.low
+        if lane.tries > 4 and lane.tries % 2:
+            aim = lane.low + 0.5 * width
+        lane.step = min(max(aim, lane.low + 0.001 * width), lane.high - 0.001 * width)
+    lane.ends = 0
+    return AGAIN
+
+
+@numba.njit(**INNER)
+def _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j):
+    """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
+    before = lane.high
+    if lane.tries > 0:
+        lane.high = lane.step
+        inside = first_root(lane, corners, e_start, e_low, e, behind, j)[0] >= 0.0
+        if not inside:
+            lane.low, lane.high = lane.step, before
+            lane.same_side = min(lane.same_side, 0) - 1
+        else:
+            lane.same_side = max(lane.same_side, 0) + 1
+        weight = 0.5 if abs(lane.same_side) > 1 else 1.0  # Illinois: an end that stays loses some
+        for i in range(e.shape[0]):
+            if inside:
+                e_low[i, j], e_high[i, j] = e_low[i, j] * weight, e[i, j]
+            else:
+                e_low[i, j], e_high[i, j] = e[i, j], e_high[i, j] * weight
+    else:
+        lane.same_side = 0
+    return first_root(lane, corners, e_start, e_low, e_high, behind, j)
+
+
+@numba.njit(**INNER)
+def step_accepted(lane, event):
+    """Count an accepted step; after several events without progress those of memories rest."""
+    lane.accepted += 1
+    lane.last = lane.step
+    lane.tries = 0
+    lane.quiet = max(0, lane.quiet - 1)
+    if event:
+        lane.events += 1
+        lane.short = lane.short + 1 if lane.step < SHORT * lane.h else 0
+        if lane.short >= PATIENCE:
+            lane.short, lane.quiet = 0, REST

@@ -1,0 +1,156 @@
+"""What an integration works on: the task, arrays for all members, and the right-hand side.
+
+The right-hand side is an address: what calls it is compiled once and not once per diagram.  Here
+and in what works on these arrays elements are assigned in loops: assigning a slice compiles to the
+same loop and to the text of errors that cannot happen, and takes ten times as long to compile.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from ..machine.address import call_out, call_rhs
+from . import rodas5p, tsit5
+from .memory import type_of, with_table
+from .state import INNER, new_lanes
+
+AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
+
+
+class Task(NamedTuple):
+    """What is to be integrated, and how."""
+
+    times: np.ndarray  # of the samples; inputs are linear in between
+    inputs: np.ndarray  # (inputs, times)
+    p: np.ndarray  # (rows, lanes): what the right-hand side reads besides its arguments
+    corners: int  # number of switching functions, the first rows of g
+    memory: np.ndarray  # indices of memory states; what they would become follows in g
+    rtol: float
+    atol: float
+    fixed: float  # step size, 0 if it is to be chosen
+    max_steps: int
+    method: int
+    alone: int  # whether this is a single run
+    table: np.ndarray
+
+
+class Work(NamedTuple):
+    """The arrays for integrating members side by side: (states, lanes), (events, lanes), ..."""
+
+    lanes: np.ndarray  # a record for each member, see `_lane`
+    samples: np.ndarray  # the states at the task's times: (times, states, lanes)
+    y: np.ndarray  # the outputs there: (times, outputs, lanes)
+    t: np.ndarray  # the times at which the right-hand side is evaluated
+    h: np.ndarray
+    hh: np.ndarray  # steps, repeated for every state
+    x: np.ndarray  # the states at the start of the step being tried
+    x_new: np.ndarray  # and at its end
+    x_stage: np.ndarray
+    x_ahead: np.ndarray  # for evaluations besides the step's own, with their results
+    dx_ahead: np.ndarray
+    g_ahead: np.ndarray
+    k: np.ndarray  # derivatives at the stages
+    g: np.ndarray  # switching functions, and what memories would become
+    g_start: np.ndarray
+    e: np.ndarray  # event functions: those of corners, and the rates of memories
+    e_start: np.ndarray
+    e_low: np.ndarray  # at the ends of the bracket in which an event is located
+    e_high: np.ndarray
+    behind: np.ndarray  # 1 where the step before ended with this event
+    slope: np.ndarray  # rates of g
+    slope_start: np.ndarray
+    u: np.ndarray
+    error: np.ndarray  # of the step over its tolerance
+    rate: np.ndarray  # estimate of the largest eigenvalue's magnitude (1/s)
+    t_end: np.ndarray
+    x_flat: np.ndarray  # the same memory as x, x_new, x_stage, x_ahead, k
+    x_new_flat: np.ndarray
+    x_stage_flat: np.ndarray
+    x_ahead_flat: np.ndarray
+    k_flat: np.ndarray
+    jacobian: np.ndarray  # of the stiff method, empty with several lanes
+    matrix: np.ndarray
+    f_t: np.ndarray
+    pivots: np.ndarray
+    U: np.ndarray
+    table: np.ndarray
+
+
+def new_work(x0: np.ndarray, times: np.ndarray, inputs: int, events: int, outputs: int) -> Work:
+    """Return the arrays for integrating members from `x0` (states, lanes) on."""
+    n, lanes = x0.shape
+    stiff = n if lanes == 1 else 0  # the stiff method is for single runs
+    shapes: dict[str, tuple[int, ...]] = {
+        **dict.fromkeys(("x", "x_new", "x_stage", "x_ahead", "dx_ahead"), (n, lanes)),
+        **dict.fromkeys(("g", "g_ahead", "g_start", "slope", "slope_start"), (events, lanes)),
+        **dict.fromkeys(("e", "e_start", "e_low", "e_high", "behind"), (events, lanes)),
+        **dict.fromkeys(("t", "h", "error", "rate", "t_end"), (lanes,)),
+        "hh": (n * lanes,),
+        "k": (tsit5.STAGES, n, lanes),
+        "u": (inputs, lanes),
+        **dict.fromkeys(("jacobian", "matrix"), (stiff, stiff)),
+        "f_t": (stiff,),
+        "U": (rodas5p.STAGES, stiff),
+    }
+    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    arrays["x"][:] = x0
+    for name, rows in (("samples", n), ("y", outputs)):
+        arrays[name] = np.full((times.size, rows, lanes), np.nan)
+    flat = {f"{x}_flat": arrays[x].reshape(-1) for x in ("x", "x_new", "x_stage", "x_ahead")}
+    k_flat = arrays["k"].reshape(tsit5.STAGES, n * lanes)
+    pivots = np.zeros(stiff, dtype=np.int64)
+    records = new_lanes(times, lanes)
+    return with_table(Work, lanes=records, **arrays, **flat, k_flat=k_flat, pivots=pivots)
+
+
+_LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
+TASK = type_of(  # only the types of these matter
+    with_table(
+        Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
+        fixed=0.0, max_steps=0, method=0, alone=0,
+    )
+)  # fmt: skip
+WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
+
+
+@numba.njit(**INNER)
+def inputs_at(t, times, inputs, lanes, u):
+    """Fill `u` with the inputs at each lane's time: linear within a segment of the time grid."""
+    for j in range(lanes.size):
+        m = min(lanes[j].segment, times.size - 2)  # a lane that has finished is not moved on
+        share = (t[j] - times[m]) / (times[m + 1] - times[m])
+        for i in range(u.shape[0]):
+            u[i, j] = inputs[i, m] * (1.0 - share) + inputs[i, m + 1] * share
+
+
+@numba.njit(**INNER)
+def evaluate(rhs, task, lanes, w, x, dx, g):
+    """Evaluate the right-hand side at the times w.t; memory stands still within a step."""
+    if w.u.shape[0]:
+        inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+    call_rhs(rhs, w.t, x, w.u, task.p, dx, g)
+    for i in task.memory:
+        for j in range(lanes.size):
+            dx[i, j] = 0.0
+
+
+def outputs(rhs, out, task, w):
+    """Fill ``w.y[m, :, lane]`` with the outputs at ``w.samples[m, :, lane]``.
+
+    Samples inside a step have the memory of its beginning; here they get their own.
+    """
+    states, y = w.samples, w.y
+    for m in range(task.times.size):
+        for j in range(w.t.size):
+            w.t[j] = task.times[m]
+            for i in range(w.u.shape[0]):
+                w.u[i, j] = task.inputs[i, m]
+        if task.memory.size:
+            call_rhs(rhs, w.t, states[m], w.u, task.p, w.dx_ahead, w.g)
+            for i in range(task.memory.size):
+                for j in range(w.t.size):
+                    states[m, task.memory[i], j] = w.g[task.corners + i, j]
+        call_out(out, w.t, states[m], w.u, task.p, y[m])

@@ -1,0 +1,177 @@
+"""Exact Jacobians of compiled diagrams, from the derivatives of their expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import control as ct
+import numpy as np
+
+from ..errors import CompileError, ParameterError, UsageError
+from ..expressions.derivatives import tangents
+from ..expressions.evaluate import evaluate
+from ..expressions.graph import Expr, Graph, Untraceable
+from ..names import unknown
+from ..responses.arguments import state_array
+from .codegen.blocks import equations
+from .parameters import length
+
+if TYPE_CHECKING:
+    from .compiled import Compiled
+
+DIRECTION = "v"  # the array of a direction: of states, then inputs, then parameters
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tangent:
+    """The derivatives of a diagram's equations along a direction.
+
+    Attributes
+    ----------
+    rows : mapping
+        For ``"dx"`` and ``"y"`` pairs of an expression, None where it is 0, and its length.
+    assumed : mapping
+        Integer parameters for whose values this holds: place in the parameter vector, and value.
+    """
+
+    rows: Mapping[str, Sequence[tuple[Expr | None, int]]]
+    assumed: Mapping[int, int]
+
+
+def tangent(compiled: Compiled) -> Tangent:
+    """Differentiate a diagram's equations.
+
+    Raises
+    ------
+    CompileError
+        If a function is opaque, or there are algebraic loops.
+    """
+    if compiled.schedule.loops:
+        raise CompileError(
+            f"'{compiled.system.name}' has algebraic loops, which have no exact derivatives here: "
+            "use ct.linearize(diagram), which takes differences"
+        )
+    found = equations(compiled.schedule, compiled.program.layout)
+    for call in found.calls.values():
+        raise CompileError(
+            f"'{compiled.system.name}' has no exact derivatives, since {call.name} is called as "
+            f"it stands ({call.reason}): use ct.linearize(diagram), which takes differences"
+        )
+    n, m = compiled.system.nstates or 0, compiled.system.ninputs or 0
+    starts = {"x": 0, "u": n, "p": n + m}
+    pieces = {
+        name: [piece for _, array in found.results[name] for piece in array.pieces()]
+        for name in ("dx", "y")
+    }
+    rows = {}
+    for name, part in pieces.items():
+        along = _along(found.graph, [expr for expr, _ in part], starts)
+        rows[name] = list(zip(along, [size for _, size in part], strict=True))
+    return Tangent(rows=rows, assumed=dict(found.graph.assumptions))
+
+
+def _along(graph: Graph, exprs: Sequence[Expr], starts: Mapping[str, int]) -> list[Expr | None]:
+    def seed(leaf: Expr) -> Expr | None:
+        array, start, step = leaf.data
+        if array not in starts or leaf.kind != "f":
+            return None
+        where = (DIRECTION, starts[array] + start, step)
+        return graph.node("leaf", data=where, size=leaf.size, varies=True)
+
+    try:
+        with np.errstate(all="ignore"):
+            return tangents(graph, exprs, seed)
+    except Untraceable as error:
+        raise CompileError(f"the equations have no derivatives: {error}") from None
+
+
+def jacobian(
+    compiled: Compiled, x0: Any, u0: Any, t: float, params: Any, directions: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return the derivatives of the right-hand side and of the outputs along directions.
+
+    Parameters
+    ----------
+    directions : ndarray of shape (nstates + ninputs + parameters, k)
+
+    Returns
+    -------
+    dict
+        ``"dx"`` of shape (nstates, k) and ``"y"`` of shape (noutputs, k).
+    """
+    system, made = compiled.system, compiled.tangent
+    p = compiled.parameter_vector(params)
+    for place, value in made.assumed.items():
+        if p[place] != value:
+            raise UsageError(
+                f"the equations of '{system.name}' were differentiated for an integer parameter "
+                f"of {value}, which is {p[place]:g} now: compile again with params={{...}}"
+            )
+    columns = {"t": [t], "x": state_array(system, x0), "u": _inputs(system, u0), "p": p}
+    arrays = {name: np.asarray(v, dtype=float)[:, None] for name, v in columns.items()}
+    arrays[DIRECTION] = directions
+    count, found = directions.shape[1], {}
+    for name, rows in made.rows.items():
+        values = iter(evaluate([e for e, _ in rows if e is not None], arrays))
+        parts = [
+            np.broadcast_to(0.0 if expr is None else next(values), (size, count))
+            for expr, size in rows
+        ]
+        found[name] = np.concatenate([np.zeros((0, count)), *parts])
+    return found
+
+
+def _inputs(system: Any, u0: Any) -> np.ndarray:
+    count = system.ninputs or 0
+    u = np.asarray(0.0 if u0 is None else u0, dtype=float)
+    u = np.full(count, float(u)) if u.ndim == 0 else u.reshape(-1)
+    if u.size != count or not np.all(np.isfinite(u)):
+        raise ParameterError(f"u0 needs {count} finite numbers for '{system.name}', got {u0!r}")
+    return u
+
+
+def linearize(
+    compiled: Compiled, x0: Any, u0: Any = None, t: float = 0.0, params: Any = None
+) -> ct.StateSpace:
+    """Linearize a compiled diagram with exact derivatives; see `Compiled.linearize`."""
+    if isinstance(x0, ct.OperatingPoint):
+        x0, u0 = x0.states, x0.inputs if u0 is None else u0
+    system = compiled.system
+    n, m = system.nstates or 0, system.ninputs or 0
+    directions = np.eye(n + m + length(compiled.program.layout), n + m)
+    found = jacobian(compiled, x0, u0, t, params, directions)
+    names = {"states": system.state_labels, "inputs": system.input_labels}
+    return ct.StateSpace(
+        found["dx"][:, :n], found["dx"][:, n:], found["y"][:, :n], found["y"][:, n:], system.dt,
+        outputs=system.output_labels, name=f"{system.name}$linearized",
+        remove_useless_states=False, **names,
+    )  # fmt: skip
+
+
+def parameter_jacobian(
+    compiled: Compiled,
+    parameters: Sequence[str],
+    x0: Any,
+    u0: Any = None,
+    t: float = 0.0,
+    params: Any = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Differentiate by parameters; see `Compiled.parameter_jacobian`."""
+    system = compiled.system
+    places = {
+        (slot.name if not slot.shape else f"{slot.name}[{k}]"): slot.offset + k
+        for block in compiled.program.layout.values()
+        for slot in block.values()
+        if slot.kind == "f"
+        for k in range(slot.size)
+    }
+    start = (system.nstates or 0) + (system.ninputs or 0)
+    directions = np.zeros((start + length(compiled.program.layout), len(parameters)))
+    for k, name in enumerate(parameters):
+        if name not in places:
+            raise unknown("parameter", name, places, f"of '{system.name}' that is a float")
+        directions[start + places[name], k] = 1.0
+    found = jacobian(compiled, x0, u0, t, params, directions)
+    return found["dx"], found["y"]

@@ -1,0 +1,216 @@
+"""Functions that are called as they stand: what they are given, and what they return.
+
+In Python they get what python-control gives them.  numba, where it takes them, gets the same
+through a few lines of source: parameters as a record that is read as a dict is, and a tuple for an
+argument that the function takes apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import pairwise
+from types import FunctionType
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core.registry import CPUDispatcher
+
+from ...blocks import Block
+from ...errors import CompileError
+from ..codegen.calls import Call, Source
+from ..parameters import Slot, current_values
+from ..thirdparty import dicts, vectors
+from ..thirdparty.dicts import callable_constant, make_callable, params_record, unpacked_arguments
+from ..thirdparty.objects import frozen
+from ..thirdparty.vectors import as_vector
+
+TAUGHT = (dicts, vectors)  # modules that teach numba what functions of others use
+
+
+def call_of(
+    name: str, node: Any, kind: str, functions: Sequence[Any], slots: Mapping[str, Slot],
+    count: int, reason: str,
+) -> Call:  # fmt: skip
+    """Return a call of a block's functions.
+
+    Parameters
+    ----------
+    name : str
+    node : Node
+        The block.
+    kind : str
+        ``"update"``, ``"output"`` or ``"events"``.
+    functions : sequence of callable
+        Whose results follow each other.
+    slots : mapping
+        Places of its parameters.
+    count : int
+        Number of results.
+    reason : str
+        Why they are not written out.
+    """
+    size = sum(s.size for s in slots.values())
+    stands = _AsItStands(
+        path=node.path,
+        kind=kind,
+        functions=tuple(functions),
+        template=dict(current_values(node.system)),
+        slots=slots,
+        record=type(node.system._current_params) if isinstance(node.system, Block) else None,
+        lengths=(1, node.system.nstates or 0, len(node.inputs), size, count),
+    )
+    # a name without a value is an error in Python, and 0 in numba's machine code
+    source = None if node.unbound else partial(_source, name, stands, node.system)
+    return Call(
+        name=name, block=node.path, kind=kind, lengths=stands.lengths, reason=reason,
+        function=stands, source=source,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class _AsItStands:
+    """A block's functions of one flat array: t, x, u and parameters, one after the other."""
+
+    path: str
+    kind: str
+    functions: tuple[Any, ...]
+    template: Mapping[str, Any]
+    slots: Mapping[str, Slot]
+    record: type | None
+    lengths: tuple[int, ...]
+    start: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        first = min((s.offset for s in self.slots.values()), default=0)
+        object.__setattr__(self, "start", first)
+
+    def __call__(self, given: np.ndarray) -> np.ndarray:
+        """Return the results.
+
+        Raises
+        ------
+        ValueError
+            If there are more or fewer than the block has states or outputs.
+        """
+        _, x, u, p, count = self.lengths
+        places = np.cumsum((1, x, u, p))
+        parts = [given[a:b].copy() for a, b in pairwise(places)]
+        found = [
+            np.asarray(f(float(given[0]), parts[0], parts[1], self._params(parts[2]))).reshape(-1)
+            for f in self.functions
+        ]
+        values = np.concatenate([np.empty(0), *found])
+        if values.size != count:
+            raise ValueError(
+                f"block '{self.path}' returns {values.size} values from its {self.kind} function, "
+                f"needs {count}"
+            )
+        return values
+
+    def _params(self, p: np.ndarray) -> Any:
+        """Return the parameters as the block's functions take them."""
+        values = {
+            name: _like(value, p[slot.offset - self.start :][: slot.size])
+            if (slot := self.slots.get(name))
+            else value
+            for name, value in self.template.items()
+        }
+        return values if self.record is None else self.record(**values)
+
+
+def _like(template: Any, values: np.ndarray) -> Any:
+    """Return numbers in the type and shape that a parameter has."""
+    if isinstance(template, np.ndarray):
+        return values.reshape(template.shape).astype(template.dtype).view(type(template))
+    if isinstance(template, list | tuple):
+        parts, at = [], 0
+        for item in template:
+            size = np.size(item)
+            parts.append(_like(item, values[at : at + size]))
+            at += size
+        fields = hasattr(template, "_fields")
+        return type(template)(*parts) if fields else type(template)(parts)
+    return type(template)(values[0])
+
+
+# -- numba -----------------------------------------------------------------------------------------
+
+
+def _source(name: str, stands: _AsItStands, system: Any) -> Source:
+    """Return the source of ``name(given, y)`` for numba.
+
+    Raises
+    ------
+    CompileError, UsageError
+        If a function is no plain one, or the name of a parameter cannot be that of a field.
+    """
+    _, x, u, p, count = stands.lengths
+    first, second, third = 1, 1 + x, 1 + x + u
+    fixed = [k for k in stands.template if k not in stands.slots]
+    values = [
+        stands.slots[k].moved(-stands.start).expression if k in stands.slots else
+        f"fixed{fixed.index(k)}" for k in stands.template
+    ]  # fmt: skip
+    is_block = isinstance(system, Block)
+    record = stands.record or params_record(stands.path, list(stands.template))
+    filler = [] if values or is_block else ["0.0"]
+    lines = [
+        f"def {name}(given, y):",
+        f"    t, p = given[0], given[{third}:{third + p}]",
+        f"    params = record({', '.join(values or filler)})",
+    ]
+    counts = _counts(stands, count)
+    at = 0
+    for k, function in enumerate(stands.functions):
+        tuples = _as_tuples(system, function)
+        given = [_given(first, x, 1 in tuples), _given(second, u, 2 in tuples)]
+        call = f"function{k}(t, {', '.join(given)}, params)"
+        lines += [f"    values = as_vector({call}, {counts[k]})"]
+        lines += [f"    y[{at + j}] = values[{j}]" for j in range(counts[k])]
+        at += counts[k]
+    names = {"record": record, "as_vector": as_vector}
+    names |= {f"fixed{i}": callable_constant(stands.template[k]) for i, k in enumerate(fixed)}
+    names |= {f"function{k}": _jitted(frozen(f)) for k, f in enumerate(stands.functions)}
+    return Source(source="\n".join([*lines, ""]), names=names, taught=TAUGHT)
+
+
+def _counts(stands: _AsItStands, count: int) -> list[int]:
+    """Return how many results each function has; of several it is found by calling them."""
+    if len(stands.functions) == 1:
+        return [count]
+    x, u = np.zeros(stands.lengths[1]), np.full(stands.lengths[2], 0.25)
+    params = stands.record(**stands.template) if stands.record else dict(stands.template)
+    return [int(np.size(f(0.0, x, u, params))) for f in stands.functions]
+
+
+def _as_tuples(system: Any, function: Any) -> set[int]:
+    """Return which arguments a function wants as tuples: x (1) and u (2)."""
+    if isinstance(system, Block):
+        return set() if getattr(system.spec, "vector", False) else {1, 2}
+    return unpacked_arguments(function)
+
+
+def _given(first: int, size: int, as_tuple: bool) -> str:
+    if not as_tuple:
+        return f"given[{first}:{first + size}]"
+    items = [f"given[{first + k}]" for k in range(size)]
+    return f"({', '.join(items)}{',' if size == 1 else ''})"
+
+
+def _jitted(function: Any) -> Any:
+    """Make a function callable from machine code; equations already are.
+
+    Raises
+    ------
+    CompileError
+        If it is no plain function.
+    """
+    if isinstance(function, CPUDispatcher):
+        return function
+    if not isinstance(function, FunctionType):
+        raise CompileError(f"{function!r} is no plain function")
+    make_callable(function)
+    return numba.njit(function, error_model="numpy", nogil=True, boundscheck=True)

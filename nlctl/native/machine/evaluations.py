@@ -1,0 +1,116 @@
+"""A program's machine code for members side by side, whichever way it can be had."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..codegen.blocks import equations
+from ..codegen.lower import Lowered, lower
+from .routine import called_back, check, entry, lowered_code
+
+if TYPE_CHECKING:
+    from ..compiled import Compiled
+
+WIDTH = 8  # members side by side in ensembles: one AVX-512 register
+
+
+@dataclass(frozen=True, kw_only=True)
+class Machine:
+    """Functions over `width` members, with the member as the last index of every array.
+
+    Attributes
+    ----------
+    width : int
+    lowered : Lowered
+        The plan that they are made from.
+    prepare : callable
+        ``prepare(p, c)`` fills these from the program's parameter vectors.
+    rhs, out : callable
+        ``rhs(t, x, u, c, dx, g)`` and ``out(t, x, u, c, y)``.
+    """
+
+    width: int
+    lowered: Lowered
+    prepare: Callable[[np.ndarray, np.ndarray], None]
+    rhs: Any
+    out: Any
+
+    @property
+    def rows(self) -> int:
+        """Rows of the parameters that `rhs` and `out` take."""
+        return self.lowered.size
+
+    @property
+    def called_back(self) -> tuple[str, ...]:
+        """Names of functions that call back into Python."""
+        return called_back((self.rhs, self.out))
+
+    @property
+    def entries(self) -> tuple[Any, Any]:
+        """What integrators take of `rhs` and `out`."""
+        return entry(self.rhs), entry(self.out)
+
+    def check(self, c: np.ndarray) -> None:
+        """Raise what an opaque function has raised, with `c` as the parameters."""
+        check((self.rhs, self.out), c)
+
+
+def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:
+    """Return machine code that holds for parameter vectors `p` of shape (parameters, members).
+
+    Where an integer that steers an equation has another value, the blocks' functions are read
+    once more.  The first member's values decide: `fitting` says for which members they hold.
+    """
+    known: list[Machine] = compiled.__dict__.setdefault("_machines", [])
+    for made in known:
+        if made.width == width and made.lowered.holds_for(p):
+            return made
+    found, schedule, program = compiled.equations, compiled.schedule, compiled.program
+    if not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
+        found = equations(schedule, program.layout, p[:, 0])
+    lowered = lower(schedule, program, width, found)
+    if not lowered.holds_for(p):
+        raise ValueError("members whose integers differ have no machine code in common")
+    prepare, rhs, out = lowered_code(lowered)
+    known.append(Machine(width=width, lowered=lowered, prepare=prepare, rhs=rhs, out=out))
+    return known[-1]
+
+
+def fitting(compiled: Compiled, p: np.ndarray, width: int) -> np.ndarray:
+    """Return for which members the machine code of the first one holds."""
+    made = machine(compiled, np.repeat(p[:, :1], width, axis=1), width)
+    return np.array([made.lowered.holds_for(column) for column in p.T], dtype=bool)
+
+
+def evaluations(compiled: Compiled) -> tuple[Callable[..., None], Callable[..., None]]:
+    """Return ``rhs(t, x, u, p, dx, g)`` and ``out(t, x, u, p, y)`` of numbers and flat vectors."""
+    machine(compiled, compiled.parameter_vector()[:, None])
+
+    def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: np.ndarray, g: np.ndarray) -> None:
+        code, c = prepared_parameters(compiled, p)
+        code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], g[:, None])
+
+    def out(t: float, x: Any, u: Any, p: np.ndarray, y: np.ndarray) -> None:
+        code, c = prepared_parameters(compiled, p)
+        code.out(np.array([t]), _column(x), _column(u), c, y[:, None])
+
+    return rhs, out
+
+
+def prepared_parameters(
+    compiled: Compiled, p: np.ndarray, width: int = 1
+) -> tuple[Machine, np.ndarray]:
+    """Return machine code for a parameter vector, and what its functions take of that."""
+    each = np.repeat(p[:, None], width, axis=1)
+    code = machine(compiled, each, width)
+    c = np.zeros((code.rows, width))
+    code.prepare(each, c)
+    return code, c
+
+
+def _column(values: Any) -> np.ndarray:
+    return np.ascontiguousarray(values, dtype=float).reshape(-1, 1)

@@ -1,0 +1,121 @@
+"""The integrators as machine code, from the bitcode that is shipped beside their sources.
+
+``python -m nlctl.native.ship`` makes it, after every change of the integrators.  Where it is not
+that of the sources beside it, or is of a newer LLVM than there is here, what numba makes of the
+sources is used instead, and kept in the cache.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import hashlib
+import json
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+from numba.core import config
+
+from ..integrate import advance, restart, workspace
+from ..integrate.workspace import TASK, WORK
+from . import address, store
+from .fingerprint import function_key, module_key
+from .finish import finished
+from .machine_code import Wanted, full_key
+
+HERE = Path(__file__).parents[1]
+SHIPPED = HERE / "integrators.bitcode"
+RETURNED = (0, -2)  # what numba's functions return, unless they raise an exception
+ADDRESS = numba.intp
+WANTED = [
+    Wanted(
+        function=function,
+        signature=numba.void(*arguments),
+        options={"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True},
+    )
+    for function, *arguments in (
+        (restart.start, ADDRESS, TASK, WORK),
+        (advance.advance, ADDRESS, TASK, WORK, numba.intp),
+        (workspace.outputs, ADDRESS, ADDRESS, TASK, WORK),
+    )
+]
+_ONCE = threading.Lock()  # of several threads that begin at the same time one compiles
+
+
+def integrators() -> dict[str, Callable[..., None]]:
+    """Return `start`, `advance` and `outputs`, ready to be called; without JIT as they stand."""
+    with _ONCE:
+        return _integrators()
+
+
+@functools.cache
+def _integrators() -> dict[str, Callable[..., None]]:
+    functions = {each.function.__name__: each for each in WANTED}
+    if getattr(config, "DISABLE_JIT", False):
+        return {name: each.function for name, each in functions.items()}
+    loaded = finished(shipped() or _made_anew(), functions)
+    return {
+        name: _callable(loaded.addresses[name], each.signature.args, loaded)
+        for name, each in functions.items()
+    }
+
+
+def _callable(address: int, arguments: Any, owner: Any) -> Callable[..., None]:
+    """Return a function of addresses, records and integers."""
+    kinds = [ctypes.c_void_p if isinstance(a, type(TASK)) else ctypes.c_ssize_t for a in arguments]
+    call = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_void_p] * 2, *kinds)(address)
+    nothing = (ctypes.c_void_p * 2)()  # places for a result and an exception, never read
+
+    def function(*given: Any) -> None:
+        values = (g if isinstance(g, int) else g.table.ctypes.data for g in given)
+        status = call(nothing, ctypes.byref(nothing, 8), *values)
+        if status not in RETURNED:
+            raise MemoryError(f"the integrators have failed for want of memory (status {status})")
+
+    function.owner = owner  # type: ignore[attr-defined]
+    return function
+
+
+def shipped() -> bytes | None:
+    """Return the bitcode that is shipped, if it is that of the sources and can be read here."""
+    try:
+        first, _, code = SHIPPED.read_bytes().partition(b"\n")
+        header = json.loads(first)
+        fits = header["sources"] == sources_key(header["files"])
+    except (OSError, ValueError, KeyError, TypeError):  # none, or damaged
+        return None
+    fits = fits and header["code"] == hashlib.sha256(code).hexdigest()
+    readable = list(llvm.llvm_version_info) >= header["llvm"]  # old LLVM does not read new code
+    checked = getattr(config, "BOUNDSCHECK", False)  # indices are to be checked: not in this code
+    return code if fits and readable and not checked else None
+
+
+def sources_key(files: list[str]) -> str:
+    """Return a key of source files, wherever they lie; ends of lines may be any system's."""
+    digest = hashlib.sha256()
+    for name in files:
+        text = (HERE / name).read_text(encoding="utf-8")
+        digest.update(f"{name}\0{text}\0".encode())
+    return digest.hexdigest()
+
+
+def integrator_key() -> str:
+    """Return a key that changes with whatever the integrators' machine code is made of."""
+    wanted = ((each.function, each.signature.args) for each in WANTED)
+    return function_key(module_key(address), *wanted)
+
+
+def _made_anew() -> bytes:
+    """Return what numba makes of the sources, from the cache if it is there."""
+    from .export import exported
+
+    key = full_key(integrator_key(), "bitcode")
+    code = store.read(key)
+    if code is None:
+        code = exported(WANTED)
+        store.write(key, code)
+    return code

@@ -1,0 +1,149 @@
+"""The functions of a program, as Python and the integrators call them."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba.core import config
+
+from ..codegen.calls import FAILED, Call, Native, native_calls, plain_calls
+from ..codegen.interpret import interpreted
+from ..codegen.lower import Lowered
+from ..codegen.solver import plain_solver
+from .finish import Loaded, finished
+
+
+@dataclass(frozen=True, kw_only=True)
+class Opaque:
+    """A call of an opaque function within a program.
+
+    Attributes
+    ----------
+    call : Call
+    row : int
+        Where it begins in `c`.
+    native : Native
+    """
+
+    call: Call
+    row: int
+    native: Native
+
+    def check(self, c: np.ndarray) -> None:
+        """Raise what the function has raised for one of the members, if it has."""
+        at = self.row + self.call.failed
+        for lane in np.flatnonzero(c[at] == FAILED)[:1]:
+            raise self.native.error(self.call, c, self.row, int(lane))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Routine:
+    """A C function of arrays of floats.
+
+    Attributes
+    ----------
+    address : int
+    shapes : tuple
+        Shapes of its arrays: nothing else may be given to it.
+    loaded : Loaded
+        What the address belongs to.
+    opaque : tuple of Opaque
+        What it calls.
+    """
+
+    address: int
+    shapes: tuple[tuple[int, ...], ...]
+    loaded: Loaded
+    opaque: tuple[Opaque, ...]
+
+    def __call__(self, *arrays: np.ndarray) -> None:
+        for array, shape in zip(arrays, self.shapes, strict=True):
+            fits = array.shape == shape and array.dtype == float and array.flags.c_contiguous
+            if not fits:
+                raise ValueError(f"an array of shape {shape} is needed, got {array.shape}")
+        self._function(*(array.ctypes.data for array in arrays))
+        if self.opaque:
+            self.check(arrays[3])
+
+    @cached_property
+    def _function(self) -> Any:
+        return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(self.shapes))(self.address)
+
+    def check(self, c: np.ndarray) -> None:
+        """Raise what a function that it has called has raised.
+
+        Parameters
+        ----------
+        c : ndarray
+            As it was given.
+        """
+        for each in self.opaque:
+            each.check(c)
+
+
+Runnable = Callable[..., None]
+
+
+def plain_functions(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
+    """Return ``prepare``, ``rhs`` and ``out`` of a program as plain Python."""
+    calls = plain_calls(lowered.calls)
+    calls |= {name: plain_solver(solver) for name, solver in lowered.solvers.items()}
+    prepare, rhs, out = (interpreted(f, lowered.lanes, calls) for f in lowered.functions.values())
+    return prepare, rhs, out
+
+
+def lowered_code(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
+    """Return ``prepare``, ``rhs`` and ``out`` as machine code, from the cache if it is there.
+
+    With NUMBA_DISABLE_JIT=1 the same plan is carried out in plain Python.
+
+    Raises
+    ------
+    CompileError
+        If the C library lacks a function.
+    """
+    if getattr(config, "DISABLE_JIT", False):
+        return plain_functions(lowered)
+    native = native_calls(lowered.calls, lowered.lanes)
+    loaded = finished(lowered.text, lowered.functions, native.symbols, native.owners)
+    prepare, rhs, out = (_routine(lowered, name, loaded, native) for name in lowered.functions)
+    return prepare, rhs, out
+
+
+def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Routine:
+    function = lowered.functions[name]
+    opaque = [
+        Opaque(call=lowered.calls[node.data[0]], row=row, native=native)
+        for node, (_, row) in function.plan.stored.items()
+        if node.op == "call"
+    ]
+    return Routine(
+        address=loaded.addresses[name],
+        shapes=tuple(lowered.shape(array) for array in function.arguments),
+        loaded=loaded,
+        opaque=tuple(opaque),
+    )
+
+
+def entry(function: Any) -> Any:
+    """Return what integrators take: the address of machine code, or a plain function."""
+    return function.address if isinstance(function, Routine) else function
+
+
+def check(functions: Sequence[Any], c: np.ndarray) -> None:
+    """Raise what an opaque function has raised within these, whose parameters were `c`."""
+    for function in functions:
+        if isinstance(function, Routine):
+            function.check(c)
+
+
+def called_back(functions: Sequence[Any]) -> tuple[str, ...]:
+    """Return the names of opaque functions that these call back in Python."""
+    found = [each for f in functions if isinstance(f, Routine) for each in f.opaque]
+    names = [each.call.name for each in found if each.call.name in each.native.called_back]
+    return tuple(dict.fromkeys(names))

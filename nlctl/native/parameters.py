@@ -1,0 +1,189 @@
+"""Where every parameter lies in the one flat vector that a program takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import control as ct
+import numpy as np
+
+from ..blocks import Block
+from ..errors import UsageError
+
+if TYPE_CHECKING:
+    from .diagram.schedule import Node
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slot:
+    """One number, vector or matrix in the parameter vector.
+
+    Attributes
+    ----------
+    name : str
+        Qualified name for nlctl's blocks; path and key for foreign ones.
+    offset : int
+        Where it begins.
+    shape : tuple of int
+    kind : str
+        ``"f"`` float, ``"i"`` integer, ``"b"`` Boolean.
+    """
+
+    name: str
+    offset: int
+    shape: tuple[int, ...]
+    kind: str
+
+    @property
+    def size(self) -> int:
+        """How many entries of the vector it takes."""
+        return math.prod(self.shape)
+
+    def moved(self, by: int) -> Slot:
+        """Return the same, `by` places later."""
+        return replace(self, offset=self.offset + by)
+
+    @property
+    def expression(self) -> str:
+        """Source that reads it from the vector `p`."""
+        if self.shape:
+            whole = f"p[{self.offset}:{self.offset + self.size}]"
+            return whole if len(self.shape) == 1 else f"{whole}.reshape({self.shape})"
+        return {"f": "p[{}]", "i": "int(p[{}])", "b": "(p[{}] != 0.0)"}[self.kind].format(
+            self.offset
+        )
+
+
+def current_values(system: Any) -> Mapping[str, Any]:
+    """Return a block's parameters as python-control has resolved them.
+
+    A foreign block in a diagram with nlctl's blocks is handed their qualified names as well;
+    they are none of its business.
+    """
+    if isinstance(system, Block):
+        return system._current_params._asdict()
+    if isinstance(system, ct.StateSpace):
+        return {}
+    params = system._current_params
+    return {k: params[k] for k in params if k in system.params or "." not in str(k)}
+
+
+def is_numeric(value: Any) -> bool:
+    """Whether a parameter can vary between runs: a finite-shaped number or array of numbers."""
+    return not isinstance(value, str) and np.asarray(value).dtype.kind in "fib"
+
+
+def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
+    """Lay out the numeric parameters of all blocks.
+
+    Returns
+    -------
+    dict
+        For every block index the slots of its parameters by name.
+
+    Raises
+    ------
+    UsageError
+        If a foreign block's parameter name is no string.
+    """
+    found: dict[int, dict[str, Slot]] = {}
+    offset = 0
+    for i, node in enumerate(nodes):
+        found[i] = slots_of(node.system, node.path, offset)
+        offset += sum(slot.size for slot in found[i].values())
+    return found
+
+
+def slots_of(system: Any, path: str = "", offset: int = 0) -> dict[str, Slot]:
+    """Lay out the numeric parameters of one block from `offset` on, as `slots` does."""
+    found: dict[str, Slot] = {}
+    path = path or system.name
+    for name, value in current_values(system).items():
+        if not isinstance(name, str):
+            raise UsageError(
+                f"block '{path}' has a parameter called {name!r}; names must be strings"
+            )
+        if is_numeric(value):
+            array = np.asarray(value)
+            found[name] = Slot(
+                name=f"{path}.{name}", offset=offset, shape=array.shape, kind=array.dtype.kind
+            )
+            offset += found[name].size
+    return found
+
+
+def length(layout: Mapping[int, Mapping[str, Slot]]) -> int:
+    """Return how many numbers the parameter vector has."""
+    return sum(slot.size for block in layout.values() for slot in block.values())
+
+
+def packed(
+    nodes: Sequence[Node],
+    layout: Mapping[int, Mapping[str, Slot]],
+    fixed: Mapping[int, Mapping[str, Any]],
+) -> np.ndarray:
+    """Return the parameter vector with the values that the blocks have now.
+
+    Raises
+    ------
+    UsageError
+        If an override has changed what is fixed by compiling, or brings a parameter that nobody
+        declared.
+    """
+    p = np.empty(length(layout))
+    for i, block in layout.items():
+        path, values, constants = nodes[i].path, current_values(nodes[i].system), fixed.get(i, {})
+        for name, value in values.items():
+            if name in block:
+                filled(p, block[name], value)
+            elif name not in constants:
+                raise UsageError(
+                    f"parameter '{name}' of block '{path}' was not known when the diagram "
+                    f"was compiled: declare it in the block's params, or compile with "
+                    f"params={{'{name}': ...}}"
+                )
+            elif not _same(value, constants[name]):
+                raise UsageError(
+                    f"parameter '{path}.{name}' is no number and was {constants[name]!r} when the "
+                    f"diagram was compiled; it cannot be {value!r} now: compile again"
+                )
+    return p
+
+
+def filled(p: np.ndarray, slot: Slot, value: Any) -> None:
+    """Put a parameter into its place in the vector.
+
+    Raises
+    ------
+    UsageError
+        If its shape is another than when the diagram was compiled, or it is no whole number any
+        more.
+    """
+    array = np.asarray(value) if is_numeric(value) else None
+    if array is None or array.shape != slot.shape:
+        now = f"be {value!r}" if array is None else f"have shape {array.shape}"
+        raise UsageError(
+            f"parameter '{slot.name}' had shape {slot.shape} when the diagram was "
+            f"compiled and cannot {now} now: compile again"
+        )
+    whole = {"i": "a whole number", "b": "True or False"}.get(slot.kind)
+    if whole and not slot.shape and array.dtype.kind == "f" and array != np.trunc(array):
+        raise UsageError(
+            f"parameter '{slot.name}' was {whole} when the diagram was compiled and cannot be "
+            f"{value!r} now: declare it as a float ({float(np.trunc(array))!r}), or compile with "
+            f"params={{'{slot.name.rpartition('.')[2]}': {value!r}}}"
+        )
+    p[slot.offset : slot.offset + slot.size] = array.ravel()
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values that are no numbers are equal."""
+    if one is other:
+        return True
+    try:
+        return type(one) is type(other) and bool(np.all(one == other))
+    except (TypeError, ValueError):
+        return False

@@ -1,0 +1,134 @@
+"""Responses of compiled diagrams."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..errors import DivergedError
+from ..responses.arguments import evaluation_array, input_array, interpolated, state_array
+from ..responses.time_response import Response
+from .audit import Audit, Trial
+from .audit import audit as compare
+from .compiled import Compiled
+from .integrate.driver import Settings, Statistics, Trajectory, trajectory
+from .integrate.state import Status
+
+
+def respond(
+    compiled: Compiled,
+    times: np.ndarray,
+    inputs: Any = 0.0,
+    initial_state: Mapping[str, float] | Any = None,
+    *,
+    settings: Settings,
+    params: Mapping[str, Any] | None = None,
+    evaluation_times: Any = "T",
+    ignore_errors: bool = False,
+    progress: Callable[[float], object] | None = None,
+    audit: Audit = True,
+    **form: Any,
+) -> Response:
+    """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments.
+
+    Parameters
+    ----------
+    settings : Settings
+    **form
+        ``squeeze``, ``transpose`` and ``return_states`` of the response.
+
+    Raises
+    ------
+    DivergedError
+        If the run does not reach the last time, unless `ignore_errors`: then the response ends
+        where the run did, with ``success = False``.
+    KeyboardInterrupt
+        After Ctrl-C, unless `ignore_errors`.
+    ParameterError
+        If an argument has a wrong shape, or times do not fit a discrete-time diagram.
+    """
+    system = compiled.system
+    wanted = evaluation_array(evaluation_times, times)
+    u, x0 = input_array(system, inputs, times), state_array(system, initial_state)
+    grid = times if wanted is times else _grid(system, times, wanted)
+    if grid is not times:
+        u = interpolated(u, times, grid)
+    p = compiled.parameter_vector(params)
+    made = trajectory(compiled, grid, u, x0, p, settings, progress)
+    trial = Trial(time=made.time, states=made.states, inputs=u, p=p, params=params, width=1)
+    compare(compiled, trial, audit)
+    run = made.statistics
+    if run.status is Status.STOPPED and not ignore_errors:
+        raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error goes on
+    if run.status is not Status.OK and not ignore_errors:
+        raise DivergedError(_message(system, run), run.time)
+    shown = np.flatnonzero(np.isin(made.time, wanted))
+    return _response(compiled, made, u, shown, params, form)
+
+
+def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return the times of a run with inputs at `times` that is `wanted` at other times.
+
+    A sampled system starts with the first of these; in between inputs are linear, and have their
+    corners where they were given.
+    """
+    if system.isdtime(strict=True):
+        return wanted
+    return np.union1d(times if system.ninputs else times[[0, -1]], wanted)
+
+
+def uninterrupted(response: Any) -> Any:
+    """Return a response that was computed with `ignore_errors`, if Ctrl-C has not ended it.
+
+    Raises
+    ------
+    KeyboardInterrupt
+    """
+    if response.statistics.status is Status.STOPPED:
+        raise KeyboardInterrupt(response.message)
+    return response
+
+
+def _message(system: ct.InputOutputSystem, run: Statistics) -> str:
+    what = {
+        Status.DIVERGED: "diverged: no finite state after",
+        Status.STEP_LIMIT: "stopped at the limit of steps at",
+        Status.STOPPED: "was stopped at",
+        Status.STEP_TOO_SMALL: "diverged or jumps: no step is small enough after",
+    }
+    return f"'{system.name}' {what[run.status]} t = {run.time:.6g} s"
+
+
+def _response(
+    compiled: Compiled,
+    made: Trajectory,
+    inputs: np.ndarray,
+    shown: np.ndarray,
+    params: Mapping[str, Any] | None,
+    form: Mapping[str, Any],
+) -> Response:
+    system, run = compiled.system, made.statistics
+    ok = run.status is Status.OK
+    response = Response(
+        made.time[shown],
+        made.outputs[:, shown],
+        made.states[:, shown],
+        inputs[:, shown],
+        issiso=system.issiso(),
+        params=dict(system.params) | dict(params or {}),
+        output_labels=system.output_labels,
+        input_labels=system.input_labels,
+        state_labels=system.state_labels,
+        title=f"Input/output response for {system.name}",
+        sysname=system.name,
+        success=ok,
+        message=None if ok else _message(system, run),
+        squeeze=form.get("squeeze"),
+        transpose=form.get("transpose", False),
+        return_x=form.get("return_states", False),
+    )
+    response.statistics = run
+    return response

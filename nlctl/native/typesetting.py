@@ -1,0 +1,294 @@
+"""The equations of blocks and diagrams as LaTeX, read from the functions that are run."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..blocks import Block
+from ..errors import CompileError
+from ..expressions.arrays import Tracer
+from ..expressions.graph import Expr, Graph, needed
+from ..expressions.latex import Index, Writer, index_text, number_text, symbol
+from ..params import declared_params
+from .codegen.blocks import Reader
+from .diagram.schedule import Node, Schedule, Signal, schedule
+from .parameters import Slot, slots_of
+
+OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
+WORTH = 12  # parts from which an expression that is used twice gets a letter
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlockEquations:
+    """The equations of one block.
+
+    Attributes
+    ----------
+    block : str
+        Its name, with the diagrams around it.
+    equations : tuple of str
+        LaTeX: derivatives (or next values) of the states, then outputs.
+    where : tuple of str
+        LaTeX: what the symbols of these equations stand for.
+    inputs : tuple of str
+        LaTeX: what the inputs are connected to, where it is not a signal of the same name.
+    """
+
+    block: str
+    equations: tuple[str, ...]
+    where: tuple[str, ...]
+    inputs: tuple[str, ...]
+
+    @property
+    def latex(self) -> str:
+        """All lines in one aligned environment."""
+        lines = [*self.inputs, *self.equations, *self.where]
+        body = " \\\\\n".join(line.replace(" = ", " &= ", 1) for line in lines)
+        return f"\\begin{{aligned}}\n{body}\n\\end{{aligned}}"
+
+    def _repr_latex_(self) -> str:
+        return f"$${self.latex}$$"
+
+
+def typeset(
+    system: Any, *, values: bool = False, params: Mapping[str, Any] | None = None
+) -> tuple[BlockEquations, ...]:
+    """Return the equations of a block or diagram as LaTeX, block by block.
+
+    They are read from the functions that are run, so that another sign or parameter is another
+    formula; symbols are the names of signals, parameters and of the functions' local variables.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+    values : bool, optional
+        Write the values of parameters in the places of their names.
+    params : mapping, optional
+        Parameters that are overridden.
+
+    Returns
+    -------
+    tuple of BlockEquations
+
+    Raises
+    ------
+    CompileError
+        If a function is not made of expressions, as for `nlctl.compile`.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> (law,) = nlctl.typeset(nlctl.block(nlctl.controllers.FixedGainLaw(), "law"))
+    >>> print(law.equations[0])
+    u = -\\kappa \\left(\\beta r + W_{\\psi} + \\mathrm{robust} + Y_{d}\\right)
+    """
+    system = ct.ss(system) if isinstance(system, ct.TransferFunction) else system
+    system._update_params(params)
+    read = schedule(system, solve_loops=True)
+    return tuple(_block(read, node, values) for node in read.nodes)
+
+
+def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
+    system = node.system
+    every = {} if values else slots_of(system, node.path)
+    slots = {name: slot for name, slot in every.items() if slot.kind == "f"}  # others steer
+    inputs = tuple({Signal(None, j): 1.0} for j in range(len(node.inputs)))
+    alone = replace(node, state_offset=0, inputs=inputs)
+    reader = Reader(graph=Graph(), layout={0: slots}, blocks=[alone])
+    with np.errstate(all="ignore"), _local_names() as names:
+        found = {"x": reader.derivatives(0), "y": reader.outputs(0, ())}
+    for call in reader.calls.values():
+        raise CompileError(f"block '{node.path}' has no formula: {call.reason}")
+    leaf = _symbols(system, slots)
+    writer = Writer(leaf=leaf, known=_known(found, names, leaf))
+    derivative = _dotted if ct.isctime(system) else (lambda s: rf"{s}^{{+}}")
+    lines = [
+        *_lines(writer, found["x"], [derivative(s) for s in _names(system.state_labels)]),
+        *_lines(writer, found["y"], _names(system.output_labels[: found["y"].size])),
+    ]
+    return BlockEquations(
+        block=node.path,
+        equations=tuple(line for line in lines if not _says_nothing(line)),
+        where=tuple(_definitions(writer)),
+        inputs=tuple(_connections(read, node)),
+    )
+
+
+def _dotted(name: str) -> str:
+    """Return the symbol of a derivative: the dot stands on the letter, not on its index."""
+    head, _, index = name.partition("_")
+    return rf"\dot{{{head}}}_{index}" if index else rf"\dot{{{head}}}"
+
+
+def _says_nothing(line: str) -> bool:
+    left, _, right = line.partition(" = ")
+    return left == right
+
+
+def _names(labels: list[str]) -> list[str]:
+    return [symbol(label) for label in labels]
+
+
+def _lines(writer: Writer, array: Tracer, names: list[str]) -> Iterator[str]:
+    """Yield an equation per number, and one per vector."""
+    at = 0
+    for expr, size in _split(array):
+        if size == 1 or not expr.size:
+            for k in range(at, at + size):
+                yield f"{names[k]} = {writer.formula(expr, by_name=False)}"
+        else:
+            vector, first = _vector(names, at)
+            right = writer.formula(expr, (1 - first, 1, "i"), by_name=False)
+            yield rf"{vector('i')} = {right}, \quad i = {first}, \dots, {first + size - 1}"
+        at += size
+
+
+def _split(array: Tracer) -> Iterator[tuple[Expr, int]]:
+    for expr, size in array.pieces():
+        yield from _pieces(expr, size)
+
+
+def _pieces(expr: Expr, size: int) -> Iterator[tuple[Expr, int]]:
+    if expr.op != "concat":
+        yield expr, size
+        return
+    for piece, length in zip(expr.args, expr.data, strict=True):
+        yield from _pieces(piece, length)
+
+
+def _vector(names: list[str], at: int) -> tuple[Callable[[str], str], int]:
+    """Return what names the elements of a vector by an index, and the number of the first one."""
+    found = re.fullmatch(r"(.*)_\{((?:.*,)?)(\d+)\}", names[at])
+    if not found:
+        return (lambda index: f"{names[at]}_{{{index}}}"), 1
+    return (lambda index: f"{found[1]}_{{{found[2]}{index}}}"), int(found[3])
+
+
+def _symbols(system: Any, slots: Mapping[str, Slot]) -> Callable[[str, Index], str]:
+    """Return what names a place in one of the arrays that a block reads."""
+    labels = {"x": _names(system.state_labels), "u": _names(system.input_labels)}
+    declared = declared_params(system.spec) if isinstance(system, Block) else {}
+
+    def leaf(array: str, index: Index) -> str:
+        start, step, letter = index
+        if array == "t":
+            return "t"
+        if array in labels:
+            if not step:
+                return labels[array][start]
+            vector, first = _vector(labels[array], start)
+            return vector(index_text((first - 1, step, letter)))
+        for name, slot in slots.items():
+            if 0 <= start - slot.offset < slot.size:
+                own = declared[name].symbol if name in declared else name
+                return _entry(symbol(own or name), slot, (start - slot.offset, step, letter))
+        raise CompileError(f"block '{system.name}' has no parameter at {start}")
+
+    return leaf
+
+
+def _entry(name: str, slot: Slot, index: Index) -> str:
+    """Return a parameter, or an element of an array of them."""
+    if not slot.shape:
+        return name
+    if len(slot.shape) == 1:
+        return f"{name}_{{{index_text(index)}}}"
+    (start, step, letter), width = index, slot.shape[1]
+    (row, column), along = divmod(start, width), step % width == 0
+    first = index_text((row, step // width if along else 0, letter))
+    return f"{name}_{{{first},{index_text((column, 0 if along else step, letter))}}}"
+
+
+@contextmanager
+def _local_names() -> Iterator[dict[Expr, str]]:
+    """Note how functions that are traced meanwhile call what they compute."""
+    found: dict[Expr, str] = {}
+    before = sys.getprofile()
+
+    def noted(frame: Any, event: str, _: Any) -> None:
+        if event != "return" or frame.f_code.co_filename.startswith(OWN):
+            return  # (also what dataclasses write: "<string>")
+        for name, value in frame.f_locals.items():
+            if isinstance(value, Tracer) and value.values.size == 1 and value.origin is None:
+                found.setdefault(value.only, name)
+
+    sys.setprofile(noted)
+    try:
+        yield found
+    finally:
+        sys.setprofile(before)
+
+
+def _known(
+    found: Mapping[str, Tracer], names: Mapping[Expr, str], leaf: Callable[[str, Index], str]
+) -> dict[Expr, str]:
+    """Return names for parts of the equations: the author's, and letters for what is used twice."""
+    exprs = needed(expr for array in found.values() for expr, _ in array.pieces())
+    plain = ("leaf", "const", "table", "concat", "item", "slice")
+    taken = {leaf(e.data[0], (e.data[1], 0, "")) for e in exprs if e.op == "leaf" and not e.size}
+    known: dict[Expr, str] = {}
+    for expr in exprs:
+        name = symbol(names[expr]) if expr in names else ""
+        if name and expr.op not in plain and expr.kind != "b" and name not in taken:
+            known[expr] = name
+            taken.add(name)
+    uses: dict[Expr, int] = {}
+    for expr in exprs:
+        for arg in expr.args:
+            uses[arg] = uses.get(arg, 0) + 1
+    for expr in exprs:
+        heavy = uses.get(expr, 0) > 1 and len(needed([expr], known)) > WORTH
+        if heavy and expr not in known and expr.op not in plain and expr.kind != "b":
+            known[expr] = next(s for k in itertools.count(1) if (s := f"s_{{{k}}}") not in taken)
+            taken.add(known[expr])
+    return known
+
+
+def _definitions(writer: Writer) -> Iterator[str]:
+    """Yield what the symbols stand for, until no new one turns up."""
+    done: set[Expr] = set()
+    while set(writer.used) - done:
+        expr = max(set(writer.used) - done, key=lambda e: e.index)
+        done.add(expr)
+        name = writer.used[expr]
+        if expr.size:
+            right = writer.formula(expr, (0, 1, "i"), by_name=False)
+            yield rf"{name}_{{i}} = {right}, \quad i = 1, \dots, {expr.size}"
+        else:
+            yield f"{name} = {writer.formula(expr, by_name=False)}"
+    for table, name in writer.tables.items():
+        texts = [number_text(v) for v in table.data]
+        shown = texts if len(texts) <= 6 else [*texts[:3], r"\dots", texts[-1]]
+        yield rf"{name} = \left({', '.join(shown)}\right)"
+
+
+def _connections(read: Schedule, node: Node) -> Iterator[str]:
+    """Yield what an input is connected to, where that is not just a signal of its name."""
+    for label, combination in zip(node.system.input_labels, node.inputs, strict=True):
+        terms = []
+        for signal, gain in combination.items():
+            owner = read.system if signal.block is None else read.nodes[signal.block].system
+            labels = owner.input_labels if signal.block is None else owner.output_labels
+            terms.append((labels[signal.index], float(gain)))
+        if terms == [(label, 1.0)]:
+            continue
+        yield f"{symbol(label)} = {_combination(terms)}"
+
+
+def _combination(terms: list[tuple[str, float]]) -> str:
+    texts = []
+    for label, gain in terms:
+        factor = "" if abs(gain) == 1.0 else rf"{number_text(abs(gain))} "
+        texts.append(("- " if gain < 0 else "+ ") + factor + symbol(label))
+    joined = " ".join(texts) or "0"
+    return joined.removeprefix("+ ").replace("- ", "-", 1) if joined[:1] in "+-" else joined
