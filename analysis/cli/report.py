@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,13 +17,9 @@ import typer
 from .studies import ANSWERS, INCOMPLETE, INTERRUPTED, Trust, exit_codes, run_folder
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor, Future
+    from concurrent.futures import Executor
 
-    from analysis.report.document import Report
-    from analysis.report.svg import Drawn
     from nlctl.errors import UsageError
-
-QUICK = ("example-1-quick", "example-2-quick")  # the studies of the paper's report
 
 Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser.")]
 Force = Annotated[
@@ -93,57 +90,28 @@ def _paper(
 ) -> tuple[str, Path, int]:
     """Reproduce the paper; return the verdict, the page and the exit code."""
     with _other_process() as beside:
-        compiling = beside.submit(_compile_ahead)  # first of all: imports here take seconds
+        beside.submit(_import_ahead)  # first of all: imports there and here take seconds
         check_report_options(out, pdf=pdf, force=force)
+        from analysis.paper.report import clear, compose
         from analysis.report.render import write_report
 
-        from .study_report import clear_shipped
+        from .study_report import tell
+        from .terminal import progress_bar
 
-        clear_shipped(QUICK, out, force=force)
-        made, drawn, passed = _reproduced(beside, compiling, out, jobs, far=far)
-        options = " --far" * far + " --interactive" * interactive
-        made = replace(made, command=made.command + options)
-        page = write_report(
-            made, out, interactive=interactive, force=force, pool=beside, drawn=drawn
+        clear(out, force=force)
+        made = compose(
+            out, whole=far, threads=jobs or None, beside=beside, watch=progress_bar, tell=tell
         )
-    return made.verdict, page, int(not passed)
+        options = " --far" * far + " --interactive" * interactive
+        report = replace(made.report, command=made.report.command + options)
+        page = write_report(
+            report, out, interactive=interactive, force=force, pool=beside, drawn=made.drawn
+        )
+    return report.verdict, page, int(not made.passed)
 
 
-def _reproduced(
-    beside: Executor, compiling: Future[None], out: Path, jobs: int, *, far: bool
-) -> tuple[Report, Drawn, bool]:
-    """Return the report, those of its figures that are drawn, and whether all claims hold."""
-    from analysis.paper import checks
-    from analysis.paper.evidence import evidence, far_runs_in_background
-    from analysis.paper.page.report import paper_report, paper_sections
-    from analysis.report.svg import draw_ahead
-    from nlctl import paper
-
-    from .study_report import studies_part
-    from .terminal import progress_bar
-
-    with far_runs_in_background(whole=far) as long_runs:
-        runs, waiting = _runs(beside, out, jobs)
-        proofs = {}
-        with progress_bar("checking the proof", 2) as advance:
-            for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
-                proofs[number] = evidence(loop)
-                advance(1)
-        with progress_bar("running far beyond 20 s, and the studies", 2) as advance:
-            far_away = long_runs.result()
-            advance(1)
-            sections = paper_sections(runs, proofs=proofs, far=far_away)
-            drawn = draw_ahead(sections, until=waiting[-1].done)
-            *_, numbers = (task.result() for task in (compiling, *waiting))
-    made = paper_report(
-        runs,
-        proofs=proofs,
-        far=far_away,
-        sections=sections,
-        studies=studies_part([out / name for name in QUICK], threads=jobs or None),
-        numerics=numbers,
-    )
-    return made, drawn, all(check.passed for check in checks(runs))
+def _import_ahead() -> None:
+    import_module("analysis.paper.report")
 
 
 @contextmanager
@@ -160,39 +128,6 @@ def _other_process() -> Iterator[Executor]:
             for process in active_children():
                 process.terminate()
             raise
-
-
-def _runs(beside: Executor, out: Path, jobs: int) -> tuple[Any, list[Future[Any]]]:
-    """Run the paper's cases; return them, and what runs in the other process meanwhile.
-
-    That is the studies, and last the numerics.  Both processes need the integrators: where nothing
-    is compiled yet only this one compiles them, while the other does what needs none.
-    """
-    from analysis.paper import CASES, numerics, run_all
-
-    from .study_report import run_shipped
-    from .terminal import progress_bar
-
-    with progress_bar("simulating", len(CASES)) as advance:
-        runs = run_all(CASES[:1], done=lambda _: advance(1))
-        studies = beside.submit(run_shipped, QUICK, out, jobs or None)
-        waiting = [studies, beside.submit(numerics)]
-        runs |= run_all(CASES[1:], done=lambda _: advance(1))  # machine code: in this process
-    return runs, waiting
-
-
-def _compile_ahead() -> None:
-    """Compile what is needed besides the integrators, first what the other process needs late."""
-    from analysis.paper import CASES, evidence
-    from analysis.paper import compile_ahead as compile_cases
-    from nlctl import paper
-
-    from .study_report import compile_shipped
-
-    evidence.compile_ahead(paper.example_1())
-    evidence.compile_ahead(paper.example_2())
-    compile_cases(CASES)  # by now the other process has the first two
-    compile_shipped(QUICK)
 
 
 def _study(

@@ -1,0 +1,282 @@
+"""The report of the paper, from Python: what ``nlctl report`` writes, and each of its three parts.
+
+>>> from pathlib import Path
+>>> from analysis.paper.report import compose
+>>> from analysis.report import write_report
+>>> made = compose(Path("reports/paper"))                    # doctest: +SKIP
+>>> write_report(made.report, Path("reports/paper"))         # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from nlctl import paper
+
+from ..lyapunov.nussbaum.long_run import LongRun
+from ..report.document import Report, Section
+from ..report.svg import Drawn, draw_ahead
+from ..robustness import prepare
+from ..robustness.runs.experiment import compile_ahead as compile_experiment
+from ..studies import load_result, read_study, run, shipped
+from ..studies.folder import remove_run
+from ..studies.page.redrawn import loop_again, rows_again
+from ..studies.page.report import study_part
+from . import evidence as proofs
+from .cases import CASES, HORIZON
+from .numerics import numerics
+from .page.proof import lyapunov_sections
+from .page.report import paper_report, paper_sections
+from .page.text import PUBLISHED
+from .reproduction import Run, checks, run_all
+from .reproduction import compile_ahead as compile_cases
+
+__all__ = [
+    "QUICK",
+    "Composed",
+    "Watch",
+    "clear",
+    "compose",
+    "proof",
+    "reproduction",
+    "robustness",
+]
+
+QUICK = ("example-1-quick", "example-2-quick")
+"""The studies of the report, of those that come with nlctl."""
+
+Watch = Callable[[str, float], AbstractContextManager[Callable[[float], object]]]
+"""``watch(what, total)`` is entered around a part of the work; what it gives is called with how
+much more of `total` is done."""
+
+
+def _unwatched(what: str, total: float) -> AbstractContextManager[Callable[[float], object]]:
+    return nullcontext(lambda amount: None)
+
+
+def _untold(words: str) -> None:
+    return None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Composed:
+    """The report, before it is written.
+
+    Attributes
+    ----------
+    report : Report
+    drawn : mapping
+        Those of its figures that are drawn already, for `analysis.report.render.write_report`.
+    passed : bool
+        Whether all numbers of the reproduction are those that were to be reached.
+    """
+
+    report: Report
+    drawn: Drawn
+    passed: bool
+
+
+class _Here(Executor):
+    """Runs what is submitted at once, in this process."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        made: Future[Any] = Future()
+        made.set_result(fn(*args, **kwargs))
+        return made
+
+
+def reproduction(watch: Watch = _unwatched) -> list[Section]:
+    """Run both examples, and return the report's first part: their figures and numbers.
+
+    Parameters
+    ----------
+    watch : callable, optional
+        See `Watch`.
+
+    Raises
+    ------
+    nlctl.DivergedError
+        If a loop diverges.
+    """
+    with watch("simulating", len(CASES)) as advance:
+        runs = run_all(CASES, done=lambda _: advance(1))
+    return paper_sections(runs)
+
+
+def proof(
+    horizon: float = HORIZON,
+    far: Mapping[str, LongRun] | None = None,
+    watch: Watch = _unwatched,
+) -> list[Section]:
+    """Check the proof for both examples, and return the report's second part.
+
+    Parameters
+    ----------
+    horizon : float, optional
+        Length of the runs along which it is checked (s).
+    far : mapping of str to LongRun, optional
+        Runs far beyond that, see `evidence.far_runs_in_background`.
+    watch : callable, optional
+        See `Watch`.
+    """
+    return lyapunov_sections(_proved(horizon, watch), far)
+
+
+def robustness(
+    folders: Sequence[Path],
+    *,
+    threads: int | None = None,
+    tell: Callable[[str], object] = _untold,
+) -> list[Section]:
+    """Return runs of studies as the report's third part.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Of `analysis.studies.run`, of any loops.
+    threads : int, optional
+        For the rows that are simulated again to be drawn.
+    tell : callable, optional
+        Takes a sentence on what the part will lack.
+
+    Raises
+    ------
+    RunFolderError
+        If a folder holds no run, or one that was computed from another loop than today's.
+    """
+    results = [load_result(folder) for folder in folders]
+    found = [(r, rows_again(r, loop_again(r, tell=tell), threads)) for r in results]
+    return study_part(found, published=PUBLISHED)
+
+
+def compose(
+    folder: Path,
+    *,
+    studies: Sequence[str] = QUICK,
+    horizon: float = HORIZON,
+    far: bool = True,
+    whole: bool = False,
+    threads: int | None = None,
+    beside: Executor | None = None,
+    watch: Watch = _unwatched,
+    tell: Callable[[str], object] = _untold,
+) -> Composed:
+    """Reproduce the paper, check its proof, run the studies, and compose the report of it all.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the studies are run, each in a folder of its name; what is there is not replaced,
+        see `clear`.
+    studies : sequence of str, optional
+        Names of `analysis.studies.shipped`; without any there is no part on robustness.
+    horizon : float, optional
+        Length of the runs along which the proof is checked (s).
+    far : bool, optional
+        Whether the loops are run far beyond 20 s, which takes some seconds.
+    whole : bool, optional
+        Whether Example 2 is then run to its burst, which takes minutes, instead of going on with
+        the kept record.
+    threads : int, optional
+    beside : concurrent.futures.Executor, optional
+        One other process, for the other core; by default all runs in this one.
+    watch, tell : callable, optional
+        See `Watch` and `robustness`.
+
+    Raises
+    ------
+    UsageError
+        If a folder of a study holds a run.
+    KeyboardInterrupt
+        If a study was interrupted; those after it are not begun.
+    """
+    other = _Here() if beside is None else beside
+    ahead = [] if beside is None else [beside.submit(_compile_ahead, studies)]
+    with _far_away(far, whole) as long_runs:
+        runs, waiting = _runs(other, folder, studies, threads, watch)
+        found = _proved(horizon, watch)
+        with watch("running far beyond 20 s, and the studies", 2) as advance:
+            far_away = long_runs.result()
+            advance(1)
+            sections = paper_sections(runs, proofs=found, far=far_away)
+            drawn = draw_ahead(sections, until=waiting[-1].done)
+            *_, numbers = (task.result() for task in (*ahead, *waiting))
+            advance(1)
+    folders = [folder / name for name in studies]
+    made = paper_report(
+        runs,
+        proofs=found,
+        far=far_away,
+        sections=sections,
+        studies=robustness(folders, threads=threads, tell=tell) if folders else (),
+        numerics=numbers,
+    )
+    return Composed(report=made, drawn=drawn, passed=all(c.passed for c in checks(runs)))
+
+
+def clear(folder: Path, studies: Sequence[str] = QUICK, *, force: bool = False) -> None:
+    """Remove the runs of studies in a folder, to make them anew: runs and nothing else.
+
+    Raises
+    ------
+    UsageError
+        If a folder of such a name holds something else; with `force` that goes as well.
+    """
+    for name in studies:
+        if (folder / name).exists():
+            remove_run(folder / name, force=force)
+
+
+def _proved(horizon: float, watch: Watch) -> dict[int, proofs.Evidence]:
+    found = {}
+    with watch("checking the proof", 2) as advance:
+        for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
+            found[number] = proofs.evidence(loop, horizon)
+            advance(1)
+    return found
+
+
+@contextmanager
+def _far_away(far: bool, whole: bool) -> Iterator[Future[dict[str, LongRun]]]:
+    """Run the loops far beyond 20 s while the body goes on, or nothing."""
+    if far:
+        with proofs.far_runs_in_background(whole=whole) as long_runs:
+            yield long_runs
+    else:
+        yield _Here().submit(dict)
+
+
+def _runs(
+    beside: Executor, folder: Path, studies: Sequence[str], threads: int | None, watch: Watch
+) -> tuple[dict[str, Run], list[Future[Any]]]:
+    """Run the paper's cases; return them, and what runs in the other process meanwhile.
+
+    That is the studies, and last the numerics.  Both processes need the integrators: where nothing
+    is compiled yet only this one compiles them, while the other does what needs none.
+    """
+    with watch("simulating", len(CASES)) as advance:
+        runs = run_all(CASES[:1], done=lambda _: advance(1))
+        waiting = [beside.submit(_run_shipped, studies, folder, threads), beside.submit(numerics)]
+        runs |= run_all(CASES[1:], done=lambda _: advance(1))  # machine code: in this process
+    return runs, waiting
+
+
+def _run_shipped(names: Sequence[str], folder: Path, threads: int | None) -> None:
+    """Run studies that come with nlctl, each in ``folder/name``: what they find is on the disk."""
+    for name in names:
+        if run(read_study(shipped(name)), folder / name, threads=threads).interrupted:
+            raise KeyboardInterrupt
+
+
+def _compile_ahead(studies: Sequence[str]) -> None:
+    """Compile what is needed besides the integrators, first what the other process needs late."""
+    proofs.compile_ahead(paper.example_1())
+    proofs.compile_ahead(paper.example_2())
+    compile_cases(CASES)  # by now the other process has the first two
+    for name in studies:
+        compile_experiment(prepare(read_study(shipped(name)).experiment))

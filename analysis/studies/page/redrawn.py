@@ -1,0 +1,61 @@
+"""What a page draws from the loop of a run: it is made again, and some rows are simulated again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nlctl.errors import UsageError
+
+from ...robustness import Prepared
+from ..result import Result
+from ..run import reopened
+from ..sealed import RunFolderError
+from .histories import Histories, histories
+
+__all__ = ["loop_again", "rows_again"]
+
+
+def loop_again(
+    result: Result, *, trust: bool = False, tell: Callable[[str], object]
+) -> Prepared | None:
+    """Return the loop of a run again; None if it has gone.
+
+    Parameters
+    ----------
+    result : Result
+    trust : bool, optional
+        As in `analysis.studies.read_study`.
+    tell : callable
+        Takes a sentence on what the page will lack, or on versions that differ.
+
+    Raises
+    ------
+    RunFolderError
+        If the results were computed from another loop than today's: nothing is drawn from it.
+    """
+    try:
+        run = reopened(result.folder, trust=trust)
+    except RunFolderError:
+        raise
+    except UsageError as error:  # what was found is shown all the same
+        tell(f"the report has no fans and no diagram: {error}")
+        return None
+    if run.versions:
+        told = f"computed with other versions ({run.versions}): fans are drawn with those of today"
+        tell(f"'{result.folder}' was {told}")
+    return run.prepared
+
+
+def rows_again(
+    result: Result, prepared: Prepared | None, threads: int | None = None
+) -> Histories | None:
+    """Simulate some rows of the main table again; None without rows or loop."""
+    if prepared is None or result.rows is None or not result.rows.done:
+        return None
+    told = [
+        look(f)
+        for f in result.findings
+        if (look := result.asked[f.key].definition.witness) is not None and f.is_answered
+    ]
+    witness = min(told, key=lambda pair: pair[1], default=None)
+    return histories(prepared, result.rows.table, witness, threads=threads)
