@@ -20,6 +20,12 @@ def folder(tmp_path_factory):
     return here
 
 
+def files_in(folder):
+    """What is in a folder, but for locks and what Python keeps of imported modules."""
+    ours = (".lock", ".owner", "__pycache__")
+    return sorted(p for p in folder.rglob("*") if not {*p.parts} & {*ours})
+
+
 def in_the_way(folder, tmp_path, command, file, content):
     """Write a study and a file where a command would write; return the command and the file."""
     write(tmp_path, HEAD, SMALL)
@@ -50,7 +56,7 @@ def in_the_way(folder, tmp_path, command, file, content):
 def test_what_others_have_made_stays(folder, tmp_path, command, file, content):
     """One sentence names it and --force; the file is untouched, and no file has come."""
     command, path = in_the_way(folder, tmp_path, command, file, content)
-    before = sorted(p for p in tmp_path.rglob("*") if p.name not in (".lock", ".owner"))
+    before = files_in(tmp_path)
     told = nlctl_here(*command, cwd=tmp_path)
     assert (told.returncode, told.stdout) == (2, ""), told
     assert {*file.split("/")} & {
@@ -59,7 +65,7 @@ def test_what_others_have_made_stays(folder, tmp_path, command, file, content):
     assert "--force" in told.stderr
     assert len(told.stderr.strip().splitlines()) == 1
     assert path.read_text(encoding="utf-8") == content
-    after = sorted(p for p in tmp_path.rglob("*") if p.name not in (".lock", ".owner"))
+    after = files_in(tmp_path)
     assert after == before
 
 

@@ -12,6 +12,7 @@ from ..params import as_numbers, param, record
 __all__ = ["Backlash"]
 
 
+@equation
 def play_band(u, p):
     """Return the lower and upper output that the gap admits at input u.
 

@@ -62,7 +62,6 @@ class DeadZone:
         return u1 - p.b_l, u1 - p.b_r
 
 
-@equation
 @record
 class Gain:
     """Linear actuator.
