@@ -232,6 +232,7 @@ MISTAKES = [  # the analysis, the place that is named, and words
     ('kind = "spread.py:spred"', ("analysis", 0, "kind"), "nearest: 'spread'"),
     ('kind = "gone.py:spread"', ("analysis", 0, "kind"), "there is no file"),
     ('kind = "spread.py:not_a_kind"', ("analysis", 0, "kind"), "is a int"),
+    ('kind = "spred"', ("analysis", 0, "kind"), "a kind of your own is 'path/to/file.py:name'"),
     ('kind = "subprocess:run"', ("analysis", 0, "kind"), "standard library"),
     ('kind = "spread.py:spread"\nof = "spac"', ("analysis", 0, "of"), "nearest: 'spec'"),
     ('kind = "spread.py:spread"\nlimit = -1.0', ("analysis", 0, "limit"), "greater than 0"),
@@ -283,6 +284,21 @@ def test_a_run_can_be_read_whose_kind_has_gone(tmp_path, forgotten):
     with pytest.raises(StudyError, match="there is no file"):
         read_study(path)
     remove_run(tmp_path / "run")
+
+
+def test_a_kind_from_elsewhere_is_imported_for_who_trusts_it(tmp_path):
+    """Without trust a run is read all the same, and the note says what its page lacks."""
+    home = tmp_path / "study"
+    home.mkdir()
+    path = written(home, SPREAD.replace("spread.py", "../spread.py"))
+    (home / "spread.py").rename(tmp_path / "spread.py")
+    with pytest.raises(StudyError, match=r"analysis\[1\]\.kind: .* Trust it with --trust"):
+        read_study(path)
+    found = run(read_study(path, trust=True), home / "run")
+    for trust in (False, True):
+        again = load_result(home / "run", trust=trust)
+        assert again["spread"].plain() == found["spread"].plain()
+        assert any("Trust it with --trust" in note for note in again.notes) is not trust
 
 
 def test_a_run_is_not_continued_with_another_kind(tmp_path, forgotten):

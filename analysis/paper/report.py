@@ -1,10 +1,9 @@
 """The report of the paper, from Python: what ``nlctl report`` writes, and each of its three parts.
 
->>> from pathlib import Path
->>> from analysis.paper.report import compose
->>> from analysis.report import write_report
->>> made = compose(Path("reports/paper"))                    # doctest: +SKIP
->>> write_report(made.report, Path("reports/paper"))         # doctest: +SKIP
+In a notebook::
+
+    made = compose(Path("reports/paper"))
+    write_report(made.report, Path("reports/paper"))          # of analysis.report
 """
 
 from __future__ import annotations

@@ -26,6 +26,7 @@ __all__ = [
 
 Place = tuple[str | int, ...]
 LONGEST = 600  # characters of a mistake
+OWN_KIND = "a kind of your own is 'path/to/file.py:name' or 'module:name'"
 LARGEST = 10**40  # integers beyond are not printed
 
 
@@ -162,7 +163,10 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
             place, message = (*place, "kind"), "is missing"
         elif one["type"] == "union_tag_invalid":
             tags = context["expected_tags"].replace("'", "").split(", ")
-            place, message = (*place, "kind"), str(unknown("kind", str(context["tag"]), tags))
+            place, message = (
+                (*place, "kind"),
+                f"{unknown('kind', str(context['tag']), tags)}; {OWN_KIND}",
+            )
         elif "input" in one and not isinstance(one["input"], dict | list):
             message = f"{message}, got {_text(one['input'])}"
         found.append(Problem(place=place, message=message))
