@@ -5,6 +5,7 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 
+from ._along import derivatives
 from ._compile import Compiled
 from ._discrete import compile_discrete
 from ._machine import WIDTH, machine
@@ -34,6 +35,8 @@ def compile_for(compiled: Compiled, p: np.ndarray, width: int) -> None:
     """Make the machine code that runs with parameters `p` need, as `machine` takes them."""
     if ct.isctime(compiled.system):
         machine(compiled, p, width)
+        if width == 1:
+            derivatives(compiled, p[:, 0])
     else:
         machine(compiled, p[:, :1], 1)
         compile_discrete()

@@ -18,7 +18,7 @@ from .._names import unknown
 from .._run_arguments import checked_params
 from ._describe import described
 from ._emit import Program, emit
-from ._jacobians import Tangent, linearize, parameter_jacobian, tangent
+from ._jacobians import Tangent, inexact, linearize, parameter_jacobian, tangent
 from ._lower import Lowered, lower
 from ._lower_blocks import Equations, equations
 from ._machine import evaluations
@@ -48,6 +48,9 @@ class Compiled:
     It is no python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
     run it, ``compiled.linearize(x0)`` linearizes it with exact derivatives, and for every other
     function of python-control there is ``compiled.system``.
+
+    The stiff method's Jacobian is exact too.  Where a function is opaque or algebraic loops are
+    solved it is taken by differences; the printed form says so, and why.
     """
 
     schedule: Schedule
@@ -209,7 +212,7 @@ class Compiled:
         return result
 
     def __repr__(self) -> str:
-        return described(self.schedule, self.program, self.parameter_vector())
+        return described(self.schedule, self.program, self.parameter_vector(), inexact(self))
 
 
 def compile(  # noqa: A001 (what it does)

@@ -16,7 +16,9 @@ from ._schedule import Node, Schedule
 SHOWN = 8  # names that are listed before the rest is only counted
 
 
-def described(schedule: Schedule, program: Program, p: np.ndarray) -> str:
+def described(
+    schedule: Schedule, program: Program, p: np.ndarray, inexact: str | None = None
+) -> str:
     """Return what was compiled, block by block in the order of evaluation.
 
     Parameters
@@ -25,6 +27,8 @@ def described(schedule: Schedule, program: Program, p: np.ndarray) -> str:
     program : Program
     p : ndarray
         The parameter vector whose values are shown.
+    inexact : str, optional
+        Why the stiff method has no exact Jacobian.
     """
     system, nodes = schedule.system, schedule.nodes
     lines = [
@@ -33,6 +37,9 @@ def described(schedule: Schedule, program: Program, p: np.ndarray) -> str:
         f"{_count(system.noutputs, 'output')}",
         f"  order        {' -> '.join(nodes[i].path for i in schedule.order)}",
     ]
+    if ct.isctime(system) and system.nstates:
+        how = "exact" if inexact is None else f"by differences, since {inexact}"
+        lines.append(f"  Jacobian     {how}")
     for loop in schedule.loops:
         torn = ", ".join(
             f"{nodes[s.block or 0].path}.{nodes[s.block or 0].system.output_labels[s.index]}"

@@ -19,10 +19,22 @@ from . import _address, _rodas5p, _tsit5
 from ._address import call_rhs
 from ._control import choose_method, choose_step, next_step, rejected
 from ._events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
-from ._lane import INNER, LANES, RUNNING
+from ._lane import DERIVATIVES, INNER, LANES, RUNNING
 from ._restart import memory_rates, restart, start
 from ._stiff import stiff_attempt
-from ._work import AUTO, OUT, RESTART, RHS, STIFF_ATTEMPT, TASK, WORK, inputs_at, outputs
+from ._work import (
+    ALONG,
+    AUTO,
+    OUT,
+    RESTART,
+    RHS,
+    STIFF_ATTEMPT,
+    TASK,
+    UNKNOWN,
+    WORK,
+    inputs_at,
+    outputs,
+)
 from .codegen.fingerprint import function_key, module_key
 from .codegen.machine_code import Wanted
 from .codegen.machine_code import machine_code as stored_code
@@ -155,11 +167,12 @@ def _take(task, w, done):
             w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
 
 
-def advance(rhs, restart, stiff_attempt, task, lanes, w, states, rounds):
+def advance(rhs, restart, stiff_attempt, along, task, lanes, w, states, rounds):
     """Try at most `rounds` steps in every lane; fill ``states[m, :, lane]`` for passed times.
 
-    A run's ``lane.status`` is RUNNING until it has ended.  What is rarely called is an argument,
-    and so machine code of its own: it is compiled once and not into this function too.
+    A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
+    before the stiff method knows where to get its Jacobian from.  What is rarely called is an
+    argument, and so machine code of its own: it is compiled once and not into this function too.
     """
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     for _ in range(rounds):
@@ -171,8 +184,11 @@ def advance(rhs, restart, stiff_attempt, task, lanes, w, states, rounds):
                 running += lanes[j].status == RUNNING
         if not running:
             return
+        if lanes[0].stiff and task.derivatives == UNKNOWN:
+            lanes[0].status = DERIVATIVES
+            return
         if lanes[0].stiff:
-            stiff_attempt(rhs, task, lanes, w)
+            stiff_attempt(rhs, along, task, lanes, w)
         else:
             _explicit_attempt(rhs, task, lanes, w)
         if task.memory.size:
@@ -212,7 +228,7 @@ def _wanted() -> list[Wanted]:
         code(restart, *RESTART.signature.args, **rarely),
         code(stiff_attempt, *STIFF_ATTEMPT.signature.args, **rarely),
         code(start, RHS, RESTART, *common, **often),
-        code(advance, RHS, RESTART, STIFF_ATTEMPT, *common, samples, numba.int64, **often),
+        code(advance, RHS, RESTART, STIFF_ATTEMPT, ALONG, *common, samples, numba.int64, **often),
         code(outputs, RHS, OUT, TASK, WORK, samples, samples, **often),
     ]
 
@@ -222,6 +238,6 @@ def _machine_code() -> dict[str, Callable[..., None]]:
     again, stiff, begin, go_on, fill = stored_code(integrator_key(), _wanted())
     return {
         "start": lambda rhs, *rest: begin(rhs, again, *rest),
-        "advance": lambda rhs, *rest: go_on(rhs, again, stiff, *rest),
+        "advance": lambda rhs, along, *rest: go_on(rhs, again, stiff, along, *rest),
         "outputs": fill,
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
 
@@ -12,13 +12,14 @@ import numpy as np
 
 from .._errors import ParameterError
 from .._names import unknown
+from ._along import Along, derivatives
 from ._compile import Compiled
 from ._discrete import simulate_discrete
 from ._integrate import machine_code
-from ._lane import RUNNING, Status, new_lanes
+from ._lane import DERIVATIVES, RUNNING, Status, new_lanes
 from ._machine import Machine, machine
 from ._pointed import with_table
-from ._work import AUTO, EXPLICIT, IMPLICIT, Task, new_work
+from ._work import AUTO, DIFFERENCES, EXACT, EXPLICIT, IMPLICIT, UNKNOWN, Task, new_work
 
 METHODS = {"auto": AUTO, "tsit5": EXPLICIT, "rodas5p": IMPLICIT}
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
@@ -42,7 +43,7 @@ class Settings:
 
     rtol: float = 1e-8
     atol: float = 1e-10
-    max_steps: int = 10_000_000
+    max_steps: int = 10_000_000_000
     method: str = "auto"
     step: float = 0.0
 
@@ -114,6 +115,7 @@ def trajectory(
             begin(run)
             while run.lanes["status"][0] == RUNNING:
                 go_on(run)
+                run = differentiated(compiled, run, p)
                 if progress is not None:
                     progress(float(run.lanes["t"][0]))
         except KeyboardInterrupt:
@@ -152,6 +154,8 @@ class Run:
         Samples, NaN beyond the time that a member has reached.
     signals : int
         Number of outputs.
+    along : Along or None
+        Exact derivatives, if the stiff method has asked for them and there are any.
     """
 
     machine: Machine
@@ -160,6 +164,7 @@ class Run:
     lanes: np.ndarray
     states: np.ndarray
     signals: int
+    along: Along | None = None
 
 
 def begin(run: Run) -> None:
@@ -173,8 +178,21 @@ def begin(run: Run) -> None:
 def go_on(run: Run, rounds: int = ROUNDS) -> None:
     """Try up to `rounds` steps in every lane that is still running."""
     rhs, _ = run.machine.entries
-    machine_code()["advance"](rhs, run.task, run.lanes, run.work, run.states, rounds)
+    along = 0 if run.along is None else run.along.entry
+    machine_code()["advance"](rhs, along, run.task, run.lanes, run.work, run.states, rounds)
     run.machine.check(run.task.p)
+
+
+def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
+    """Return a run with the derivatives that its stiff method has asked for, if it has."""
+    if run.lanes["status"][0] != DERIVATIVES:
+        return run
+    along, given = derivatives(compiled, p), run.task._asdict()
+    del given["table"]
+    given["derivatives"] = EXACT if along else DIFFERENCES
+    given["c_along"] = along.c if along else given["c_along"]
+    run.lanes["status"] = RUNNING
+    return replace(run, task=with_table(Task, **given), along=along)
 
 
 def finish(run: Run) -> np.ndarray:
@@ -211,6 +229,8 @@ def prepared(
         max_steps=int(settings.max_steps),
         method=METHODS[settings.method],
         alone=int(count == 1),
+        derivatives=UNKNOWN,
+        c_along=np.zeros((1, 1)),
     )
     lanes, work = new_lanes(times, count), new_work(n, inputs.shape[0], program.events, count)
     lanes["stiff"] = settings.method == "rodas5p"

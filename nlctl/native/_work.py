@@ -17,9 +17,11 @@ from ._address import call_out, call_rhs
 from ._lane import INNER, LANES
 from ._pointed import pointed, with_table
 
-RHS = OUT = numba.intp  # addresses
+RHS = OUT = ALONG = numba.intp  # addresses
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
+UNKNOWN, DIFFERENCES, EXACT = 0, 1, 2  # where the stiff method has its Jacobian from
+DIRECTIONS = 8  # that are taken together
 
 
 @pointed
@@ -37,6 +39,8 @@ class Task(NamedTuple):
     max_steps: int
     method: int
     alone: int  # whether this is a single run
+    derivatives: int  # UNKNOWN until the stiff method asks for them
+    c_along: np.ndarray  # what exact ones read besides their arguments
     table: np.ndarray
 
 
@@ -72,19 +76,28 @@ class Work(NamedTuple):
     x_stage_flat: np.ndarray
     x_ahead_flat: np.ndarray
     k_flat: np.ndarray
+    dx_ahead_flat: np.ndarray
     jacobian: np.ndarray  # of the stiff method, empty with several lanes
     matrix: np.ndarray
     f_t: np.ndarray
     pivots: np.ndarray
     U: np.ndarray
+    t_along: np.ndarray  # what exact derivatives are evaluated with, a direction in each column
+    x_along: np.ndarray
+    u_along: np.ndarray
+    v: np.ndarray
+    dx_along: np.ndarray
     table: np.ndarray
+
+
+_STATES = ("x", "x_new", "x_stage", "x_ahead", "dx_ahead")
 
 
 def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
     """Return the arrays for integrating members with `n` states."""
     stiff = n if lanes == 1 else 0  # the stiff method is for single runs
     shapes: dict[str, tuple[int, ...]] = {
-        **dict.fromkeys(("x", "x_new", "x_stage", "x_ahead", "dx_ahead"), (n, lanes)),
+        **dict.fromkeys(_STATES, (n, lanes)),
         **dict.fromkeys(("g", "g_ahead", "g_start", "slope", "slope_start"), (events, lanes)),
         **dict.fromkeys(("e", "e_start", "e_low", "e_high", "behind"), (events, lanes)),
         **dict.fromkeys(("t", "h", "error", "rate", "t_end"), (lanes,)),
@@ -94,9 +107,13 @@ def new_work(n: int, inputs: int, events: int, lanes: int) -> Work:
         **dict.fromkeys(("jacobian", "matrix"), (stiff, stiff)),
         "f_t": (stiff,),
         "U": (_rodas5p.STAGES, stiff),
+        "t_along": (DIRECTIONS,),
+        **dict.fromkeys(("x_along", "dx_along"), (stiff, DIRECTIONS)),
+        "u_along": (inputs, DIRECTIONS),
+        "v": (stiff + inputs + 1, DIRECTIONS),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-    flat = {f"{x}_flat": arrays[x].reshape(-1) for x in ("x", "x_new", "x_stage", "x_ahead")}
+    flat = {f"{x}_flat": arrays[x].reshape(-1) for x in _STATES}
     k_flat = arrays["k"].reshape(_tsit5.STAGES, n * lanes)
     pivots = np.zeros(stiff, dtype=np.int64)
     return with_table(Work, **arrays, **flat, k_flat=k_flat, pivots=pivots)
@@ -106,11 +123,11 @@ _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
 TASK = numba.typeof(  # only the types of these matter
     with_table(
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
-        fixed=0.0, max_steps=0, method=0, alone=0,
+        fixed=0.0, max_steps=0, method=0, alone=0, derivatives=0, c_along=_GRID,
     )
 )  # fmt: skip
 WORK = numba.typeof(new_work(1, 1, 1, 1))
-STIFF_ATTEMPT = numba.types.FunctionType(numba.void(RHS, TASK, LANES, WORK))
+STIFF_ATTEMPT = numba.types.FunctionType(numba.void(RHS, ALONG, TASK, LANES, WORK))
 RESTART = numba.types.FunctionType(numba.void(RHS, TASK, LANES, WORK, numba.boolean[::1]))
 
 
