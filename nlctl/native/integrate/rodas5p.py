@@ -64,10 +64,7 @@ H[2] = (
 )
 
 
-SUMS = {**INNER, "fastmath": {"reassoc", "contract"}}  # sums in vector registers; NaN is kept
-
-
-@numba.njit(**SUMS)
+@numba.njit(**INNER)
 def factorise(matrix, pivots):
     """Factorise a square matrix in place, P M = L U, with partial pivoting."""
     n = matrix.shape[0]
@@ -89,45 +86,19 @@ def factorise(matrix, pivots):
                     matrix[i, j] -= factor * matrix[c, j]
 
 
-@numba.njit(**SUMS)
+@numba.njit(**INNER)
 def solve(matrix, pivots, b):
     """Solve with the factors of `factorise`; `b` becomes the solution."""
     n = b.size
     for i in range(n):
         other = pivots[i]
         b[i], b[other] = b[other], b[i]
-    for i in range(1, n):
-        total = 0.0
         for j in range(i):
-            total += matrix[i, j] * b[j]
-        b[i] -= total
+            b[i] -= matrix[i, j] * b[j]
     for i in range(n - 1, -1, -1):
-        total = 0.0
         for j in range(i + 1, n):
-            total += matrix[i, j] * b[j]
-        b[i] = (b[i] - total) / matrix[i, i]
-
-
-@numba.njit(**SUMS)
-def stage(s, x, U, result):
-    """Fill `result` with the state of stage `s`."""
-    for i in range(x.size):
-        result[i] = x[i]
-    for j in range(s):
-        weight = A[s, j]
-        for i in range(x.size):
-            result[i] += weight * U[j, i]
-
-
-@numba.njit(**SUMS)
-def right_side(s, h, dx, f_t, U):
-    """Fill U[s] with the right side of its linear equations, dx the derivative at stage `s`."""
-    for i in range(dx.size):
-        U[s, i] = dx[i] + h * D[s] * f_t[i]
-    for j in range(s):
-        weight = C[s, j] / h
-        for i in range(dx.size):
-            U[s, i] += weight * U[j, i]
+            b[i] -= matrix[i, j] * b[j]
+        b[i] /= matrix[i, i]
 
 
 @numba.njit(**INNER)
@@ -154,13 +125,3 @@ def interpolate(theta, x, x_new, U, result):
             polynomial = polynomial * theta + coefficient
         rest = 1.0 - theta
         result[i, 0] = rest * x[i, 0] + theta * (x_new[i, 0] + rest * polynomial)
-
-
-@numba.njit(**INNER)
-def end_slope(h, x, x_new, U, result):
-    """Fill `result` with the slope of the interpolant at the end of a step."""
-    for i in range(x.size):
-        rest = 0.0
-        for s in range(STAGES):
-            rest += (H[0, s] + H[1, s] + H[2, s]) * U[s, i]
-        result[i] = (x_new[i] - x[i] - rest) / h

@@ -89,15 +89,16 @@ class Routine:
 Runnable = Callable[..., None]
 
 
-def plain_functions(lowered: Lowered) -> tuple[Runnable, ...]:
-    """Return the functions of a program as plain Python, in their order."""
+def plain_functions(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
+    """Return ``prepare``, ``rhs`` and ``out`` of a program as plain Python."""
     calls = plain_calls(lowered.calls)
     calls |= {name: plain_solver(solver) for name, solver in lowered.solvers.items()}
-    return tuple(interpreted(f, lowered.lanes, calls) for f in lowered.functions.values())
+    prepare, rhs, out = (interpreted(f, lowered.lanes, calls) for f in lowered.functions.values())
+    return prepare, rhs, out
 
 
-def lowered_code(lowered: Lowered) -> tuple[Runnable, ...]:
-    """Return the functions of a program as machine code, from the cache if it is there.
+def lowered_code(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
+    """Return ``prepare``, ``rhs`` and ``out`` as machine code, from the cache if it is there.
 
     With NUMBA_DISABLE_JIT=1 the same plan is carried out in plain Python.
 
@@ -110,7 +111,8 @@ def lowered_code(lowered: Lowered) -> tuple[Runnable, ...]:
         return plain_functions(lowered)
     native = native_calls(lowered.calls, lowered.lanes)
     loaded = finished(lowered.text, lowered.functions, native.symbols, native.owners)
-    return tuple(_routine(lowered, name, loaded, native) for name in lowered.functions)
+    prepare, rhs, out = (_routine(lowered, name, loaded, native) for name in lowered.functions)
+    return prepare, rhs, out
 
 
 def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Routine:
