@@ -45,7 +45,7 @@ def test_wheel_holds_both_packages_and_their_data(wheel):
         *("analysis/report/templates/report.html", "analysis/report/templates/report.css"),
         *("analysis/report/templates/report.js", "analysis/report/templates/gallery.html"),
         "analysis/studies/reports/example-1-quick.toml",
-        "analysis/lyapunov/example-2-burst.csv",
+        "analysis/paper/example-2-burst.csv",
         *("analysis/report/fonts/nlctl-math.woff2", "analysis/report/fonts/OFL.txt"),
         *("analysis/report/templates/history.js", "analysis/report/templates/history.css"),
         *("analysis/report/vendor/uplot/uPlot.iife.min.js", "analysis/report/vendor/uplot/LICENSE"),
