@@ -1,7 +1,7 @@
 """Make the integrators' bitcode that is shipped: ``python -m nlctl.native.ship``.
 
 To be run after every change of the integrators' sources, before it is committed; it takes some
-fifteen seconds.  Until then the new sources are compiled by numba on each machine, and a test of
+twenty seconds.  Until then the new sources are compiled by numba on each machine, and a test of
 the everyday suite fails.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -57,4 +58,4 @@ def _imported(path: Path) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    ship()
+    ship(*map(Path, sys.argv[1:]))
