@@ -85,7 +85,8 @@ class Creep:
         turns round before; and the earliest and the latest time when mean rate and dependence on
         1/|N| are moved by two standard errors each, and the time that is left by 5 % more.  It
         is meant to hold the burst in nine of ten loops at least, and has done so in simulated ones
-        (tests/test_creep_forecast.py), as long as disturbance and reference go on as they were.
+        (tests/lyapunov/test_creep_forecast.py), as long as disturbance and reference go on as they
+        were.
     balance : Balance
         The law fitted to all windows.
     rest, rest_range : float or None, tuple of float or None

@@ -3,8 +3,9 @@
 The C library's functions take one number at a time; these cost the same for a vector.  Each is the
 textbook's: reduce the argument by a multiple of a constant that is a sum of floats, each product
 rounded once; take a polynomial by Estrin's scheme; put the power of two, or the sign, back.
-tests/test_ir_functions.py measures the errors (exp, exp2 1.5, sin, cos and tanh 2.1 units in the
-last place) and derives the polynomials: interpolation at the Chebyshev nodes of the reduced range.
+tests/expressions/test_ir_functions.py measures the errors (exp, exp2 1.5, sin, cos and tanh 2.1
+units in the last place) and derives the polynomials: interpolation at the Chebyshev nodes of the
+reduced range.
 """
 
 from __future__ import annotations

@@ -1,0 +1,174 @@
+"""The design's layers: imports go downwards only, modules and functions stay small."""
+
+import ast
+import subprocess
+import sys
+from graphlib import TopologicalSorter
+
+from places import ROOT
+
+LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
+    ["nlctl._version", "nlctl.host"],
+    ["nlctl.errors", "nlctl.names", "nlctl.arguments", "nlctl.params", "nlctl.equations"],
+    ["nlctl.blocks", "nlctl.diagrams", "nlctl.functions", "nlctl.drawing", "nlctl.responses"],
+    ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers"],
+    ["nlctl.paper"],
+    ["nlctl.expressions"],
+    ["nlctl.native"],
+    ["nlctl.response", "nlctl.__main__"],
+    ["analysis.json_values", "analysis.catalogue", "analysis.metrics", "analysis.intervals"],
+    ["analysis.lyapunov", "analysis.robustness"],
+    ["analysis.figures", "analysis.report"],
+    ["analysis.studies"],
+    ["analysis.paper"],
+    ["analysis.cli"],
+]
+BLOCK_MODULES = LAYERS[3]
+FILES = sorted(p for package in ("nlctl", "analysis") for p in (ROOT / package).rglob("*.py"))
+
+
+def module_name(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_name(path): ast.parse(path.read_text(encoding="utf-8")) for path in FILES}
+PACKAGES = {module_name(path) for path in FILES if path.name == "__init__.py"}
+MEMBERS = [name for name in MODULES if name not in ("nlctl", "analysis")]  # these only re-export
+
+
+def runtime_nodes(tree):
+    """Yield the nodes of a module, but not what stands under `if TYPE_CHECKING:`."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            continue
+        yield node
+        yield from runtime_nodes(node)
+
+
+def imports(name):
+    """Return the modules of this project that a module imports, also inside functions."""
+    found = set()
+    for node in runtime_nodes(MODULES[name]):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = name.split(".")
+            if name not in PACKAGES:
+                base = base[:-1]
+            base = base[: len(base) - node.level + 1] if node.level else []
+            source = ".".join([*base, *([node.module] if node.module else [])])
+            members = {f"{source}.{alias.name}" for alias in node.names}
+            found |= (members & set(MODULES)) or {source}
+    return {module for module in found if module.split(".")[0] in ("nlctl", "analysis")}
+
+
+def within(name, prefixes):
+    """Whether a module is one of those named, or inside of one."""
+    return any(name == prefix or name.startswith(f"{prefix}.") for prefix in prefixes)
+
+
+def layer(name):
+    """Return the number of a module's layer."""
+    fits = [
+        (len(prefix), number)
+        for number, prefixes in enumerate(LAYERS)
+        for prefix in prefixes
+        if within(name, [prefix])
+    ]
+    assert fits, f"{name} belongs to no layer: give it a place in LAYERS"
+    return max(fits)[1]
+
+
+def test_imports_go_downwards_only():
+    """No module imports one of a higher layer, not even lazily inside a function."""
+    upwards = {n: {m for m in imports(n) if layer(m) > layer(n)} for n in MEMBERS}
+    assert {name: found for name, found in upwards.items() if found} == {}
+
+
+def test_there_are_imports_to_look_at():
+    """The reader of imports sees relative, absolute and lazy ones."""
+    assert "nlctl.params" in imports("nlctl.plants")
+    assert "nlctl.functions" in imports("nlctl.controllers.rbf")
+    assert "nlctl.controllers" in imports("nlctl.paper")
+    assert layer("nlctl.controllers.rbf") == 3
+
+
+def test_no_module_imports_itself_in_a_ring():
+    """There is an order in which every module comes after those that it imports."""
+    packages_inside = {n: {m for m in imports(n) if m in MEMBERS and m != n} for n in MEMBERS}
+    order = list(TopologicalSorter(packages_inside).static_order())
+    assert set(order) == set(MEMBERS)
+
+
+def test_nlctl_knows_nothing_of_analysis():
+    """Blocks, diagrams and the engine can be used without it; the command is looked up by name."""
+    upwards = {n for n in MEMBERS if n.startswith("nlctl.") for m in imports(n) if "analysis" in m}
+    assert upwards == set()
+
+
+def test_drawing_and_native_code_know_no_blocks():
+    """They treat any python-control diagram alike, with or without our blocks."""
+    for name in ("nlctl.drawing", "nlctl.native"):
+        assert [m for m in MEMBERS if within(m, [name])], f"{name} does not exist"
+    readers = [m for m in MEMBERS if within(m, ["nlctl.drawing", "nlctl.native"])]
+    blocks = (*BLOCK_MODULES, "nlctl.paper")
+    known = {name: {m for m in imports(name) if m.startswith(blocks)} for name in readers}
+    assert {name: found for name, found in known.items() if found} == {}
+
+
+def test_layout_is_independent_of_python_control():
+    """Geometry needs sizes and connections only."""
+    geometry = [m for m in MEMBERS if within(m, ["nlctl.drawing"]) and "picture" not in m]
+    for name in geometry[1:]:  # the first is the package, which re-exports
+        assert all(within(m, ["nlctl.drawing"]) for m in imports(name))
+        assert "import control" not in ast.unparse(MODULES[name])
+    assert len(geometry) > 4
+
+
+def lines_of_functions(path, lines):
+    """Yield the name and the lines of code of every function, docstrings not counted."""
+    for node in ast.walk(MODULES[module_name(path)]):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+            if body:
+                code = [s.strip() for s in lines[body[0].lineno - 1 : node.end_lineno]]
+                yield node.name, len([s for s in code if s and not s.startswith("#")])
+
+
+def test_modules_and_functions_are_small():
+    """At most 500 lines a module, 40 lines of code a function."""
+    large = []
+    for path in FILES:
+        name, lines = str(path.relative_to(ROOT)), path.read_text(encoding="utf-8").splitlines()
+        if len(lines) > 500:
+            large.append((name, len(lines)))
+        large += [(f"{name}: {f}", n) for f, n in lines_of_functions(path, lines) if n > 40]
+    assert large == []
+
+
+NOT_COUNTED = ("__init__", "__main__", "_version")
+
+
+def test_rooms_are_small():
+    """At most 12 modules a folder, and a package says in its docstring what is in it."""
+    rooms = {path.parent for path in FILES}
+    counts = {
+        str(room.relative_to(ROOT)): len(
+            [p for p in room.glob("*.py") if p.stem not in NOT_COUNTED]
+        )
+        for room in rooms
+    }
+    assert {room: n for room, n in counts.items() if n > 12} == {}
+    assert [name for name in PACKAGES if not ast.get_docstring(MODULES[name])] == []
+
+
+def test_importing_is_cheap():
+    """`nlctl --help` and `import nlctl` load none of the heavy libraries."""
+    heavy = ["control", "scipy", "numba", "matplotlib", "pandas"]
+    for module in ("nlctl", "analysis.cli.main"):
+        code = f"import {module}, sys; print(*(m for m in {heavy} if m in sys.modules))"
+        run = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        )
+        assert (module, run.stdout.split()) == (module, [])
