@@ -285,6 +285,8 @@ def _check_timebase(spec: Any, name: str, dt: Any) -> None:
 def default_state(system: ct.InputOutputSystem) -> np.ndarray:
     """Return the initial state of one block: what its record declares, otherwise 0."""
     x = np.zeros(system.nstates or 0)
+    if hasattr(system, "default_state"):  # a block that has another one inside
+        return system.default_state()
     if isinstance(system, Block):
         states = list(system.spec.states)  # python-control may have renamed the block's own labels
         for name, value in getattr(system.spec, "initial", {}).items():

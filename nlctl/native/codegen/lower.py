@@ -31,6 +31,7 @@ ARGUMENTS = {
     "rhs": ("t", "x", "u", "c", "dx", "g"),
     "out": ("t", "x", "u", "c", "y"),
 }
+SAMPLE = ("t", "x", "u", "c", "s")  # of those of sampled blocks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +41,8 @@ class Lowered:
     Attributes
     ----------
     functions : mapping
-        Plans of ``prepare(p, c)``, ``rhs(t, x, u, c, dx, g)`` and ``out(t, x, u, c, y)``.  All
+        Plans of ``prepare(p, c)``, ``rhs(t, x, u, c, dx, g)`` and ``out(t, x, u, c, y)``, and of a
+        ``sample(t, x, u, c, s)`` for each meeting of the clocks of sampled blocks.  All
         arrays have a row per number and a column per member, `t` is one row.  `prepare` fills `c`
         with all that depends on the parameters `p` alone; the rest of `c` is room that `rhs` and
         `out` write to, so members that run at the same time need a `c` each.
@@ -111,9 +113,9 @@ def lower(
     Lowered
     """
     if found is None:
-        found = equations(schedule, program.layout)
+        found = equations(schedule, program.layout, meetings=program.meetings)
     written = {
-        name: [part for row, array in rows for part in _stores(name, row, array)]
+        name: [part for row, array in rows for part in _stores(_array(name), row, array)]
         for name, rows in found.results.items()
     }
     stores, exact = rewritten(found.graph, written)
@@ -123,7 +125,7 @@ def lower(
     rows = {
         "p": parameters, "t": 1, "x": system.nstates or 0, "u": system.ninputs or 0,
         "c": max(size, 1), "dx": system.nstates or 0, "g": program.events,
-        "y": len(schedule.outputs),
+        "y": len(schedule.outputs), "s": len(program.sampled),
     }  # fmt: skip
     return Lowered(
         functions=functions, exact=exact, calls=found.calls, solvers=found.solvers, rows=rows,
@@ -140,14 +142,21 @@ def _planned(stores: Mapping[str, list[Store]], parameters: int) -> tuple[dict[s
         if r >= parameters
     ]
     wanted = {"prepare": prepared, "rhs": [*stores["dx"], *stores["g"]], "out": stores["y"]}
+    samples = {name: SAMPLE for name in stores if name.startswith("sample")}
+    wanted |= {name: stores[name] for name in samples}
     functions, size = {}, parameters + sum(store.size for store in prepared)
-    for name, arguments in ARGUMENTS.items():
+    for name, arguments in (ARGUMENTS | samples).items():
         first = name == "prepare"
         planned = plan(wanted[name], {} if first else known, size)
         size = planned.rows
         copied = parameters if first else 0
         functions[name] = Function(arguments=arguments, plan=planned, copied=copied)
     return functions, size
+
+
+def _array(results: str) -> str:
+    """Return the array that results are written to."""
+    return "s" if results.startswith("sample") else results
 
 
 def _stores(name: str, row: int, array: Tracer) -> list[Store]:

@@ -39,6 +39,7 @@ _FIELDS = [
     ("rate", "f8"),  # estimate of the largest eigenvalue's magnitude (1/s)
     ("jacobian_at", "f8"),  # time for which the Jacobian matrix is known
     ("segment", "i8"),  # interval of the time grid in which t lies
+    ("tick", "i8"),  # what happens next to sampled blocks
     ("status", "i8"),
     ("accepted", "i8"),
     ("rejected", "i8"),
