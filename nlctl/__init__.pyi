@@ -50,6 +50,7 @@ from .params import param, record
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
+from .sampling import Clock, Sampled, discretise, sampled
 
 __all__ = [
     "PID",
@@ -62,6 +63,7 @@ __all__ = [
     "BlockEquations",
     "BlockError",
     "CacheWarning",
+    "Clock",
     "CompileError",
     "Compiled",
     "DeadZone",
@@ -85,6 +87,7 @@ __all__ = [
     "ParameterError",
     "PureFeedback",
     "RobustTerm",
+    "Sampled",
     "Saturation",
     "SlidingModeLaw",
     "Spec",
@@ -99,6 +102,7 @@ __all__ = [
     "compile",
     "controllers",
     "diagonal_centres",
+    "discretise",
     "draw",
     "ensemble_response",
     "equation",
@@ -116,6 +120,7 @@ __all__ = [
     "record",
     "references",
     "replaced",
+    "sampled",
     "sliding_mode",
     "state_names",
     "typeset",

@@ -86,9 +86,7 @@ class Compiled:
     @cached_property
     def equations(self) -> Equations:
         """What the blocks' functions compute as expressions."""
-        return equations(
-            self.schedule, self.program.layout, meetings=self.program.meetings
-        )
+        return equations(self.schedule, self.program.layout, meetings=self.program.meetings)
 
     @cached_property
     def native(self) -> tuple[Rhs, Rhs]:

@@ -15,9 +15,9 @@ from .arguments import interpolated
 
 
 def sampled_states(system: Any) -> dict[int, Any]:
-    """Return the states of sampled blocks: the clock of each, by place in the state vector."""
+    """Return the block that each state of a sampled block is of, by place in the state vector."""
     return {
-        i: leaf.system.clock
+        i: leaf.system
         for leaf in leaves(system)
         if isinstance(leaf.system, Sampled)
         for i in range(leaf.state_offset, leaf.state_offset + (leaf.system.nstates or 0))
@@ -58,13 +58,16 @@ def from_sample_to_sample(
     """
     wanted = times if evaluation_times is None else evaluation_times
     found = sampled_states(system)
-    due = instants(dict.fromkeys(found.values()), float(times[0]), float(times[-1]))
-    rows, x = list(found), np.array(x0, dtype=float)
+    clocks = [block.clock for block in found.values()]
+    due = instants(dict.fromkeys(clocks), float(times[0]), float(times[-1]))
+    x = np.array(x0, dtype=float)
     y = np.full((system.noutputs or 0, wanted.size), np.nan)
     states = np.full((system.nstates or 0, wanted.size), np.nan)
     form = {name: settings.pop(name, None) for name in ("squeeze", "transpose", "return_states")}
     for begin, end, what in _segments(due, times):
-        x[rows] = _after(system, begin, x, interpolated(inputs, times, np.array([begin])), what, params)[rows]
+        u = interpolated(inputs, times, np.array([begin]))[:, 0]
+        rows = [i for i, block in found.items() if block.acts(what)]
+        x[rows] = _after(system, (begin, x, u), what, params)[rows]
         inner = np.union1d(times, wanted)
         grid = np.concatenate(([begin], inner[(inner > begin) & (inner < end)], [end]))
         with happening():
@@ -89,12 +92,12 @@ def _segments(due: Instants, times: np.ndarray) -> Iterator[tuple[float, float, 
         yield begin, begins[k + 1] if k + 1 < len(begins) else float(times[-1]), what[k]
 
 
-def _after(system: Any, t: float, x: np.ndarray, u: np.ndarray, what: Happening, params: Any) -> Any:
+def _after(system: Any, point: Any, what: Happening, params: Any) -> Any:
     """Return the states after what happens at an instant, for those of sampled blocks."""
     if not what:
-        return x
+        return point[1]
     with happening(what):
-        return np.asarray(system.dynamics(t, x, u[:, 0], params=params)).reshape(-1)
+        return np.asarray(system.dynamics(*point, params=params)).reshape(-1)
 
 
 def _response(

@@ -7,7 +7,6 @@ from typing import Any
 import control as ct
 
 from ..arguments import number, one_of
-from ..blocks import Block
 from ..errors import ParameterError
 from .rebuilt import rebuilt
 
@@ -57,11 +56,18 @@ def _discretised(system: Any, dt: float, method: str) -> Any:
     if system.dt not in (0, None):
         raise ParameterError(f"'{system.name}' is in discrete time already (dt = {system.dt})")
     if isinstance(system, ct.StateSpace):
-        names = {"name": system.name, "inputs": system.input_labels, "outputs": system.output_labels}
-        return ct.sample_system(system, dt, "forward_diff" if method == "euler" else method, **names)
+        names = {
+            "name": system.name,
+            "inputs": system.input_labels,
+            "outputs": system.output_labels,
+        }
+        return ct.sample_system(
+            system, dt, "forward_diff" if method == "euler" else method, **names
+        )
     if method != "euler":
         raise ParameterError(
-            f"discretise needs method='euler' for '{system.name}', which is not linear, got {method!r}"
+            f"discretise needs method='euler' for '{system.name}', which is not linear, got "
+            f"{method!r}"
         )
     made = system.copy(name=system.name)
     made.dt, made.updfcn = dt, _euler(system.updfcn, float(dt))

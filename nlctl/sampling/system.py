@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -11,10 +11,11 @@ import control as ct
 import numpy as np
 
 from ..arguments import number
-from ..blocks import Block, block, default_state
+from ..blocks import block, default_state
 from ..errors import ParameterError, UsageError
 from .clock import Clock, Moment
-from .rebuilt import rebuilt
+from .discretised import discretise
+from .rebuilt import rebuilt, staged
 
 Happening = frozenset[Moment]
 _HAPPENING: ContextVar[Happening | None] = ContextVar("nlctl_happening", default=None)
@@ -173,6 +174,7 @@ def sampled(
     seed: int = 0,
     input_quantum: float = 0.0,
     output_quantum: float = 0.0,
+    method: str | None = None,
 ) -> Any:
     """Put a block or diagram in discrete time beside continuous ones: a computer's program.
 
@@ -200,6 +202,9 @@ def sampled(
     input_quantum, output_quantum : float, optional
         Steps of the converters: inputs and outputs are rounded to multiples of these, in their
         own units.
+    method : str, optional
+        How one in continuous time becomes one in discrete time, as in `discretise`; by default it
+        is refused.
 
     Returns
     -------
@@ -228,17 +233,28 @@ def sampled(
     for name, value in (("input_quantum", input_quantum), ("output_quantum", output_quantum)):
         number("sampled", name, value, at_least=0)
     if not isinstance(system, ct.InputOutputSystem):
-        system = block(system, "sampled", **({} if not getattr(system, "states", ()) else {"dt": dt}))
-    clock = Clock(dt=_sampling_time(system, dt), offset=offset, delay=delay, jitter=jitter, seed=seed)
+        is_discrete = getattr(system, "discrete", False)
+        system = block(system, "sampled", dt=dt if is_discrete else None)
+    if method is not None and system.dt in (0, None):
+        system = discretise(system, number("sampled", "dt", dt, above=0), method)
+    period = _sampling_time(system, dt)
+    clock = Clock(dt=period, offset=offset, delay=delay, jitter=jitter, seed=seed)
     quanta = {"input_quantum": input_quantum, "output_quantum": output_quantum}
     if not isinstance(system, ct.InterconnectedSystem):
         return Sampled(_discrete(system), clock, **quanta)
-    if delay or input_quantum or output_quantum:
-        raise ParameterError(
-            f"'{system.name}' is a diagram: sample it without a delay and quanta, and give these "
-            "to the blocks at its inputs and outputs, for example sampled(gain, dt, delay=...)"
-        )
-    return rebuilt(system, lambda part: Sampled(_discrete(part), clock), dt=0)
+    made = rebuilt(system, lambda part: Sampled(_discrete(part), clock.sampling.clock), dt=0)
+    first = _through(made.input_labels, "input_stage", clock.sampling.clock, input_quantum)
+    last = _through(made.output_labels, "output_stage", clock, output_quantum)
+    return staged(made, first if input_quantum else None, last if delay or output_quantum else None)
+
+
+def _through(labels: list[str], name: str, clock: Clock, quantum: float) -> Sampled:
+    """Return a sampled block whose outputs are its inputs, rounded and later."""
+    outputs = [f"{label}_{name}" for label in labels]
+    inner = ct.ss(
+        [], [], [], np.eye(len(labels)), clock.dt, inputs=labels, outputs=outputs, name=name
+    )
+    return Sampled(inner, clock, output_quantum=quantum)
 
 
 def _sampling_time(system: Any, dt: float | None) -> float:
@@ -246,8 +262,8 @@ def _sampling_time(system: Any, dt: float | None) -> float:
     if own == 0 and (system.nstates or 0) > 0:
         raise ParameterError(
             f"'{system.name}' is in continuous time, and a sampled block is in discrete time: "
-            f"give nlctl.discretise(system, {0.01 if dt is None else dt}), or for a linear one "
-            "ct.sample_system"
+            f"say how, nlctl.sampled(system, {0.01 if dt is None else dt}, method='euler'), or "
+            "give ct.sample_system(system, dt) of a linear one"
         )
     if dt is None and not own:
         raise ParameterError(f"'{system.name}' has no sampling time of its own: give dt in s")
@@ -261,9 +277,13 @@ def _sampling_time(system: Any, dt: float | None) -> float:
 def _discrete(system: Any) -> Any:
     """Return a block that can be sampled: transfer functions as state-space systems."""
     if isinstance(system, ct.TransferFunction):
-        return ct.ss(system, name=system.name, inputs=system.input_labels, outputs=system.output_labels)
+        return ct.ss(
+            system, name=system.name, inputs=system.input_labels, outputs=system.output_labels
+        )
     if not isinstance(system, ct.StateSpace | ct.NonlinearIOSystem):
-        raise ParameterError(f"'{system.name}' is a {type(system).__name__}, which has no equations")
+        raise ParameterError(
+            f"'{system.name}' is a {type(system).__name__}, which has no equations"
+        )
     for kind in ("inputs", "outputs", "states"):
         if getattr(system, f"n{kind}") is None:
             raise ParameterError(

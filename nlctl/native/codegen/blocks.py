@@ -245,7 +245,7 @@ class Reader:
 
     def outputs(self, i: int, unknown: Collection[int]) -> Tracer:
         """Return a block's outputs; those that depend on unknown inputs are asked for again."""
-        node, system = self.blocks[i], self.blocks[i].system
+        node = self.blocks[i]
         if node.sampled:
             if not node.sampled.answers(self.what):
                 _, waiting, held = self._divided(node)
@@ -280,7 +280,7 @@ class Reader:
 
     def next_states(self, i: int) -> Tracer:
         """Return the states of a sampled block after what happens."""
-        sampled = self.blocks[i].sampled
+        sampled: Any = self.blocks[i].sampled
         own, waiting, held = self._divided(self.blocks[i])
         if sampled.releases(self.what):
             held = waiting[-held.size :]
@@ -297,7 +297,8 @@ class Reader:
 
     def _divided(self, node: Node) -> tuple[Tracer, Tracer, Tracer]:
         """Return a sampled block's own states, waiting outputs and held outputs."""
-        return node.sampled.parts(vector(self.graph, "x", node.state_offset, (node.size,)))
+        sampled: Any = node.sampled
+        return sampled.parts(vector(self.graph, "x", node.state_offset, (node.size,)))
 
     def _rounded(self, quantum: float, values: Tracer) -> Tracer:
         if not quantum or not values.size:

@@ -16,6 +16,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ...blocks import within
 from ...diagrams import places
 from ...sampling.system import Happening, Sampled
 from ..thirdparty.captured import Captured, noted
@@ -138,7 +139,7 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
         If a block's function does not depend on its arguments alone.
     """
     wiring = Wiring(system)
-    blocks = [getattr(place.system, "inner", place.system) for place in wiring.blocks]
+    blocks = [within(place.system) for place in wiring.blocks]
     read = [note for place in places(system) for note in _equations_of(place.system)]
     read += [note for one in blocks for note in _equations_of(one)]
     readings = [  # before any is called

@@ -211,9 +211,7 @@ def prepared(
         **_instants(compiled, code, times),
     )
     signals = compiled.system.noutputs or 0
-    work = new_work(
-        x0, times, inputs.shape[0], program.events, signals, len(program.sampled)
-    )
+    work = new_work(x0, times, inputs.shape[0], program.events, signals, len(program.sampled))
     work.lanes["stiff"] = settings.method == "rodas5p"
     return Run(machine=code, task=task, work=work)
 
