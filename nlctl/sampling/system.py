@@ -123,7 +123,7 @@ class Sampled(ct.NonlinearIOSystem):
         x = np.array(x, dtype=float)
         own, waiting, held = self.parts(x)
         samples = self.clock.sampling in now
-        if not (samples or self.releases(now)):
+        if not self.acts(now):
             return np.zeros(x.size)
         result = [own, waiting, held]
         if self.releases(now):
@@ -144,6 +144,10 @@ class Sampled(ct.NonlinearIOSystem):
         if self.answers(now):
             return self._new(t, own, _rounded(np.asarray(u, dtype=float), self.input_quantum))
         return waiting[waiting.size - held.size :] if self.releases(now) else held
+
+    def acts(self, now: Happening) -> bool:
+        """Whether anything happens to it."""
+        return self.clock.sampling in now or self.releases(now)
 
     def releases(self, now: Happening) -> bool:
         """Whether outputs follow that have waited."""

@@ -105,7 +105,7 @@ def _next(reader: Reader) -> list[tuple[int, Tracer]]:
     found, row = [], 0
     for i, node in enumerate(reader.blocks):
         if node.sampled:
-            if node.sampled.clock.sampling in reader.what or node.sampled.releases(reader.what):
+            if node.sampled.acts(reader.what):
                 found.append((row, reader.next_states(i)))
             row += node.size
     return found
