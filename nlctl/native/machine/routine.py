@@ -89,17 +89,15 @@ class Routine:
 Runnable = Callable[..., None]
 
 
-def plain_functions(lowered: Lowered) -> list[Runnable]:
-    """Return the functions of a program as plain Python: prepare, rhs, out, and of samples."""
+def plain_functions(lowered: Lowered) -> tuple[Runnable, ...]:
+    """Return the functions of a program as plain Python, in their order."""
     calls = plain_calls(lowered.calls)
     calls |= {name: plain_solver(solver) for name, solver in lowered.solvers.items()}
-    return [interpreted(f, lowered.lanes, calls) for f in lowered.functions.values()]
+    return tuple(interpreted(f, lowered.lanes, calls) for f in lowered.functions.values())
 
 
-def lowered_code(lowered: Lowered) -> list[Runnable]:
+def lowered_code(lowered: Lowered) -> tuple[Runnable, ...]:
     """Return the functions of a program as machine code, from the cache if it is there.
-
-    They are prepare, rhs and out, and those of samples.
 
     With NUMBA_DISABLE_JIT=1 the same plan is carried out in plain Python.
 
@@ -112,7 +110,7 @@ def lowered_code(lowered: Lowered) -> list[Runnable]:
         return plain_functions(lowered)
     native = native_calls(lowered.calls, lowered.lanes)
     loaded = finished(lowered.text, lowered.functions, native.symbols, native.owners)
-    return [_routine(lowered, name, loaded, native) for name in lowered.functions]
+    return tuple(_routine(lowered, name, loaded, native) for name in lowered.functions)
 
 
 def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Routine:
