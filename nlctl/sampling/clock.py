@@ -169,6 +169,32 @@ def instants(
     return Instants(np.array(times, float), np.array(which, np.int64), tuple(patterns))
 
 
+def common_period(clocks: Sequence[Clock]) -> tuple[float, float]:
+    """Return a time from which on all repeats, and after how long (s).
+
+    Raises
+    ------
+    ParameterError
+        If samples are late at random, or the period has too many of them.
+    """
+    for clock in clocks:
+        if clock.jitter:
+            raise ParameterError(
+                f"a clock of {clock.dt:g} s has a jitter of {clock.jitter:g} s: its samples have "
+                "no period"
+            )
+    periods = [_exact(clock.dt) for clock in clocks]
+    scale = lcm(*(p.denominator for p in periods))
+    period = Fraction(lcm(*(int(p * scale) for p in periods)), scale)
+    if period / min(periods) > 10_000:
+        raise ParameterError(
+            f"clocks of {', '.join(f'{float(p):g}' for p in periods)} s have a common period of "
+            f"{float(period):g} s, which is too long: choose sampling times with a short one"
+        )
+    settled = max(_exact(clock.offset) + _exact(clock.delay) for clock in clocks)
+    return float(-(-settled // period) * period), float(period)
+
+
 def _instants_of(moment: Moment, begin: float, end: float) -> np.ndarray:
     clock, start, dt = moment.clock, _start(moment), _exact(moment.clock.dt)
     late = _exact(clock.jitter)

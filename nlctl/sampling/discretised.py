@@ -7,6 +7,7 @@ from typing import Any
 import control as ct
 
 from ..arguments import number, one_of
+from ..blocks import memory_states
 from ..errors import ParameterError
 from .rebuilt import rebuilt
 
@@ -68,6 +69,12 @@ def _discretised(system: Any, dt: float, method: str) -> Any:
         raise ParameterError(
             f"discretise needs method='euler' for '{system.name}', which is not linear, got "
             f"{method!r}"
+        )
+    spec = getattr(system, "spec", None)
+    for name in memory_states(spec)[:1]:
+        raise ParameterError(
+            f"'{system.name}' has a memory, '{name}', that is a state in continuous time only: "
+            "leave the block outside of what is sampled"
         )
     made = system.copy(name=system.name)
     made.dt, made.updfcn = dt, _euler(system.updfcn, float(dt))
