@@ -202,12 +202,12 @@ def over_a_period(compiled: Compiled, found: Mapping[str, np.ndarray]) -> tuple[
     """
     n, width = found["dx"].shape
     clocks, meetings = compiled.program.clocks, compiled.program.meetings
-    begin, period = common_period(clocks)
-    due = instants(clocks, begin, begin + period, meetings)
+    begin, end, period = common_period(clocks)
+    due = instants(clocks, begin, end, meetings)
     flow = np.zeros((width, width))
     flow[:n] = found["dx"]
     total, shown = np.eye(width), found["y"]
-    gaps = np.diff(np.r_[begin, due.times, begin + period])
+    gaps = np.diff(np.r_[begin, due.times, end])
     total = expm(flow * gaps[0]) @ total
     for k, (which, gap) in enumerate(zip(due.which, gaps[1:], strict=True)):
         step = _sampled_map(compiled, found, int(which), width)

@@ -169,8 +169,8 @@ def instants(
     return Instants(np.array(times, float), np.array(which, np.int64), tuple(patterns))
 
 
-def common_period(clocks: Sequence[Clock]) -> tuple[float, float]:
-    """Return a time from which on all repeats, and after how long (s).
+def common_period(clocks: Sequence[Clock]) -> tuple[float, float, float]:
+    """Return the beginning and end of a period that repeats, and its length (s).
 
     Raises
     ------
@@ -192,7 +192,8 @@ def common_period(clocks: Sequence[Clock]) -> tuple[float, float]:
             f"{float(period):g} s, which is too long: choose sampling times with a short one"
         )
     settled = max(_exact(clock.offset) + _exact(clock.delay) for clock in clocks)
-    return float(-(-settled // period) * period), float(period)
+    begin = -(-settled // period) * period
+    return float(begin), float(begin + period), float(period)  # each rounded once
 
 
 def _instants_of(moment: Moment, begin: float, end: float) -> np.ndarray:
