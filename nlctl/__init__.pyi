@@ -1,4 +1,4 @@
-from . import actuators, controllers, functions, native, paper, plants, references
+from . import actuators, controllers, faults, functions, native, paper, plants, references
 from ._version import __version__ as __version__
 from .actuators import Backlash, DeadZone, Gain, Saturation, cascade
 from .blocks import Block, Spec, block
@@ -35,6 +35,7 @@ from .errors import (
     ParameterError,
     UnknownNameError,
 )
+from .faults import Fault, with_faults
 from .native import (
     AlgebraicLoopError,
     BlockEquations,
@@ -72,6 +73,7 @@ __all__ = [
     "DivergedError",
     "EngineWarning",
     "Ensemble",
+    "Fault",
     "FilteredError",
     "FilteredStep",
     "FixedGainLaw",
@@ -106,6 +108,7 @@ __all__ = [
     "draw",
     "ensemble_response",
     "equation",
+    "faults",
     "functions",
     "grid_centres",
     "initial_state",
@@ -124,4 +127,5 @@ __all__ = [
     "sliding_mode",
     "state_names",
     "typeset",
+    "with_faults",
 ]
