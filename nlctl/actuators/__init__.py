@@ -6,6 +6,16 @@ see what a controller makes of them.
 
 from .backlash import Backlash
 from .cascade import cascade
+from .prandtl_ishlinskii import OneSidedDeadZones, PrandtlIshlinskii, Stop
 from .static import DeadZone, Gain, Saturation
 
-__all__ = ["Backlash", "DeadZone", "Gain", "Saturation", "cascade"]
+__all__ = [
+    "Backlash",
+    "DeadZone",
+    "Gain",
+    "OneSidedDeadZones",
+    "PrandtlIshlinskii",
+    "Saturation",
+    "Stop",
+    "cascade",
+]
