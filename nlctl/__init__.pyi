@@ -1,6 +1,19 @@
 from . import actuators, controllers, functions, native, paper, plants, references
 from ._version import __version__ as __version__
-from .actuators import Backlash, DeadZone, Gain, Saturation, cascade
+from .actuators import (
+    AsymmetricSaturation,
+    Backlash,
+    DeadZone,
+    Gain,
+    OneSidedDeadZones,
+    PrandtlIshlinskii,
+    Preisach,
+    Relay,
+    Saturation,
+    Stop,
+    cascade,
+    relay_grid,
+)
 from .blocks import Block, Spec, block
 from .controllers import (
     PID,
@@ -56,6 +69,7 @@ __all__ = [
     "AdaptiveWeights",
     "AlgebraicLoopError",
     "AmbiguousNameError",
+    "AsymmetricSaturation",
     "Backlash",
     "BandLimitedNoise",
     "Block",
@@ -82,12 +96,17 @@ __all__ = [
     "LeakyNussbaumLaw",
     "MonotoneNussbaumLaw",
     "NussbaumLaw",
+    "OneSidedDeadZones",
     "ParameterError",
+    "PrandtlIshlinskii",
+    "Preisach",
     "PureFeedback",
+    "Relay",
     "RobustTerm",
     "Saturation",
     "SlidingModeLaw",
     "Spec",
+    "Stop",
     "SumOfSines",
     "UnknownNameError",
     "Zero",
@@ -115,6 +134,7 @@ __all__ = [
     "plants",
     "record",
     "references",
+    "relay_grid",
     "replaced",
     "sliding_mode",
     "state_names",

@@ -7,15 +7,20 @@ see what a controller makes of them.
 from .backlash import Backlash
 from .cascade import cascade
 from .prandtl_ishlinskii import OneSidedDeadZones, PrandtlIshlinskii, Stop
-from .static import DeadZone, Gain, Saturation
+from .relay import Preisach, Relay, relay_grid
+from .static import AsymmetricSaturation, DeadZone, Gain, Saturation
 
 __all__ = [
+    "AsymmetricSaturation",
     "Backlash",
     "DeadZone",
     "Gain",
     "OneSidedDeadZones",
     "PrandtlIshlinskii",
+    "Preisach",
+    "Relay",
     "Saturation",
     "Stop",
     "cascade",
+    "relay_grid",
 ]

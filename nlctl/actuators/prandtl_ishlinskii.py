@@ -6,35 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import number, vector
+from ..arguments import number
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
+from .memories import checked_start, memory_names, started
+from .static import BOUNDED_OUTPUT
 
 __all__ = ["OneSidedDeadZones", "PrandtlIshlinskii", "Stop"]
-
-NOT_BOUNDED_BELOW = "its output stays bounded for all u, so that no k >= k_1 > 0 keeps eps_u bounded"
 
 
 @equation
 def unit_play(u, memory, r):
     """Plays with unit slope and half gaps r: the memories clipped into [u - r, u + r]."""
     return clip(memory, u - r, u + r)
-
-
-def initial_memories(spec: Any, count: int) -> dict[str, float]:
-    """Return the initial values of ``memory[0]``, ... from a record's v0, one for all or one each."""
-    v0 = np.broadcast_to(np.asarray(spec.v0, dtype=float), (count,))
-    return {f"memory[{i}]": float(v0[i]) for i in range(count)}
-
-
-def check_v0(spec: Any, count: int) -> None:
-    """Refuse initial memories that are neither one finite number nor `count` of them."""
-    who = type(spec).__name__
-    v0 = vector(who, "v0", np.atleast_1d(spec.v0))
-    if v0.size not in (1, count):
-        raise ParameterError(f"{who} needs v0 to be 1 or {count} numbers, got {v0.size}")
 
 
 @record
@@ -66,7 +52,7 @@ class Stop:
     states = ("memory",)
     memory = ("memory",)
     feedthrough = True
-    no_split = NOT_BOUNDED_BELOW
+    no_split = BOUNDED_OUTPUT
 
     @property
     def initial(self) -> dict[str, float]:
@@ -158,14 +144,14 @@ class PrandtlIshlinskii:
     @property
     def states(self) -> tuple[str, ...]:
         """Names memory[0], ..., one for each play."""
-        return tuple(f"memory[{i}]" for i in range(len(self.r)))
+        return memory_names("memory", len(self.r))
 
     memory = states
 
     @property
     def initial(self) -> dict[str, float]:
         """The memories start from H_i(0-)."""
-        return initial_memories(self, len(self.r))
+        return started("memory", self.v0, len(self.r))
 
     @property
     def gains(self) -> tuple[float, float]:
@@ -178,7 +164,7 @@ class PrandtlIshlinskii:
         check_weights(self, "so that the loading curve increases")
         if not np.all(np.diff(self.r) > 0):
             raise ParameterError(f"PrandtlIshlinskii needs increasing thresholds r, got {self.r}")
-        check_v0(self, len(self.r))
+        checked_start(self, len(self.r))
 
     @staticmethod
     @equation
