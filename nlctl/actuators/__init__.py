@@ -6,7 +6,9 @@ see what a controller makes of them.
 
 from .backlash import Backlash
 from .cascade import cascade
+from .dynamic import Lag, RateLimiter, SecondOrderLag
 from .prandtl_ishlinskii import OneSidedDeadZones, PrandtlIshlinskii, Stop
+from .quantiser import Quantiser
 from .relay import Preisach, Relay, relay_grid
 from .static import AsymmetricSaturation, DeadZone, Gain, Saturation
 
@@ -15,11 +17,15 @@ __all__ = [
     "Backlash",
     "DeadZone",
     "Gain",
+    "Lag",
     "OneSidedDeadZones",
     "PrandtlIshlinskii",
     "Preisach",
+    "Quantiser",
+    "RateLimiter",
     "Relay",
     "Saturation",
+    "SecondOrderLag",
     "Stop",
     "cascade",
     "relay_grid",

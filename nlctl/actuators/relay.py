@@ -45,7 +45,7 @@ class Relay:
 
     Its memory is the side s.  For u = A sin(w t) with thresholds on = -off = h < A its describing
     function is 4 height / (pi A) (sqrt(1 - (h / A)^2) - i h / A) (Gelb, Vander Velde,
-    Multiple-Input Describing Functions, 1968, table B.1).
+    Multiple-Input Describing Functions, 1968, appendix B).
 
     It does not obey (2): |v| = height for all u.  In python-control the memory relaxes onto the
     side with the rate given, and its sign counts: a swing back that comes sooner than ln(2) / rate

@@ -288,7 +288,7 @@ def test_a_sum_of_plays_is_the_sum_of_plays():
 
 @pytest.mark.parametrize("kind", EVERY)
 def test_in_python_control_the_memories_relax_onto_the_operator(kind):
-    """Away from jumps they differ by some times |u'| / rate, at the start and behind the corners of u."""
+    """Away from jumps they differ by some times |u'| / rate, at the start and at corners of u."""
     spec = {
         "play": nlctl.Backlash(rate=1e4),
         "stop": nlctl.Stop(rate=1e4),
