@@ -7,6 +7,7 @@ see what a controller makes of them.
 from .backlash import Backlash
 from .cascade import cascade
 from .dynamic import Lag, RateLimiter, SecondOrderLag
+from .friction import BoucWen, Coulomb, Dahl, LuGre, Stribeck
 from .prandtl_ishlinskii import OneSidedDeadZones, PrandtlIshlinskii, Stop
 from .quantiser import Quantiser
 from .relay import Preisach, Relay, relay_grid
@@ -15,9 +16,13 @@ from .static import AsymmetricSaturation, DeadZone, Gain, Saturation
 __all__ = [
     "AsymmetricSaturation",
     "Backlash",
+    "BoucWen",
+    "Coulomb",
+    "Dahl",
     "DeadZone",
     "Gain",
     "Lag",
+    "LuGre",
     "OneSidedDeadZones",
     "PrandtlIshlinskii",
     "Preisach",
@@ -27,6 +32,7 @@ __all__ = [
     "Saturation",
     "SecondOrderLag",
     "Stop",
+    "Stribeck",
     "cascade",
     "relay_grid",
 ]
