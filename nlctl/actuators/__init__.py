@@ -8,6 +8,7 @@ from .backlash import Backlash
 from .cascade import cascade
 from .dynamic import Lag, RateLimiter, SecondOrderLag
 from .friction import BoucWen, Coulomb, Dahl, LuGre, Stribeck
+from .inverses import DeadZoneInverse, PrandtlIshlinskiiInverse
 from .prandtl_ishlinskii import OneSidedDeadZones, PrandtlIshlinskii, Stop
 from .quantiser import Quantiser
 from .relay import Preisach, Relay, relay_grid
@@ -20,11 +21,13 @@ __all__ = [
     "Coulomb",
     "Dahl",
     "DeadZone",
+    "DeadZoneInverse",
     "Gain",
     "Lag",
     "LuGre",
     "OneSidedDeadZones",
     "PrandtlIshlinskii",
+    "PrandtlIshlinskiiInverse",
     "Preisach",
     "Quantiser",
     "RateLimiter",

@@ -23,6 +23,19 @@ def unit_play(u, memory, r):
     return clip(memory, u - r, u + r)
 
 
+@equation
+def weighted_plays(u, memories, w_0, w, r):
+    """Prandtl-Ishlinskii operator: u and its plays, weighted."""
+    return w_0 * u + np.sum(w * unit_play(u, memories, r))
+
+
+@equation
+def weighted_band(u, w_0, w, r):
+    """Least and greatest value of the operator at input u, whatever the memories."""
+    middle, half = (w_0 + np.sum(w)) * u, np.sum(np.abs(w) * r)
+    return middle - half, middle + half
+
+
 @record
 class Stop:
     """Stop operator, the elastic-plastic element dual to the play.
@@ -108,6 +121,12 @@ def check_weights(spec: Any, meaning: str) -> None:
         )
 
 
+def check_thresholds(spec: Any) -> None:
+    """Refuse thresholds that do not increase."""
+    if not np.all(np.diff(spec.r) > 0):
+        raise ParameterError(f"{type(spec).__name__} needs increasing thresholds r, got {spec.r}")
+
+
 @record
 class PrandtlIshlinskii:
     """Prandtl-Ishlinskii operator: a weighted sum of plays.
@@ -162,8 +181,7 @@ class PrandtlIshlinskii:
     def check(self) -> None:
         """A weight for each threshold, thresholds in order, an increasing loading curve."""
         check_weights(self, "so that the loading curve increases")
-        if not np.all(np.diff(self.r) > 0):
-            raise ParameterError(f"PrandtlIshlinskii needs increasing thresholds r, got {self.r}")
+        check_thresholds(self)
         checked_start(self, len(self.r))
 
     @staticmethod
@@ -176,7 +194,7 @@ class PrandtlIshlinskii:
     @equation
     def output(t, x, u, p):
         """The weighted sum."""
-        return (p.w_0 * u[0] + np.sum(p.w * unit_play(u[0], x, p.r)),)
+        return (weighted_plays(u[0], x, p.w_0, p.w, p.r),)
 
     @staticmethod
     @equation
@@ -194,8 +212,7 @@ class PrandtlIshlinskii:
     @equation
     def band(t, u, p):
         """Least and greatest output at input u."""
-        middle, half = (p.w_0 + np.sum(p.w)) * u, np.sum(np.abs(p.w) * p.r)
-        return middle - half, middle + half
+        return weighted_band(u, p.w_0, p.w, p.r)
 
 
 @record

@@ -18,14 +18,16 @@ __all__ = ["Preisach", "Relay", "relay_grid"]
 
 
 @equation
-def relay_side(u, side, on, off):
-    """Side of relays, +1 or -1: +1 from u >= on, -1 from u <= off, in between that of the memory.
+def kept_side(side):
+    """Side that a memory stands for: a memory that relaxes passes through the numbers between."""
+    return np.where(side < 0, -1.0, np.where(side >= 0, 1.0, side))  # NaN stays
 
-    A memory that relaxes in python-control passes through the numbers in between; its sign counts.
-    """
-    kept = np.where(side < 0, -1.0, np.where(side >= 0, 1.0, side))  # NaN stays
+
+@equation
+def relay_side(u, side, on, off):
+    """Side of relays: +1 where u >= on, -1 where u <= off, in between that of the memory."""
     free = np.where(u >= on, 1.0, np.where(u <= off, -1.0, u))
-    return np.where((off < u) & (u < on), kept, free)
+    return np.where((off < u) & (u < on), kept_side(side), free)
 
 
 def check_sides(spec: Any, count: int) -> None:
