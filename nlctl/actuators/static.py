@@ -70,7 +70,8 @@ class Gain:
 
     v = k u
 
-    With k = -1 behind another actuator the sign of the input gain is turned round.
+    It obeys (2) where k > 0.  With k = -1 behind another actuator the sign of the input gain is
+    reversed.
     """
 
     k: float = param(1.0, unit="1", meaning="gain")
@@ -79,6 +80,11 @@ class Gain:
     outputs = ("v",)
     states = ()
     feedthrough = True
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Bounds (k_1, k_2) of k in (2): the gain."""
+        return self.k, self.k
 
     @staticmethod
     @equation
