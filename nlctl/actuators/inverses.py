@@ -16,6 +16,7 @@ from .memories import checked_start, memory_names, started
 from .prandtl_ishlinskii import (
     check_thresholds,
     check_weights,
+    unit_contact,
     unit_play,
     weighted_band,
     weighted_plays,
@@ -172,7 +173,7 @@ class PrandtlIshlinskiiInverse:
     @equation
     def corners(t, x, u, p):
         """Contact of each play with either side of its gap."""
-        return np.concatenate((u[0] - x - p.R, u[0] - x + p.R))
+        return np.concatenate(unit_contact(u[0], x, p.R))
 
     @staticmethod
     @equation

@@ -24,6 +24,12 @@ def unit_play(u, memory, r):
 
 
 @equation
+def unit_contact(u, memory, r):
+    """How far plays are from either side of their gaps; exactly 0 where they touch it."""
+    return memory - (u - r), memory - (u + r)
+
+
+@equation
 def weighted_plays(u, memories, w_0, w, r):
     """Prandtl-Ishlinskii operator: u and its plays, weighted."""
     return w_0 * u + np.sum(w * unit_play(u, memories, r))
@@ -102,7 +108,7 @@ class Stop:
     def corners(t, x, u, p):
         """Where it begins or ends to yield: contact with either side of the gap."""
         (memory,) = x
-        return u[0] - memory - p.r, u[0] - memory + p.r
+        return unit_contact(u[0], memory, p.r)
 
 
 def check_weights(spec: Any, meaning: str) -> None:
@@ -206,7 +212,7 @@ class PrandtlIshlinskii:
     @equation
     def corners(t, x, u, p):
         """Contact of each play with either side of its gap."""
-        return np.concatenate((u[0] - x - p.r, u[0] - x + p.r))
+        return np.concatenate(unit_contact(u[0], x, p.r))
 
     @staticmethod
     @equation

@@ -326,3 +326,30 @@ def test_what_makes_no_operator_is_refused(make, told):
     """With the record, the rule and the value."""
     with pytest.raises(nlctl.ParameterError, match=told):
         make()
+
+
+@pytest.mark.parametrize("kind", ["play", "stop", "Prandtl-Ishlinskii"])
+@given(data=st.data())
+def test_in_contact_the_switching_function_is_exactly_zero(kind, data):
+    """Where the memory was carried to.
+
+    What rounding would leave of it may have the wrong sign, and would be met as an event again.
+    """
+    spec = data.draw(EVERY[kind])
+    p, n = equation_arguments(spec), len(spec.states)
+    x = np.array(data.draw(st.lists(inputs, min_size=n, max_size=n)))
+    u = np.array([data.draw(inputs)])
+    moved = np.array(spec.commit(0.0, x, u, p), dtype=float)
+    distances = np.reshape(spec.corners(0.0, moved, u, p), (2, n))
+    np.testing.assert_array_equal((distances == 0).any(axis=0)[moved != x], True)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+def test_a_sum_of_plays_in_a_closed_loop_takes_no_more_steps_than_a_play(rtol):
+    """Several memories that reverse and touch together: the paper's Example 1 with one and four."""
+    steps = []
+    for actuator in (nlctl.Backlash(m_r=1, m_l=1, c_r=0.5, c_l=-0.5), nlctl.PrandtlIshlinskii()):
+        loop = nlctl.compile(nlctl.paper.example_1(actuator=actuator))
+        run = nlctl.input_output_response(loop, np.linspace(0, 20, 201), rtol=rtol)
+        steps.append(run.statistics.accepted + run.statistics.rejected)
+    assert steps[1] < 1.5 * steps[0]

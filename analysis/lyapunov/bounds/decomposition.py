@@ -173,6 +173,7 @@ def decompose(
     u_max = number("decompose", "u_max", u_max, above=0)
     tol = number("decompose", "tol", tol, above=0)
     check_gain("decompose", k)
+    _refuse_by_itself(actuator)
     if k is None and hasattr(actuator, "decomposition"):
         return _declared_split(actuator, u_max, tol)
     if k is None and type(actuator) is DeadZone:
@@ -193,7 +194,6 @@ def _refuse_by_itself(actuator: Any) -> None:
 
 def _own_gains(actuator: Any) -> tuple[float, float]:
     """Return the bounds of k that a record knows."""
-    _refuse_by_itself(actuator)
     name = type(actuator).__name__
     k = getattr(actuator, "gains", None)
     if k is None:
@@ -339,7 +339,6 @@ def _edges(actuator: Any) -> tuple[Edge, Edge]:
     p, name = equation_arguments(actuator), type(actuator).__name__
     band: Any = getattr(actuator, "band", None)
     if len(actuator.inputs) != 1 or len(actuator.outputs) != 1 or (actuator.states and not band):
-        _refuse_by_itself(actuator)
         raise DecompositionError(
             f"{name} has memory or several signals: give the record a method decomposition(u_max), "
             "or an equation band(t, u, p) of its least and greatest output at input u"
