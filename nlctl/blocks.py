@@ -244,6 +244,13 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     BlockError
         If `spec` lacks something that a block needs, or its equations return the wrong number
         of values, or ``feedthrough = False`` is not true.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> actuator = nlctl.block(nlctl.DeadZone(b_r=0.6), "actuator")
+    >>> print(actuator.params["actuator.b_r"], actuator.output(0, [], [0.4]))
+    0.6 [0.]
     """
     missing = [a for a in ("inputs", "outputs", "states", "feedthrough") if not hasattr(spec, a)]
     missing += [] if hasattr(spec, "output") else ["output"]

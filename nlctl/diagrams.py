@@ -135,6 +135,13 @@ def interconnect(
         lower order than the one that it is connected to.
     UnknownNameError
         If `outputs` names a signal that no block delivers, or `inputs` one that none takes.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> loop = nlctl.interconnect({"limit": nlctl.Saturation(limit=2)}, inputs=["u"], outputs=["v"])
+    >>> print(loop.output(0, [], [3.0]))
+    [2.]
     """
     if not isinstance(blocks, Mapping | Sequence) or isinstance(blocks, str) or not len(blocks):
         raise DiagramError(
@@ -263,7 +270,14 @@ def known_system(who: str, system: Any) -> Any:
 
 
 def state_names(system: ct.InputOutputSystem) -> list[str]:
-    """Return the qualified names of all states, ``"controller.law.zeta"``, in vector order."""
+    """Return the qualified names of all states, ``"controller.law.zeta"``, in vector order.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> state_names(nlctl.block(nlctl.Backlash(), "actuator"))
+    ['actuator.memory']
+    """
     system = known_system("state_names", system)
     return [f"{leaf.path}.{s}" for leaf in leaves(system) for s in leaf.system.state_labels]
 
@@ -294,6 +308,12 @@ def initial_state(
         If a name is not that of exactly one state.
     ParameterError
         If a value is not a finite number.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> print(initial_state(nlctl.block(nlctl.Backlash(v0=0.2), "actuator")))
+    [0.2]
     """
     system = known_system("initial_state", system)
     if not isinstance(values, Mapping | None):
@@ -344,6 +364,12 @@ def parameters(system: Any) -> pd.DataFrame:
     ------
     ParameterError
         If it is none of these.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> float(parameters(nlctl.DeadZone())["value"]["b_r"])
+    0.5
     """
     import pandas as pd
 

@@ -145,6 +145,14 @@ def input_output_response(
     -----
     UserWarning
         If `initial_state` has fewer values than there are states and the last one is not 0.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> lag = ct.ss(-1, 1, 1, 0)
+    >>> response = input_output_response(lag, [0, 1], 1, engine="python-control")
+    >>> round(float(response.outputs[-1]), 6)  # 1 - exp(-1)
+    0.632121
     """
     checked_params(params)
     for name, tolerance in (("rtol", rtol), ("atol", atol)):

@@ -33,6 +33,13 @@ def cascade(stages: Mapping[str, Any], *, name: str = "actuator") -> ct.Intercon
     ------
     DiagramError
         If there is no stage, or one has other signals.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> actuator = cascade({"limit": nlctl.Saturation(limit=2), "turned": nlctl.Gain(k=-1)})
+    >>> print(actuator.output(0, [], [3.0]))
+    [-2.]
     """
     if not isinstance(stages, Mapping):
         raise DiagramError(

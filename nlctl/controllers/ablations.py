@@ -54,6 +54,13 @@ def replaced(controller: ct.InterconnectedSystem, **pieces: Any) -> ct.Interconn
     ------
     ParameterError, DiagramError
         As in `adaptive_neural`.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> fixed = replaced(nlctl.adaptive_neural(order=2), law=nlctl.FixedGainLaw(kappa=5.0))
+    >>> float(nlctl.parameters(fixed)["value"]["law.kappa"])
+    5.0
     """
     of_type("replaced", "controller", controller, ct.InterconnectedSystem, "adaptive_neural(2)")
     own = {s.name: getattr(s, "spec", None) or s.copy(name=s.name) for s in controller.syslist}
@@ -80,6 +87,12 @@ def ablations(
     dict
         "no network": W_hat^T psi = 0; "no robust term": delta_hat tanh(r/tau) = 0; "neither":
         both; "fixed gain": u = -kappa eta.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> list(ablations(nlctl.adaptive_neural(order=2)))
+    ['no network', 'no robust term', 'neither', 'fixed gain']
     """
     beta = controller.syslist[controller.syslist_index["law"]].spec.beta
     no_network = {"weights": Zero(outputs=("W_psi", "W_norm"))}

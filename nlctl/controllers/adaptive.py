@@ -89,6 +89,13 @@ def adaptive_neural(
         If `order` is below 2 or does not fit to the filter or the basis.
     DiagramError
         If a replaced piece lacks a signal.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> controller = adaptive_neural(order=2, law=nlctl.NussbaumLaw(beta=3.0))
+    >>> controller.input_labels
+    ['x1', 'x2', 'yd', 'yd1', 'yd2']
     """
     order = whole_number("adaptive_neural", "an order", order, at_least=2)
     if filtered_error is None:

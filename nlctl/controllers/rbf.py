@@ -45,6 +45,11 @@ def diagonal_centres(count: int, inputs: int, low: float = -10, high: float = 10
     ------
     ParameterError
         If `count` or `inputs` is no integer >= 1, or an end is not finite.
+
+    Examples
+    --------
+    >>> diagonal_centres(3, 2)
+    ((-10.0, -10.0), (0.0, 0.0), (10.0, 10.0))
     """
     count = _checked("diagonal_centres", count, inputs, low, high)
     return _rows(np.tile(np.linspace(low, high, count)[:, None], (1, inputs)))
@@ -59,6 +64,11 @@ def grid_centres(counts: Sequence[int], low: float = -10, high: float = 10) -> M
     ------
     ParameterError
         If a count is no integer >= 1, or an end is not finite.
+
+    Examples
+    --------
+    >>> grid_centres([2, 1], low=0, high=1)
+    ((0.0, 0.0), (1.0, 0.0))
     """
     for i, count in enumerate(tuple_of("grid_centres", "counts", counts, int)):
         _checked("grid_centres", count, i + 1, low, high)
@@ -75,6 +85,11 @@ def latin_hypercube_centres(
     ------
     ParameterError
         As `diagonal_centres`, and if the seed is no integer >= 0.
+
+    Examples
+    --------
+    >>> sorted(int(x // 5) for (x,) in latin_hypercube_centres(4, 1, seed=1))
+    [-2, -1, 0, 1]
     """
     count = _checked("latin_hypercube_centres", count, inputs, low, high)
     whole_number("latin_hypercube_centres", "seed", seed, at_least=0)

@@ -69,6 +69,11 @@ def sliding_mode(
     ------
     DiagramError
         If a replaced piece lacks a signal.
+
+    Examples
+    --------
+    >>> sliding_mode().output_labels
+    ['e', 'r', 'u']
     """
     blocks = {
         "filtered_error": FilteredError() if filtered_error is None else filtered_error,

@@ -262,6 +262,13 @@ def compile(  # noqa: A001 (what it does)
     A function that cannot be written out as expressions (it has a loop that the state ends, reads
     a table of SciPy) is called as it stands: as machine code that numba makes of it, otherwise
     back in Python, which is right and as slow as python-control.  ``print(compiled)`` says which.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> backlash = nlctl.compile(nlctl.block(nlctl.Backlash(), "actuator"))
+    >>> backlash.system.name
+    'actuator'
     """
     if isinstance(system, ct.TransferFunction):
         system = ct.ss(system)

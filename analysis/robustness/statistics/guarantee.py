@@ -151,6 +151,11 @@ def clopper_pearson(
     ParameterError
         If not 0 <= violations <= runs with at least one run and at most 10^9, the confidence is
         none, or the side.
+
+    Examples
+    --------
+    >>> round(clopper_pearson(0, 459)[1], 4)  # 1 - 0.01^(1/459)
+    0.01
     """
     k, n = checked_counts(violations, runs)
     side = one_of("a bound", "side", side, get_args(Side))
@@ -192,6 +197,11 @@ def runs_needed(probability: float, confidence: float = 0.99, violations: int = 
     ParameterError
         If the probability is not between 0 and 1, the confidence is none, `violations` is no
         integer >= 0, or more than 10^9 runs would be needed.
+
+    Examples
+    --------
+    >>> runs_needed(0.01, confidence=0.99)  # ln 0.01 / ln 0.99, rounded upwards
+    459
     """
     k = whole_number("a plan", "violations", violations, at_least=0)
     a = 1 - checked_confidence(confidence)

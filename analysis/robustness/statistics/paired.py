@@ -228,6 +228,12 @@ def holm(p_values: np.ndarray) -> np.ndarray:
     ------
     ParameterError
         If a value is no number in [0, 1], or they are not in one row.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> holm(np.array([0.01, 0.04])).tolist()
+    [0.02, 0.04]
     """
     p = as_numbers(p_values)
     if p is None or p.ndim != 1 or np.any((p < 0) | (p > 1)):

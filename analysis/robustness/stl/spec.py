@@ -127,6 +127,8 @@ def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.nda
 
     Parameters
     ----------
+    requirement : Requirement
+        What is asked of the response.
     t : ndarray of shape (m,)
         Increasing times (s).
     signals : mapping

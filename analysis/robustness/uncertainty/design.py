@@ -353,6 +353,8 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
         With nominal values, see `resolve.resolved`.
     levels : int, optional
         Number of evenly spaced values per quantity, ends included.
+    entropy : int, optional
+        Of the rows' seeds, see `row_seed`; drawn afresh if it is left out.
 
     Raises
     ------
