@@ -21,7 +21,7 @@ SPLIT = {
 }  # fmt: skip
 BOUNDED = {"AsymmetricSaturation", "Preisach", "Relay", "Saturation", "Stop"}
 LATE = {"Lag", "RateLimiter", "SecondOrderLag"}
-FORCES = {"BoucWen", "Coulomb", "Dahl", "LuGre", "Stribeck"}
+FORCES = {"BoucWen", "Coulomb", "Dahl", "LuGre", "StickSlip", "Stribeck"}
 WHY = [(BOUNDED, "its output is bounded"), (LATE, "follows u later"), (FORCES, "a force law")]
 
 
