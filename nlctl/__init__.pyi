@@ -1,4 +1,4 @@
-from . import actuators, controllers, functions, native, paper, plants, references
+from . import actuators, controllers, faults, functions, native, paper, plants, references
 from ._version import __version__ as __version__
 from .actuators import (
     AsymmetricSaturation,
@@ -60,6 +60,7 @@ from .errors import (
     ParameterError,
     UnknownNameError,
 )
+from .faults import Fault, with_faults
 from .native import (
     AlgebraicLoopError,
     BlockEquations,
@@ -75,6 +76,7 @@ from .params import param, record
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
+from .sampling import Clock, Sampled, discretise, sampled
 
 __all__ = [
     "PID",
@@ -89,6 +91,7 @@ __all__ = [
     "BlockError",
     "BoucWen",
     "CacheWarning",
+    "Clock",
     "CompileError",
     "Compiled",
     "Coulomb",
@@ -100,6 +103,7 @@ __all__ = [
     "DivergedError",
     "EngineWarning",
     "Ensemble",
+    "Fault",
     "FilteredError",
     "FilteredStep",
     "FixedGainLaw",
@@ -124,6 +128,7 @@ __all__ = [
     "RateLimiter",
     "Relay",
     "RobustTerm",
+    "Sampled",
     "Saturation",
     "SecondOrderLag",
     "SlidingModeLaw",
@@ -142,9 +147,11 @@ __all__ = [
     "compile",
     "controllers",
     "diagonal_centres",
+    "discretise",
     "draw",
     "ensemble_response",
     "equation",
+    "faults",
     "functions",
     "grid_centres",
     "initial_state",
@@ -160,7 +167,9 @@ __all__ = [
     "references",
     "relay_grid",
     "replaced",
+    "sampled",
     "sliding_mode",
     "state_names",
     "typeset",
+    "with_faults",
 ]
