@@ -9,7 +9,7 @@ controller makes of it.  Friction is here as a force law, from velocity to force
 from .backlash import Backlash
 from .cascade import cascade
 from .dynamic import Lag, RateLimiter, SecondOrderLag
-from .friction import BoucWen, Coulomb, Dahl, LuGre, Stribeck
+from .friction import BoucWen, Coulomb, Dahl, LuGre, StickSlip, Stribeck
 from .inverses import DeadZoneInverse, PrandtlIshlinskiiInverse
 from .prandtl_ishlinskii import OneSidedDeadZones, PrandtlIshlinskii, Stop
 from .quantiser import Quantiser
@@ -36,6 +36,7 @@ __all__ = [
     "Relay",
     "Saturation",
     "SecondOrderLag",
+    "StickSlip",
     "Stop",
     "Stribeck",
     "cascade",

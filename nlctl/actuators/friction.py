@@ -1,14 +1,15 @@
-"""Friction as a force law of velocity: Coulomb, Stribeck, Dahl, LuGre, Bouc-Wen."""
+"""Friction as a force law of velocity, from Coulomb's to LuGre, and Bouc-Wen's hysteresis."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..arguments import number
 from ..equations import equation
 from ..errors import ParameterError
 from ..params import param, record
 
-__all__ = ["BoucWen", "Coulomb", "Dahl", "LuGre", "Stribeck"]
+__all__ = ["BoucWen", "Coulomb", "Dahl", "LuGre", "StickSlip", "Stribeck"]
 
 FORCE_LAW = "it is a force law of a velocity, no actuator from u to v"
 
@@ -25,7 +26,7 @@ def bristle_rate(z, velocity, p):
     return velocity - p.sigma_0 * np.abs(velocity) * z / stribeck_level(velocity, p)
 
 
-def check_levels(spec: LuGre | Stribeck) -> None:
+def check_levels(spec: LuGre | Stribeck | StickSlip) -> None:
     """Friction at rest is not below that of motion."""
     if not spec.F_c <= spec.F_s:
         raise ParameterError(
@@ -40,7 +41,8 @@ class Coulomb:
         force = F_c sign(velocity) + sigma_2 velocity
 
     A force law for velocities that keep their sign, or change it.  It does not hold a mass at
-    rest: there the sign chatters, and a run ends at the limit of its steps; `LuGre` sticks.
+    rest: there the sign chatters, and a run ends at the limit of its steps; `StickSlip` and `LuGre`
+    stick.
     """
 
     F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
@@ -104,6 +106,96 @@ class Stribeck:
     def corners(t, x, u, p):
         """Where the velocity changes its sign."""
         return (u[0],)
+
+
+@equation
+def stick_mode(velocity, applied, mode, p):
+    """1 or -1 while a contact slips in that direction, 0 while it sticks."""
+    kept = np.where(mode < -0.5, -1.0, np.where(mode > 0.5, 1.0, 0.0 * mode))  # NaN stays
+    onwards = kept * velocity
+    pushed = np.where(np.abs(applied) > p.F_s, np.sign(applied), 0.0 * applied)
+    released = np.where(np.abs(velocity) > p.v_rest, np.sign(velocity), pushed)
+    return np.where(onwards > 0, kept, released + 0.0 * onwards)
+
+
+@record
+class StickSlip:
+    """Coulomb friction that sticks: the force that holds a mass at rest, up to a limit.
+
+        force = applied                              it sticks
+                F_c s + sigma_2 velocity             it slips in the direction s = +-1
+
+    It sticks from where its velocity becomes 0 while |applied| <= F_s, and slips from where
+    |applied| exceeds F_s (Karnopp, Journal of Dynamic Systems, Measurement, and Control 107, 1985,
+    p. 100), or the velocity is beyond what counts as rest.  ``applied`` is the sum of all other
+    forces on the mass.  It must not depend on this force: that would be an algebraic loop.
+
+    The mode s is a memory, and both changes are located as events: nothing chatters, and the
+    velocity at rest is 0 but for what is left of it where the event is located.  In python-control
+    the mode relaxes with the rate given, and friction is late by about ln(2) / rate.
+
+    Parameters
+    ----------
+    v0 : float, optional
+        Mode at the start, 0, 1 or -1: the initial value of the state ``mode``.
+    """
+
+    F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
+    F_s: float = param(1.5, unit="N", meaning="static friction", above=0)
+    sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
+    v_rest: float = param(1e-6, unit="m/s", meaning="velocity up to which it is at rest", above=0)
+    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the mode", above=0)
+    v0: float = 0.0
+
+    inputs = ("velocity", "applied")
+    outputs = ("force",)
+    states = ("mode",)
+    memory = ("mode",)
+    feedthrough = True
+    no_split = FORCE_LAW
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The mode at the start."""
+        return {"mode": float(self.v0)}
+
+    def check(self) -> None:
+        """Static friction is not below Coulomb friction; one of three modes at the start."""
+        check_levels(self)
+        if number("StickSlip", "v0", self.v0) not in (-1, 0, 1):
+            raise ParameterError(f"StickSlip needs v0 to be 0, 1 or -1, got {self.v0:g}")
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Relaxation of the memory onto the mode."""
+        (mode,) = x
+        return (p.rate * (stick_mode(u[0], u[1], mode, p) - mode),)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The force that holds, or slips."""
+        (mode,) = x
+        velocity, applied = u
+        now = stick_mode(velocity, applied, mode, p)
+        slipping = p.F_c * now + p.sigma_2 * velocity
+        return (np.where(now == 0, applied, slipping),)
+
+    @staticmethod
+    @equation
+    def commit(t, x, u, p):
+        """The mode."""
+        (mode,) = x
+        return (stick_mode(u[0], u[1], mode, p),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where the mass comes to rest, and where it may break away."""
+        velocity, applied = u
+        forces = applied - p.F_s, applied + p.F_s
+        return (velocity, velocity - p.v_rest, velocity + p.v_rest) + forces
 
 
 @record

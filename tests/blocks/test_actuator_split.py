@@ -9,7 +9,7 @@ from rows import each_row
 
 import nlctl
 from analysis.catalogue import block_records
-from analysis.lyapunov import DecompositionError, decompose
+from analysis.lyapunov import DecompositionError, decompose, examine
 from nlctl import actuators
 
 RECORDS = {
@@ -21,7 +21,7 @@ SPLIT = {
 }  # fmt: skip
 BOUNDED = {"AsymmetricSaturation", "Preisach", "Relay", "Saturation", "Stop"}
 LATE = {"Lag", "RateLimiter", "SecondOrderLag"}
-FORCES = {"BoucWen", "Coulomb", "Dahl", "LuGre", "Stribeck"}
+FORCES = {"BoucWen", "Coulomb", "Dahl", "LuGre", "StickSlip", "Stribeck"}
 WHY = [(BOUNDED, "its output is bounded"), (LATE, "follows u later"), (FORCES, "a force law")]
 
 
@@ -123,3 +123,14 @@ def test_other_records_are_refused_too(spec, told):
     """A gain of the wrong sign, and what is no actuator."""
     with pytest.raises(DecompositionError, match=told):
         decompose(spec)
+
+
+@pytest.mark.slow
+def test_the_proof_is_examined_with_several_memories_or_refused():
+    """The ledger's runs with four plays; with relays one sentence, before anything runs."""
+    found = examine(nlctl.paper.example_1(actuator=nlctl.PrandtlIshlinskii()), 1.0)
+    run = found.runs.first
+    eps = found.runs.split.eps_u(run.signals["u"], run.signals["v"])
+    assert np.abs(eps).max() <= found.runs.split.eps_star + 1e-12
+    with pytest.raises(DecompositionError, match="Preisach is not of the form"):
+        examine(nlctl.paper.example_1(actuator=nlctl.Preisach()), 1.0)

@@ -57,6 +57,8 @@ def points(spec, seed=1, count=8):
     scalars = [v for k in declared_params(spec) if np.ndim(v := getattr(spec, k)) == 0]
     for corner in 2 * (0.0, *scalars):  # with one state and another: memories count there
         yield 0.7, rng.normal(size=n), np.full(m, float(corner))
+        for i in range(m if 1 < m <= 4 else 0):  # and each input alone, while others are at rest
+            yield 0.7, rng.normal(size=n), np.where(np.arange(m) == i, float(corner), 0.0)
 
 
 def call(function, spec, t, x, u, p=None):

@@ -253,6 +253,117 @@ class TestLuGre:
         assert np.all(work - 1e5 * run.states[0] ** 2 / 2 > -1e-9)
 
 
+@functools.cache
+def on_a_belt():
+    """Return a mass of 1 kg on friction that sticks, pulled through a spring of 2 N/m."""
+    mass = ct.nlsys(
+        lambda t, x, u, p: [x[1], u[0] - u[1]], lambda t, x, u, p: x, states=2,
+        inputs=["applied", "force"], outputs=["position", "velocity"], name="mass",
+    )  # fmt: skip
+    spring = ct.nlsys(
+        None, lambda t, x, u, p: [2.0 * (u[0] - u[1])], inputs=["pull", "position"],
+        outputs=["applied"], name="spring",
+    )  # fmt: skip
+    blocks = [mass, spring, nlctl.block(nlctl.StickSlip(sigma_2=0.0), "friction")]
+    outputs = ["position", "velocity", "applied", "force"]
+    return nlctl.compile(nlctl.interconnect(blocks, inputs=["pull"], outputs=outputs, name="belt"))
+
+
+class TestStickSlip:
+    """Both changes of the mode against closed forms."""
+
+    @pytest.mark.parametrize(("speed", "F_s"), [(0.1, 1.5), (0.3, 1.2), (0.02, 1.9)])
+    def test_the_cycle_of_a_mass_that_is_pulled_through_a_spring(self, speed, F_s):
+        """It sticks until the spring pulls with F_s, swings about F_c, and sticks again.
+
+        Slipping takes (2 / w) (pi - arctan((F_s - F_c) w / (k speed))), sticking
+        2 (F_s - F_c) / (k speed).
+        """
+        k, w, F_c = 2.0, np.sqrt(2.0), 1.0
+        first = F_s / (k * speed)
+        slips = 2 / w * (np.pi - np.arctan((F_s - F_c) * w / (k * speed)))
+        period = slips + 2 * (F_s - F_c) / (k * speed)
+        times = np.append(0, first + period * np.arange(0, 4, 0.125))
+        run = nlctl.input_output_response(
+            on_a_belt(), times, speed * times, params={"friction.F_s": F_s}, rtol=1e-10, atol=1e-12
+        )
+        phase = (times[1:] - first) % period
+        swing = F_c / k + (F_s - F_c) / k * np.cos(w * phase) + speed / w * np.sin(w * phase)
+        held = (2 * F_c - F_s) / k + speed * (phase - slips)
+        # on a node of the cycle rounding decides on which side of the break-away a sample lies
+        stretch = np.where(phase < slips, swing, held)
+        stretch = np.where(period - phase < 1e-9, F_s / k, stretch)
+        np.testing.assert_allclose(speed * times[1:] - run.outputs[0, 1:], stretch, atol=1e-8)
+
+    @given(v=speeds, push=st.floats(-0.7, 0.7))
+    @settings(max_examples=20)
+    def test_a_mass_slides_to_rest_and_stays(self, v, push):
+        """After v^2 / 2 / (F_c -+ push) of way at a constant push below F_c."""
+        times = np.linspace(0, 6, 25)
+        applied = np.full(times.size, push)
+        run = nlctl.input_output_response(
+            free_mass(),
+            times,
+            applied,
+            {"mass.x[1]": v},
+            rtol=1e-10,
+            atol=1e-12,
+        )
+        brake = 1.0 - np.sign(v) * push
+        stop = abs(v) / brake
+        t = np.minimum(times, stop)
+        np.testing.assert_allclose(
+            run.outputs[0], np.sign(v) * (abs(v) * t - brake * t**2 / 2), atol=1e-8
+        )
+        at_rest = times > stop + 1e-6
+        np.testing.assert_allclose(run.outputs[1, at_rest], 0, atol=1e-8)
+        np.testing.assert_allclose(run.outputs[2, at_rest], push, atol=1e-12)
+
+    def test_it_breaks_away_where_the_push_exceeds_static_friction(self):
+        """A push that grows by 1 N/s: at 1.5 s, and F - F_c accelerates it from then on."""
+        times = np.linspace(0, 3, 31)
+        run = nlctl.input_output_response(free_mass(), times, times, rtol=1e-10, atol=1e-12)
+        late = np.maximum(times - 1.5, 0)
+        velocity = 0.5 * late + late**2 / 2
+        np.testing.assert_allclose(run.outputs[1], velocity, atol=1e-8)
+
+    @pytest.mark.parametrize("rtol", [1e-4, 1e-6])
+    def test_loose_tolerances_stick_as_well(self, rtol):
+        """It overshoots rest, comes back, and then stays."""
+        times = np.linspace(0, 6, 25)
+        run = nlctl.input_output_response(
+            free_mass(), times, 0 * times + 0.3, {"mass.x[1]": 1.0}, rtol=rtol
+        )
+        np.testing.assert_allclose(run.outputs[1, -12:], 0, atol=1e-6)
+        assert run.outputs[0, -1] == pytest.approx(0.5 / 0.7, abs=10 * rtol)
+
+    @given(
+        v=st.sampled_from((-1.0, -1e-6, -1e-9, 0.0, 1e-9, 1.1e-6, 1.0)),
+        push=st.sampled_from((-2.0, -1.5, -0.3, 0.0, 1.5, 1.5 + 1e-12)),
+        mode=st.sampled_from((-1.0, -0.5, 0.0, 0.2, 0.5, 1.0)),
+    )
+    def test_machine_code_equals_python_control(self, v, push, mode):
+        """At rest, at the limit of static friction, and between the modes."""
+        block, made = nlctl.block(nlctl.StickSlip(), "b"), compiled(nlctl.StickSlip)
+        for name in ("dynamics", "output"):
+            expected = getattr(block, name)(0.0, [mode], [v, push])
+            np.testing.assert_array_equal(getattr(made, name)(0.0, [mode], [v, push]), expected)
+
+
+@functools.cache
+def free_mass():
+    """Return a mass of 1 kg on friction that sticks, pushed by a force that is given."""
+    mass = ct.nlsys(
+        lambda t, x, u, p: [x[1], u[0] - u[1]], lambda t, x, u, p: x, states=2,
+        inputs=["applied", "force"], outputs=["position", "velocity"], name="mass",
+    )  # fmt: skip
+    blocks = [mass, nlctl.block(nlctl.StickSlip(sigma_2=0.0), "friction")]
+    outputs = ["position", "velocity", "force"]
+    return nlctl.compile(
+        nlctl.interconnect(blocks, inputs=["applied"], outputs=outputs, name="pushed")
+    )
+
+
 @given(v=st.floats(-1, 1), F_c=positive, sigma_2=positive)
 def test_stribecks_curve_between_its_levels_is_coulombs(v, F_c, sigma_2):
     """With F_s = F_c; both are odd, and oppose the motion."""
@@ -288,6 +399,8 @@ def test_machine_code_equals_python_control(kind, v, x):
     [
         (lambda: nlctl.LuGre(F_s=0.5), "LuGre needs F_c <= F_s, got 1 and 0.5"),
         (lambda: nlctl.Stribeck(F_c=2.0), "Stribeck needs F_c <= F_s, got 2 and 1.5"),
+        (lambda: nlctl.StickSlip(F_s=0.5), "StickSlip needs F_c <= F_s, got 1 and 0.5"),
+        (lambda: nlctl.StickSlip(v0=0.5), "StickSlip needs v0 to be 0, 1 or -1, got 0.5"),
         (lambda: nlctl.Dahl(F_c=0.0), "Dahl needs F_c > 0, got 0"),
         (lambda: nlctl.BoucWen(nu=0.5), "BoucWen needs nu >= 1, got 0.5"),
     ],

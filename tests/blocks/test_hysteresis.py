@@ -353,3 +353,20 @@ def test_a_sum_of_plays_in_a_closed_loop_takes_no_more_steps_than_a_play(rtol):
         run = nlctl.input_output_response(loop, np.linspace(0, 20, 201), rtol=rtol)
         steps.append(run.statistics.accepted + run.statistics.rejected)
     assert steps[1] < 1.5 * steps[0]
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_members_of_an_ensemble_are_single_runs(kind):
+    """Memories that start elsewhere, side by side in lanes; sums add up in another order."""
+    record = {
+        "play": nlctl.Backlash, "stop": nlctl.Stop, "Prandtl-Ishlinskii": nlctl.PrandtlIshlinskii,
+        "relay": nlctl.Relay, "Preisach": nlctl.Preisach,
+    }[kind]  # fmt: skip
+    rng = np.random.default_rng(8)
+    path, memories = rng.normal(size=20), np.sign(rng.normal(size=(11, len(record().states))))
+    names = [f"actuator.{name}" for name in record().states]
+    start = dict(zip(names, memories.T, strict=True))
+    times = np.arange(20.0)
+    made = nlctl.ensemble_response(compiled(record), times, path, start, keep=["v"])
+    alone = [along(record(), path, memory) for memory in memories]
+    np.testing.assert_allclose(made.signals["v"], alone, rtol=0, atol=1e-15)
