@@ -48,6 +48,9 @@ class Compiled:
     It is not a python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
     run it, and ``compiled.linearize(x0)`` linearizes it with exact derivatives, in the place of
     ``ct.linearize``.  Every other function of python-control takes ``compiled.system``.
+
+    The stiff method's Jacobian is exact too.  Where a function is opaque or algebraic loops are
+    solved it is taken by differences; the printed form says so, and why.
     """
 
     schedule: Schedule
@@ -86,7 +89,7 @@ class Compiled:
     @cached_property
     def equations(self) -> Equations:
         """What the blocks' functions compute as expressions."""
-        return equations(self.schedule, self.program.layout)
+        return equations(self.schedule, self.program.layout, meetings=self.program.meetings)
 
     @cached_property
     def native(self) -> tuple[Rhs, Rhs]:
@@ -272,7 +275,7 @@ def compile(  # noqa: A001 (what it does)
         raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
     read = schedule(system, solve_loops=algebraic_loops == "solve")
     arrays = program(read)
-    check_sizes(system, [node.system for node in read.nodes])
+    check_sizes(system, [node.sampled or node.system for node in read.nodes])
     made = Compiled(schedule=read, program=arrays)
     _ = made.equations  # what expressions would understand otherwise is refused now
     return made

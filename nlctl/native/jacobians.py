@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
+from scipy.linalg import expm
 
 from ..errors import CompileError, ParameterError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate
-from ..expressions.graph import Expr, Graph, Untraceable
+from ..expressions.graph import Expr, Untraceable, needed
 from ..names import unknown
 from ..responses.arguments import state_array
-from .codegen.blocks import equations
+from ..sampling.clock import common_period, instants
+from .codegen.blocks import Equations
 from .parameters import length
 
 if TYPE_CHECKING:
     from .compiled import Compiled
 
-DIRECTION = "v"  # the array of a direction: of states, then inputs, then parameters
+DIRECTION = "v"  # the array of a direction: of states, then inputs, then what else is varied
+_DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +35,8 @@ class Tangent:
     Attributes
     ----------
     rows : mapping
-        For ``"dx"`` and ``"y"`` pairs of an expression, None where it is 0, and its length.
+        For ``"dx"`` and ``"y"``, and for ``"sample0"`` and so on of sampled blocks' next states,
+        pairs of an expression, None where it is 0, and its length.
     assumed : mapping
         Integer parameters for whose values this holds: place in the parameter vector, and value.
     """
@@ -40,39 +45,67 @@ class Tangent:
     assumed: Mapping[int, int]
 
 
+def inexact(compiled: Compiled, results: Sequence[str] = ("dx",)) -> str | None:
+    """Return why there are no exact derivatives of a diagram's results, None if there are."""
+    if compiled.schedule.loops:
+        return "it has algebraic loops"
+    found = compiled.equations
+    parts = [e for name in results for _, array in found.results[name] for e, _ in array.pieces()]
+    for node in needed(parts):
+        if node.op == "call":
+            call = found.calls[node.data[0]]
+            return f"{call.name} is called as it stands ({call.reason})"
+    return None
+
+
 def tangent(compiled: Compiled) -> Tangent:
-    """Differentiate a diagram's equations.
+    """Differentiate a diagram's equations by states, inputs and parameters.
 
     Raises
     ------
     CompileError
         If a function is opaque, or there are algebraic loops.
     """
-    if compiled.schedule.loops:
+    found = compiled.equations
+    names = ("dx", "y", *(name for name in found.results if name.startswith("sample")))
+    why = inexact(compiled, names)
+    if why is not None:
         raise CompileError(
-            f"'{compiled.system.name}' has algebraic loops, which have no exact derivatives here: "
-            "use ct.linearize(diagram), which takes differences"
-        )
-    found = equations(compiled.schedule, compiled.program.layout)
-    for call in found.calls.values():
-        raise CompileError(
-            f"'{compiled.system.name}' has no exact derivatives, since {call.name} is called as "
-            f"it stands ({call.reason}): use ct.linearize(diagram), which takes differences"
+            f"'{compiled.system.name}' has no exact derivatives, since {why}: use "
+            "ct.linearize(diagram), which takes differences"
         )
     n, m = compiled.system.nstates or 0, compiled.system.ninputs or 0
     starts = {"x": 0, "u": n, "p": n + m}
-    pieces = {
-        name: [piece for _, array in found.results[name] for piece in array.pieces()]
-        for name in ("dx", "y")
-    }
-    rows = {}
-    for name, part in pieces.items():
-        along = _along(found.graph, [expr for expr, _ in part], starts)
-        rows[name] = list(zip(along, [size for _, size in part], strict=True))
+    rows = {name: along(found, name, starts) for name in names}
     return Tangent(rows=rows, assumed=dict(found.graph.assumptions))
 
 
-def _along(graph: Graph, exprs: Sequence[Expr], starts: Mapping[str, int]) -> list[Expr | None]:
+def along(
+    equations: Equations, name: str, starts: Mapping[str, int]
+) -> list[tuple[Expr | None, int]]:
+    """Return the derivative of a diagram's results along a direction.
+
+    Parameters
+    ----------
+    equations : Equations
+    name : str
+        ``"dx"`` or ``"y"``.
+    starts : mapping
+        By which arrays is differentiated: where in the direction each begins.
+
+    Returns
+    -------
+    list of tuple
+        Of each piece the expression, None where it is 0, and its length.
+
+    Raises
+    ------
+    CompileError
+        If a function is opaque.
+    """
+    graph = equations.graph
+    pieces = [piece for _, array in equations.results[name] for piece in array.pieces()]
+
     def seed(leaf: Expr) -> Expr | None:
         array, start, step = leaf.data
         if array not in starts or leaf.kind != "f":
@@ -81,10 +114,11 @@ def _along(graph: Graph, exprs: Sequence[Expr], starts: Mapping[str, int]) -> li
         return graph.node("leaf", data=where, size=leaf.size, varies=True)
 
     try:
-        with np.errstate(all="ignore"):
-            return tangents(graph, exprs, seed)
+        with _DIFFERENTIATING, np.errstate(all="ignore"):
+            found = tangents(graph, [expr for expr, _ in pieces], seed)
     except Untraceable as error:
         raise CompileError(f"the equations have no derivatives: {error}") from None
+    return list(zip(found, [size for _, size in pieces], strict=True))
 
 
 def jacobian(
@@ -99,7 +133,8 @@ def jacobian(
     Returns
     -------
     dict
-        ``"dx"`` of shape (nstates, k) and ``"y"`` of shape (noutputs, k).
+        ``"dx"`` of shape (nstates, k) and ``"y"`` of shape (noutputs, k), and of next states of
+        sampled blocks ``"sample0"`` and so on.
     """
     system, made = compiled.system, compiled.tangent
     p = compiled.parameter_vector(params)
@@ -142,12 +177,56 @@ def linearize(
     n, m = system.nstates or 0, system.ninputs or 0
     directions = np.eye(n + m + length(compiled.program.layout), n + m)
     found = jacobian(compiled, x0, u0, t, params, directions)
+    rates, outputs, dt = found["dx"], found["y"], system.dt
+    if compiled.program.sampled:
+        rates, outputs, dt = over_a_period(compiled, found)
     names = {"states": system.state_labels, "inputs": system.input_labels}
     return ct.StateSpace(
-        found["dx"][:, :n], found["dx"][:, n:], found["y"][:, :n], found["y"][:, n:], system.dt,
+        rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:], dt,
         outputs=system.output_labels, name=f"{system.name}$linearized",
         remove_useless_states=False, **names,
     )  # fmt: skip
+
+
+def over_a_period(compiled: Compiled, found: Mapping[str, np.ndarray]) -> tuple[Any, Any, float]:
+    """Return the map of a diagram with sampled blocks from period to period, exactly.
+
+    States are taken before what happens at the beginning of a period, outputs after it; inputs
+    are constant over it.  Between instants the map is a matrix exponential.
+
+    Returns
+    -------
+    states, outputs : ndarray of shape (nstates, nstates + ninputs), (noutputs, ...)
+    period : float
+        Common period of the clocks (s).
+    """
+    n, width = found["dx"].shape
+    clocks, meetings = compiled.program.clocks, compiled.program.meetings
+    begin, end, period = common_period(clocks)
+    due = instants(clocks, begin, end, meetings)
+    flow = np.zeros((width, width))
+    flow[:n] = found["dx"]
+    total, shown = np.eye(width), found["y"]
+    gaps = np.diff(np.r_[begin, due.times, end])
+    total = expm(flow * gaps[0]) @ total
+    for k, (which, gap) in enumerate(zip(due.which, gaps[1:], strict=True)):
+        step = _sampled_map(compiled, found, int(which), width)
+        if k == 0 and gaps[0] == 0.0:
+            shown = shown @ step
+        total = expm(flow * gap) @ step @ total
+    return total[:n], shown, period
+
+
+def _sampled_map(
+    compiled: Compiled, found: Mapping[str, np.ndarray], which: int, width: int
+) -> np.ndarray:
+    """Return what an instant does to states and inputs."""
+    step, at = np.eye(width), 0
+    for row, array in compiled.equations.results[f"sample{which}"]:
+        places = list(compiled.program.sampled[row : row + array.size])
+        step[places] = found[f"sample{which}"][at : at + array.size]
+        at += array.size
+    return step
 
 
 def parameter_jacobian(

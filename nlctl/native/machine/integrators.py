@@ -39,7 +39,7 @@ WANTED = [
     )
     for function, *arguments in (
         (restart.start, ADDRESS, TASK, WORK),
-        (advance.advance, ADDRESS, TASK, WORK, numba.intp),
+        (advance.advance, ADDRESS, ADDRESS, TASK, WORK, numba.intp),
         (workspace.outputs, ADDRESS, ADDRESS, TASK, WORK),
     )
 ]
