@@ -64,6 +64,8 @@ weights = ""
 gain = ""
 """
 EVERY = """
+[faults]
+"lag.y" = { bias = 0.1, gain = 2.0 }
 [runs]
 size = 128
 [[analysis]]
@@ -104,6 +106,10 @@ x = "lag.rate"
 y = "lag.gain"
 cells = 3
 levels = 2
+[[analysis]]
+kind = "faults"
+onset = 1.5
+tolerates = ["lag.y bias"]
 [[analysis]]
 kind = "compare"
 keyword = "scale"
@@ -378,7 +384,7 @@ def test_an_unfinished_study_says_so(result):
     """What is done is shown."""
     part = replace(result, findings=result.findings[:2], complete=False)
     made = study_report(part)
-    assert made.verdict.startswith("Incomplete: 2 of 10 analyses are done.")
+    assert made.verdict.startswith("Incomplete: 2 of 11 analyses are done.")
     keys = [section.key for section in made.sections]
     assert keys == ["study_asked", "study_rows", "probability", "sequential", "study_assumed"]
 
