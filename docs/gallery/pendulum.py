@@ -18,8 +18,7 @@ g, length, start = 9.81, 1.0, np.pi / 2
 
 @nlctl.equation
 def swing(x, v):
-    x1, x2 = x
-    return -9.81 * np.sin(x1) + v
+    return -9.81 * np.sin(x[0]) + v
 
 
 plant = nlctl.block(nlctl.PureFeedback(order=2, f=swing, initial={"x1": start}), "plant")

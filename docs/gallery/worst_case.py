@@ -54,4 +54,4 @@ axes.axhline(limit, linestyle="--", color="black")
 axes.set(xlabel="t (s)", ylabel="y")
 axes.legend()
 peak = 1 + np.exp(-np.pi * 0.2 / np.sqrt(1 - 0.2**2))
-assert abs(worst.margin * (2 * limit) - (limit - peak)) < 1e-4
+assert abs(worst.margin * limit - (limit - peak)) < 1e-4
