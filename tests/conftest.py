@@ -10,6 +10,8 @@ from hypothesis import settings
 settings.register_profile("nlctl", deadline=None, derandomize=True, database=None, max_examples=50)
 settings.load_profile("nlctl")
 
+NEEDY = ("browser", "cluster", "docs", "upstream")  # marks of what counts as slow
+
 
 def pytest_configure(config):
     """Keep machine code in one folder for all workers, the processes they start and later runs.
@@ -22,13 +24,13 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
-    """Count as slow what needs a browser, a cluster or other people's tests, unless it is weekly.
+    """Count as slow what needs a browser, a cluster, Sphinx or other people's tests; not if weekly.
 
     So is the machine code, ``native=True``, of what the same test compares as plain Python.
     """
     for item in items:
         values = item.callspec.params if hasattr(item, "callspec") else {}
-        marked = any(item.get_closest_marker(name) for name in ("browser", "cluster", "upstream"))
+        marked = any(item.get_closest_marker(name) for name in NEEDY)
         weekly = item.get_closest_marker("weekly")
         if not weekly and (marked or values.get("native") is True):
             item.add_marker("slow")

@@ -1,0 +1,75 @@
+"""Sphinx's settings: offline, executed pages, formulas as MathML.
+
+``pip install ".[docs]" && sphinx-build -W -n docs build/site``, from the root of the repository.
+"""
+
+import sys
+import warnings
+from pathlib import Path
+
+import matplotlib
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
+matplotlib.use("agg")
+
+from nlctl._version import __version__  # noqa: E402
+
+project = "nlctl"
+author = "The nlctl developers"
+copyright = author  # noqa: A001
+version = release = __version__
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "numpydoc",
+    "myst_parser",
+    "sphinx_gallery.gen_gallery",
+    "formulas",
+    "docstrings",
+    "public",
+]
+root_doc = "index"
+exclude_patterns = ["auto/**/*.py", "auto/**/*.ipynb", "gallery", "tutorials", "how-to/*.py"]
+exclude_patterns += ["how-to/GALLERY_HEADER.rst"]
+
+autodoc_typehints = "none"  # types stand in the docstrings
+autosummary_generate = False
+numpydoc_show_class_members = False
+myst_heading_anchors = 3
+myst_enable_extensions = ["deflist", "dollarmath"]
+suppress_warnings = ["config.cache"]  # functions among sphinx-gallery's settings
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"nlctl {version}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sourcelink = False
+html_copy_source = False
+html_sidebars = {"index": []}
+html_theme_options = {
+    "logo": {"text": "nlctl"},
+    "navbar_end": ["theme-switcher"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "navigation_with_keys": False,
+    "show_toc_level": 2,
+}
+
+sphinx_gallery_conf = {
+    "examples_dirs": ["tutorials", "how-to", "gallery"],
+    "gallery_dirs": ["auto/tutorials", "auto/how-to", "auto/gallery"],
+    "filename_pattern": r"\.py$",
+    "within_subsection_order": "FileNameSortKey",
+    "abort_on_example_error": True,
+    "only_warn_on_example_error": False,
+    "write_computation_times": False,
+    "show_signature": False,
+    "download_all_examples": False,
+    "remove_config_comments": True,
+    "matplotlib_animations": False,
+    "image_srcset": ["2x"],
+    "nested_sections": False,
+}
+warnings.filterwarnings("ignore", message=".*non-interactive.*", category=UserWarning)

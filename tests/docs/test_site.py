@@ -1,0 +1,80 @@
+"""The site builds without a warning, its scripts are checked, and no public name is left out."""
+
+import ast
+import importlib
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+from extras import needed
+from places import ROOT
+from rows import each_row
+
+DOCS = ROOT / "docs"
+GALLERY = sorted((DOCS / "gallery").glob("*.py"))
+SCRIPTS = GALLERY + sorted([*DOCS.glob("tutorials/*.py"), *DOCS.glob("how-to/*.py")])
+PUBLIC = ["nlctl", "nlctl.paper", "analysis.lyapunov", "analysis.robustness", "analysis.studies"]
+
+
+def text(path):
+    return path.read_text(encoding="utf-8")
+
+
+@each_row("script", [path.name for path in GALLERY])
+def test_a_script_of_the_gallery_is_short_and_asserts(script):
+    """Under 60 lines, and what it asserts is not a constant."""
+    source = text(DOCS / "gallery" / script)
+    assert len(source.splitlines()) < 60
+    asserted = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Assert)]
+    assert asserted
+    assert not any(isinstance(node.test, ast.Constant) for node in asserted)
+
+
+def test_every_page_that_is_executed_asserts_something():
+    """Tutorials and how-to pages too."""
+    for path in SCRIPTS:
+        assert any(isinstance(node, ast.Assert) for node in ast.walk(ast.parse(text(path)))), path
+
+
+@each_row("module", PUBLIC)
+def test_every_public_name_is_in_the_reference(module):
+    """And nothing else: the lists of the pages are the modules' own."""
+    told = []
+    for page in (DOCS / "reference").glob("*.rst"):
+        for name, block in re.findall(r"^\.\. public:: (\S+)\n\n((?: +.*\n?)+)", text(page), re.M):
+            told += block.split() if name == module else []
+    assert sorted(told) == sorted(importlib.import_module(module).__all__)
+
+
+def test_code_of_the_explanations_runs():
+    """Blocks of Python on pages in Markdown, which assert what the text says."""
+    for path in (DOCS / "explanation").glob("*.md"):
+        for code in re.findall(r"```python\n(.*?)```", text(path), flags=re.DOTALL):
+            assert "assert" in code
+            exec(compile(code, str(path), "exec"), {})
+
+
+def built(folder, *options):
+    """Build the site in a folder; return what Sphinx says of it."""
+    needed("sphinx_gallery", "docs")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "-n", "-E", *options, str(DOCS), folder]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+
+
+@pytest.mark.docs
+def test_the_site_builds_without_a_warning(tmp_path):
+    """Links, names and formulas; nothing is executed."""
+    said = built(str(tmp_path), "-D", "plot_gallery=0")
+    assert said.returncode == 0, said.stderr
+    assert "<math" in text(tmp_path / "explanation" / "paper.html")
+
+
+@pytest.mark.docs
+@pytest.mark.weekly
+def test_every_page_is_executed(tmp_path):
+    """All scripts run, and their assertions hold."""
+    said = built(str(tmp_path))
+    assert said.returncode == 0, said.stderr
