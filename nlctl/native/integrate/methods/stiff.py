@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from ...machine.address import call_along
-from ..control import TRIAL
+from ..control import TRIAL, memory_error
 from ..state import INNER
 from ..workspace import DIFFERENCES, evaluate, inputs_at
 from . import rodas5p
@@ -124,12 +124,9 @@ def _spectral_radius(w):
 def _memory_error(rhs, task, lanes, w):
     """Return the largest error of what memories would become, over its tolerance.
 
-    A memory that is carried along is a state like any other, and follows from the others by an
-    equation that may amplify their errors: in Example 2 that of r by 6000, and with it the time
-    at which the memory is seen to turn round.  Estimated by the defect f - x' of the solution at
-    the end of the step, divided by 1 / (h gamma) - J.  Most of that is the polynomial's, which is
-    of order 3 in what fast components amplify; less than `SHARE` of it (a tenth, measured) is the
-    solution's, of order 4.
+    Estimated by the defect f - x' of the solution at the end of the step, divided by
+    1 / (h gamma) - J.  Most of that is the polynomial's, which is of order 3 in what fast
+    components amplify; less than `SHARE` of it (a tenth, measured) is the solution's, of order 4.
     """
     error = w.x_stage_flat  # not needed any more
     rodas5p.end_slope(lanes[0].step, w.x_flat, w.x_new_flat, w.U, error)
@@ -139,12 +136,7 @@ def _memory_error(rhs, task, lanes, w):
     for i in range(error.size):
         w.x_ahead[i, 0] = w.x_new[i, 0] + error[i]
     evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
-    largest = 0.0
-    for i in range(task.corners, w.g.shape[0]):
-        scale = task.atol + task.rtol * abs(w.g[i, 0])
-        part = SHARE * abs(w.g[i, 0] - w.g_ahead[i, 0]) / scale
-        largest = part if part > largest else largest
-    return largest
+    return SHARE * memory_error(task.corners, w.g, w.g_ahead, task.rtol, task.atol, 0)
 
 
 @numba.njit(**INNER)
@@ -176,4 +168,6 @@ def stiff_attempt(rhs, along, task, lanes, w):
     evaluate(rhs, task, lanes, w, w.x_new, w.k[6], w.g)
     w.error[0] = rodas5p.error_norm(w.x, w.x_new, w.U, task.rtol, task.atol)
     if task.memory.size:
-        w.error[0] = max(w.error[0], _memory_error(rhs, task, lanes, w))
+        error = _memory_error(rhs, task, lanes, w)
+        if not error <= w.error[0]:
+            w.error[0] = error

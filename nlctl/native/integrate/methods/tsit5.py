@@ -81,14 +81,21 @@ def combined(x, h, k, s, result):
 
 
 @numba.njit(**INNER)
-def weighed_errors(x, x_new, k, h, rtol, atol, result):
-    """Fill `result` with the magnitudes of the errors over atol + rtol |x|; all are flat."""
+def difference(h, k, result):
+    """Fill `result` with the difference of the solutions of order 5 and 4; all are flat."""
     e0, e1, e2, e3, e4, e5, e6 = E[0], E[1], E[2], E[3], E[4], E[5], E[6]
-    for j in range(x.size):
+    for j in range(h.size):
         slope = e0 * k[0, j] + e1 * k[1, j] + e2 * k[2, j] + e3 * k[3, j]
         slope += e4 * k[4, j] + e5 * k[5, j] + e6 * k[6, j]
+        result[j] = h[j] * slope
+
+
+@numba.njit(**INNER)
+def weighed(x, x_new, change, rtol, atol, result):
+    """Fill `result` with the magnitudes of `change` over atol + rtol |x|; all are flat."""
+    for j in range(x.size):
         largest = abs(x[j]) if abs(x[j]) > abs(x_new[j]) else abs(x_new[j])
-        result[j] = abs(h[j] * slope) / (atol + rtol * largest)
+        result[j] = abs(change[j]) / (atol + rtol * largest)
 
 
 @numba.njit(**INNER)
