@@ -58,12 +58,15 @@ def draw_lines(ax: Axes, t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Non
         legend_above(ax)
 
 
-def legend_above(ax: Axes, shown: Mapping[str, Any] | None = None, line: int = LINE) -> None:
-    """Put the legend above axes, where it hides nothing and takes no width.
+def legend_above(
+    ax: Axes | Figure, shown: Mapping[str, Any] | None = None, line: int = LINE
+) -> None:
+    """Put the legend above axes, or above all of a figure, where it hides nothing.
 
     Parameters
     ----------
-    ax : Axes
+    ax : Axes or Figure
+        A figure where the axes beside each other are narrower than the legend.
     shown : mapping of str to artist, optional
         What it shows; by default what the axes have labels for.
     line : int, optional
@@ -76,11 +79,11 @@ def legend_above(ax: Axes, shown: Mapping[str, Any] | None = None, line: int = L
     if not labels:
         return
     widest = max(len(label.replace("\\", "")) for label in labels) + 6
+    above = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
     ax.legend(
         handles,
         labels,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
+        **({"loc": "outside upper left"} if isinstance(ax, Figure) else above),
         ncols=max(1, min(len(labels), line // widest)),
         frameon=False,
         borderaxespad=0.2,
