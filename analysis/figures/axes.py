@@ -79,11 +79,13 @@ def legend_above(
     if not labels:
         return
     widest = max(len(label.replace("\\", "")) for label in labels) + 6
-    above = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
+    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
+    if isinstance(ax, Figure):
+        place = {"loc": "outside upper left"}
     ax.legend(
         handles,
         labels,
-        **({"loc": "outside upper left"} if isinstance(ax, Figure) else above),
+        **place,
         ncols=max(1, min(len(labels), line // widest)),
         frameon=False,
         borderaxespad=0.2,
