@@ -68,14 +68,14 @@ def legend_above(
     ax : Axes or Figure
         A figure where the axes beside each other are narrower than the legend.
     shown : mapping of str to artist, optional
-        What it shows; by default what the axes have labels for.
+        What it shows; by default what the axes have labels for; a figure needs it.
     line : int, optional
         Characters that the axes have room for; those with long names at the left have less.
     """
-    if shown is None:
+    if shown is None and isinstance(ax, Axes):
         handles, labels = ax.get_legend_handles_labels()
     else:
-        labels, handles = list(shown), list(shown.values())
+        labels, handles = list(shown or ()), list((shown or {}).values())
     if not labels:
         return
     widest = max(len(label.replace("\\", "")) for label in labels) + 6
