@@ -58,29 +58,34 @@ def draw_lines(ax: Axes, t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Non
         legend_above(ax)
 
 
-def legend_above(ax: Axes, shown: Mapping[str, Any] | None = None, line: int = LINE) -> None:
-    """Put the legend above axes, where it hides nothing and takes no width.
+def legend_above(
+    ax: Axes | Figure, shown: Mapping[str, Any] | None = None, line: int = LINE
+) -> None:
+    """Put the legend above axes, or above all of a figure, where it hides nothing.
 
     Parameters
     ----------
-    ax : Axes
+    ax : Axes or Figure
+        A figure where the axes beside each other are narrower than the legend.
     shown : mapping of str to artist, optional
-        What it shows; by default what the axes have labels for.
+        What it shows; by default what the axes have labels for; a figure needs it.
     line : int, optional
         Characters that the axes have room for; those with long names at the left have less.
     """
-    if shown is None:
+    if shown is None and isinstance(ax, Axes):
         handles, labels = ax.get_legend_handles_labels()
     else:
-        labels, handles = list(shown), list(shown.values())
+        labels, handles = list(shown or ()), list((shown or {}).values())
     if not labels:
         return
     widest = max(len(label.replace("\\", "")) for label in labels) + 6
+    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
+    if isinstance(ax, Figure):
+        place = {"loc": "outside upper left"}
     ax.legend(
         handles,
         labels,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
+        **place,
         ncols=max(1, min(len(labels), line // widest)),
         frameon=False,
         borderaxespad=0.2,

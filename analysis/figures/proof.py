@@ -54,7 +54,8 @@ def burst(run: LongRun) -> Figure:
         whole.plot(p.time, p.zeta, "o", linestyle=style, color=colour, markersize=5, label=label)
     for ax in (whole, error):
         ax.axvline(run.burst, color=ORANGE, linewidth=1.6, label="happened")
-    legend_above(whole)
+    shown_above = dict(zip(*whole.get_legend_handles_labels()[::-1], strict=True))
+    legend_above(figure, shown_above)
     error.semilogy(*envelope(time, np.abs(s["e"])), color=BLUE, linewidth=1.4)
     shown = left <= 100.0
     for (name, label), (colour, style) in zip(
@@ -104,7 +105,7 @@ def _creeping(ax: Axes, run: LongRun) -> None:
     ax.plot(run.time, zeta, "-", color=BLUE, linewidth=1.6, label="argument $\\zeta$ of the gain")
     ax.axhline(high, color=GREY, linewidth=1.0, linestyle="--")
     ax.annotate(
-        f"$\\zeta$ = {high:g}: the gain changes its sign", (0, high), (3, -11),
+        f"$\\zeta$ = {high:g}: the gain changes its sign", (0, high), (3, 4),
         textcoords="offset points", color=GREY,
     )  # fmt: skip
     if np.isfinite(run.burst):

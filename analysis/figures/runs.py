@@ -18,7 +18,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from ..robustness.stl.spec import violates
-from .axes import BLUE, GREY, ORANGE, STYLES, TIME, WIDTH, legend_above, set_style, stacked_axes
+from .axes import (
+    BLUE,
+    GREY,
+    ORANGE,
+    SHORT_LINE,
+    STYLES,
+    TIME,
+    WIDTH,
+    legend_above,
+    set_style,
+    stacked_axes,
+)
 from .labels import arms, plain
 
 __all__ = [
@@ -61,7 +72,7 @@ def margins(values: np.ndarray) -> Figure:
     if violated.any():
         at = np.minimum(y[violated], -width / 2)  # a margin of 0 is a violation
         counts.hist(at, edges, color=ORANGE, hatch="///", edgecolor="white", label="violates")
-    counts.legend(frameon=False)
+    legend_above(counts, line=SHORT_LINE)
     counts.set(xlabel="margin (1)", ylabel="runs")
     ordered = np.sort(y)
     share = np.arange(1, y.size + 1) / y.size
@@ -72,7 +83,7 @@ def margins(values: np.ndarray) -> Figure:
         part.fill_between(ordered[below], share[below], step="post", color=ORANGE, alpha=0.5)
     part.axvline(0.0, color=GREY, linewidth=1.0, linestyle="--")
     part.set(xlabel="margin (1)", ylabel="share of runs", ylim=(0.0, 1.02))
-    part.yaxis.set_major_formatter(PercentFormatter(1.0))
+    part.yaxis.set_major_formatter(PercentFormatter(1.0, symbol="\N{NO-BREAK SPACE}%"))
     for ax in (counts, part):
         set_style(ax)
     counts.yaxis.set_major_locator(MaxNLocator(integer=True))

@@ -77,7 +77,7 @@ def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | Non
     )  # fmt: skip
     if at is not None and limit is not None:
         ax.plot([at], [limit], "v", color=ORANGE, markersize=7, label="limit")
-        ax.legend(frameon=False)
+        legend_above(ax)
     ax.set(xlabel="size of the uncertainty (1)", ylabel="probability of a violation")
     ax.margins(x=0.03)
     ax.set_ylim(bottom=-0.03 * ax.get_ylim()[1])

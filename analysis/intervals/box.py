@@ -125,7 +125,7 @@ def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
             raise ParameterError(f"visited_box needs finite values, got {name} in {sides[name]}")
     start, end = (f([f(r.time) for r in responses]) for f in (np.min, np.max))
     who = "one response" if len(responses) == 1 else f"{len(responses)} responses"
-    how = f"visited by {who} in [{start:g}, {end:g}] s, + {margin:.0%}"
+    how = f"visited by {who} in [{start:g}, {end:g}] s, and {100 * margin:.0f} % more"
     return dataclasses.replace(Box.of(**sides), provenance="sampled", how=how)
 
 

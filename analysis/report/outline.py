@@ -144,13 +144,18 @@ def cells(table: Table) -> list[list[Cell]]:
 
 
 def numeric(table: Table) -> list[bool]:
-    """Return for each column whether all its cells are numbers or empty, and not all empty."""
+    """Return for each column whether all its cells are numbers or empty, and not all empty.
+
+    Units are words, also where each of them is 1.
+    """
     rows = cells(table)
     if not rows:
         return [False] * len(table.columns)
     return [
-        any(cell.value for cell in column) and all(cell.value or not cell.text for cell in column)
-        for column in zip(*rows, strict=True)
+        any(cell.value for cell in column)
+        and all(cell.value or not cell.text for cell in column)
+        and title != "unit"
+        for title, column in zip_longest(table.columns, zip(*rows, strict=True))
     ]
 
 

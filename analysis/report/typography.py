@@ -7,7 +7,7 @@ Whatever a report says is plain text; a formula inside it is written as LaTeX be
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .mathml import spoken
 
@@ -20,15 +20,18 @@ UNITS = (
 )
 FORMULA = re.compile(r"\\\((.+?)\\\)", re.DOTALL)
 DOI = re.compile(r"(?:\bdoi:?\s*|https://doi\.org/)(10\.\d{4,9}/[\w.()/:-]*\w)", re.IGNORECASE)
-RAISED = str.maketrans("-+0123456789", "⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹")
+RAISED = str.maketrans("-+0123456789i", "⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹ⁱ")
 
 _POWER_OF_TEN = re.compile(r"(?<![\w.·])(\d+(?:\.\d+)?)e([+-]?)0*(\d{1,3})(?![\w.]*\w)")
-_POWER = re.compile(r"(?<=[A-Za-zα-ω)])\^(-?\d+)(?![\w.])")
+_POWER = re.compile(r"(?<=[A-Za-zα-ω)|])\^(-?(?:\d+|i))(?![\w.])")
 _MINUS = re.compile(r"(?:^|(?<=[\s(\[{=,;:|<>≤≥±…·]))-(?=[\d∞]|\.\d)")
 _SIGNS = ((" <= ", " ≤ "), (" >= ", " ≥ "), (")-(", ")–("))
 _UNIT = re.compile(
     rf"(?<=[\d∞⁰¹²³⁴⁵⁶⁷⁸⁹\]]) (?=(?:{UNITS}|1/[A-Za-z]+|/ [A-Za-z])(?![A-Za-z0-9_]))"
 )
+_TAIL = re.compile(r"[,.;:)\]]+")
+_RELATED = re.compile(r"(?<=[=<>≤≥±≈]) (?=[−+]?[\d∞])")
+_PER_CENT = re.compile(r"(?<=\d)(?=%(?![\w%]))")
 _NUMBERED = re.compile(r"\b(Example|Lemma|row|size) (?=\d)")
 _SLASH = re.compile(rf"(?<=\d{NO_BREAK}/) (?=[A-Za-z])")
 
@@ -39,6 +42,7 @@ class Piece:
 
     text: str = ""
     latex: str = ""
+    tail: str = ""  # what stays on the line of the formula before it
     doi: str = ""
 
 
@@ -46,7 +50,7 @@ def in_print(text: str) -> str:
     """Return plain text with the signs of print; what is no number, power or unit stays.
 
     1e-06 becomes 10⁻⁶, 1/s^4 becomes 1/s⁴, -0.5 has a minus sign, and the spaces of 10 s,
-    99 % and Example 1 do not break.
+    99 %, = 3 and Example 1 do not break.
     """
     text = _POWER_OF_TEN.sub(_scientific, text)
     text = _POWER.sub(lambda found: found[1].translate(RAISED), text)
@@ -55,11 +59,17 @@ def in_print(text: str) -> str:
         text = text.replace(typed, sign)
     text = _UNIT.sub(NO_BREAK, text)
     text = _SLASH.sub(NO_BREAK, text)
+    text = _PER_CENT.sub(NO_BREAK, text)
+    text = _RELATED.sub(NO_BREAK, text)
     return _NUMBERED.sub(rf"\1{NO_BREAK}", text)
 
 
 def _scientific(number: re.Match[str]) -> str:
     mantissa, sign, exponent = number.groups()
+    if float(mantissa) == 0:
+        return "0"
+    if exponent == "0":
+        return mantissa
     power = f"10{(sign.strip('+') + exponent).translate(RAISED)}"
     return power if mantissa == "1" else f"{mantissa}·{power}"
 
@@ -71,6 +81,9 @@ def pieces(text: str) -> list[Piece]:
         if number % 2:
             found.append(Piece(latex=part))
             continue
+        if found and (tail := _TAIL.match(part)):
+            found[-1] = replace(found[-1], tail=tail[0])
+            part = part[tail.end() :]
         words, *rest = DOI.split(part)
         for doi, after in zip(rest[0::2], rest[1::2], strict=True):
             found += [Piece(text=f"{in_print(words)}doi "), Piece(doi=doi)]

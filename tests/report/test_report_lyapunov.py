@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from drawn import hidden
 from test_report import made_up_runs, outline
 
 import nlctl
@@ -221,6 +222,17 @@ def test_a_burst_feeds_on_the_integral_of_the_nussbaum_function():
     lower, upper = antiderivative(parts.law.N)(np.array([3.0, zeta[-1]]))
     slope, G = 1.2, (1.0, 3.0 * 1.2)  # of the backlash; (2 + cos x1)(1 + 0.2 sin(v)^2)
     assert slope * G[0] < r[-1] ** 2 / 2 / (upper - lower) < 1.01 * slope * G[1]
+
+
+def test_no_word_of_the_figures_is_hidden():
+    """With the run of Example 2 that the page shows; nothing is cut off or lies on a curve."""
+    record = read_record(dataclasses.replace(burst(), predictions=(found()[2].creep,) * 2))
+    made = [i.figure for s in part() for i in s.items if isinstance(i, Figure)]
+    made += [figures.burst(record), figures.story(*np.zeros((3, 9)), record)]
+    made += [figures.long_zeta({"Example 2 with the phase": record})]
+    assert len(made) > 8
+    for figure in made:
+        assert hidden(figure) == []
 
 
 def test_ctrl_c_ends_a_long_run():

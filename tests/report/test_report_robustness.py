@@ -11,6 +11,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pandas as pd
 import pytest
+from drawn import hidden
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.text import Text
@@ -367,6 +368,12 @@ def test_the_page_holds_the_study(result, report, page, tmp_path):
     (tmp_path / "study.toml").write_text(report.inputs["study.toml"], encoding="utf-8")
     assert read_study(tmp_path / "study.toml").study == result.study
     assert report.inputs["study.toml"] in Reader(page).text
+
+
+def test_no_word_of_the_figures_is_hidden(report):
+    """Labels and legends are whole, and lie on no curve, no bar and no other label."""
+    made = {i.key: i.figure for s in report.sections for i in s.items if isinstance(i, Figure)}
+    assert {key: hidden(figure) for key, figure in made.items() if hidden(figure)} == {}
 
 
 def test_captions_name_what_is_drawn(result):

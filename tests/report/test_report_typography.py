@@ -16,7 +16,11 @@ from analysis.report.typography import FORMULA, NO_BREAK, in_print, pieces, plai
 @each_row(
     ("typed", "printed"),
     [
-        ("for t >= 10 s", "for t ≥ 10_s"),
+        ("for t >= 10 s", "for t ≥_10_s"),
+        ("x1(0) = -0.5 and n < m", "x1(0) =_−0.5 and n < m"),
+        ("0.0e+00, 2.1e+00, 1e0", "0, 2.1, 1"),
+        ("rms (71%), 50% each, a%20b", "rms (71_%), 50_% each, a%20b"),
+        ("d per |x|^2, s^-i", "d per |x|², s⁻ⁱ"),
         ("99 % of 20 of 30 runs", "99_% of 20 of 30 runs"),
         ("2.5 / s, 10 1/s^2 and 3 N m", "2.5_/_s, 10_1/s² and 3_N m"),
         ("tolerance 1e-06 or 5e-05", "tolerance 10⁻⁶ or 5·10⁻⁵"),
@@ -106,3 +110,16 @@ def test_a_formula_can_be_read_aloud(latex, words):
     """In titles and descriptions of figures, where no MathML can stand."""
     assert spoken(latex) == words
     assert plain(rf"see \({latex}\).") == f"see {words}."
+
+
+def test_a_comma_stays_on_the_line_of_its_formula():
+    """What closes a formula goes with it; what follows after a space may go on below."""
+    found = pieces(r"if \(a < b\), then (\(c\)).")
+    assert [(p.text, p.latex, p.tail) for p in found] == [
+        ("if ", "", ""), ("", "a < b", ","), (" then (", "", ""), ("", "c", ")."),
+    ]  # fmt: skip
+
+
+def test_an_index_of_several_signs_is_an_index():
+    """In braces, as (1) has it."""
+    assert formulas("x_i' = x_{i+1}, y = x_1") == r"\(\dot{x}_{i}=x_{i+1}\), \(y=x_{1}\)"

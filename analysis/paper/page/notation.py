@@ -27,7 +27,7 @@ OPENING, CLOSING = frozenset("([{"), frozenset(")]}")
 
 _NAME = (
     rf"(?:d?(?:{'|'.join(GREEK)})|[A-Za-z])"  # also dzeta
-    r"(?:_(?:max|min|hat|[A-Za-z]|\d+))*\d*(?:~|(?<=[lE])[+-](?=[\s,=]|$))?\*?'*"
+    r"(?:_(?:max|min|hat|\{[a-z0-9+-]+\}|[A-Za-z]|\d+))*\d*(?:~|(?<=[lE])[+-](?=[\s,=]|$))?\*?'*"
 )
 TOKEN = re.compile(
     rf"(?P<integral>int(?:_0\^s)?(?![A-Za-z]))|(?P<function>(?:{'|'.join(FUNCTIONS)})(?![A-Za-z_]))"
@@ -164,7 +164,7 @@ def _name(token: str) -> str:
     if dots:
         told = rf"\{'dot' if dots == 1 else 'ddot'}{{{told}}}"
     lower = ",".join(
-        rf"\{i}" if i in ("max", "min") else i
+        rf"\{i}" if i in ("max", "min") else i.strip("{}")
         for i in [*indices, number, side]
         if i not in ("", "hat")
     )

@@ -233,7 +233,7 @@ def _constants(one: Evidence) -> Table:
         caption=f"{text.CONSTANTS} {formulas(str(one.ledger.constants.box))}.",
         columns=("constant", "value", "unit", "provenance", "how"),
         rows=[
-            (formulas(c.symbol), f"{c.value:.6g}", formulas(c.unit), c.provenance, formulas(c.how))
+            (formulas(c.symbol), f"{c.value:.6g}", c.unit, c.provenance, formulas(c.how))
             for c in entries
         ],
         status="provenance",

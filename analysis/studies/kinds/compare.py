@@ -218,11 +218,15 @@ def _run(asked: Compare, ground: Ground) -> Finding | None:
     )
 
 
+def _middle(metric: str, row: Mapping[str, Any]) -> str:
+    middle = row[f"median {metric}"]
+    return f"median {metric} {middle:.4g}" if middle == middle else f"no run with {metric}"
+
+
 def _sentence(asked: Compare, found: Comparison) -> str:
     metric = next(iter(asked.metrics))
     told = "; ".join(
-        f"{label}: {row['violations']:.0f} violations, median {metric} "
-        f"{row[f'median {metric}']:.4g}"
+        f"{label}: {row['violations']:.0f} violations, {_middle(metric, row)}"
         for label, row in found.ranking.to_dict("index").items()
     )
     spec = f" (requirements {', '.join(asked.requirements)})" if asked.requirements else ""
