@@ -16,7 +16,7 @@ import control as ct
 
 from .errors import AmbiguousNameError, UnknownNameError
 
-LISTED = 24  # names that a message lists; it says how many more there are
+_LISTED = 24  # names that a message lists; it says how many more there are
 
 
 def unknown(
@@ -33,8 +33,8 @@ def unknown(
         hint = "nearest: " + ", ".join(f"'{n}'" for n in near)
     else:
         names = sorted(dict.fromkeys(known))
-        hint = "known: " + (", ".join(f"'{n}'" for n in names[:LISTED]) or "none")
-        hint += f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        hint = "known: " + (", ".join(f"'{n}'" for n in names[:_LISTED]) or "none")
+        hint += f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     return error(f"unknown {kind} '{name}'{where and ' ' + where}; {hint}")
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from analysis.lyapunov.ledger import Ledger, Line
 
 STATUSES = ("proved", "computed", "checked", "undecided", "not applicable", "violated")
-STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
+_STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
 
 
 def random_start(
@@ -115,7 +115,7 @@ def show_ledger(found: Ledger, console: Console) -> None:
             what.append("\nas in the paper", "italic")
         if line.follows:
             what.append(f"\n{line.follows}", "red" if line.reading == "corrected" else "yellow")
-        cells = (line.key, Text(line.status, STYLES.get(line.status, "")), _number(line.least))
+        cells = (line.key, Text(line.status, _STYLES.get(line.status, "")), _number(line.least))
         who = (str(line.member),) if found.members > 1 else ()
         rows.add_row(*cells, _number(line.time), what, *who)
     console.print(rows)

@@ -27,8 +27,8 @@ from .nussbaum.slow_drift import Creep, creep
 __all__ = ["closure", "conclusions", "creep_of"]
 
 SAFE = "zeta cannot cross its lobe before T"
-WINDOW = 4 * np.pi  # s; period of the paper's reference
-LEMMA = (
+_WINDOW = 4 * np.pi  # s; period of the paper's reference
+_LEMMA = (
     "false on [0, inf): with zeta' = c1 c2/(2 + exp(zeta^2)), V = c1 + I and g = 1 its premise "
     "holds and zeta is unbounded"
 )
@@ -56,10 +56,10 @@ def creep_of(run: Run) -> Creep | None:
 def _creep_or_reason(run: Run) -> Creep | str:
     """Return where the creep leads, or why that cannot be told."""
     length = run.signals.t[-1] - run.signals.t[0]
-    if length < 6 * WINDOW:
-        return f"{length:g} s show nothing of it: run {np.ceil(6 * WINDOW):g} s at least"
+    if length < 6 * _WINDOW:
+        return f"{length:g} s show nothing of it: run {np.ceil(6 * _WINDOW):g} s at least"
     try:
-        return creep(_Response(run), run.parts.law.N, window=WINDOW)
+        return creep(_Response(run), run.parts.law.N, window=_WINDOW)
     except ParameterError as error:
         return str(error)
 
@@ -98,7 +98,7 @@ def _lemma() -> Line:
         key="Lemma 1",
         statement="V, zeta and int k G N dzeta are bounded if (32) holds",
         status="violated",
-        evidence=LEMMA,
+        evidence=_LEMMA,
         follows=NO_BOUND,
         reading="paper",
     )

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Ledger", "Line", "ledger"]
 
-SETTINGS = ("box", "W", "k", "start", "params", "step", "max_steps")
+_SETTINGS = ("box", "W", "k", "start", "params", "step", "max_steps")
 """What `examine` takes by name."""
 
 
@@ -154,8 +154,8 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
         As `examine` does.
     """
     for name in settings:
-        if name not in SETTINGS:
-            raise unknown("setting", name, SETTINGS, "of ledger", UnknownKeywordError)
+        if name not in _SETTINGS:
+            raise unknown("setting", name, _SETTINGS, "of ledger", UnknownKeywordError)
     found = loop if isinstance(loop, Examination) else examine(loop, run, **settings)
     return _assembled(found)
 

@@ -19,7 +19,7 @@ from .controllers import contenders, sensor
 
 __all__ = ["example_1", "example_2"]
 
-WIDE = 1e6  # a saturation beyond every |u| of a run that is worth keeping
+_WIDE = 1e6  # a saturation beyond every |u| of a run that is worth keeping
 
 
 def example_1(
@@ -27,7 +27,7 @@ def example_1(
     controller: Any = "paper",
     actuator: Any = None,
     gain: float = 1.0,
-    limit: float = WIDE,
+    limit: float = _WIDE,
     noise: float | None = None,
 ) -> ct.InterconnectedSystem:
     """Example 1 with another controller, gain, saturation or noise.
@@ -65,7 +65,7 @@ def example_2(
     controller: Any = "paper",
     actuator: Any = None,
     gain: float = 1.0,
-    limit: float = WIDE,
+    limit: float = _WIDE,
     noise: float | None = None,
 ) -> ct.InterconnectedSystem:
     """Example 2 with another controller, gain, saturation or noise; see `example_1`."""

@@ -16,8 +16,8 @@ from ..lyapunov.nussbaum.long_run import LOOKS, SIGNALS, LongRun
 __all__ = ["RECORD", "continued", "read_record", "thinned", "write_record"]
 
 RECORD = Path(__file__).with_name("example-2-burst.csv")
-WINDOW = 4 * np.pi  # s; period of the paper's reference: one row in each, where |e| is largest
-LAST, STEP, PER_DECADE = 100.0, 0.5, 60  # s, s; the last seconds by time left until the end
+_WINDOW = 4 * np.pi  # s; period of the paper's reference: one row in each, where |e| is largest
+LAST, _STEP, PER_DECADE = 100.0, 0.5, 60  # s, s; the last seconds by time left until the end
 
 
 def thinned(run: LongRun) -> LongRun:
@@ -28,11 +28,11 @@ def thinned(run: LongRun) -> LongRun:
     at which predictions are made.
     """
     time, error = run.time, np.abs(run.signals["e"])
-    number = np.floor(time / WINDOW).astype(int)
+    number = np.floor(time / _WINDOW).astype(int)
     starts = np.flatnonzero(np.diff(number, prepend=-1))
     ends = [*starts[1:], time.size]
     peaks = [a + int(np.argmax(error[a:b])) for a, b in zip(starts, ends, strict=True)]
-    left = np.concatenate([np.arange(LAST, 1.0, -STEP), np.geomspace(1.0, 1e-5, 5 * PER_DECADE)])
+    left = np.concatenate([np.arange(LAST, 1.0, -_STEP), np.geomspace(1.0, 1e-5, 5 * PER_DECADE)])
     late = np.searchsorted(time, time[-1] - left)
     cross = np.searchsorted(run.signals["zeta"], run.lobe.high) + np.array([-1, 0])
     calm = np.searchsorted(time, run.burst - 1.0, "right") - 1

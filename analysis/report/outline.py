@@ -16,8 +16,8 @@ import numpy as np
 from .document import Claim, Figure, History, Item, Report, Section, Table
 
 __all__ = [
-    "Cell",
     "Placed",
+    "TableCell",
     "cells",
     "claim_status",
     "evidence",
@@ -36,8 +36,8 @@ __all__ = [
 SHELL = frozenset(
     ["claims", "contents", "provenance", "files", "lead", "lead-title", "lead-desc"]
 )  # anchors of the page itself
-LONG = 32  # characters of a word that must be broken to fit a column
-SHORT = 24  # characters of a text that stays on one line
+_LONG = 32  # characters of a word that must be broken to fit a column
+_SHORT = 24  # characters of a text that stays on one line
 
 # Statuses by the look of their badge.  What is proved never looks like what is sampled.
 LIGHTS = {
@@ -63,12 +63,12 @@ MEANINGS = {  # of the statuses of claims, as the page explains them
     "violated": "there is a counterexample",
     "fails": "what was measured is beyond the limit",
 }
-ANSWERS = ("shown", "refuted", "not shown yet")  # to the claims of studies
+_ANSWERS = ("shown", "refuted", "not shown yet")  # to the claims of studies
 _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in statuses}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell:
+class TableCell:
     """One cell of a table as shown: text, number to sort by, look of its badge."""
 
     text: str
@@ -130,7 +130,7 @@ def _anchor(key: str, taken: set[str], endings: Sequence[str]) -> str:
     return name
 
 
-def cells(table: Table) -> list[list[Cell]]:
+def cells(table: Table) -> list[list[TableCell]]:
     """Return the rows of a table as they are shown, all of one length."""
     width = max([len(table.columns), *map(len, table.rows)])
     titles = [*table.columns, *[""] * (width - len(table.columns))]
@@ -154,21 +154,21 @@ def numeric(table: Table) -> list[bool]:
     ]
 
 
-def _cell(value: Any, is_status: bool) -> Cell:
+def _cell(value: Any, is_status: bool) -> TableCell:
     text = shown(value)
     if is_status:
-        return Cell(text=text, badge=light(text))
-    return Cell(text=text, value=sort_key(value))
+        return TableCell(text=text, badge=light(text))
+    return TableCell(text=text, value=sort_key(value))
 
 
 def is_long(text: str) -> bool:
     """Whether a text has a word that no column is wide enough for."""
-    return max(map(len, text.split()), default=0) > LONG
+    return max(map(len, text.split()), default=0) > _LONG
 
 
 def is_short(text: str) -> bool:
     """Whether a text is better not broken into lines."""
-    return len(text) <= SHORT
+    return len(text) <= _SHORT
 
 
 def shown(value: Any) -> str:
@@ -235,7 +235,7 @@ def summary(claims: Sequence[Claim]) -> tuple[str, str]:
         return "fail", f"{failed} of {total} claims {'fails' if failed == 1 else 'fail'}."
     kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
     kept = ", ".join(f"{number} {status}" for status, number in kinds.items())
-    waiting = "not shown yet" if {status for status, _ in statuses} <= set(ANSWERS) else "open"
+    waiting = "not shown yet" if {status for status, _ in statuses} <= set(_ANSWERS) else "open"
     if refuted:
         left = total - refuted - open_
         told = [f"{_whose(claims)} refuted"]

@@ -28,7 +28,7 @@ from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
 __all__ = ["file_hashes", "render_html", "render_json", "write_report"]
 
 DRAWN = ("figure", "time", "signals")  # curves are on the page only
-TITLES = {
+_TITLES = {
     "methods": "How it was found",
     "limits": "Limits of validity",
     "references": "References",
@@ -81,7 +81,7 @@ def render_html(
         drawings=drawings,
         shapes=shapes_svg(shapes),
         evidence=evidence(placed),
-        extra={k: t for k, t in TITLES.items() if getattr(report, k) or k == "provenance"},
+        extra={k: t for k, t in _TITLES.items() if getattr(report, k) or k == "provenance"},
         light=light,
         told=told,
         margins=any(claim.margin for claim in report.claims),

@@ -26,7 +26,7 @@ from .sealed import RunFolderError, as_json, origin_key
 
 __all__ = ["Replay", "replay", "replay_figure"]
 
-MOST = 8  # panels of a figure
+_MOST = 8  # panels of a figure
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,7 +168,7 @@ def replay_figure(made: Replay) -> Figure:
                 bounds.setdefault(band.signal, set()).update(ends)
         for signal in requirement.signals:
             texts.setdefault(signal, []).append(f"{requirement.key}: {requirement.formula}")
-    names = [*bounds, *(name for name in made.signals if name not in bounds)][:MOST]
+    names = [*bounds, *(name for name in made.signals if name not in bounds)][:_MOST]
     figure, axes = stacked_axes(rows=len(names), height=1.7)
     for ax, name in zip(axes, names, strict=True):
         ax.plot(made.time, made.signals[name], color=BLUE, linewidth=1.2)

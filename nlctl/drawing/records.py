@@ -14,7 +14,7 @@ from matplotlib.textpath import text_to_path
 FONT = "DejaVu Sans"  # comes with matplotlib, so a figure is the same on every machine
 GRID, LANE, STUB, ROW_GAP, APART = 8.0, 9.0, 16.0, 24.0, 48.0
 OUTSIDE = -1  # in place of a wire: the arrow from or to the outside
-Point = tuple[float, float]
+_Point = tuple[float, float]
 Links = set[tuple[int, int]]  # (source, target)
 Heights = Mapping[tuple[int, int], float]  # [block, wire]
 
@@ -82,7 +82,7 @@ class Route:
     The routes of one wire start together; the first of them carries the label.
     """
 
-    points: tuple[Point, ...]
+    points: tuple[_Point, ...]
     label: Label | None
     source: int | None
     target: int | None
@@ -97,7 +97,7 @@ class Layout:
     height: float
     boxes: tuple[Box, ...]
     routes: tuple[Route, ...]
-    dots: tuple[Point, ...]
+    dots: tuple[_Point, ...]
 
 
 def bundle(names: Sequence[str], letters: int = 14) -> str:
@@ -142,14 +142,14 @@ def measured(text: str, size: float, weight: str = "normal") -> Text:
     return Text(text, max(widths, default=0.0), 1.25 * size * len(lines) if text else 0.0)
 
 
-def strokes(routes: Sequence[Route]) -> list[tuple[Point, Point]]:
+def strokes(routes: Sequence[Route]) -> list[tuple[_Point, _Point]]:
     """Straight pen strokes that draw some routes, each stretch once though they share it."""
     lines: dict[tuple[int, float], list[tuple[float, float]]] = {}
     for start, end in [pair for route in routes for pair in pairwise(route.points)]:
         along = int(start[0] == end[0])
         span = min(start[along], end[along]), max(start[along], end[along])
         lines.setdefault((along, start[1 - along]), []).append(span)
-    drawn: list[tuple[Point, Point]] = []
+    drawn: list[tuple[_Point, _Point]] = []
     for (along, at), spans in lines.items():
         merged: list[list[float]] = []
         for low, high in sorted(spans):

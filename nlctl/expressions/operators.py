@@ -199,8 +199,8 @@ def _in_place(name: str) -> Callable[[Any, Any], Any]:
     return method
 
 
-BINARY = {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div", "mod": "remainder"}
-for _name, _op in (BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
+_BINARY = {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div", "mod": "remainder"}
+for _name, _op in (_BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
     setattr(Tracer, f"__{_name}__", _operator(_op))
     setattr(Tracer, f"__r{_name}__", _operator(_op, swapped=True))
     setattr(Tracer, f"__i{_name}__", _in_place(_op))

@@ -19,7 +19,7 @@ USE = (
     "nlctl.input_output_response, nlctl.ensemble_response, .linearize(x0, u0); "
     "python-control's functions take .system"
 )
-SHOWN = 8  # names that are listed before the rest is only counted
+_SHOWN = 8  # names that are listed before the rest is only counted
 
 
 def described(compiled: Compiled) -> str:
@@ -91,14 +91,14 @@ def _value(slot: Slot, p: np.ndarray) -> str:
     values = p[slot.offset : slot.offset + slot.size]
     if not slot.shape:
         return f"{values[0]:g}"
-    if slot.size > SHOWN:
+    if slot.size > _SHOWN:
         return f"{' x '.join(map(str, slot.shape))} values"
     return np.array2string(values.reshape(slot.shape), separator=", ").replace("\n", "")
 
 
 def _listed(names: Sequence[str]) -> str:
-    more = len(names) - SHOWN
-    return ", ".join(names if more <= 1 else [*names[:SHOWN], f"and {more} more"])
+    more = len(names) - _SHOWN
+    return ", ".join(names if more <= 1 else [*names[:_SHOWN], f"and {more} more"])
 
 
 def _count(number: int | None, what: str) -> str:

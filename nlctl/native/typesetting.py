@@ -24,7 +24,7 @@ from .codegen.blocks import Reader
 from .diagram.schedule import Node, Schedule, Signal, schedule
 from .parameters import Slot, slots_of
 
-OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
+_OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
 WORTH = 12  # parts from which an expression that is used twice gets a letter
 
 
@@ -216,7 +216,7 @@ def _local_names() -> Iterator[dict[Expr, str]]:
     before = sys.getprofile()
 
     def noted(frame: Any, event: str, _: Any) -> None:
-        if event != "return" or frame.f_code.co_filename.startswith(OWN):
+        if event != "return" or frame.f_code.co_filename.startswith(_OWN):
             return  # (also what dataclasses write: "<string>")
         for name, value in frame.f_locals.items():
             if isinstance(value, Tracer) and value.values.size == 1 and value.origin is None:

@@ -15,7 +15,7 @@ from .arguments import Run, evaluation_array, input_array, state_array
 from .time_response import as_response
 
 METHODS = ("LSODA", "RK23", "RK45", "DOP853", "Radau", "BDF")  # of scipy.integrate.solve_ivp
-STANDSTILL = 200  # steps in a row that do not advance the time
+_STANDSTILL = 200  # steps in a row that do not advance the time
 
 
 def interpreted(run: Run) -> ct.TimeResponseData:
@@ -83,7 +83,7 @@ class _Watch:
 
     def __call__(self, t: float, x: np.ndarray) -> float:
         self.repeated = self.repeated + 1 if t <= self.reached else 0
-        if self.repeated > STANDSTILL or not np.all(np.isfinite(x)):
+        if self.repeated > _STANDSTILL or not np.all(np.isfinite(x)):
             raise _diverged(self.system, self.reached)
         self.reached = max(float(t), self.reached)
         if self.progress is not None:

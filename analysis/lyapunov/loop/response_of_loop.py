@@ -14,8 +14,8 @@ from .roles import read_parts
 
 __all__ = ["law_of_response", "own_parameters"]
 
-LOOKS = 12  # samples that are compared
-EQUAL = 1e-6  # relative, and absolute below 1
+_LOOKS = 12  # samples that are compared
+_EQUAL = 1e-6  # relative, and absolute below 1
 
 
 def own_parameters(loop: Any, response: Any) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def law_of_response(loop: Any, response: Any) -> Function:
             f"creep is about laws with a Nussbaum argument, got {type(parts.law).__name__}"
         )
     place = state_names(loop).index(f"{parts.paths['law']}.zeta")
-    for i in np.unique(np.linspace(0, states.shape[1] - 1, LOOKS).astype(int)):
+    for i in np.unique(np.linspace(0, states.shape[1] - 1, _LOOKS).astype(int)):
         t, x = float(response.time[i]), states[:, i]
         zeta, r, u = _compared(loop, response, i, params)
         rate = float(np.asarray(loop.dynamics(t, x, np.zeros(0), params=params))[place])
@@ -86,5 +86,5 @@ def _compared(loop: Any, response: Any, i: int, params: dict[str, Any]) -> list[
 def _check_close(
     what: str, a: float, b: float, t: float, error: type[ValueError] = ParameterError
 ) -> None:
-    if not abs(a - b) <= EQUAL * max(1.0, abs(a), abs(b)):
+    if not abs(a - b) <= _EQUAL * max(1.0, abs(a), abs(b)):
         raise error(f"{what} differ at t = {t:g} s: {a:.9g} and {b:.9g}")

@@ -27,7 +27,7 @@ from .signals import Margin, Signals, signals_of
 
 __all__ = ["Member", "Run", "members_of", "observe", "observed_loop"]
 
-LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
+_LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
 AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
 
 
@@ -190,7 +190,7 @@ def observe(
             ignore_errors=True,
         )
         signals = signals_of(native.uninterrupted(response))
-        seen = _along(loop, response, LOOKS if place == 0 else 1)
+        seen = _along(loop, response, _LOOKS if place == 0 else 1)
         check_same(loop, compiled.system, seen, member.params, params)
         _check_reproduced(member, signals)
         lost = None if response.success else float(response.statistics.time)

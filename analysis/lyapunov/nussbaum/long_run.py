@@ -25,8 +25,8 @@ FINE, COARSE = (
     0.01,
     0.1,
 )  # s; sampling interval up to the last look, which `creep` needs, and beyond
-END, FINEST = 0.5, 1e-5  # s; how much of a burst is run again, and the sampling interval there
-STANDSTILL = 1e-5  # s; a burst has no end: a run that gets no further in 2000 steps is given up
+END, _FINEST = 0.5, 1e-5  # s; how much of a burst is run again, and the sampling interval there
+_STANDSTILL = 1e-5  # s; a burst has no end: a run that gets no further in 2000 steps is given up
 SIGNALS = ("zeta", "e", "r", "u")
 
 
@@ -149,7 +149,7 @@ def long_run(
     lost = None
     if not whole.success:
         i = max(int(np.searchsorted(time, whole.statistics.time - END)) - 1, 0)
-        again = np.arange(time[i], whole.statistics.time + END, FINEST)
+        again = np.arange(time[i], whole.statistics.time + END, _FINEST)
         end = _watched(compiled, again, whole.states[:, i], progress, settings)
         late = _signals(end)
         time = np.append(time[:i], end.time)
@@ -196,7 +196,7 @@ class _Watch:
     def __call__(self, t: float) -> None:
         if self.progress is not None:
             self.progress(t)
-        self.stands_still = t - self.reached < STANDSTILL
+        self.stands_still = t - self.reached < _STANDSTILL
         if self.stands_still:
             raise KeyboardInterrupt
         self.reached = t

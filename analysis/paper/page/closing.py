@@ -12,10 +12,10 @@ from .. import HORIZON, METRICS, TAIL, Run
 
 __all__ = ["closing_sections", "metric_table"]
 
-Runs = Mapping[str, Run]
+_Runs = Mapping[str, Run]
 
 
-def closing_sections(runs: Runs, numerics: pd.DataFrame | None = None) -> list[Section]:
+def closing_sections(runs: _Runs, numerics: pd.DataFrame | None = None) -> list[Section]:
     """Return the last sections.
 
     Parameters
@@ -42,7 +42,7 @@ def metric_table(caption: str, cases: Sequence[Run]) -> Table:
     )
 
 
-def _choices(runs: Runs) -> Section:
+def _choices(runs: _Runs) -> Section:
     shown = [r for r in runs.values() if r.case.group in ("published", "choice")]
     return Section(
         key="choices",
@@ -68,7 +68,7 @@ def _same_verdict(shown: Sequence[Run]) -> bool:
     return all(r.metrics["tail_max_e"] <= 1.25 * base[r.case.example] for r in shown)
 
 
-def _numerics(runs: Runs, found: pd.DataFrame | None) -> Section:
+def _numerics(runs: _Runs, found: pd.DataFrame | None) -> Section:
     return Section(
         key="numerics",
         title="Numerics",
@@ -102,7 +102,7 @@ def _apart(found: pd.DataFrame) -> Table:
     )
 
 
-def _limits(runs: Runs) -> Section:
+def _limits(runs: _Runs) -> Section:
     drift = {n: _drift(runs[str(n)]) for n in (1, 2)}
     return Section(
         key="limits",

@@ -17,7 +17,7 @@ from .proof_text import LONG_RUN
 
 __all__ = ["LONG_RUN", "Evidence", "evidence", "lyapunov_sections"]
 
-GROUPS = (  # of the ledger's lines, each a table of its own
+_GROUPS = (  # of the ledger's lines, each a table of its own
     (("violated",), "corrected", text.VIOLATED),
     (("proved", "computed"), None, text.PROVED),
     (("checked",), None, text.CHECKED),
@@ -156,7 +156,7 @@ def _example(number: int, one: Evidence) -> list[Section]:
 
 
 def _ledger_tables(lines: Sequence[Line]) -> Iterator[Table]:
-    for statuses, reading, caption in GROUPS:
+    for statuses, reading, caption in _GROUPS:
         group = [x for x in lines if x.status in statuses and reading in (None, x.reading)]
         rows = [_row(line) for line in group]
         if rows:

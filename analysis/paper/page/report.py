@@ -24,11 +24,11 @@ from .proof import Evidence, lyapunov_sections
 
 __all__ = ["paper_report", "paper_sections"]
 
-Runs = Mapping[str, Run]
+_Runs = Mapping[str, Run]
 
 
 def paper_report(
-    runs: Runs,
+    runs: _Runs,
     *,
     proofs: Mapping[int, Evidence] | None = None,
     far: Mapping[str, LongRun] | None = None,
@@ -76,7 +76,7 @@ def paper_report(
 
 
 def paper_sections(
-    runs: Runs,
+    runs: _Runs,
     *,
     proofs: Mapping[int, Evidence] | None = None,
     far: Mapping[str, LongRun] | None = None,
@@ -92,7 +92,7 @@ def paper_sections(
     ]
 
 
-def _lead(runs: Runs, long: LongRun | None) -> Figure:
+def _lead(runs: _Runs, long: LongRun | None) -> Figure:
     """Return the picture at the top: Example 2 follows its reference, and zeta creeps."""
     run = runs["2"]
     told = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_CREEP}"
@@ -120,7 +120,7 @@ def _model() -> Section:
     )
 
 
-def _example(number: int, runs: Runs, compared: Sequence[Check]) -> list[Section]:
+def _example(number: int, runs: _Runs, compared: Sequence[Check]) -> list[Section]:
     run = runs[str(number)]
     diagram = run.case.diagram
     blocks = ", ".join(system.name for system in diagram.syslist)
@@ -252,7 +252,7 @@ def _check_table(number: int, compared: Sequence[Check]) -> Table:
     )
 
 
-def _exchange(runs: Runs) -> Section:
+def _exchange(runs: _Runs) -> Section:
     pairs = (("1", "1-backlash"), ("2", "2-dead-zone"))
     return Section(
         key="exchange",

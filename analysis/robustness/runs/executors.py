@@ -33,7 +33,7 @@ from .experiment import Prepared, columns_of, evaluate, typed
 
 __all__ = ["LostChunkError", "chunk_table", "computed_elsewhere", "computed_here"]
 
-LOOK = 0.5  # s between looks at Ctrl-C while workers are busy
+_LOOK = 0.5  # s between looks at Ctrl-C while workers are busy
 Chunk = tuple[range, pd.DataFrame]
 
 
@@ -139,7 +139,7 @@ def computed_elsewhere(
                         del waiting[future]
             if not waiting:
                 break
-            ready, _ = wait(waiting, timeout=LOOK, return_when=FIRST_COMPLETED)
+            ready, _ = wait(waiting, timeout=_LOOK, return_when=FIRST_COMPLETED)
             for future in ready:
                 numbers, error = waiting.pop(future), _failure(future)
                 if error is None:

@@ -29,9 +29,9 @@ from .store import Store, claimed, opened, put, stored, table_of, taken_up
 
 __all__ = ["Interrupt", "Sweep", "gentle_interrupt", "load", "sweep"]
 
-LARGEST = 1024  # rows of a chunk: some 200 kB on disk, and seconds of work
+_LARGEST = 1024  # rows of a chunk: some 200 kB on disk, and seconds of work
 FEWEST = 20  # chunks of a sweep, so that a kill costs little
-STEP = 64  # rows: a chunk keeps the SIMD lanes of several threads busy
+_STEP = 64  # rows: a chunk keeps the SIMD lanes of several threads busy
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -209,7 +209,7 @@ def _check_space(prepared: Prepared, design: Design) -> None:
 
 
 def _chunk_size(design: Design) -> int:
-    return min(LARGEST, STEP * math.ceil(design.size / (FEWEST * STEP)))
+    return min(_LARGEST, _STEP * math.ceil(design.size / (FEWEST * _STEP)))
 
 
 def _continued(store: Store, tally: Tally) -> list[str]:

@@ -20,7 +20,7 @@ from .space import Space, boxed, nominal, sampled
 
 __all__ = [
     "Design",
-    "Kind",
+    "_Kind",
     "affordable",
     "checked_entropy",
     "corners",
@@ -38,12 +38,12 @@ __all__ = [
     "sobol_points",
 ]
 
-MOST_ROWS = 10**9
+_MOST_ROWS = 10**9
 """Rows of a design at most: what is drawn row by row."""
 MOST_HELD = 10**8
 """Numbers that a design holds in memory at most, 800 MB: rows times columns."""
 
-Kind = Literal[
+_Kind = Literal[
     "i.i.d.", "Sobol'", "Latin hypercube", "grid", "corners", "one at a time", "Saltelli",
     "Morris", "user's table", "adaptive",
 ]  # fmt: skip
@@ -72,7 +72,7 @@ class Design:
     """
 
     space: Space
-    kind: Kind
+    kind: _Kind
     size: int
     is_iid: bool
     entropy: int
@@ -148,8 +148,8 @@ def independent(space: Space, size: int, entropy: int | None = None) -> Design:
     """
     of_type("a design", "space", space, Space)
     size = whole_number("a design", "size", size, at_least=1)
-    if size > MOST_ROWS:
-        raise ParameterError(f"a design needs size <= {MOST_ROWS:.0e}, got {size}")
+    if size > _MOST_ROWS:
+        raise ParameterError(f"a design needs size <= {_MOST_ROWS:.0e}, got {size}")
     return Design(
         space=space, kind="i.i.d.", size=size, is_iid=True, entropy=checked_entropy(entropy)
     )  # fmt: skip
@@ -228,7 +228,7 @@ def from_table(
 
 def listed(
     space: Space,
-    kind: Kind,
+    kind: _Kind,
     points: pd.DataFrame,
     entropy: int,
     details: Mapping[str, Any] | None = None,

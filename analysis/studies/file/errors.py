@@ -25,9 +25,9 @@ __all__ = [
 ]
 
 Place = tuple[str | int, ...]
-LONGEST = 600  # characters of a mistake
+_LONGEST = 600  # characters of a mistake
 OWN_KIND = "a kind of your own is 'path/to/file.py:name' or 'module:name'"
-LARGEST = 10**40  # integers beyond are not printed
+_LARGEST = 10**40  # integers beyond are not printed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +69,9 @@ class Problem:
 
 def _short(text: str) -> str:
     """Leave out the middle of a text that quotes too much of a file."""
-    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
+    return (
+        text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"
+    )
 
 
 class StudyError(UsageError):
@@ -175,7 +177,7 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
 
 def _text(value: Any) -> str:
     """Return a value as it stands in the file; not an integer of thousands of digits."""
-    if isinstance(value, int) and abs(value) > LARGEST:
+    if isinstance(value, int) and abs(value) > _LARGEST:
         return f"an integer of {value.bit_length()} bits"
     return repr(value)
 

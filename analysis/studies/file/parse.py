@@ -24,7 +24,7 @@ from .validate import bound
 
 __all__ = ["StudyFile", "read_study"]
 
-ROUNDS = 5  # mistakes may stand behind mistakes
+_ROUNDS = 5  # mistakes may stand behind mistakes
 NAMELESS = {"title": "a study", "seed": 0}  # while the rest of a mistaken file is looked at
 
 
@@ -122,7 +122,7 @@ def _validated(
     for problem in mistaken:
         _remove(rest, problem.place)
     entries: list[int] = []
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         whole, listed = rest, rest.get("analysis")
         if isinstance(listed, list):
             entries = [i for i, entry in enumerate(listed) if entry is not None]

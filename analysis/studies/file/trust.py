@@ -38,11 +38,11 @@ __all__ = [
     "untrusted_names",
 ]
 
-OWN = (Path(errors.__file__).parent, Path(__file__).parents[2])  # nlctl, analysis
+_OWN = (Path(errors.__file__).parent, Path(__file__).parents[2])  # nlctl, analysis
 MAKERS = ("control", "nlctl")  # whoever makes a diagram calls one of these
 NO_DIAGRAMS = {"None", "bool", "int", "float", "complex", "str", "bytes", "list", "tuple", "dict"}
 SITES = ("site-packages", "dist-packages")
-LONGEST = 500  # characters of a function's name
+_LONGEST = 500  # characters of a function's name
 NO_DIAGRAMS |= {"set", "Path", "ndarray", "DataFrame", "NoReturn", "Never"}
 DIAGRAMS = {
     name
@@ -105,7 +105,7 @@ def _reason(name: str, folder: Path) -> str:
         places = _module_places(source)
     except (ParameterError, OSError):  # there is none such: said when it is looked for
         return ""
-    homes = [*OWN, *_installed(source.partition(".")[0]), folder.resolve()]
+    homes = [*_OWN, *_installed(source.partition(".")[0]), folder.resolve()]
     outside = [p for p in places if not any(p.resolve().is_relative_to(home) for home in homes)]
     return f"'{source}' is '{outside[0]}', and no installed package" if outside else ""
 
@@ -125,8 +125,10 @@ def check_place(name: str) -> None:
         )
     if not name.isprintable():
         raise ParameterError(f"a function's name has characters that can be printed, got {name!r}")
-    if len(name) > LONGEST:
-        raise ParameterError(f"a function's name has at most {LONGEST} characters, got {len(name)}")
+    if len(name) > _LONGEST:
+        raise ParameterError(
+            f"a function's name has at most {_LONGEST} characters, got {len(name)}"
+        )
     if source.endswith(".py"):
         return
     if not all(part.isidentifier() for part in source.split(".")):

@@ -38,8 +38,8 @@ from .schema import RESERVED, Study
 
 __all__ = ["bound"]
 
-T = TypeVar("T")
-MOST_ROWS = 10_000_000  # of a design or a search
+_T = TypeVar("_T")
+_MOST_ROWS = 10_000_000  # of a design or a search
 MOST_DIAGRAMS = 1000
 
 
@@ -52,7 +52,7 @@ class _Notes:
     def add(self, place: Place, message: str) -> None:
         self.problems.append(Problem(place=place, message=message))
 
-    def attempt(self, place: Place, make: Callable[..., T], *arguments: Any) -> T | None:
+    def attempt(self, place: Place, make: Callable[..., _T], *arguments: Any) -> _T | None:
         """Return what `make` returns; a mistake that it names is noted instead."""
         try:
             return make(*arguments)
@@ -255,10 +255,10 @@ def _too_large(study: Study, notes: _Notes) -> set[Place]:
         counts["runs",] = study.runs.size or 1
         if study.runs.design in ("grid", "corners"):
             counts["runs",] = (study.runs.levels or 2) ** wide * options
-    large = {place: count for place, count in counts.items() if count > MOST_ROWS}
+    large = {place: count for place, count in counts.items() if count > _MOST_ROWS}
     for place, count in large.items():
         what = "rows can be run" if place == ("runs",) else "runs can be made"
-        notes.add(place, f"at most {MOST_ROWS:,} {what}, got {_count(count)}")
+        notes.add(place, f"at most {_MOST_ROWS:,} {what}, got {_count(count)}")
     return set(large)
 
 

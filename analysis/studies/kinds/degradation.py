@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DEGRADATION"]
 
-CAPTION = (
+_CAPTION = (
     "Share of violations with all deviations from nominal scaled by a factor; bars: intervals with "
     "confidence {confidence:g} %, {together}."
 )
@@ -111,7 +111,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     """Yield the probability of a violation against the size of the uncertainty."""
     n, curve = finding.numbers, finding.tables["curve"]
     together = "all together" if n["simultaneous"] else "each by itself"
-    caption = CAPTION.format(confidence=100 * n["confidence"], together=together)
+    caption = _CAPTION.format(confidence=100 * n["confidence"], together=together)
     yield Figure(
         key=f"{key}-curve",
         caption=caption,

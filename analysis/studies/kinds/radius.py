@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 __all__ = ["RADIUS"]
 
 SIZES = 12  # that the search looks at, roughly
-CAPTION = "Sizes that were looked at, as factors of the box, with the lowest margin found there."
-SMALLEST = " Dashed: the smallest size with a violation."
+_CAPTION = "Sizes that were looked at, as factors of the box, with the lowest margin found there."
+_SMALLEST = " Dashed: the smallest size with a violation."
 
 
 class Radius(Varied):
@@ -120,7 +120,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
         f"{step['size']:.4g}: {margin_text(float(step['margin']))}"
         for step in steps.to_dict("records")
     )
-    caption = CAPTION + SMALLEST * bool(np.isfinite(n["upper"])) + text.clipped(steps["margin"])
+    caption = _CAPTION + _SMALLEST * bool(np.isfinite(n["upper"])) + text.clipped(steps["margin"])
     yield Figure(
         key=f"{key}-sizes",
         caption=caption,

@@ -20,7 +20,7 @@ from ...robustness.uncertainty.space import nominal
 
 __all__ = ["Histories", "histories", "limits"]
 
-MOST = 4  # signals
+_MOST = 4  # signals
 IN_UNIT = (  # metrics whose unit is that of their signal
     *(metrics.peak, metrics.rms, metrics.highest, metrics.spread, metrics.ultimate_bound),
     metrics.total_variation,
@@ -159,4 +159,4 @@ def _kept(
 
 def _signals(requirements: Sequence[Any]) -> list[str]:
     """Return the signals that the spec looks at, each once."""
-    return list(dict.fromkeys(s for r in requirements for s in r.signals))[:MOST]
+    return list(dict.fromkeys(s for r in requirements for s in r.signals))[:_MOST]

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Loop", "Published", "loop_of", "loop_sections"]
 
-OWN = ("nlctl", "analysis")  # packages whose source comes with nlctl and is not printed
-LONGEST = 60  # characters of a value
+_OWN = ("nlctl", "analysis")  # packages whose source comes with nlctl and is not printed
+_LONGEST = 60  # characters of a value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,7 +97,7 @@ def loop_of(prepared: Prepared) -> Loop:
         diagram=found.diagram,
         maker=found.maker,
         file=path.name,
-        source="" if module.partition(".")[0] in OWN else content.decode(errors="replace"),
+        source="" if module.partition(".")[0] in _OWN else content.decode(errors="replace"),
         sha256=hashlib.sha256(content).hexdigest(),
     )
 
@@ -177,4 +177,4 @@ def _value(value: Any) -> Any:
     if isinstance(value, bool | int | float | str):
         return value
     told = str(value)
-    return told if len(told) <= LONGEST else f"{'×'.join(map(str, np.shape(value)))} numbers"
+    return told if len(told) <= _LONGEST else f"{'×'.join(map(str, np.shape(value)))} numbers"

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["study_part", "study_report", "study_sections"]
 
-LISTED = 400  # lines of a table that report.json holds as well; longer ones are files beside it
+_LISTED = 400  # lines of a table that report.json holds as well; longer ones are files beside it
 OUTCOMES = {  # by the light
     "pass": "shown",
     "caution": "not shown yet",
@@ -292,7 +292,7 @@ def numbers(result: Result) -> dict[str, Any]:
         finding.key: {
             name: table.reset_index().to_dict("records")
             for name, table in sorted(finding.tables.items())
-            if len(table) <= LISTED
+            if len(table) <= _LISTED
         }
         for finding in result.findings
     }

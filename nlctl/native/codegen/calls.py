@@ -26,7 +26,7 @@ from ..machine.fingerprint import module_key
 from ..machine.machine_code import Wanted, address_of, machine_code_if_taken
 from ..machine.module import loaded
 
-ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)
+_ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)
 CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
 OPTIONS = {"error_model": "numpy", "nogil": True, "no_cpython_wrapper": True}
 FAILED = 1.0
@@ -155,7 +155,7 @@ def native_calls(calls: Mapping[str, Call], lanes: int) -> Native:
     for name, call in calls.items():
         code = _by_numba(call, lanes)
         if code is not None:
-            symbols[name] = address_of(code, ADDRESS)
+            symbols[name] = address_of(code, _ADDRESS)
         else:
             code = CALLBACK(_back(call, lanes, raised))
             symbols[name] = ctypes.cast(code, ctypes.c_void_p).value or 0
@@ -205,7 +205,9 @@ def _by_numba(call: Call, lanes: int) -> Any:
         taught=known.taught,
     )
     module = loaded(own, {})
-    wanted = Wanted(function=getattr(module, f"at_{call.name}"), signature=ADDRESS, options=OPTIONS)
+    wanted = Wanted(
+        function=getattr(module, f"at_{call.name}"), signature=_ADDRESS, options=OPTIONS
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaWarning)  # of what the user need not know
         return machine_code_if_taken(f"{module.__name__} {module_key(*known.taught)}", wanted)

@@ -29,8 +29,8 @@ from .machine_code import Wanted, full_key
 
 HERE = Path(__file__).parents[1]
 SHIPPED = HERE / "integrators.bitcode"
-RETURNED = (0, -2)  # what numba's functions return, unless they raise an exception
-ADDRESS = numba.intp
+_RETURNED = (0, -2)  # what numba's functions return, unless they raise an exception
+_ADDRESS = numba.intp
 WANTED = [
     Wanted(
         function=function,
@@ -38,9 +38,9 @@ WANTED = [
         options={"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True},
     )
     for function, *arguments in (
-        (restart.start, ADDRESS, TASK, WORK),
-        (advance.advance, ADDRESS, TASK, WORK, numba.intp),
-        (workspace.outputs, ADDRESS, ADDRESS, TASK, WORK),
+        (restart.start, _ADDRESS, TASK, WORK),
+        (advance.advance, _ADDRESS, TASK, WORK, numba.intp),
+        (workspace.outputs, _ADDRESS, _ADDRESS, TASK, WORK),
     )
 ]
 _ONCE = threading.Lock()  # of several threads that begin at the same time one compiles
@@ -73,7 +73,7 @@ def _callable(address: int, arguments: Any, owner: Any) -> Callable[..., None]:
     def function(*given: Any) -> None:
         values = (g if isinstance(g, int) else g.table.ctypes.data for g in given)
         status = call(nothing, ctypes.byref(nothing, 8), *values)
-        if status not in RETURNED:
+        if status not in _RETURNED:
             raise MemoryError(f"the integrators have failed for want of memory (status {status})")
 
     function.owner = owner  # type: ignore[attr-defined]

@@ -43,13 +43,13 @@ WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis
 IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
             "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
 # functions that draw random numbers inside, read or write files, or change settings for everybody
-OTHERS = {"differential_evolution": DRAW, "basinhopping": DRAW, "dual_annealing": DRAW,
-          "eigs": DRAW, "eigsh": DRAW, "svds": DRAW, "lobpcg": DRAW, "kmeans": DRAW,
-          "kmeans2": DRAW, "estimate_rank": DRAW, "interp_decomp": DRAW}  # fmt: skip
-OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoptions"), MEMORY)
-OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt", "loads",
-                         "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
-                        "read files before the run, and write them after it")  # fmt: skip
+_OTHERS = {"differential_evolution": DRAW, "basinhopping": DRAW, "dual_annealing": DRAW,
+           "eigs": DRAW, "eigsh": DRAW, "svds": DRAW, "lobpcg": DRAW, "kmeans": DRAW,
+           "kmeans2": DRAW, "estimate_rank": DRAW, "interp_decomp": DRAW}  # fmt: skip
+_OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoptions"), MEMORY)
+_OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt",
+                          "loads", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
+                         "read files before the run, and write them after it")  # fmt: skip
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
@@ -80,9 +80,9 @@ CONTAINERS = (
     | range
 )
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
-PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float", "format",
-         "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord", "pow", "range",
-         "repr", "round", "slice", "str", "sum", "bytes", "object", "bin", "hex"}  # fmt: skip
+_PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float", "format",
+          "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord", "pow", "range",
+          "repr", "round", "slice", "str", "sum", "bytes", "object", "bin", "hex"}  # fmt: skip
 
 
 def call(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]) -> Value:
@@ -216,7 +216,7 @@ def _builtin(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]
     if name == "next":
         _written(given[0], "next()")
         return element(given[0])
-    if name in PLAIN:
+    if name in _PLAIN:
         return FRESH
     advice = OUTPUT if name in ("print", "input", "open") else "do without it"
     raise Impure(f"calls {name}()", advice)
@@ -228,8 +228,8 @@ def _library(
     name = getattr(thing, "__name__", "")
     if module.startswith(VARYING):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
-    if name in OTHERS:
-        raise Impure(f"calls {module}.{name}, which is more than its result", OTHERS[name])
+    if name in _OTHERS:
+        raise Impure(f"calls {module}.{name}, which is more than its result", _OTHERS[name])
     _call_functions(walk, [*given, *named.values()])
     for value in (*given, *named.values()):
         if not callable(value.known):

@@ -22,7 +22,7 @@ from .source import Definition, Unreadable, definition
 from .statements import Body
 from .values import OUTSIDE, Impure, Local, OneOf, Unknown, Value, captured, holder, joined
 
-BUDGET = 400  # bodies that are walked for one function, before it is too much to follow
+_BUDGET = 400  # bodies that are walked for one function, before it is too much to follow
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +113,7 @@ class Walk:
     ) -> Value:
         frame = Frame(_bound(node.args, function, parent, given, named), function, parent)
         self.bodies += 1
-        if self.bodies > BUDGET:
+        if self.bodies > _BUDGET:
             raise Impure("calls too many functions to be followed", "make it simpler")
         if parent is not None:  # what it finds in the names around it may have changed
             if node in self.walked:

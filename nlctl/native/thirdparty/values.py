@@ -18,9 +18,9 @@ class Unknown:
 
 UNKNOWN = Unknown()
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
-LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
-             "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
-             "statistics")  # fmt: skip
+_LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
+              "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
+              "statistics")  # fmt: skip
 
 
 class Impure(Exception):  # noqa: N818 (it is what a walk finds)
@@ -149,7 +149,7 @@ def library(thing: Any) -> str | None:
         module = "numpy"
     elif owner is not None and not isinstance(owner, type):
         return None  # a method of some object
-    return module if module.partition(".")[0] in LIBRARIES else None
+    return module if module.partition(".")[0] in _LIBRARIES else None
 
 
 def python_function(thing: Any) -> FunctionType | None:

@@ -13,9 +13,9 @@ from .memory import load, place, store
 from .numbers import Writer, shown
 from .text import Value, constant, float_text
 
-WIDE = 4  # elements of one member side by side
+_WIDE = 4  # elements of one member side by side
 PER_ROUND = 3  # elements of several members in a round
-STRAIGHT = 16  # turns of one member up to which they are written one after the other
+_STRAIGHT = 16  # turns of one member up to which they are written one after the other
 
 
 def written(w: Writer, loop: LoopOfLevel) -> None:
@@ -28,7 +28,7 @@ class _Loop:
 
     def __init__(self, w: Writer, loop: LoopOfLevel) -> None:
         self.w, self.b, self.loop, self.lanes = w, w.b, loop, w.lanes
-        self.step = 1 if self.lanes > 1 else next(k for k in (WIDE, 2, 1) if k <= loop.size)
+        self.step = 1 if self.lanes > 1 else next(k for k in (_WIDE, 2, 1) if k <= loop.size)
         self.chunk = w.width or self.step
         self.sums = [node for node in loop.nodes if node.op == "sum"]
 
@@ -38,7 +38,7 @@ class _Loop:
         for node in self.sums:
             names[node] = constant(0.0, self.chunk)
         turns = size // self.step
-        done = self._rounds(turns) if turns > (STRAIGHT if self.lanes == 1 else 1) else 0
+        done = self._rounds(turns) if turns > (_STRAIGHT if self.lanes == 1 else 1) else 0
         for k in range(done, turns):
             self._turn(None, k * self.step)
         if size > turns * self.step:

@@ -11,7 +11,7 @@ from .functions import CALLED, applied, sin_cos
 from .memory import load, place, store
 from .text import Body, Value, constant
 
-COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
+_COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 PACKED = 4  # numbers of one member whose sines, powers, ... are computed side by side
 
@@ -81,7 +81,7 @@ class Writer:
         if node.op in ARITHMETIC:
             return b.op(ARITHMETIC[node.op], *args, exact=node in self.exact)
         if node.op in COMPARISONS:
-            return b.compare(COMPARE[node.op], *args)
+            return b.compare(_COMPARE[node.op], *args)
         if node.op == "not":
             return b.logic("xor", args[0], constant(True, args[0].width, "b"))
         if node.op in LOGIC:

@@ -11,7 +11,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-KINDS = {"f": "double", "b": "i1", "i": "i64"}
+_KINDS = {"f": "double", "b": "i1", "i": "i64"}
 RARELY = "!prof !0"  # the first way of a branch is all but never taken
 
 
@@ -44,7 +44,7 @@ class Value:
 
 def type_of(width: int, kind: str = "f") -> str:
     """Return LLVM's name of a type."""
-    return f"<{width} x {KINDS[kind]}>" if width else KINDS[kind]
+    return f"<{width} x {_KINDS[kind]}>" if width else _KINDS[kind]
 
 
 def float_text(x: float) -> str:
