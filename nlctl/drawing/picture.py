@@ -17,7 +17,18 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from .figure import Drawing
-from .records import FONT, Box, Layout, Node, Route, Text, Wire, bundle, measured, strokes
+from .records import (
+    FONT,
+    BlockFrame,
+    Layout,
+    LayoutNode,
+    Route,
+    Text,
+    Wire,
+    bundle,
+    measured_text,
+    strokes,
+)
 from .routes import arrange
 
 _WIDTH, MARGIN = 648.0, 12.0  # of the figure, in points
@@ -163,11 +174,11 @@ def lay_out(diagram: ct.InterconnectedSystem) -> Layout:
             outside[("in", edge.target) if edge.source is None else ("out", edge.source)] = names
     nodes = []
     for n, block in enumerate(blocks):
-        name, kind = measured(block.name, _NAME, "bold"), measured(block.kind, _SMALL)
-        ends = [measured(bundle(outside.get((way, n), ())), _SMALL) for way in ("in", "out")]
-        nodes.append(Node(max(name.w + 16, kind.w + 16, 56.0), name.h + kind.h + 16, *ends))
+        name, kind = measured_text(block.name, _NAME, "bold"), measured_text(block.kind, _SMALL)
+        ends = [measured_text(bundle(outside.get((way, n), ())), _SMALL) for way in ("in", "out")]
+        nodes.append(LayoutNode(max(name.w + 16, kind.w + 16, 56.0), name.h + kind.h + 16, *ends))
     wires = [
-        Wire(source, tuple(ends), measured(bundle(names), _SMALL))
+        Wire(source, tuple(ends), measured_text(bundle(names), _SMALL))
         for (source, names), ends in targets.items()
     ]
     return arrange(nodes, wires, _WIDTH - 2 * MARGIN)
@@ -270,13 +281,13 @@ def _paint_wire(axes: Axes, routes: Sequence[Route], colour: str) -> None:
     axes.add_collection(LineCollection(strokes(shafts), **style), autolim=False)
 
 
-def _paint_box(axes: Axes, block: _Block, box: Box) -> None:
+def _paint_box(axes: Axes, block: _Block, box: BlockFrame) -> None:
     """A box with its name and kind in the middle; a double line where there is more inside."""
     for inset in (0.0, 2.5)[: 1 + block.nested]:
         outline = Rectangle((box.x + inset, box.y + inset), box.w - 2 * inset, box.h - 2 * inset)
         outline.set(facecolor=FILL, edgecolor=INK, linewidth=1.2 - 0.2 * inset, zorder=2)
         axes.add_patch(outline)
-    name, kind = measured(block.name, _NAME, "bold"), measured(block.kind, _SMALL)
+    name, kind = measured_text(block.name, _NAME, "bold"), measured_text(block.kind, _SMALL)
     middle, top = box.x + box.w / 2, box.y + (box.h - name.h - kind.h) / 2
     _write(axes, middle - name.w / 2, top, name, _NAME, weight="bold")
     _write(axes, middle - kind.w / 2, top + name.h, kind, _SMALL, color=GREY)

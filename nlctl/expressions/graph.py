@@ -89,7 +89,7 @@ def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, .
     return tuple(sorted(found, key=lambda e: e.index))
 
 
-class Undecided(BaseException):  # (what is traced may catch exceptions)
+class OpenCondition(BaseException):  # (what is traced may catch exceptions)
     """A function asks whether a condition holds that is not known when it is traced."""
 
     def __init__(self, condition: Expr) -> None:
@@ -128,7 +128,7 @@ class Graph:
         if condition.op == "const":
             return bool(condition.data)
         if condition not in self.decisions:
-            raise Undecided(condition)
+            raise OpenCondition(condition)
         return self.decisions[condition]
 
     def assumed(self, integer: Expr) -> int:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from .functions import FUNCTIONS
 from .graph import Expr, Untraceable, needed
 
-__all__ = ["Index", "Writer", "index_text", "number_text", "symbol"]
+__all__ = ["Index", "LatexWriter", "index_text", "number_text", "symbol"]
 
 _GREEK = """alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma
 tau upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"""
@@ -85,7 +85,7 @@ def number_text(value: float) -> str:
 
 
 @dataclass(kw_only=True)
-class Writer:
+class LatexWriter:
     """Writes the formulas of one function.
 
     Attributes

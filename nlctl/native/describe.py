@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
-from .codegen.program import Program, corners, memory
+from .codegen.program import Program, count_switching_functions, memory
 from .diagram.schedule import Node, signal_name
 from .parameters import Slot
 
@@ -83,7 +83,7 @@ def _facts(i: int, node: Node, program: Program, p: np.ndarray) -> Iterator[tupl
     parameters = [f"{name} = {_value(slot, p)}" for name, slot in program.layout[i].items()]
     parameters += [f"{k} = {value!r} (fixed)" for k, value in program.fixed.get(i, {}).items()]
     yield "parameters", _listed(parameters)
-    yield "corners", str(corners(node) or "")
+    yield "corners", str(count_switching_functions(node) or "")
     yield "memory", _listed([labels[j - first] for j in memory(node)])
 
 

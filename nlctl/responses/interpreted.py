@@ -11,14 +11,21 @@ import numpy as np
 
 from ..errors import DivergedError, ParameterError
 from ..names import unknown
-from .arguments import Run, evaluation_array, input_array, state_array
+from .arguments import RunArguments, evaluation_array, input_array, state_array
 from .time_response import as_response
 
-METHODS = ("LSODA", "RK23", "RK45", "DOP853", "Radau", "BDF")  # of scipy.integrate.solve_ivp
+SOLVE_IVP_METHODS = (
+    "LSODA",
+    "RK23",
+    "RK45",
+    "DOP853",
+    "Radau",
+    "BDF",
+)  # of scipy.integrate.solve_ivp
 _STANDSTILL = 200  # steps in a row that do not advance the time
 
 
-def interpreted(run: Run) -> ct.TimeResponseData:
+def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     """Run a diagram in python-control.
 
     Raises
@@ -41,8 +48,8 @@ def interpreted(run: Run) -> ct.TimeResponseData:
     simulate: Any = ct.input_output_response  # its types are those of the defaults
     watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
     method = solver["method"] or solver["solve_ivp_method"] or "LSODA"
-    if isinstance(method, str) and method not in METHODS:
-        raise unknown("method", method, METHODS, "of python-control's solve_ivp")
+    if isinstance(method, str) and method not in SOLVE_IVP_METHODS:
+        raise unknown("method", method, SOLVE_IVP_METHODS, "of python-control's solve_ivp")
     settings = {"rtol": solver["rtol"], "atol": solver["atol"], "events": watch}
     with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
         try:

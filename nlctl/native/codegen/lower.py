@@ -21,7 +21,7 @@ from ..parameters import length
 from .blocks import Equations, equations
 from .calls import Call
 from .ir.program import program_text
-from .plan import Function, Store, plan, split
+from .plan import Function, Store, plan_function, split
 from .program import Program
 from .rewrite import rewritten
 from .solver import Solver
@@ -143,7 +143,7 @@ def _planned(stores: Mapping[str, list[Store]], parameters: int) -> tuple[dict[s
     functions, size = {}, parameters + sum(store.size for store in prepared)
     for name, arguments in ARGUMENTS.items():
         first = name == "prepare"
-        planned = plan(wanted[name], {} if first else known, size)
+        planned = plan_function(wanted[name], {} if first else known, size)
         size = planned.rows
         copied = parameters if first else 0
         functions[name] = Function(arguments=arguments, plan=planned, copied=copied)

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from ...expressions.arrays import Tracer, number
+from ...expressions.arrays import Tracer, scalar
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from ...expressions.stage import Stage
-from .plan import Function, Store, plan
+from .plan import Function, Store, plan_function
 from .rewrite import rewritten
 from .solver import DONE, GUESS, PASS, Solver
 
@@ -120,14 +120,14 @@ def _pass(
         for g in guesses
     ]
     zero = graph.const(0.0)
-    jacobian = [[number(graph, columns[j][i] or zero) for j in range(n)] for i in range(n)]
-    state = [number(graph, graph.leaf("s", i, None)) for i in range(GUESS + 2 * n)]
-    values = [number(graph, graph.number(e)) for e in found]
+    jacobian = [[scalar(graph, columns[j][i] or zero) for j in range(n)] for i in range(n)]
+    state = [scalar(graph, graph.leaf("s", i, None)) for i in range(GUESS + 2 * n)]
+    values = [scalar(graph, graph.number(e)) for e in found]
     following = Stage(graph).copied(improved)(n, state, values, jacobian)
     exprs = [e.only if isinstance(e, Tracer) else graph.const(float(e)) for e in following]
     stores = [Store(array="n", row=i, expr=e, size=1) for i, e in enumerate(exprs)]
     written, exact = rewritten(graph, {"n": stores})
-    return Function(arguments=PASS, plan=plan(written["n"], {}, 0)), exact
+    return Function(arguments=PASS, plan=plan_function(written["n"], {}, 0)), exact
 
 
 def improved(

@@ -23,7 +23,15 @@ from .feedthrough import closer_feedthrough, feedthrough
 from .tearing import first_loop, tear
 from .wiring import AlgebraicLoopError, Combination, Signal, Wiring
 
-__all__ = ["AlgebraicLoopError", "Combination", "Loop", "Node", "Schedule", "Signal", "schedule"]
+__all__ = [
+    "AlgebraicLoop",
+    "AlgebraicLoopError",
+    "Combination",
+    "Node",
+    "Schedule",
+    "Signal",
+    "schedule",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +62,7 @@ class Node:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loop:
+class AlgebraicLoop:
     """Signals that depend on each other at the same instant and are solved for together.
 
     Attributes
@@ -98,7 +106,7 @@ class Schedule:
     order: tuple[int, ...]
     unknown: tuple[frozenset[int], ...]
     outputs: tuple[Combination, ...]
-    loops: tuple[Loop, ...]
+    loops: tuple[AlgebraicLoop, ...]
     captured: tuple[Captured, ...]
 
     @property
@@ -189,7 +197,7 @@ class _Ordering:
     known: set[Signal] = field(default_factory=set)
     order: list[int] = field(default_factory=list)
     unknown: list[frozenset[int]] = field(default_factory=list)
-    loops: list[Loop] = field(default_factory=list)
+    loops: list[AlgebraicLoop] = field(default_factory=list)
 
     def run(self, solve_loops: bool) -> None:
         every = {Signal(i, k) for i, node in enumerate(self.nodes) for k in range(len(node.direct))}
@@ -204,7 +212,7 @@ class _Ordering:
             loop = first_loop(before)
             torn, start = tear({s: before[s] & loop for s in before if s in loop}), len(self.order)
             self._evaluate(loop, torn)
-            self.loops.append(Loop(start=start, stop=len(self.order), torn=torn))
+            self.loops.append(AlgebraicLoop(start=start, stop=len(self.order), torn=torn))
             self._evaluate(every, ())
 
     def _evaluate(self, wanted: set[Signal], guessed: Iterable[Signal]) -> None:

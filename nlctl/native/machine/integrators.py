@@ -25,7 +25,7 @@ from ..integrate.workspace import TASK, WORK
 from . import address, store
 from .fingerprint import function_key, module_key
 from .finish import finished
-from .machine_code import Wanted, full_key
+from .machine_code import Wanted, store_key
 
 HERE = Path(__file__).parents[1]
 SHIPPED = HERE / "integrators.bitcode"
@@ -57,7 +57,7 @@ def _integrators() -> dict[str, Callable[..., None]]:
     functions = {each.function.__name__: each for each in WANTED}
     if getattr(config, "DISABLE_JIT", False):
         return {name: each.function for name, each in functions.items()}
-    loaded = finished(shipped() or _made_anew(), functions)
+    loaded = finished(shipped_bitcode() or _made_anew(), functions)
     return {
         name: _callable(loaded.addresses[name], each.signature.args, loaded)
         for name, each in functions.items()
@@ -80,7 +80,7 @@ def _callable(address: int, arguments: Any, owner: Any) -> Callable[..., None]:
     return function
 
 
-def shipped() -> bytes | None:
+def shipped_bitcode() -> bytes | None:
     """Return the bitcode that is shipped, if it is that of the sources and can be read here."""
     try:
         first, _, code = SHIPPED.read_bytes().partition(b"\n")
@@ -113,7 +113,7 @@ def _made_anew() -> bytes:
     """Return what numba makes of the sources, from the cache if it is there."""
     from .export import exported
 
-    key = full_key(integrator_key(), "bitcode")
+    key = store_key(integrator_key(), "bitcode")
     code = store.read(key)
     if code is None:
         code = exported(WANTED)

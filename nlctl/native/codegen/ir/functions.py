@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from ....expressions.functions import FUNCTIONS
-from .text import RARELY, Body, Value, type_of
+from .text import RARELY, Body, Value, llvm_type
 
 _LOG2_E, LN2 = 1.4426950408889634, (0.6931471805599453, 2.3190468138462996e-17)
 TWO_OVER_PI, HALF_PI = 0.6366197723675814, (
@@ -91,7 +91,7 @@ def _call(b: Body, name: str, make: Callable[..., Results], *args: Value) -> Res
     """Call a function of this module; it is written when it is first needed."""
     values = b.same(*args)
     width, count = values[0].width, 2 if make is _sin_and_cos else 1
-    kind = type_of(width)
+    kind = llvm_type(width)
     kind = f"{{{kind}, {kind}}}" if count == 2 else kind
     full = f"@nlctl.{name}.{width or 1}"
     if full not in b.module.functions:
@@ -154,7 +154,9 @@ def _scaled(b: Body, y: Value, m: Value, small: Value) -> Value:
     Where the result may be small it is made in two steps, so that it underflows gradually.
     """
     bits = b.bits(m)
-    more = b.integer("and", b.new(f"sext {small} to {type_of(y.width, 'i')}", y.width, "i"), _STEP)
+    more = b.integer(
+        "and", b.new(f"sext {small} to {llvm_type(y.width, 'i')}", y.width, "i"), _STEP
+    )
     bits = b.new(f"add {bits}, {more.text}", y.width, "i")
     y = b.mul(y, b.real(b.integer("shl", bits, 52)), exact=True)
     return b.mul(y, b.select(small, 2.0**-_STEP, 1.0), exact=True)
@@ -257,7 +259,7 @@ def _exact_if_far(b: Body, x: Value, near: dict[str, Value]) -> Results:
 
 def _far(b: Body, name: str, x: Value, y: Value) -> Value:
     """Call a function that is seldom called: it leaves all registers as they were."""
-    full, kind = f"@nlctl.far.{name}.{x.width or 1}", type_of(x.width)
+    full, kind = f"@nlctl.far.{name}.{x.width or 1}", llvm_type(x.width)
     if full not in b.module.functions:
         inner, (given, known) = Body(b.module), (Value("%x", x.width), Value("%y", x.width))
         is_far = inner.compare("ogt", inner.intrinsic("fabs", given), LARGEST_ANGLE)
