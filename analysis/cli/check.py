@@ -63,7 +63,7 @@ def random_start(
     return {**full, **drawn}
 
 
-def replay(
+def repeat_command(
     example: str, horizon: float, settings: Sequence[str], start: Mapping[str, Any], member: int
 ) -> str:
     """Return the command that repeats one run of an ensemble, to the last digit.
@@ -121,7 +121,7 @@ def show_ledger(found: Ledger, console: Console) -> None:
     console.print(rows)
 
 
-def summary(found: Ledger) -> str:
+def ledger_summary(found: Ledger) -> str:
     """Return the ledger in a few lines: bound, number of lines by status, what is violated."""
     count = {status: sum(x.status == status for x in found.lines) for status in STATUSES}
     told = ", ".join(f"{number} {status}" for status, number in count.items() if number)

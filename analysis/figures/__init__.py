@@ -3,16 +3,25 @@
 from .proof import (
     bounds,
     burst,
-    envelope,
     equality_residuals,
     inequality_margins,
     long_zeta,
     lyapunov_bound,
     story,
+    windowed_maximum,
 )
 from .rankings import paired_differences, screening, set_apart, shares, violation_rates
-from .runs import CLIP, LIMIT, Limit, fans, margins, most_frequent, quantile, running_estimate
-from .searches import degradation, deviations, failure_map, radius_steps, search
+from .runs import (
+    CLIP,
+    LIMIT,
+    Limit,
+    fans,
+    margins_figure,
+    most_frequent,
+    quantile,
+    running_estimate,
+)
+from .searches import degradation, deviations, failure_map_figure, radius_steps, search
 
 __all__ = [
     "CLIP",
@@ -22,14 +31,13 @@ __all__ = [
     "burst",
     "degradation",
     "deviations",
-    "envelope",
     "equality_residuals",
-    "failure_map",
+    "failure_map_figure",
     "fans",
     "inequality_margins",
     "long_zeta",
     "lyapunov_bound",
-    "margins",
+    "margins_figure",
     "most_frequent",
     "paired_differences",
     "quantile",
@@ -41,4 +49,5 @@ __all__ = [
     "shares",
     "story",
     "violation_rates",
+    "windowed_maximum",
 ]

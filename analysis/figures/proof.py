@@ -28,12 +28,12 @@ from .axes import (
 __all__ = [
     "bounds",
     "burst",
-    "envelope",
     "equality_residuals",
     "inequality_margins",
     "long_zeta",
     "lyapunov_bound",
     "story",
+    "windowed_maximum",
 ]
 
 
@@ -55,7 +55,7 @@ def burst(run: LongRun) -> Figure:
     for ax in (whole, error):
         ax.axvline(run.burst, color=ORANGE, linewidth=1.6, label="happened")
     legend_above(whole)
-    error.semilogy(*envelope(time, np.abs(s["e"])), color=BLUE, linewidth=1.4)
+    error.semilogy(*windowed_maximum(time, np.abs(s["e"])), color=BLUE, linewidth=1.4)
     shown = left <= 100.0
     for (name, label), (colour, style) in zip(
         (("e", "$|e_1|$"), ("r", "$|r|$"), ("u", "$|u|$")), STYLES, strict=False
@@ -119,7 +119,7 @@ def _creeping(ax: Axes, run: LongRun) -> None:
     ax.set(xlabel=TIME)
 
 
-def envelope(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi) -> np.ndarray:
+def windowed_maximum(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi) -> np.ndarray:
     """Return the largest value of y in each whole window, at the middle of the windows."""
     number = np.floor((time - time[0]) / window).astype(int)
     starts = np.flatnonzero(np.diff(number, prepend=-1))

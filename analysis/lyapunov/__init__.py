@@ -10,8 +10,8 @@ from .bounds.provenance import Constant, Constants
 from .bounds.sector import Sector, sector
 from .bounds.weights import approximation_error, minimax_weights, tightest_weights
 from .certificate.certify import Certificate, certify
-from .certificate.gains import Design, design
-from .conservatism import Comparison, Conservatism, comparison, conservatism
+from .certificate.gains import GainDesign, design
+from .conservatism import Conservatism, DirectBound, comparison, conservatism
 from .examination import Examination, examine
 from .inequalities import inequalities
 from .ledger import Ledger, ledger
@@ -28,16 +28,16 @@ from .tighten import Tightened, tighten
 __all__ = [
     "Box",
     "Certificate",
-    "Comparison",
     "Conservatism",
     "Constant",
     "Constants",
     "Creep",
     "Decomposition",
     "DecompositionError",
-    "Design",
+    "DirectBound",
     "Drift",
     "Examination",
+    "GainDesign",
     "Ledger",
     "Line",
     "Margin",

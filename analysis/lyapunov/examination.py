@@ -19,9 +19,9 @@ from .bounds.decomposition import Decomposition, decompose
 from .bounds.provenance import Constants
 from .loop.integral import sharpest
 from .loop.roles import read_parts
-from .loop.simulation import Member, Run, members_of, observe, observed_loop
+from .loop.simulation import Member, MemberRun, members_of, observe, observed_loop
 
-__all__ = ["U_MAX", "Examination", "_Runs", "compile_ahead", "examine"]
+__all__ = ["U_MAX", "Examination", "_Runs", "compile_examination_ahead", "examine"]
 
 U_MAX = 60.0  # a split that is proved and not computed holds for |u| <= 2 U_MAX
 
@@ -45,13 +45,13 @@ class _Runs:
     split: Decomposition
     max_steps: int = 2_000_000
 
-    def __iter__(self) -> Iterator[Run]:
+    def __iter__(self) -> Iterator[MemberRun]:
         if len(self.members) == 1:
             return iter([self.first])
         return observe(self.loop, self.members, self.split, self.max_steps)
 
     @cached_property
-    def first(self) -> Run:
+    def first(self) -> MemberRun:
         """The first run."""
         return next(observe(self.loop, self.members[:1], self.split, self.max_steps))
 
@@ -140,7 +140,7 @@ def examine(
     return Examination(loop=loop, runs=runs, constants=found)
 
 
-def compile_ahead(loop: ct.InterconnectedSystem) -> None:
+def compile_examination_ahead(loop: ct.InterconnectedSystem) -> None:
     """Compile the diagram that `examine` runs, which otherwise happens with the first run."""
     native.compile_ahead(observed_loop(loop, _split(read_parts(loop).actuator)))
 

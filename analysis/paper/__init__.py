@@ -4,15 +4,15 @@ from .cases import CASES, HORIZON, METRICS, TAIL, Case
 from .controllers import contenders
 from .numerics import numerics
 from .reproduction import (
+    CaseRun,
     Check,
     Expectation,
-    Run,
     checks,
-    compile_ahead,
+    compile_cases_ahead,
     expectations,
     measured,
-    run,
     run_all,
+    run_case,
     sample_times,
 )
 
@@ -22,16 +22,16 @@ __all__ = [
     "METRICS",
     "TAIL",
     "Case",
+    "CaseRun",
     "Check",
     "Expectation",
-    "Run",
     "checks",
-    "compile_ahead",
+    "compile_cases_ahead",
     "contenders",
     "expectations",
     "measured",
     "numerics",
-    "run",
     "run_all",
+    "run_case",
     "sample_times",
 ]

@@ -19,7 +19,7 @@ from ..lyapunov.assumptions import assumptions
 from ..lyapunov.bounds.premises import premises
 from ..lyapunov.certificate.certify import Certificate, certify
 from ..lyapunov.conservatism import Conservatism, conservatism
-from ..lyapunov.examination import compile_ahead as examine_ahead
+from ..lyapunov.examination import compile_examination_ahead as examine_ahead
 from ..lyapunov.examination import examine
 from ..lyapunov.inequalities import inequalities, terms
 from ..lyapunov.ledger import Ledger, ledger
@@ -32,10 +32,10 @@ from .controllers import contenders
 from .reference_run import continued, read_record
 
 __all__ = [
-    "FAR",
+    "FAR_HORIZONS",
     "LOOK",
     "Evidence",
-    "compile_ahead",
+    "compile_evidence_ahead",
     "evidence",
     "far_runs_in_background",
     "known_sign",
@@ -43,7 +43,7 @@ __all__ = [
 
 SPLIT = {"example_1": (0.6, 1.3)}  # bounds of the dead zone's k that make eps_u* small
 LOOK = min(LOOKS)  # s; from so much of a run the creep of zeta is told
-FAR = {  # key of a run far beyond 20 s: what it is, and its horizon (s)
+FAR_HORIZONS = {  # key of a run far beyond 20 s: what it is, and its horizon (s)
     "2": ("Example 2 as published", 9_600.0),
     "1": ("Example 1 as printed, cos(w(t) t)", 1_000.0),
     "1-integral": ("Example 1 with the phase ∫ w dt", 1_000.0),
@@ -119,7 +119,7 @@ def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
     )
 
 
-def compile_ahead(loop: ct.InterconnectedSystem) -> None:
+def compile_evidence_ahead(loop: ct.InterconnectedSystem) -> None:
     """Compile the diagrams that `evidence` runs besides the example itself."""
     examine_ahead(loop)
     native.compile_ahead(compiled(known_sign(loop)))
@@ -138,7 +138,7 @@ def known_sign(loop: ct.InterconnectedSystem) -> ct.InterconnectedSystem:
 
 @contextmanager
 def far_runs_in_background(*, whole: bool = False) -> Iterator[Future[dict[str, LongRun]]]:
-    """Run the loops of `FAR` in a thread while the body goes on; an early exit ends the runs.
+    """Run `FAR_HORIZONS` in a thread while the body goes on; an early exit ends the runs.
 
     Example 2 is run as far as its burst is foretold from, and goes on with the record of
     `analysis.paper.reference_run`; with `whole` it is run to its burst, which takes minutes.
@@ -162,7 +162,7 @@ def _far_runs(stop: Event, whole: bool) -> dict[str, LongRun]:
         if stop.is_set():
             raise InterruptedError
 
-    ends = {key: end for key, (_, end) in FAR.items()}
+    ends = {key: end for key, (_, end) in FAR_HORIZONS.items()}
     if not whole:
         ends["2"] = max(LOOKS)
     with ThreadPoolExecutor(2) as pool:

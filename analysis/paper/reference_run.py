@@ -11,16 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ..lyapunov.nussbaum.long_run import LOOKS, SIGNALS, LongRun
+from ..lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LOOKS, LongRun
 
-__all__ = ["RECORD", "continued", "read_record", "thinned", "write_record"]
+__all__ = ["RECORD", "continued", "read_record", "thinned_run", "write_record"]
 
 RECORD = Path(__file__).with_name("example-2-burst.csv")
 _WINDOW = 4 * np.pi  # s; period of the paper's reference: one row in each, where |e| is largest
 LAST, _STEP, PER_DECADE = 100.0, 0.5, 60  # s, s; the last seconds by time left until the end
 
 
-def thinned(run: LongRun) -> LongRun:
+def thinned_run(run: LongRun) -> LongRun:
     """Return a run with fewer samples, which its figure and its `burst` and `calm` do not miss.
 
     Kept are the largest \\|e\\| of each period, the two samples around the burst, one in half a
@@ -46,9 +46,9 @@ def thinned(run: LongRun) -> LongRun:
 def write_record(run: LongRun, path: Path = RECORD) -> None:
     """Write a run as CSV; the first line says what it is, in JSON."""
     about = {"loop": run.loop, "horizon": run.horizon, "rtol": run.rtol, "lost": run.lost}
-    rows = np.column_stack([run.time, *(run.signals[name] for name in SIGNALS)])
-    names = ",".join(["time", *SIGNALS])
-    formats = ["%.6f", *["%.7g"] * len(SIGNALS)]
+    rows = np.column_stack([run.time, *(run.signals[name] for name in LONG_RUN_SIGNALS)])
+    names = ",".join(["time", *LONG_RUN_SIGNALS])
+    formats = ["%.6f", *["%.7g"] * len(LONG_RUN_SIGNALS)]
     header = f"{json.dumps(about)}\n{names}"
     np.savetxt(path, rows, fmt=formats, delimiter=",", header=header, comments="# ")
 
@@ -58,7 +58,7 @@ def read_record(beginning: LongRun, path: Path = RECORD) -> LongRun:
     with path.open(encoding="utf-8") as file:
         about = json.loads(file.readline().removeprefix("# "))
         time, *rows = np.loadtxt(file, delimiter=",").T
-    signals = dict(zip(SIGNALS, rows, strict=True))
+    signals = dict(zip(LONG_RUN_SIGNALS, rows, strict=True))
     return replace(beginning, time=time, signals=signals, **about)
 
 
@@ -91,5 +91,5 @@ if __name__ == "__main__":
     from ..lyapunov.nussbaum.long_run import long_run
 
     made = long_run(paper.example_2(), progress=lambda t: print(f"\r{t:7.1f} s", end=""))
-    write_record(thinned(made))
+    write_record(thinned_run(made))
     print(f"\n{made}\n{RECORD}: the predictions need {max(LOOKS):g} s of a run and are not kept")

@@ -18,17 +18,17 @@ from .document import Claim, Figure, History, Item, Report, Section, Table
 __all__ = [
     "Placed",
     "TableCell",
+    "_shown",
     "cells",
     "claim_status",
-    "evidence",
+    "evidence_anchors",
     "is_long",
     "is_short",
     "kind",
     "light",
     "meanings",
     "numeric",
-    "place",
-    "shown",
+    "place_anchors",
     "sort_key",
     "summary",
 ]
@@ -86,7 +86,7 @@ class Placed:
     items: Sequence[tuple[str, str, Item]]
 
 
-def place(report: Report) -> list[Placed]:
+def place_anchors(report: Report) -> list[Placed]:
     """Give sections, tables, figures and histories anchors that nothing else on the page has."""
     taken = set(SHELL)
     taken |= {name for name in ("methods", "limits", "references") if getattr(report, name)}
@@ -103,7 +103,7 @@ def place(report: Report) -> list[Placed]:
     return placed
 
 
-def evidence(placed: Sequence[Placed]) -> Mapping[str, str]:
+def evidence_anchors(placed: Sequence[Placed]) -> Mapping[str, str]:
     """Return the anchor of each key that a claim may name; a section's wins over a figure's."""
     figures = {i.key: a for p in placed for a, _, i in p.items if isinstance(i, Figure)}
     return figures | {p.section.key: p.anchor for p in reversed(placed)}
@@ -155,7 +155,7 @@ def numeric(table: Table) -> list[bool]:
 
 
 def _cell(value: Any, is_status: bool) -> TableCell:
-    text = shown(value)
+    text = _shown(value)
     if is_status:
         return TableCell(text=text, badge=light(text))
     return TableCell(text=text, value=sort_key(value))
@@ -171,7 +171,7 @@ def is_short(text: str) -> bool:
     return len(text) <= _SHORT
 
 
-def shown(value: Any) -> str:
+def _shown(value: Any) -> str:
     """Return a cell's text: numbers with the digits that a reader can use."""
     if isinstance(value, float | np.floating):
         return f"{value:.6g}"

@@ -20,7 +20,7 @@ from nlctl.drawing import picture
 
 from ..figures import axes
 from .document import Figure, Section
-from .typography import plain
+from .typography import plain_text
 
 __all__ = ["compact", "draw_ahead", "shapes_svg", "shared_shape", "short_path", "svg", "svg_files"]
 
@@ -28,7 +28,7 @@ __all__ = ["compact", "draw_ahead", "shapes_svg", "shared_shape", "short_path", 
 THEME = {
     "#000000": "currentColor",
     picture.INK: "currentColor",
-    picture.GREY: "var(--soft)",
+    picture.WIRE_GREY: "var(--soft)",
     picture.FILL: "var(--panel)",
     axes.GREY: "var(--soft)",
     axes.BLUE.lower(): "var(--blue)",
@@ -119,7 +119,7 @@ def svg(figure: Figure, file: bytes, key: str, shapes: dict[str, str]) -> Markup
     root.attrib = attributes | {k: v for k, v in root.attrib.items() if k != "version"}
     title = ElementTree.Element("title", id=f"{key}-title")
     description = ElementTree.Element("desc", id=f"{key}-desc")
-    title.text, description.text = plain(figure.caption), plain(figure.description)
+    title.text, description.text = plain_text(figure.caption), plain_text(figure.description)
     root[:] = [title, description, *root]
     return Markup(ElementTree.tostring(root, encoding="unicode"))
 

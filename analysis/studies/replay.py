@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures.axes import BLUE, ORANGE, TIME, stacked_axes
 from analysis.robustness import Experiment, Prepared, evaluate, prepare
-from analysis.robustness.runs.experiment import by_diagram, simulate
+from analysis.robustness.runs.experiment import by_diagram, simulate_rows
 from analysis.robustness.stl.formula import Band, parts_of
 from nlctl.errors import ParameterError
 
@@ -150,7 +150,7 @@ def _same(one: Any, other: Any) -> bool:
 def _signals(prepared: Prepared, row: pd.DataFrame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return all outputs of a row over time."""
     ((loop, _),) = by_diagram(prepared, row)
-    found = simulate(prepared.experiment, loop, row, keep=loop.system.output_labels)
+    found = simulate_rows(prepared.experiment, loop, row, keep=loop.system.output_labels)
     return found.time, {name: samples[0] for name, samples in found.signals.items()}
 
 

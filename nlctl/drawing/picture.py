@@ -33,7 +33,7 @@ from .routes import arrange
 
 _WIDTH, MARGIN = 648.0, 12.0  # of the figure, in points
 _NAME, _SMALL, TITLE = 9.0, 8.0, 11.0  # type sizes
-INK, GREY, FILL = "#16202b", "#5c6670", "#f0f3f7"
+INK, WIRE_GREY, FILL = "#16202b", "#5c6670", "#f0f3f7"
 
 
 @dataclass(frozen=True)
@@ -255,11 +255,11 @@ def _paint(axes: Axes, panel: _Panel, width: float, *, framed: bool) -> None:
     axes.set_axis_off()
     if framed:
         frame = Rectangle((left + 4, top + 2), width - 8, panel.height - 4)
-        frame.set(fill=False, edgecolor=GREY, linewidth=0.6)
+        frame.set(fill=False, edgecolor=WIRE_GREY, linewidth=0.6)
         axes.add_patch(frame)
     _write(axes, left + MARGIN, top + MARGIN, Text(panel.head), TITLE, weight="bold", ha="left")
     for wire, routes in groupby(panel.layout.routes, key=lambda route: route.wire):
-        _paint_wire(axes, list(routes), GREY if wire is None else INK)
+        _paint_wire(axes, list(routes), WIRE_GREY if wire is None else INK)
     for dot in panel.layout.dots:
         axes.add_patch(Circle(dot, 2.2, color=INK, linewidth=0, zorder=3))
     for block, box in zip(panel.blocks, panel.layout.boxes, strict=True):
@@ -290,7 +290,7 @@ def _paint_box(axes: Axes, block: _Block, box: BlockFrame) -> None:
     name, kind = measured_text(block.name, _NAME, "bold"), measured_text(block.kind, _SMALL)
     middle, top = box.x + box.w / 2, box.y + (box.h - name.h - kind.h) / 2
     _write(axes, middle - name.w / 2, top, name, _NAME, weight="bold")
-    _write(axes, middle - kind.w / 2, top + name.h, kind, _SMALL, color=GREY)
+    _write(axes, middle - kind.w / 2, top + name.h, kind, _SMALL, color=WIRE_GREY)
 
 
 def _write(

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from nlctl.expressions.functions import FUNCTIONS
 from nlctl.native.codegen.ir import functions as ir
-from nlctl.native.codegen.ir.memory import address_of, load_value, store
+from nlctl.native.codegen.ir.memory import entry_address, load_value, store
 from nlctl.native.codegen.ir.text import Body, Module
 from nlctl.native.machine.finish import finished
 
@@ -100,7 +100,7 @@ def kernel(name, width=WIDTH, inlined=False):
         result = ir.sin_cos(b, args[0], {"sin", "cos"})[one]
     else:
         result = ir.applied(b, one, *args[: FUNCTIONS[one].count])
-    store(b, result, address_of(b, "y", 0))
+    store(b, result, entry_address(b, "y", 0))
     text = f"define void @f(ptr %x, ptr %z, ptr %y) {{\nentry:\n{b.text()}  ret void\n}}\n"
     code = finished(module.text() + text, ["f"], {})
     call = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(code.addresses["f"])

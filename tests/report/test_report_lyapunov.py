@@ -20,7 +20,7 @@ from analysis.paper.page import proof_text as text
 from analysis.paper.page.notation import formulas
 from analysis.paper.page.proof import LONG_RUN, evidence, lyapunov_sections
 from analysis.paper.page.report import paper_report
-from analysis.paper.reference_run import continued, read_record, thinned, write_record
+from analysis.paper.reference_run import continued, read_record, thinned_run, write_record
 from analysis.report import Figure, Paragraph, Report, Section, Table, render_html, render_json
 from analysis.report.outline import claim_status, light, summary
 
@@ -76,7 +76,7 @@ def test_proved_checked_and_violated_lines_stand_in_tables_of_their_own(number):
     assert stands[text.PROVED] == {"proved", "computed"}
     assert stands[text.CHECKED] == {"checked"}
     assert stands[text.FAILING] == {"violated as printed"}
-    assert stands[text.OPEN] <= {"undecided", "not applicable"}
+    assert stands[text.LEFT_OPEN] <= {"undecided", "not applicable"}
     assert text.VIOLATED not in stands
 
 
@@ -282,7 +282,7 @@ def test_the_envelope_is_the_largest_value_of_each_whole_window():
     """A spike counts in its own window only, and a part of a window is left out."""
     t = np.linspace(0, 10, 101)
     y = np.where(t == 4.5, 7.0, 1.0)
-    at, largest = figures.envelope(t, y, 3.0)
+    at, largest = figures.windowed_maximum(t, y, 3.0)
     np.testing.assert_allclose(at, [1.5, 4.5, 7.5])
     np.testing.assert_array_equal(largest, [1, 7, 1])
 
@@ -296,7 +296,7 @@ def test_a_thinned_run_has_the_same_burst_and_the_same_largest_error(tmp_path):
         loop="example_2", horizon=2000.0, rtol=1e-6, time=t, signals=signals, predictions=(),
         lobe=lobe_around(2.0), lost=1901.0,
     )  # fmt: skip
-    thin = thinned(run)
+    thin = thinned_run(run)
     assert thin.time.size < run.time.size / 100
     assert thin.burst == run.burst
     assert thin.calm == run.calm

@@ -20,7 +20,7 @@ from .certify import Certificate, bound_of_r, certify
 from .known_sign import KnownSignLoop, read_loop
 from .plant_bounds import Demand, demand
 
-__all__ = ["Design", "GainCandidate", "design"]
+__all__ = ["GainCandidate", "GainDesign", "design"]
 
 SLACK = 1.002  # of N_0 over 1 / min k G
 _BOUNDS = np.geomspace(0.02, 20, 40)  # of |r|, for which delta* is tabulated
@@ -46,7 +46,7 @@ class GainCandidate:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Design:
+class GainDesign:
     """The gains that were found, and the proof for them.
 
     Attributes
@@ -101,7 +101,7 @@ def design(
     horizon: float = 20.0,
     evaluations: int = 150,
     max_steps: int = 100_000,
-) -> Design:
+) -> GainDesign:
     """Search the gains with the smallest proved bound of |r| whose run keeps |u| below a limit.
 
     Searched are gamma, tau, b, beta, and the shares of sigma_2 gamma and sigma_1 Gamma in 2 beta
@@ -221,13 +221,13 @@ def _largest_input(compiled: Any, gains: dict[str, float], horizon: float, max_s
 
 def _proved(
     loop: Any, trials: list[GainCandidate], u_limit: float, how: dict[str, Any], horizon: float
-) -> Design:
+) -> GainDesign:
     """Prove the best trial that keeps the limit; if that fails, the next one."""
     allowed = [t for t in trials if np.isfinite(t.C_0) and t.u <= u_limit]
     for trial in sorted(allowed, key=lambda t: t.C_0)[:5]:
         certificate = certify(loop, params=trial.gains, **how)
         if certificate.holds:
-            return Design(
+            return GainDesign(
                 gains=trial.gains,
                 certificate=certificate,
                 u=trial.u,

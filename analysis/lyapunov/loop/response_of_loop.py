@@ -9,7 +9,7 @@ import numpy as np
 from nlctl.diagrams import state_names
 from nlctl.errors import DiagramError, ParameterError
 
-from ..nussbaum.property import Gain
+from ..nussbaum.property import GainFunction
 from .roles import read_parts
 
 __all__ = ["law_of_response", "own_parameters"]
@@ -24,7 +24,7 @@ def own_parameters(loop: Any, response: Any) -> dict[str, Any]:
     return {k: v for k, v in given if "." in k and not np.array_equal(usual.get(k, np.nan), v)}
 
 
-def law_of_response(loop: Any, response: Any) -> Gain:
+def law_of_response(loop: Any, response: Any) -> GainFunction:
     """Return the Nussbaum function of the loop that a response is of.
 
     At samples of the response zeta, r and u are compared with the diagram's own outputs at the same

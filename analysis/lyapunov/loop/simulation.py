@@ -25,7 +25,7 @@ from .roles import Parts, read_parts
 from .same_loop import check_same, points_around
 from .signals import Margin, Signals, signals_of
 
-__all__ = ["Member", "Run", "members_of", "observe", "observed_loop"]
+__all__ = ["Member", "MemberRun", "members_of", "observe", "observed_loop"]
 
 _LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
 AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
@@ -56,7 +56,7 @@ class Member:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class MemberRun:
     """A member, and what became of it.
 
     Attributes
@@ -154,7 +154,7 @@ def observe(
     members: Sequence[Member],
     split: Decomposition,
     max_steps: int = 2_000_000,
-) -> Iterator[Run]:
+) -> Iterator[MemberRun]:
     """Run the members, observed; see `analysis.lyapunov.loop.instrumented`.
 
     Parameters
@@ -195,7 +195,7 @@ def observe(
         _check_reproduced(member, signals)
         lost = None if response.success else float(response.statistics.time)
         message = str(response.message or "")
-        yield Run(
+        yield MemberRun(
             member=member,
             parts=parts,
             signals=signals,

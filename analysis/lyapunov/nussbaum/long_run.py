@@ -27,7 +27,7 @@ FINE, COARSE = (
 )  # s; sampling interval up to the last look, which `creep` needs, and beyond
 END, _FINEST = 0.5, 1e-5  # s; how much of a burst is run again, and the sampling interval there
 _STANDSTILL = 1e-5  # s; a burst has no end: a run that gets no further in 2000 steps is given up
-SIGNALS = ("zeta", "e", "r", "u")
+LONG_RUN_SIGNALS = ("zeta", "e", "r", "u")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,7 +153,7 @@ def long_run(
         end = _watched(compiled, again, whole.states[:, i], progress, settings)
         late = _signals(end)
         time = np.append(time[:i], end.time)
-        signals = {name: np.append(signals[name][:i], late[name]) for name in SIGNALS}
+        signals = {name: np.append(signals[name][:i], late[name]) for name in LONG_RUN_SIGNALS}
         lost = None if end.success else end.statistics.time
     return LongRun(
         loop=str(loop.name),
@@ -182,7 +182,7 @@ def _watched(
 
 def _signals(response: Any) -> dict[str, np.ndarray]:
     rows = dict(zip(response.output_labels, np.asarray(response.outputs), strict=True))
-    return {name: rows[name] for name in SIGNALS}
+    return {name: rows[name] for name in LONG_RUN_SIGNALS}
 
 
 @dataclass
@@ -207,5 +207,5 @@ class _Beginning:
 
     def __init__(self, time: np.ndarray, signals: Mapping[str, np.ndarray], end: float) -> None:
         until = time <= end + 1e-9
-        self.time, self.output_labels = time[until], list(SIGNALS)
-        self.outputs: Any = np.array([signals[name][until] for name in SIGNALS])
+        self.time, self.output_labels = time[until], list(LONG_RUN_SIGNALS)
+        self.outputs: Any = np.array([signals[name][until] for name in LONG_RUN_SIGNALS])

@@ -31,7 +31,7 @@ from nlctl.errors import ParameterError
 
 from ..loop.response_of_loop import law_of_response
 from .energy import Drift, drift
-from .property import Gain, Lobe, antiderivative, lobe_around, root
+from .property import GainFunction, Lobe, antiderivative, lobe_around, root
 
 __all__ = ["Balance", "Creep", "burst_peak", "creep"]
 
@@ -178,7 +178,7 @@ def burst_peak(lobe: Lobe, kG: float) -> float:
 
 def creep(
     response: Any,
-    N: Gain = functions.nussbaum,
+    N: GainFunction = functions.nussbaum,
     *,
     loop: Any = None,
     window: float = 16 * np.pi,
@@ -256,7 +256,7 @@ def _recent(rates: np.ndarray) -> np.ndarray:
 
 
 def _windows(
-    run: Drift, N: Gain, lobe: Lobe, window: float, skip: int
+    run: Drift, N: GainFunction, lobe: Lobe, window: float, skip: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean of A' and of 1/|N| over each window that zeta spends in the lobe."""
     start = run.time[0] + skip * window
@@ -286,7 +286,7 @@ def _fitted(rates: np.ndarray, inverse: np.ndarray) -> Balance:
     return Balance(p=float(p), q=float(q), residual=float(np.sqrt(np.mean(left**2))))
 
 
-def _rest_of(balance: Balance, N: Gain, lobe: Lobe) -> float | None:
+def _rest_of(balance: Balance, N: GainFunction, lobe: Lobe) -> float | None:
     """Return the zeta of the lobe, below its extremum, at which the balance stops the drift.
 
     Beyond the extremum |N| falls again, and the same |N| is passed on the way to the burst.
@@ -300,7 +300,7 @@ def _rest_of(balance: Balance, N: Gain, lobe: Lobe) -> float | None:
 
 
 def _rest(
-    rates: np.ndarray, inverse: np.ndarray, N: Gain, lobe: Lobe
+    rates: np.ndarray, inverse: np.ndarray, N: GainFunction, lobe: Lobe
 ) -> tuple[float | None, tuple[float, float] | None]:
     """Return the resting zeta, and its range over fits that leave a part of the windows out.
 
@@ -317,7 +317,7 @@ def _rest(
 
 
 def _forecast(
-    rates: np.ndarray, inverse: np.ndarray, N: Gain, lobe: Lobe, zeta: float
+    rates: np.ndarray, inverse: np.ndarray, N: GainFunction, lobe: Lobe, zeta: float
 ) -> tuple[float, float, float]:
     """Return how long the budget lasts, and the shortest and the longest time that it may.
 
@@ -345,7 +345,7 @@ def _slope(rates: np.ndarray, inverse: np.ndarray) -> tuple[float, float, float]
     return fit.p, float(of_slope), fit.residual / float(np.sqrt(freedom))
 
 
-def _duration(balance: Balance, zeta: float, N: Gain, lobe: Lobe) -> float:
+def _duration(balance: Balance, zeta: float, N: GainFunction, lobe: Lobe) -> float:
     """Time until the budget is spent by the balance: int |N| dzeta / A'."""
     if balance.rate(lobe.extremum) <= 0 and zeta < lobe.place:
         return np.inf

@@ -27,7 +27,7 @@ LEAD_BURST = (
     "bursts."
 )
 
-METHODS = (
+METHODS_TEXT = (
     "Plant, actuator, reference and controller are blocks of python-control, joined by their "
     "signals; each equation is written once, as in the paper, and compiled to machine code. The "
     "numbers to reach are held against an independent computation, to the "

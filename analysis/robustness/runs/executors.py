@@ -116,7 +116,7 @@ def computed_elsewhere(
     UsageError
         At the end, if a row was refused.
     """
-    payload, todo = packed(prepared, design), iter(chunks)
+    payload, todo = _packed(prepared, design), iter(chunks)
     waiting: dict[Future, range] = {}
     failures: list[tuple[range, BaseException]] = []
     workers = _workers(executor)
@@ -153,7 +153,7 @@ def computed_elsewhere(
         _raise(*failures[0])
 
 
-def packed(prepared: Prepared, design: Design) -> bytes:
+def _packed(prepared: Prepared, design: Design) -> bytes:
     """Return what a worker needs, as bytes; functions made at run time travel by value.
 
     What builds diagrams stays at home, and the rows of a listed design go with their chunks.

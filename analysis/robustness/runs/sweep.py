@@ -25,7 +25,7 @@ from .executors import LostChunkError, chunk_table, computed_elsewhere, computed
 from .experiment import Prepared, columns_of
 from .identity import identity_of
 from .progress import Progress, Tally
-from .store import Store, claimed, opened, put, stored, table_of, taken_up
+from .store import ChunkStore, claimed, opened, put, stored, table_of, taken_up
 
 __all__ = ["Interrupt", "Sweep", "gentle_interrupt", "load", "sweep"]
 
@@ -155,7 +155,7 @@ def sweep(
     with ExitStack() as stack:
         if folder is not None:
             facts = identity_of(prepared, design, identity)
-            store = Store(folder=Path(folder), identity=facts, columns=columns_of(prepared))
+            store = ChunkStore(folder=Path(folder), identity=facts, columns=columns_of(prepared))
             stack.enter_context(claimed(store, resume=resume))
             keep = partial(put, store)
             notes += _continued(store, tally) if resume else []
@@ -212,7 +212,7 @@ def _chunk_size(design: Design) -> int:
     return min(_LARGEST, _STEP * math.ceil(design.size / (FEWEST * _STEP)))
 
 
-def _continued(store: Store, tally: Tally) -> list[str]:
+def _continued(store: ChunkStore, tally: Tally) -> list[str]:
     """Count the chunks that are there; return what is to be said of damaged ones."""
     notes = []
     for numbers, found in taken_up(store):

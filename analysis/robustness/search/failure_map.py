@@ -15,7 +15,7 @@ from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
 from ..uncertainty.design import affordable, numbered
-from ..uncertainty.space import Space, boxed, ends, nominal
+from ..uncertainty.space import Space, ends, from_unit_cube, nominal
 from .evaluation import Evaluate, evaluated, margins_of
 
 __all__ = ["FailureMap", "boundary", "failure_map"]
@@ -181,7 +181,7 @@ class _Plane:
         for name, coordinates in zip(self.axes, np.transpose(new), strict=True):
             unit[:, self.space.names.index(name)] = coordinates / self.steps
         others = {k: v for k, v in self.given.items() if k not in self.axes}
-        rows = numbered(boxed(self.space, unit).assign(**others), len(self.margins))
+        rows = numbered(from_unit_cube(self.space, unit).assign(**others), len(self.margins))
         results = evaluated(self.evaluate, rows)
         self.margins |= zip(new, margins_of(results), strict=True)
         self.tables.append(rows.assign(spec=results["spec"].to_numpy(), round=len(self.tables)))

@@ -16,7 +16,7 @@ from nlctl.arguments import flag, of_type, whole_number
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
-from .space import Space, boxed, nominal, sampled
+from .space import Space, from_unit_cube, nominal, sampled
 
 __all__ = [
     "Design",
@@ -339,7 +339,7 @@ def _crossed(space: Space, axes: Sequence[np.ndarray]) -> pd.DataFrame:
     impossible = [c.name for c in space.choices if min(c.weights) == 0]
     if impossible:
         raise ParameterError(f"options with weight 0 in {impossible}: leave them out of the space")
-    return boxed(space, np.array(list(itertools.product(*axes, *options))))
+    return from_unit_cube(space, np.array(list(itertools.product(*axes, *options))))
 
 
 def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> Design:
@@ -366,7 +366,7 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
     middle = nominal(space)
     made, varied = [middle], [""]
     unit = np.tile(np.linspace(0, 1, levels)[:, None], len(space.names))
-    values = boxed(space, unit)
+    values = from_unit_cube(space, unit)
     for quantity in space.quantities:
         made += [{**middle, quantity.name: value} for value in values[quantity.name]]
         varied += [quantity.name] * levels

@@ -27,7 +27,7 @@ import control as ct
 from nlctl import errors
 from nlctl.errors import ParameterError
 
-from .errors import Place, Problem
+from .errors import KeyPath, Problem
 from .schema import Study
 
 __all__ = [
@@ -59,7 +59,7 @@ def untrusted(study: Study, folder: Path) -> list[Problem]:
     return untrusted_names(_named(study), folder)
 
 
-def untrusted_names(named: Iterable[tuple[Place, str]], folder: Path) -> list[Problem]:
+def untrusted_names(named: Iterable[tuple[KeyPath, str]], folder: Path) -> list[Problem]:
     """Return which of these functions and kinds, each with its place in the file, need trust."""
     return [
         Problem(place=place, message=f"{reason}: reading this study would run it. Trust it with "
@@ -69,7 +69,7 @@ def untrusted_names(named: Iterable[tuple[Place, str]], folder: Path) -> list[Pr
     ]  # fmt: skip
 
 
-def _named(study: Study) -> Iterator[tuple[Place, str]]:
+def _named(study: Study) -> Iterator[tuple[KeyPath, str]]:
     """Yield every function that a study names, with its place."""
     if ":" in study.loop:
         yield ("loop",), study.loop
@@ -82,7 +82,7 @@ def _named(study: Study) -> Iterator[tuple[Place, str]]:
         yield from _inside(asked.model_dump(), ("analysis", i))
 
 
-def _inside(value: Any, place: Place) -> Iterator[tuple[Place, str]]:
+def _inside(value: Any, place: KeyPath) -> Iterator[tuple[KeyPath, str]]:
     if isinstance(value, Mapping):
         if isinstance(value.get("function"), str):
             yield place, value["function"]

@@ -35,7 +35,7 @@ from ..file.schema import Choices
 from ..finding import Finding
 from ..kind import Asked, Ground, Kind, Setup, made
 from ..page import text as text
-from ..page.tables import result_table, told
+from ..page.tables import column_in_words, result_table
 from .context import CLOPPER, HOLM
 
 if TYPE_CHECKING:
@@ -276,7 +276,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield Figure(
         key=f"{key}-rates",
         caption=caption,
-        description=f"{caption} {told(ranking['rate'])}.",
+        description=f"{caption} {column_in_words(ranking['rate'])}.",
         figure=figures.violation_rates(ranking),
     )
     titles = {"rate": "share", "rate_low": "from", "rate_high": "to", "failed": "did not end"}

@@ -114,7 +114,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
         key=f"{key}-map",
         caption=caption,
         description=f"{caption} {finding.sentence}",
-        figure=figures.failure_map(
+        figure=figures.failure_map_figure(
             points,
             finding.tables["triangles"].to_numpy(),
             names,

@@ -14,7 +14,7 @@ from ...report.document import Figure
 from ..finding import Finding
 from ..kind import Asked, Ground, Kind, made
 from ..page import text as text
-from ..page.tables import result_table, told
+from ..page.tables import column_in_words, result_table
 from .context import HOLM
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield Figure(
         key=f"{key}-distances",
         caption=_CAPTION,
-        description=f"{_CAPTION} {told(table['statistic'])}.",
+        description=f"{_CAPTION} {column_in_words(table['statistic'])}.",
         figure=figures.set_apart(table),
     )
     columns = {"statistic": "distance"}

@@ -103,13 +103,13 @@ def margin_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item
     yield _requirements(result, table)
     margins = table["spec"].to_numpy(dtype=float)
     violated = int(np.sum(violates(margins)))
-    caption = text.MARGINS + text.VIOLATIONS * bool(violated) + text.clipped(margins)
+    caption = text.MARGINS_CAPTION + text.VIOLATIONS * bool(violated) + text.clipped(margins)
     yield Figure(
         key=f"{key}-margins",
         caption=caption,
         description=f"{caption} {text.violate(violated, margins.size)}; the median margin is "
         f"{margin_text(float(figures.quantile(margins, 0.5, -np.inf)))}.",
-        figure=figures.margins(margins),
+        figure=figures.margins_figure(margins),
     )
 
 
@@ -175,7 +175,7 @@ def _metrics(result: Result, table: pd.DataFrame) -> Table:
         missing = values.size - there.size
         rows.append((key, about["meaning"], about["unit"], *ends, missing))
     return Table(
-        caption=text.METRICS,
+        caption=text.METRICS_CAPTION,
         columns=("metric", "meaning", "unit", *_PARTS.values(), "missing"),
         rows=rows,
         folded=True,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ....expressions.graph import Expr
 from ..plan import LoopOfLevel
-from .memory import address_of, load_value, store
+from .memory import entry_address, load_value, store
 from .numbers import Writer, one_line
 from .text import Value, constant, float_text
 
@@ -103,7 +103,7 @@ class _Loop:
         for each in self.loop.stores:
             self._reads((each.expr,), index, at)
             array, row, step = each.array, each.row, self.lanes
-            where = address_of(self.b, array, (row + at) * step, index, step)
+            where = entry_address(self.b, array, (row + at) * step, index, step)
             store(self.b, self.b.wide(w.names[each.expr], self.chunk), where)
         w.names, w.pairs = outer, pairs
 
@@ -127,11 +127,13 @@ class _Loop:
         array, row, step = self.w.plan.elements(vector)
         if self.lanes > 1:
             first = (row + step * at) * self.lanes
-            return load_value(b, address_of(b, array, first, index, step * self.lanes), self.chunk)
+            return load_value(
+                b, entry_address(b, array, first, index, step * self.lanes), self.chunk
+            )
         if step == 1:
-            return load_value(b, address_of(b, array, row + at, index), self.chunk)
+            return load_value(b, entry_address(b, array, row + at, index), self.chunk)
         parts = [
-            load_value(b, address_of(b, array, row + step * (at + k), index, step), 0)
+            load_value(b, entry_address(b, array, row + step * (at + k), index, step), 0)
             for k in range(self.chunk)
         ]
         return b.gathered(parts, self.chunk)

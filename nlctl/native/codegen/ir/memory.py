@@ -5,7 +5,7 @@ from __future__ import annotations
 from .text import Body, Value, llvm_type
 
 
-def address_of(b: Body, array: str, at: int, index: str | None = None, step: int = 1) -> str:
+def entry_address(b: Body, array: str, at: int, index: str | None = None, step: int = 1) -> str:
     """Return the address of entry `at` of an array, or of ``index * step + at``."""
     if index is None:
         return b.new(f"getelementptr double, ptr %{array}, i64 {at}").text if at else f"%{array}"
