@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .studies import ANSWERS, INCOMPLETE, INTERRUPTED, Json, Trust, exit_codes, run_folder
+from .studies import EXIT_CODES, INCOMPLETE, INTERRUPTED, Json, Trust, exit_codes, run_folder
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -156,7 +156,7 @@ def _study(
         trust=trust,
     )
     if result.complete:
-        return result.verdict, page, ANSWERS.get(result.answer, 0)
+        return result.verdict, page, EXIT_CODES.get(result.answer, 0)
     if study.suffix == ".toml":
         print("nlctl: incomplete; the same command goes on", file=sys.stderr)
     return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE

@@ -19,7 +19,10 @@ from typing import Annotated, Any
 import typer
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
-ANSWERS = {"refuted": FAILS, "not shown yet": OPEN}  # exit code by the answer to a study's claims
+EXIT_CODES = {
+    "refuted": FAILS,
+    "not shown yet": OPEN,
+}  # exit code by the answer to a study's claims
 CONNECT = "5s"  # how long a scheduler may take to answer
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY", help="The study file, .toml.")]
@@ -99,8 +102,8 @@ def run_command(
         _show(result, json)
         if not result.complete:
             raise typer.Exit(INTERRUPTED if result.interrupted else INCOMPLETE)
-        if result.answer in ANSWERS:
-            raise typer.Exit(ANSWERS[result.answer])
+        if result.answer in EXIT_CODES:
+            raise typer.Exit(EXIT_CODES[result.answer])
 
 
 def validate(

@@ -63,7 +63,7 @@ MEANINGS = {  # of the statuses of claims, as the page explains them
     "violated": "there is a counterexample",
     "fails": "what was measured is beyond the limit",
 }
-_ANSWERS = ("shown", "refuted", "not shown yet")  # to the claims of studies
+ANSWERS = ("shown", "refuted", "not shown yet")  # to the claims of studies
 _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in statuses}
 
 
@@ -235,7 +235,7 @@ def summary(claims: Sequence[Claim]) -> tuple[str, str]:
         return "fail", f"{failed} of {total} claims {'fails' if failed == 1 else 'fail'}."
     kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
     kept = ", ".join(f"{number} {status}" for status, number in kinds.items())
-    waiting = "not shown yet" if {status for status, _ in statuses} <= set(_ANSWERS) else "open"
+    waiting = "not shown yet" if {status for status, _ in statuses} <= set(ANSWERS) else "open"
     if refuted:
         left = total - refuted - open_
         told = [f"{_whose(claims)} refuted"]

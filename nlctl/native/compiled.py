@@ -48,6 +48,9 @@ class Compiled:
     It is not a python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
     run it, and ``compiled.linearize(x0)`` linearizes it with exact derivatives, in the place of
     ``ct.linearize``.  Every other function of python-control takes ``compiled.system``.
+
+    The stiff method's Jacobian is exact too.  Where a function is opaque or algebraic loops are
+    solved it is taken by differences; the printed form says so, and why.
     """
 
     schedule: Schedule

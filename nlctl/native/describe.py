@@ -10,6 +10,7 @@ import numpy as np
 
 from .codegen.program import Program, count_switching_functions, memory
 from .diagram.schedule import Node, signal_name
+from .jacobians import inexact
 from .parameters import Slot
 
 if TYPE_CHECKING:
@@ -38,6 +39,10 @@ def described(compiled: Compiled) -> str:
         f"  order        {' -> '.join(nodes[i].path for i in schedule.order)}",
         f"  run it by    {USE}",
     ]
+    if ct.isctime(system) and system.nstates:
+        why = inexact(compiled)
+        how = "exact" if why is None else f"by differences, since {why}"
+        lines.append(f"  Jacobian     {how}")
     for loop in schedule.loops:
         torn = ", ".join(signal_name(nodes, s) for s in loop.torn)
         lines.append(f"  solved for   {torn}")

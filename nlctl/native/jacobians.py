@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -12,16 +13,17 @@ import numpy as np
 from ..errors import CompileError, ParameterError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
-from ..expressions.graph import Expr, Graph, Untraceable
+from ..expressions.graph import Expr, Untraceable, needed
 from ..names import unknown
 from ..responses.arguments import state_array
-from .codegen.blocks import equations
+from .codegen.blocks import Equations
 from .parameters import length
 
 if TYPE_CHECKING:
     from .compiled import Compiled
 
-DIRECTION = "v"  # the array of a direction: of states, then inputs, then parameters
+DIRECTION = "v"  # the array of a direction: of states, then inputs, then what else is varied
+_DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,39 +42,65 @@ class Tangent:
     assumed: Mapping[int, int]
 
 
+def inexact(compiled: Compiled, results: Sequence[str] = ("dx",)) -> str | None:
+    """Return why there are no exact derivatives of a diagram's results, None if there are."""
+    if compiled.schedule.loops:
+        return "it has algebraic loops"
+    found = compiled.equations
+    parts = [e for name in results for _, array in found.results[name] for e, _ in array.pieces()]
+    for node in needed(parts):
+        if node.op == "call":
+            call = found.calls[node.data[0]]
+            return f"{call.name} is called as it stands ({call.reason})"
+    return None
+
+
 def tangent(compiled: Compiled) -> Tangent:
-    """Differentiate a diagram's equations.
+    """Differentiate a diagram's equations by states, inputs and parameters.
 
     Raises
     ------
     CompileError
         If a function is opaque, or there are algebraic loops.
     """
-    if compiled.schedule.loops:
+    why, found = inexact(compiled, ("dx", "y")), compiled.equations
+    if why is not None:
         raise CompileError(
-            f"'{compiled.system.name}' has algebraic loops, which have no exact derivatives here: "
-            "use ct.linearize(diagram), which takes differences"
-        )
-    found = equations(compiled.schedule, compiled.program.layout)
-    for call in found.calls.values():
-        raise CompileError(
-            f"'{compiled.system.name}' has no exact derivatives, since {call.name} is called as "
-            f"it stands ({call.reason}): use ct.linearize(diagram), which takes differences"
+            f"'{compiled.system.name}' has no exact derivatives, since {why}: use "
+            "ct.linearize(diagram), which takes differences"
         )
     n, m = compiled.system.nstates or 0, compiled.system.ninputs or 0
     starts = {"x": 0, "u": n, "p": n + m}
-    pieces = {
-        name: [piece for _, array in found.results[name] for piece in array.pieces()]
-        for name in ("dx", "y")
-    }
-    rows = {}
-    for name, part in pieces.items():
-        along = _along(found.graph, [expr for expr, _ in part], starts)
-        rows[name] = list(zip(along, [size for _, size in part], strict=True))
+    rows = {name: along(found, name, starts) for name in ("dx", "y")}
     return Tangent(rows=rows, assumed=dict(found.graph.assumptions))
 
 
-def _along(graph: Graph, exprs: Sequence[Expr], starts: Mapping[str, int]) -> list[Expr | None]:
+def along(
+    equations: Equations, name: str, starts: Mapping[str, int]
+) -> list[tuple[Expr | None, int]]:
+    """Return the derivative of a diagram's results along a direction.
+
+    Parameters
+    ----------
+    equations : Equations
+    name : str
+        ``"dx"`` or ``"y"``.
+    starts : mapping
+        By which arrays is differentiated: where in the direction each begins.
+
+    Returns
+    -------
+    list of tuple
+        Of each piece the expression, None where it is 0, and its length.
+
+    Raises
+    ------
+    CompileError
+        If a function is opaque.
+    """
+    graph = equations.graph
+    pieces = [piece for _, array in equations.results[name] for piece in array.pieces()]
+
     def seed(leaf: Expr) -> Expr | None:
         array, start, step = leaf.data
         if array not in starts or leaf.kind != "f":
@@ -81,10 +109,11 @@ def _along(graph: Graph, exprs: Sequence[Expr], starts: Mapping[str, int]) -> li
         return graph.node("leaf", data=where, size=leaf.size, varies=True)
 
     try:
-        with np.errstate(all="ignore"):
-            return tangents(graph, exprs, seed)
+        with _DIFFERENTIATING, np.errstate(all="ignore"):
+            found = tangents(graph, [expr for expr, _ in pieces], seed)
     except Untraceable as error:
         raise CompileError(f"the equations have no derivatives: {error}") from None
+    return list(zip(found, [size for _, size in pieces], strict=True))
 
 
 def jacobian(

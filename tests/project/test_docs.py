@@ -2,11 +2,14 @@
 
 import re
 import tomllib
+from typing import get_args
 
 import pytest
 from places import ROOT
 from rows import each_row
 
+from analysis.lyapunov.lines import LineStatus
+from analysis.report.outline import ANSWERS
 from analysis.robustness.stl.text import parse_formula
 from analysis.robustness.uncertainty.quantity import QUANTILES
 from analysis.studies import StudyError, read_study
@@ -71,3 +74,10 @@ def test_the_table_of_kinds_is_that_of_the_list():
     lines = [line for line in table.splitlines() if line.startswith("| `")]
     told = [f"| `{k.name}` | {k.answers} | {k.claims}{' ' * bool(k.claims)}|" for k in KINDS]
     assert lines[1:] == told  # below the heading
+
+
+@each_row("word", [*get_args(LineStatus), *ANSWERS])
+def test_the_glossary_explains_every_status(word):
+    """What a ledger or a claim may say."""
+    glossary = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    assert re.search(rf"^\| {word} \| \S", glossary, flags=re.MULTILINE)

@@ -20,7 +20,14 @@ from analysis.paper.page import proof_text as text
 from analysis.paper.page.notation import formulas
 from analysis.paper.page.proof import LONG_RUN, evidence, lyapunov_sections
 from analysis.paper.page.report import paper_report
-from analysis.paper.reference_run import continued, read_record, thinned_run, write_record
+from analysis.paper.reference_run import (
+    AGREE,
+    agreed,
+    continued,
+    read_record,
+    thinned_run,
+    write_record,
+)
 from analysis.report import Figure, Paragraph, Report, Section, Table, render_html, render_json
 from analysis.report.outline import claim_status, light, summary
 
@@ -314,20 +321,35 @@ def test_the_kept_record_goes_on_where_a_run_of_today_ends():
     whole = continued(today, record)
     assert np.all(np.diff(whole.time) > 0)
     assert 9.1e3 < whole.burst < 9.5e3
+    assert whole.rtol < whole.again[0] <= today.rtol
+    assert abs(whole.again[1] - whole.burst) < AGREE
     assert whole.calm < 0.06
     early, late = (p.burst for p in whole.predictions)
-    assert early == pytest.approx(whole.burst, rel=0.05)
-    assert late == pytest.approx(whole.burst, rel=0.05)
+    assert early == pytest.approx(whole.burst, rel=0.07)  # from a fiftieth of the way
+    assert late == pytest.approx(whole.burst, rel=0.02)
     other = dataclasses.replace(today, signals={k: v + 0.01 for k, v in today.signals.items()})
     with pytest.raises(ValueError, match="make it again"):
         continued(other, record)
+
+
+def test_a_record_is_of_two_tolerances_that_agree():
+    """To 5 s; the report then says both times."""
+    late = burst()
+    shifted = dataclasses.replace(late, rtol=1e-8, time=late.time + 0.9 * AGREE)
+    made = agreed(late, shifted)
+    assert made.again == (1e-8, pytest.approx(late.burst + 0.9 * AGREE))
+    assert f"it is {made.again[1]:.1f} s" in text.burst_text(
+        dataclasses.replace(made, predictions=(found()[2].creep,) * 2)
+    )
+    with pytest.raises(ValueError, match="at which these agree to 5 s"):
+        agreed(late, dataclasses.replace(shifted, time=late.time + 1.1 * AGREE))
 
 
 def test_the_verdict_and_the_claims_say_what_becomes_of_the_loop():
     """A burst is in the first sentences, and the paper's theorem is a claim that fails."""
     run = read_record(long_run(nlctl.paper.example_2(), 210.0))
     report = paper_report(made_up_runs(), proofs=found(), far={"2": run})
-    assert "loses the sign of its gain at 9212 s" in report.verdict
+    assert f"loses the sign of its gain at {run.burst:.0f} s" in report.verdict
     claims = {claim.text: claim for claim in report.claims}
     theorem = claims["The paper's theorem: do all signals stay bounded for all time?"]
     assert not theorem.holds

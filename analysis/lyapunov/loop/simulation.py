@@ -28,7 +28,7 @@ from .signals import Margin, Signals, signals_of
 __all__ = ["Member", "MemberRun", "members_of", "observe", "observed_loop"]
 
 _LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
-AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
+_AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -240,7 +240,7 @@ def _check_reproduced(member: Member, signals: Signals) -> None:
     told = dict(zip(member.expected.output_labels, member.expected.outputs, strict=True))
     r, again = np.asarray(told["r"]), signals["r"]
     far = np.abs(r[: again.size] - again)
-    if not np.all(far <= AGREE * np.max(np.abs(r))):
+    if not np.all(far <= _AGREE * np.max(np.abs(r))):
         at = float(signals.t[int(np.argmax(far))])
         raise ParameterError(
             f"the response is not one of this loop: at t = {at:g} s its r is off by "

@@ -50,6 +50,9 @@ class LongRun:
         Each made from the beginning of the run alone.
     lost : float or None
         Time (s) at which the run was given up, because its steps shrank to nothing.
+    again : tuple of two floats or None
+        Relative tolerance and `burst` (s) of a second run, if there was one: what errors that add
+        up over hours make of it.
     """
 
     loop: str
@@ -60,6 +63,7 @@ class LongRun:
     lobe: Lobe
     predictions: tuple[Creep, ...]
     lost: float | None
+    again: tuple[float, float] | None = None
 
     @property
     def burst(self) -> float:
@@ -84,6 +88,8 @@ class LongRun:
         if np.isfinite(self.burst):
             what = f"zeta crosses {self.lobe.high:g} at {self.burst:.1f} s"
         lost = "" if self.lost is None else f"; steps shrink to nothing at {self.lost:.3f} s"
+        if self.again is not None:
+            lost += f"; at {self.again[1]:.1f} s at rtol {self.again[0]:g}"
         lines = [
             f"{self.loop} at rtol {self.rtol:g} over {end:.6g} s: {what}{lost}",
             f"max |e| before, from 200 s on: {self.calm:.3g}",

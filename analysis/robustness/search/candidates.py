@@ -18,7 +18,7 @@ from .evaluation import Evaluate, evaluated, margins_of
 
 __all__ = ["Found", "corner_count", "search_worst"]
 
-SHARE = 4
+_SHARE = 4
 """Corners, and uniform draws, take one part in this many of the runs each."""
 BATCH = 64
 """Rows that run together."""
@@ -69,7 +69,7 @@ def search_worst(found: Found, rng: np.random.Generator) -> None:
     """Run rows until the budget is spent or the target met; see `worst_case.worst_case`."""
     space = found.space
     is_finite = not space.quantities or space.scale == 0  # the corners are everything
-    share = found.runs if is_finite else max(found.runs // SHARE, 1)
+    share = found.runs if is_finite else max(found.runs // _SHARE, 1)
     has_all = corner_count(space) <= share
     some = corners(space).table if has_all else _some_corners(space, share, rng)
     _in_batches(found, "corners", some)

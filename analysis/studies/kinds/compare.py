@@ -55,7 +55,7 @@ MCNEMAR = (
     "McNemar's test by pair: runs in which only one of the two violates the spec. Holm: p adjusted "
     "for the number of pairs."
 )
-DIFFERENCES = (
+_DIFFERENCES = (
     "Paired differences a − b with intervals, confidence {confidence:g} % each: of the median, "
     "exact, and of the mean, by bootstrap (NaN where a run did not end). p: sign test; Holm: "
     "adjusted for the pairs of a metric."
@@ -285,7 +285,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield from _medians(t["differences"], result.metrics["unit"].to_dict(), key)
     columns = {c: c.replace("_", " ") for c in t["differences"].columns} | {"p_holm": "p (Holm)"}
     pairs, only = _with_first(t["differences"], f"{finding.key}/differences.parquet")
-    yield result_table(pairs, DIFFERENCES.format(confidence=confidence) + only, columns)
+    yield result_table(pairs, _DIFFERENCES.format(confidence=confidence) + only, columns)
     columns = {c: c.replace("_", " ") for c in t["violations"].columns} | {"p_holm": "p (Holm)"}
     pairs, only = _with_first(t["violations"], f"{finding.key}/violations.parquet")
     yield result_table(pairs, MCNEMAR + only, columns)

@@ -7,7 +7,7 @@ generator makes machine code of the plan (`codegen.ir`), and one interpreter car
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...expressions.arrays import Tracer
-from ...expressions.graph import Expr, needed
+from ...expressions.graph import Expr, Graph, needed
 from ..diagram.schedule import Schedule
 from ..parameters import length
 from .blocks import Equations, equations
@@ -26,11 +26,9 @@ from .program import Program
 from .rewrite import rewritten
 from .solver import Solver
 
-ARGUMENTS = {
-    "prepare": ("p", "c"),
-    "rhs": ("t", "x", "u", "c", "dx", "g"),
-    "out": ("t", "x", "u", "c", "y"),
-}
+PREPARE = {"prepare": ("p", "c")}
+EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g"), "out": ("t", "x", "u", "c", "y")}
+ALONG = {"along": ("t", "x", "u", "c", "v", "dx")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,10 +38,11 @@ class Lowered:
     Attributes
     ----------
     functions : mapping
-        Plans of ``prepare(p, c)``, ``rhs(t, x, u, c, dx, g)`` and ``out(t, x, u, c, y)``.  All
-        arrays have a row per number and a column per member, `t` is one row.  `prepare` fills `c`
-        with all that depends on the parameters `p` alone; the rest of `c` is room that `rhs` and
-        `out` write to, so members that run at the same time need a `c` each.
+        Plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g)`` and
+        ``out(t, x, u, c, y)``, or ``along(t, x, u, c, v, dx)``.  All arrays have a row per number
+        and a column per member, `t` is one row.  `prepare` fills `c` with all that depends on the
+        parameters `p` alone; the rest of `c` is room that the others write to, so members that
+        run at the same time need a `c` each.
     exact : frozenset of Expr
         Operations that are rounded one by one.
     calls : mapping
@@ -112,18 +111,63 @@ def lower(
     """
     if found is None:
         found = equations(schedule, program.layout)
-    written = {
+    stores = {
         name: [part for row, array in rows for part in _stores(name, row, array)]
         for name, rows in found.results.items()
     }
-    stores, exact = rewritten(found.graph, written)
+    wanted = {"rhs": [*stores["dx"], *stores["g"]], "out": stores["y"]}
+    return _lowered(schedule, program, found, EVALUATE, wanted, lanes)
+
+
+def lower_along(
+    schedule: Schedule,
+    program: Program,
+    graph: Graph,
+    derivatives: Sequence[tuple[Expr | None, int]],
+    lanes: int = 8,
+) -> Lowered:
+    """Plan the derivative of the right-hand side along a direction, one in each lane.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    program : Program
+    graph : Graph
+        Where the derivatives are kept.
+    derivatives : sequence
+        Of the rows of dx one after the other: an expression, None where it is 0, and its length.
+        They read the direction in an array ``"v"``.
+    lanes : int, optional
+        Number of directions.
+
+    Returns
+    -------
+    Lowered
+    """
+    stores, row = [], 0
+    for expr, size in derivatives:
+        expr = graph.const(0.0) if expr is None else expr
+        stores += split(Store(array="dx", row=row, expr=expr, size=size))
+        row += size
+    found = Equations(graph=graph, results={}, calls={}, solvers={})
+    return _lowered(schedule, program, found, ALONG, {"along": stores}, lanes)
+
+
+def _lowered(
+    schedule: Schedule,
+    program: Program,
+    found: Equations,
+    arguments: Mapping[str, tuple[str, ...]],
+    wanted: Mapping[str, list[Store]],
+    lanes: int,
+) -> Lowered:
+    stores, exact = rewritten(found.graph, wanted)
     parameters = length(program.layout)
-    functions, size = _planned(stores, parameters)
-    system = schedule.system
+    functions, size = _planned(stores, arguments, parameters)
+    n, m = schedule.system.nstates or 0, schedule.system.ninputs or 0
     rows = {
-        "p": parameters, "t": 1, "x": system.nstates or 0, "u": system.ninputs or 0,
-        "c": max(size, 1), "dx": system.nstates or 0, "g": program.events,
-        "y": len(schedule.outputs),
+        "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n, "g": program.events,
+        "y": len(schedule.outputs), "v": n + m + 1,
     }  # fmt: skip
     return Lowered(
         functions=functions, exact=exact, calls=found.calls, solvers=found.solvers, rows=rows,
@@ -131,7 +175,9 @@ def lower(
     )  # fmt: skip
 
 
-def _planned(stores: Mapping[str, list[Store]], parameters: int) -> tuple[dict[str, Function], int]:
+def _planned(
+    stores: Mapping[str, list[Store]], arguments: Mapping[str, tuple[str, ...]], parameters: int
+) -> tuple[dict[str, Function], int]:
     """Return the plans of all functions, and how many rows of `c` they need."""
     known = _parameters_alone([s.expr for part in stores.values() for s in part], parameters)
     prepared = [
@@ -139,14 +185,13 @@ def _planned(stores: Mapping[str, list[Store]], parameters: int) -> tuple[dict[s
         for e, (_, r) in known.items()
         if r >= parameters
     ]
-    wanted = {"prepare": prepared, "rhs": [*stores["dx"], *stores["g"]], "out": stores["y"]}
     functions, size = {}, parameters + sum(store.size for store in prepared)
-    for name, arguments in ARGUMENTS.items():
-        first = name == "prepare"
-        planned = plan_function(wanted[name], {} if first else known, size)
+    for name, given in {**PREPARE, **arguments}.items():
+        first = name in PREPARE
+        planned = plan_function(prepared if first else stores[name], {} if first else known, size)
         size = planned.rows
         copied = parameters if first else 0
-        functions[name] = Function(arguments=arguments, plan=planned, copied=copied)
+        functions[name] = Function(arguments=given, plan=planned, copied=copied)
     return functions, size
 
 

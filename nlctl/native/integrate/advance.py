@@ -16,9 +16,9 @@ from . import rodas5p, tsit5
 from .control import choose_method, choose_step, next_step, rejected
 from .events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
 from .restart import memory_rates, restart
-from .state import INNER, RUNNING
+from .state import DERIVATIVES, INNER, RUNNING
 from .stiff import stiff_attempt
-from .workspace import AUTO, inputs_at
+from .workspace import AUTO, UNKNOWN, inputs_at
 
 
 @numba.njit(**INNER)
@@ -146,10 +146,11 @@ def _take(task, w, done):
             w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
 
 
-def advance(rhs, task, w, rounds):
+def advance(rhs, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
-    A run's ``lane.status`` is RUNNING until it has ended.
+    A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
+    before the stiff method knows where to get its Jacobian from.
     """
     lanes = w.lanes
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
@@ -162,8 +163,11 @@ def advance(rhs, task, w, rounds):
                 running += lanes[j].status == RUNNING
         if not running:
             return
+        if lanes[0].stiff and task.derivatives == UNKNOWN:
+            lanes[0].status = DERIVATIVES
+            return
         if lanes[0].stiff:
-            stiff_attempt(rhs, task, lanes, w)
+            stiff_attempt(rhs, along, task, lanes, w)
         else:
             _explicit_attempt(rhs, task, lanes, w)
         if task.memory.size:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
 
@@ -12,13 +12,24 @@ import numpy as np
 
 from ...errors import ParameterError
 from ...names import unknown
+from ..codegen.along import Along, derivatives
 from ..compiled import Compiled
 from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
 from .discrete import simulate_discrete
 from .memory import with_table
-from .state import RUNNING, Status
-from .workspace import AUTO, EXPLICIT, IMPLICIT, TASK, Task, new_work
+from .state import DERIVATIVES, RUNNING, Status
+from .workspace import (
+    AUTO,
+    DIFFERENCES,
+    EXACT,
+    EXPLICIT,
+    IMPLICIT,
+    TASK,
+    UNKNOWN,
+    Task,
+    new_work,
+)
 
 METHODS = {"auto": AUTO, "tsit5": EXPLICIT, "rodas5p": IMPLICIT}
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
@@ -42,7 +53,7 @@ class Settings:
 
     rtol: float = 1e-8
     atol: float = 1e-10
-    max_steps: int = 10_000_000
+    max_steps: int = 10_000_000_000
     method: str = "auto"
     step: float = 0.0
 
@@ -114,6 +125,7 @@ def trajectory(
             begin(run)
             while run.lanes["status"][0] == RUNNING:
                 go_on(run)
+                run = differentiated(compiled, run, p)
                 if progress is not None:
                     progress(float(run.lanes["t"][0]))
         except KeyboardInterrupt:
@@ -145,16 +157,19 @@ class Run:
     ----------
     machine : Machine
     task, work : Task, Work
-        See `_work`.
+        See `workspace`.
+    along : Along or None
+        Exact derivatives, if the stiff method has asked for them and there are any.
     """
 
     machine: Machine
     task: Any
     work: Any
+    along: Along | None = None
 
     @property
     def lanes(self) -> np.ndarray:
-        """One record per member, see `_lane`."""
+        """One record per member, see `state`."""
         return self.work.lanes
 
 
@@ -169,8 +184,21 @@ def begin(run: Run) -> None:
 def go_on(run: Run, rounds: int = ROUNDS) -> None:
     """Try up to `rounds` steps in every lane that is still running."""
     rhs, _ = run.machine.entries
-    integrators()["advance"](rhs, run.task, run.work, rounds)
+    along = 0 if run.along is None else run.along.entry
+    integrators()["advance"](rhs, along, run.task, run.work, rounds)
     run.machine.check(run.task.p)
+
+
+def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
+    """Return a run with the derivatives that its stiff method has asked for, if it has."""
+    if run.lanes["status"][0] != DERIVATIVES:
+        return run
+    along, given = derivatives(compiled, p), run.task._asdict()
+    del given["table"]
+    given["derivatives"] = EXACT if along else DIFFERENCES
+    given["c_along"] = along.c if along else given["c_along"]
+    run.lanes["status"] = RUNNING
+    return replace(run, task=with_table(Task, like=TASK, **given), along=along)
 
 
 def finish(run: Run) -> np.ndarray:
@@ -207,6 +235,8 @@ def prepared(
         max_steps=int(settings.max_steps),
         method=METHODS[settings.method],
         alone=int(count == 1),
+        derivatives=UNKNOWN,
+        c_along=np.zeros((1, 1)),
     )
     signals = compiled.system.noutputs or 0
     work = new_work(x0, times, inputs.shape[0], program.events, signals)

@@ -65,40 +65,71 @@ H[2] = (
 
 
 @numba.njit(**INNER)
-def factorise(matrix, pivots):
-    """Factorise a square matrix in place, P M = L U, with partial pivoting."""
-    n = matrix.shape[0]
+def factorise(columns, pivots):
+    """Factorise a square matrix in place, P M = L U, with partial pivoting.
+
+    Row `c` of `columns` is the matrix's column `c`: every inner loop then runs through memory and
+    adds nothing up, so that SIMD registers are full and no order of additions is left to a
+    compiler.
+    """
+    n = columns.shape[0]
     for c in range(n):
         best = c
         for i in range(c + 1, n):
-            if abs(matrix[i, c]) > abs(matrix[best, c]):
+            if abs(columns[c, i]) > abs(columns[c, best]):
                 best = i
         pivots[c] = best
         if best != c:
             for j in range(n):
-                matrix[c, j], matrix[best, j] = matrix[best, j], matrix[c, j]
-        inverse = 1.0 / matrix[c, c]
+                columns[j, c], columns[j, best] = columns[j, best], columns[j, c]
+        inverse = 1.0 / columns[c, c]
         for i in range(c + 1, n):
-            factor = matrix[i, c] * inverse
-            matrix[i, c] = factor
+            columns[c, i] *= inverse
+        for j in range(c + 1, n):
+            factor = columns[j, c]
             if factor != 0.0:
-                for j in range(c + 1, n):
-                    matrix[i, j] -= factor * matrix[c, j]
+                for i in range(c + 1, n):
+                    columns[j, i] -= columns[c, i] * factor
 
 
 @numba.njit(**INNER)
-def solve(matrix, pivots, b):
+def solve(columns, pivots, b):
     """Solve with the factors of `factorise`; `b` becomes the solution."""
     n = b.size
     for i in range(n):
         other = pivots[i]
         b[i], b[other] = b[other], b[i]
-        for j in range(i):
-            b[i] -= matrix[i, j] * b[j]
-    for i in range(n - 1, -1, -1):
-        for j in range(i + 1, n):
-            b[i] -= matrix[i, j] * b[j]
-        b[i] /= matrix[i, i]
+    for c in range(n):
+        factor = b[c]
+        for i in range(c + 1, n):
+            b[i] -= columns[c, i] * factor
+    for c in range(n - 1, -1, -1):
+        factor = b[c] / columns[c, c]
+        b[c] = factor
+        for i in range(c):
+            b[i] -= columns[c, i] * factor
+
+
+@numba.njit(**INNER)
+def stage(s, x, U, result):
+    """Fill `result` with the state of stage `s`."""
+    for i in range(x.size):
+        result[i] = x[i]
+    for j in range(s):
+        weight = A[s, j]
+        for i in range(x.size):
+            result[i] += weight * U[j, i]
+
+
+@numba.njit(**INNER)
+def right_side(s, h, dx, f_t, U):
+    """Fill U[s] with the right side of its linear equations, dx the derivative at stage `s`."""
+    for i in range(dx.size):
+        U[s, i] = dx[i] + h * D[s] * f_t[i]
+    for j in range(s):
+        weight = C[s, j] / h
+        for i in range(dx.size):
+            U[s, i] += weight * U[j, i]
 
 
 @numba.njit(**INNER)
@@ -125,3 +156,13 @@ def interpolate(theta, x, x_new, U, result):
             polynomial = polynomial * theta + coefficient
         rest = 1.0 - theta
         result[i, 0] = rest * x[i, 0] + theta * (x_new[i, 0] + rest * polynomial)
+
+
+@numba.njit(**INNER)
+def end_slope(h, x, x_new, U, result):
+    """Fill `result` with the slope of the interpolant at the end of a step."""
+    for i in range(x.size):
+        rest = 0.0
+        for s in range(STAGES):
+            rest += (H[0, s] + H[1, s] + H[2, s]) * U[s, i]
+        result[i] = (x_new[i] - x[i] - rest) / h

@@ -19,6 +19,7 @@ class Status(IntEnum):
 
 OK, DIVERGED, STEP_LIMIT, STEP_TOO_SMALL, STOPPED = map(int, Status)  # for compiled code
 RUNNING, STIFF = -1, -2  # STIFF: to be finished by a method that only single runs have
+DERIVATIVES = -3  # to go on once it is known where the stiff method has its Jacobian from
 FIRST_PATIENCE = 15
 # for functions that only machine code calls: without a way in from Python, which would have to be
 # compiled as well
@@ -38,6 +39,8 @@ _FIELDS = [
     ("log_error_before", "f8"),  # of the last accepted step, for PI control
     ("rate", "f8"),  # estimate of the largest eigenvalue's magnitude (1/s)
     ("jacobian_at", "f8"),  # time for which the Jacobian matrix is known
+    ("judged_at", "f8"),  # time at which the methods were last compared
+    ("judged_after", "i8"),  # and the steps tried until then
     ("segment", "i8"),  # interval of the time grid in which t lies
     ("status", "i8"),
     ("accepted", "i8"),

@@ -18,6 +18,8 @@ from .memory import type_of, with_table
 from .state import INNER, new_lanes
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
+UNKNOWN, DIFFERENCES, EXACT = 0, 1, 2  # where the stiff method has its Jacobian from
+DIRECTIONS = 8  # that are taken together
 
 
 class Task(NamedTuple):
@@ -34,6 +36,8 @@ class Task(NamedTuple):
     max_steps: int
     method: int
     alone: int  # whether this is a single run
+    derivatives: int  # UNKNOWN until the stiff method asks for them
+    c_along: np.ndarray  # what exact ones read besides their arguments
     table: np.ndarray
 
 
@@ -71,12 +75,21 @@ class Work(NamedTuple):
     x_stage_flat: np.ndarray
     x_ahead_flat: np.ndarray
     k_flat: np.ndarray
+    dx_ahead_flat: np.ndarray
     jacobian: np.ndarray  # of the stiff method, empty with several lanes
-    matrix: np.ndarray
+    columns: np.ndarray  # of 1 / (h gamma) - J, and of its factors
     f_t: np.ndarray
     pivots: np.ndarray
     U: np.ndarray
+    t_along: np.ndarray  # what exact derivatives are evaluated with, a direction in each column
+    x_along: np.ndarray
+    u_along: np.ndarray
+    v: np.ndarray
+    dx_along: np.ndarray
     table: np.ndarray
+
+
+_STATES = ("x", "x_new", "x_stage", "x_ahead", "dx_ahead")
 
 
 def new_work(x0: np.ndarray, times: np.ndarray, inputs: int, events: int, outputs: int) -> Work:
@@ -84,22 +97,26 @@ def new_work(x0: np.ndarray, times: np.ndarray, inputs: int, events: int, output
     n, lanes = x0.shape
     stiff = n if lanes == 1 else 0  # the stiff method is for single runs
     shapes: dict[str, tuple[int, ...]] = {
-        **dict.fromkeys(("x", "x_new", "x_stage", "x_ahead", "dx_ahead"), (n, lanes)),
+        **dict.fromkeys(_STATES, (n, lanes)),
         **dict.fromkeys(("g", "g_ahead", "g_start", "slope", "slope_start"), (events, lanes)),
         **dict.fromkeys(("e", "e_start", "e_low", "e_high", "behind"), (events, lanes)),
         **dict.fromkeys(("t", "h", "error", "rate", "t_end"), (lanes,)),
         "hh": (n * lanes,),
         "k": (tsit5.STAGES, n, lanes),
         "u": (inputs, lanes),
-        **dict.fromkeys(("jacobian", "matrix"), (stiff, stiff)),
+        **dict.fromkeys(("jacobian", "columns"), (stiff, stiff)),
         "f_t": (stiff,),
         "U": (rodas5p.STAGES, stiff),
+        "t_along": (DIRECTIONS,),
+        **dict.fromkeys(("x_along", "dx_along"), (stiff, DIRECTIONS)),
+        "u_along": (inputs, DIRECTIONS),
+        "v": (stiff + inputs + 1, DIRECTIONS),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
     arrays["x"][:] = x0
     for name, rows in (("samples", n), ("y", outputs)):
         arrays[name] = np.full((times.size, rows, lanes), np.nan)
-    flat = {f"{x}_flat": arrays[x].reshape(-1) for x in ("x", "x_new", "x_stage", "x_ahead")}
+    flat = {f"{x}_flat": arrays[x].reshape(-1) for x in _STATES}
     k_flat = arrays["k"].reshape(tsit5.STAGES, n * lanes)
     pivots = np.zeros(stiff, dtype=np.int64)
     records = new_lanes(times, lanes)
@@ -110,7 +127,7 @@ _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
 TASK = type_of(  # only the types of these matter
     with_table(
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
-        fixed=0.0, max_steps=0, method=0, alone=0,
+        fixed=0.0, max_steps=0, method=0, alone=0, derivatives=0, c_along=_GRID,
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))

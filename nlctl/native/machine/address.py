@@ -19,6 +19,11 @@ def call_out(out, t, x, u, p, y):
     out(t, x, u, p, y)
 
 
+def call_along(along, t, x, u, c, v, dx):
+    """Evaluate the derivative of a right-hand side along directions."""
+    along(t, x, u, c, v, dx)
+
+
 def _by_address(typing_context: Any, function: Any, *arrays: Any) -> Any:
     def generate(context, builder, sig, args):
         pointer = ir.DoubleType().as_pointer()
@@ -43,3 +48,5 @@ _register(call_rhs, lambda typing_context, f, t, x, u, p, dx, g: _by_address(
     typing_context, f, t, x, u, p, dx, g))  # fmt: skip
 _register(call_out, lambda typing_context, f, t, x, u, p, y: _by_address(
     typing_context, f, t, x, u, p, y))  # fmt: skip
+_register(call_along, lambda typing_context, f, t, x, u, c, v, dx: _by_address(
+    typing_context, f, t, x, u, c, v, dx))  # fmt: skip

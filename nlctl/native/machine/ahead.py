@@ -5,6 +5,7 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 
+from ..codegen.along import derivatives
 from ..compiled import Compiled
 from ..integrate.discrete import compile_discrete
 from .evaluations import ENSEMBLE_WIDTH, machine
@@ -34,6 +35,8 @@ def compile_for(compiled: Compiled, p: np.ndarray, width: int) -> None:
     """Make the machine code that runs with parameters `p` need, as `machine` takes them."""
     if ct.isctime(compiled.system):
         machine(compiled, np.repeat(p[:, :1], width, axis=1), width)
+        if width == 1:
+            derivatives(compiled, p[:, 0])
     else:
         machine(compiled, p[:, :1], 1)
         compile_discrete()

@@ -89,18 +89,15 @@ class Routine:
 Runnable = Callable[..., None]
 
 
-def plain_functions(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
-    """Return ``prepare``, ``rhs`` and ``out`` of a program as plain Python."""
+def plain_functions(lowered: Lowered) -> tuple[Runnable, ...]:
+    """Return the functions of a program as plain Python, in their order."""
     calls = plain_calls(lowered.calls)
     calls |= {name: plain_solver(solver) for name, solver in lowered.solvers.items()}
-    prepare, rhs, out = (
-        interpreted_function(f, lowered.lanes, calls) for f in lowered.functions.values()
-    )
-    return prepare, rhs, out
+    return tuple(interpreted_function(f, lowered.lanes, calls) for f in lowered.functions.values())
 
 
-def lowered_code(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
-    """Return ``prepare``, ``rhs`` and ``out`` as machine code, from the cache if it is there.
+def lowered_code(lowered: Lowered) -> tuple[Runnable, ...]:
+    """Return the functions of a program as machine code, from the cache if it is there.
 
     With NUMBA_DISABLE_JIT=1 the same plan is carried out in plain Python.
 
@@ -113,8 +110,7 @@ def lowered_code(lowered: Lowered) -> tuple[Runnable, Runnable, Runnable]:
         return plain_functions(lowered)
     native = native_calls(lowered.calls, lowered.lanes)
     loaded = finished(lowered.text, lowered.functions, native.symbols, native.owners)
-    prepare, rhs, out = (_routine(lowered, name, loaded, native) for name in lowered.functions)
-    return prepare, rhs, out
+    return tuple(_routine(lowered, name, loaded, native) for name in lowered.functions)
 
 
 def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Routine:

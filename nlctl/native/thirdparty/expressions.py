@@ -18,7 +18,7 @@ from .values import (
     FRESH,
     OUTSIDE,
     SLICE,
-    UNKNOWN,
+    UNKNOWN_VALUE,
     Impure,
     KnownValue,
     Local,
@@ -253,7 +253,7 @@ class Expressions(ast.NodeVisitor):
             result = self.walk.call(captured(getter), [base], {})
             return result if not result.own else FRESH
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
-            value = getattr(thing, name, UNKNOWN)
+            value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):
                 return OUTSIDE
             if isinstance(value, MethodType) or isinstance(thing, super):

@@ -15,7 +15,7 @@ from .source import Definition
 from .values import (
     FRESH,
     OUTSIDE,
-    UNKNOWN,
+    UNKNOWN_VALUE,
     Impure,
     KnownValue,
     Local,
@@ -168,7 +168,7 @@ class CallWalker(Expressions):
     def visit_With(self, node: ast.With) -> None:
         for item in node.items:
             call = item.context_expr
-            made = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN
+            made = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN_VALUE
             if made is not np.errstate or item.optional_vars is not None:
                 raise Impure("has a with statement", "do without it")
         self.statements(node.body)

@@ -16,7 +16,7 @@ class Unknown:
     """Stands for an object that is only known when the function runs."""
 
 
-UNKNOWN = Unknown()
+UNKNOWN_VALUE = Unknown()
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
               "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
@@ -73,7 +73,7 @@ class KnownValue:
     own: bool
     inside: bool
     holds: bool = False
-    known: Any = UNKNOWN
+    known: Any = UNKNOWN_VALUE
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, KnownValue) and self.marks == other.marks
@@ -111,7 +111,7 @@ def least_upper_bound(values: Iterable[KnownValue]) -> KnownValue:
         own=all(v.own for v in values),
         inside=all(v.inside for v in values),
         holds=any(v.holds for v in values),
-        known=first.known if all(v.known is first.known for v in values) else UNKNOWN,
+        known=first.known if all(v.known is first.known for v in values) else UNKNOWN_VALUE,
     )
 
 
@@ -131,12 +131,12 @@ def function_choice(values: Iterable[KnownValue]) -> Any:
     """Return the choice between functions; UNKNOWN where not all values are functions."""
     values = tuple(values)
     functions = all(callable(v.known) or isinstance(v.known, Local) for v in values)
-    return OneOf(values) if values and functions else UNKNOWN
+    return OneOf(values) if values and functions else UNKNOWN_VALUE
 
 
 def forgotten(value: KnownValue) -> KnownValue:
     """Return the same without the object: a part of it, or another view."""
-    return replace(value, known=UNKNOWN)
+    return replace(value, known=UNKNOWN_VALUE)
 
 
 def library(thing: Any) -> str | None:

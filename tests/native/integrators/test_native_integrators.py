@@ -3,6 +3,7 @@
 import hashlib
 import json
 import lzma
+import re
 import subprocess
 import sys
 
@@ -132,6 +133,20 @@ def test_the_same_bits_as_by_numba(monkeypatch):
     monkeypatch.setattr(driver, "integrators", lambda: code)
     theirs = [array.tobytes() for array in results()]
     assert ours == theirs
+
+
+LIBERTIES = {"fast", "reassoc", "contract", "nnan", "ninf", "nsz", "arcp", "afn"}
+
+
+def test_no_compiler_may_take_liberties_with_the_arithmetic():
+    """Sums in another order, or rounded once less, would have other bits with other passes."""
+    if shipped_bitcode() is None:
+        pytest.skip("another LLVM")
+    text = str(llvm.parse_bitcode(lzma.decompress(shipped_bitcode())))
+    operations = re.findall(r" = (?:tail )?(f(?:add|sub|mul|div|cmp|neg)|call) ([a-z ]*)", text)
+    assert {"fadd", "fsub", "fmul", "fdiv"} <= {name for name, _ in operations}
+    taken = {f"{name} {flags}" for name, flags in operations if LIBERTIES & set(flags.split())}
+    assert not taken
 
 
 def test_it_has_no_path_of_the_machine_that_made_it():

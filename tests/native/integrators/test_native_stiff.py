@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numba.core import config
 from scipy.integrate import solve_ivp
+from stiff_problems import hires, robertson, van_der_pol
 
 import nlctl
 from nlctl.native.integrate.rodas5p import GAMMA, NODES, A, C, D, H
@@ -223,34 +224,6 @@ def radau(update, end, x0):
         lambda t, x: update(t, x, None, None), (0, end), x0, "Radau", rtol=1e-11, atol=1e-14
     )
     return solution.y[:, -1]
-
-
-def van_der_pol(t, x, u, p):
-    """mu = 1e3 in the scaled time of the test set: eps x2' = (1 - x1^2) x2 - x1."""
-    return np.array([x[1], ((1 - x[0] * x[0]) * x[1] - x[0]) * 1e6])
-
-
-def robertson(t, x, u, p):
-    """Robertson's kinetics: rates of 0.04, 1e4 and 3e7."""
-    first, second, third = 0.04 * x[0], 1e4 * x[1] * x[2], 3e7 * x[1] * x[1]
-    return np.array([second - first, first - second - third, third])
-
-
-def hires(t, y, u, p):
-    """High irradiance response, eight states."""
-    bond = 280 * y[5] * y[7]
-    return np.array(
-        [
-            -1.71 * y[0] + 0.43 * y[1] + 8.32 * y[2] + 0.0007,
-            1.71 * y[0] - 8.75 * y[1],
-            -10.03 * y[2] + 0.43 * y[3] + 0.035 * y[4],
-            8.32 * y[1] + 1.71 * y[2] - 1.12 * y[3],
-            -1.745 * y[4] + 0.43 * y[5] + 0.43 * y[6],
-            -bond + 0.69 * y[3] + 1.71 * y[4] - 0.43 * y[5] + 0.69 * y[6],
-            bond - 1.81 * y[6],
-            1.81 * y[6] - bond,
-        ]
-    )
 
 
 class TestKnownProblems:

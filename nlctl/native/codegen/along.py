@@ -1,0 +1,73 @@
+"""The derivative of a right-hand side along directions, as machine code for the stiff method.
+
+Members side by side are directions here: all have the same time, state, inputs and parameters.
+So a Jacobian matrix of n states takes n / `DIRECTIONS` evaluations, and the generator of right-hand
+sides serves for it as it is.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..integrate.workspace import DIRECTIONS
+from ..jacobians import along, inexact
+from ..machine.routine import entry, lowered_code
+from .lower import lower_along
+
+if TYPE_CHECKING:
+    from ..compiled import Compiled
+
+_ONCE = threading.Lock()  # of several threads that need it one compiles
+
+
+@dataclass(frozen=True, kw_only=True)
+class Along:
+    """Machine code of derivatives, and what it takes as parameters.
+
+    Attributes
+    ----------
+    function : callable
+        ``function(t, x, u, c, v, dx)``, every array with a direction in each column.  A direction
+        `v` has the rows of the states, the inputs, and time.
+    c : ndarray of shape (rows, DIRECTIONS)
+    """
+
+    function: Any
+    c: np.ndarray
+
+    @property
+    def entry(self) -> Any:
+        """What integrators take of the function."""
+        return entry(self.function)
+
+
+def derivatives(compiled: Compiled, p: np.ndarray) -> Along | None:
+    """Return the derivatives for a parameter vector, made when they are first needed.
+
+    None if there are no exact ones: an equation is opaque, or was differentiated for an integer
+    parameter that has another value now.
+    """
+    with _ONCE:
+        if "_along" not in compiled.__dict__:
+            compiled.__dict__["_along"] = _made(compiled)
+    made = compiled.__dict__["_along"]
+    if made is None or not made[0].holds_for(p):
+        return None
+    lowered, prepare, function = made
+    c = np.zeros((lowered.size, DIRECTIONS))
+    prepare(np.repeat(p[:, None], DIRECTIONS, axis=1), c)
+    return Along(function=function, c=c)
+
+
+def _made(compiled: Compiled) -> Any:
+    equations = compiled.equations
+    if inexact(compiled) is not None:
+        return None
+    n, m = compiled.system.nstates or 0, compiled.system.ninputs or 0
+    rows = along(equations, "dx", {"x": 0, "u": n, "t": n + m})
+    lowered = lower_along(compiled.schedule, compiled.program, equations.graph, rows, DIRECTIONS)
+    return lowered, *lowered_code(lowered)
