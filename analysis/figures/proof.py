@@ -93,11 +93,11 @@ def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) 
     axes[0].set(xlabel=TIME)
     axes[0].margins(x=0.01)
     if run is not None:
-        _creeping(axes[1], run)
+        _drifting(axes[1], run)
     return figure
 
 
-def _creeping(ax: Axes, run: LongRun) -> None:
+def _drifting(ax: Axes, run: LongRun) -> None:
     """Draw zeta until its burst, if it bursts, and where the gain has which sign."""
     zeta, last = run.signals["zeta"], run.time[-1]
     high = run.lobe.high

@@ -22,7 +22,7 @@ from .loop.roles import Parts, read_parts
 from .loop.signals import Margin, Signals, signals_of
 from .nussbaum.energy import Drift, drift, drift_margin, safe_horizon
 from .nussbaum.property import nussbaum_property
-from .nussbaum.slow_drift import Creep, burst_peak, creep
+from .nussbaum.slow_drift import SlowDrift, burst_peak, slow_drift
 from .tighten import Tightened, tighten
 
 __all__ = [
@@ -31,7 +31,6 @@ __all__ = [
     "Conservatism",
     "Constant",
     "Constants",
-    "Creep",
     "Decomposition",
     "DecompositionError",
     "DirectBound",
@@ -48,6 +47,7 @@ __all__ = [
     "Range",
     "Sector",
     "Signals",
+    "SlowDrift",
     "Tightened",
     "approximation_error",
     "burst_peak",
@@ -56,7 +56,6 @@ __all__ = [
     "comparison",
     "conservatism",
     "constants",
-    "creep",
     "decompose",
     "design",
     "disturbance",
@@ -79,6 +78,7 @@ __all__ = [
     "sector",
     "sharpest",
     "signals_of",
+    "slow_drift",
     "tighten",
     "tightest_weights",
     "visited_box",

@@ -22,9 +22,9 @@ from .lines import Line
 from .loop.simulation import MemberRun
 from .nussbaum.energy import drift, drift_margin, safe_horizon
 from .nussbaum.property import antiderivative, lobe_around, nussbaum_property
-from .nussbaum.slow_drift import Creep, creep
+from .nussbaum.slow_drift import SlowDrift, slow_drift
 
-__all__ = ["closure", "conclusions", "creep_of"]
+__all__ = ["closure", "conclusions", "slow_drift_of"]
 
 SAFE = "zeta cannot cross its lobe before T"
 _WINDOW = 4 * np.pi  # s; period of the paper's reference
@@ -39,7 +39,7 @@ NO_BOUND = (
 
 
 class _Response:
-    """A run as `drift` and `creep` read a response."""
+    """A run as `drift` and `slow_drift` read a response."""
 
     def __init__(self, run: MemberRun) -> None:
         names = ("zeta", "r", "u")
@@ -47,29 +47,29 @@ class _Response:
         self.outputs = np.array([run.signals[name] for name in names])
 
 
-def creep_of(run: MemberRun) -> Creep | None:
-    """Return where the creep of zeta leads; None if the run does not tell."""
-    found = _creep_or_reason(run)
+def slow_drift_of(run: MemberRun) -> SlowDrift | None:
+    """Return where the slow drift of zeta leads; None if the run does not tell."""
+    found = _slow_drift_or_reason(run)
     return None if isinstance(found, str) else found
 
 
-def _creep_or_reason(run: MemberRun) -> Creep | str:
-    """Return where the creep leads, or why that cannot be told."""
+def _slow_drift_or_reason(run: MemberRun) -> SlowDrift | str:
+    """Return where the slow drift leads, or why that cannot be told."""
     length = run.signals.t[-1] - run.signals.t[0]
     if length < 6 * _WINDOW:
         return f"{length:g} s show nothing of it: run {np.ceil(6 * _WINDOW):g} s at least"
     try:
-        return creep(_Response(run), run.parts.law.N, window=_WINDOW)
+        return slow_drift(_Response(run), run.parts.law.N, window=_WINDOW)
     except ParameterError as error:
         return str(error)
 
 
 def conclusions(loop: ct.InterconnectedSystem, run: MemberRun, found: Constants) -> list[Line]:
-    """Return the lines of (12), Lemma 1, what remains true of it, the creep and the closure."""
+    """Return the lines of (12), Lemma 1, what remains of it, the slow drift and the closure."""
     given = premises(found, run.gains)
     lines = [_property(given), _lemma(), *_bounded(run, given)]
     if np.isfinite(run.signals["zeta"]).all():
-        lines += [*_remains(run, given, found), _creep(run)]
+        lines += [*_remains(run, given, found), _slow_drift_line(run)]
     return [*lines, closure(loop, run, found, given)]
 
 
@@ -186,9 +186,9 @@ def _remains(run: MemberRun, given: Premises, found: Constants) -> list[Line]:
     return [c, b]
 
 
-def _creep(run: MemberRun) -> Line:
+def _slow_drift_line(run: MemberRun) -> Line:
     statement = "the drift of zeta ends before N changes its sign"
-    found = _creep_or_reason(run)
+    found = _slow_drift_or_reason(run)
     if isinstance(found, str):
         return Line(key="creep", statement=statement, status="undecided", evidence=found)
     calm = found.verdict in ("settles", "turned round")

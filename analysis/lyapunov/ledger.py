@@ -16,10 +16,10 @@ from nlctl.names import unknown
 from ..json_values import as_json
 from ..metrics import peak
 from .bounds.provenance import Constants
-from .conclusions import conclusions, creep_of
+from .conclusions import conclusions, slow_drift_of
 from .examination import U_MAX, Examination, examine
 from .lines import Line, assumption_lines, decay_line, inequality_lines, run_line
-from .nussbaum.slow_drift import Creep
+from .nussbaum.slow_drift import SlowDrift
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +46,7 @@ class Ledger:
         Number of runs.
     Q, max_r : float
         sup I(t) of (33) and max |r|, over all runs.
-    creep : Creep or None
+    slow_drift : SlowDrift or None
         Of the first run, if it is long enough.
     """
 
@@ -57,7 +57,7 @@ class Ledger:
     members: int
     Q: float
     max_r: float
-    creep: Creep | None
+    slow_drift: SlowDrift | None
 
     @property
     def violated(self) -> tuple[Line, ...]:
@@ -189,5 +189,5 @@ def _assembled(study: Examination) -> Ledger:
         members=count,
         Q=Q,
         max_r=max_r,
-        creep=creep_of(study.runs.first),
+        slow_drift=slow_drift_of(study.runs.first),
     )

@@ -1,7 +1,7 @@
 """What is only about Lv et al. (2017): its reproduction, loops, controllers, page."""
 
 from .cases import CASES, HORIZON, METRICS, TAIL, Case
-from .controllers import contenders
+from .controllers import compared_controllers
 from .numerics import numerics
 from .reproduction import (
     CaseRun,
@@ -26,8 +26,8 @@ __all__ = [
     "Check",
     "Expectation",
     "checks",
+    "compared_controllers",
     "compile_cases_ahead",
-    "contenders",
     "expectations",
     "measured",
     "numerics",

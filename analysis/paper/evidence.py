@@ -26,9 +26,9 @@ from ..lyapunov.ledger import Ledger, ledger
 from ..lyapunov.loop.signals import Margin
 from ..lyapunov.nussbaum.energy import signal
 from ..lyapunov.nussbaum.long_run import LOOKS, LongRun, long_run
-from ..lyapunov.nussbaum.slow_drift import Creep
+from ..lyapunov.nussbaum.slow_drift import SlowDrift
 from ..metrics import peak
-from .controllers import contenders
+from .controllers import compared_controllers
 from .reference_run import continued, read_record
 
 __all__ = [
@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 SPLIT = {"example_1": (0.6, 1.3)}  # bounds of the dead zone's k that make eps_u* small
-LOOK = min(LOOKS)  # s; from so much of a run the creep of zeta is told
+LOOK = min(LOOKS)  # s; from so much of a run the slow drift of zeta is told
 FAR_HORIZONS = {  # key of a run far beyond 20 s: what it is, and its horizon (s)
     "2": ("Example 2 as published", 9_600.0),
     "1": ("Example 1 as printed, cos(w(t) t)", 1_000.0),
@@ -58,7 +58,7 @@ class Evidence:
     ----------
     ledger : Ledger
     conservatism : Conservatism
-    creep : Creep
+    slow_drift : SlowDrift
         Told from the first 200 s.
     certificate : Certificate
         Of the same plant and actuator with the law that knows the sign of the gain.
@@ -73,7 +73,7 @@ class Evidence:
 
     ledger: Ledger
     conservatism: Conservatism
-    creep: Creep
+    slow_drift: SlowDrift
     certificate: Certificate
     certified_max_r: float
     t: np.ndarray = field(repr=False)
@@ -102,7 +102,7 @@ def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
     return Evidence(
         ledger=ledger(study),
         conservatism=conservatism(study),
-        creep=long_run(loop, LOOK, rtol=1e-7).predictions[0],
+        slow_drift=long_run(loop, LOOK, rtol=1e-7).predictions[0],
         certificate=certify(tame, k=SPLIT.get(str(loop.name))),
         certified_max_r=_max_r(tame, s.t),
         t=s.t,
@@ -133,7 +133,7 @@ def _max_r(loop: ct.InterconnectedSystem, times: np.ndarray) -> float:
 def known_sign(loop: ct.InterconnectedSystem) -> ct.InterconnectedSystem:
     """Return an example with the law that knows the sign of the gain, and gains that suit it."""
     name = str(loop.name)
-    return paper.EXAMPLES[name](controller=contenders(name)["certified"])
+    return paper.EXAMPLES[name](controller=compared_controllers(name)["certified"])
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from nlctl import paper
 from nlctl.actuators import Backlash, DeadZone, Gain, Saturation, cascade
 from nlctl.names import unknown
 
-from .controllers import contenders, sensor
+from .controllers import compared_controllers, sensor
 
 __all__ = ["example_1", "example_2"]
 
@@ -35,7 +35,7 @@ def example_1(
     Parameters
     ----------
     controller : str, record or control.InputOutputSystem, optional
-        A label of `contenders.contenders`, or a controller.
+        A label of `controllers.compared_controllers`, or a controller.
     actuator : record, optional
         The ``body`` of the cascade; the example's by default.
     gain : float, optional
@@ -43,7 +43,7 @@ def example_1(
     limit : float, optional
         Largest |u| that passes; none by default.
     noise : float, optional
-        RMS of measurement noise on each state, see `contenders.sensor`; without it there is no
+        RMS of measurement noise on each state, see `controllers.sensor`; without it there is no
         sensor, with 0 there is one whose ``sensor.rms`` and ``sensor.seed`` may be varied.
 
     Returns
@@ -77,7 +77,7 @@ def _loop(
     example: str, body: Any, controller: Any, gain: float, limit: float, noise: float | None
 ) -> ct.InterconnectedSystem:
     if isinstance(controller, str):
-        known = contenders(example)
+        known = compared_controllers(example)
         if controller not in known:
             raise unknown("controller", controller, known)
         controller = known[controller]

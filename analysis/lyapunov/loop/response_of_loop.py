@@ -55,7 +55,7 @@ def law_of_response(loop: Any, response: Any) -> GainFunction:
     parts = read_parts(loop, params=params)
     if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
         raise DiagramError(
-            f"creep is about laws with a Nussbaum argument, got {type(parts.law).__name__}"
+            f"slow_drift is about laws with a Nussbaum argument, got {type(parts.law).__name__}"
         )
     place = state_names(loop).index(f"{parts.paths['law']}.zeta")
     for i in np.unique(np.linspace(0, states.shape[1] - 1, _LOOKS).astype(int)):

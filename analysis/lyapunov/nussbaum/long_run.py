@@ -14,7 +14,7 @@ from nlctl.response import input_output_response
 
 from ..loop.roles import read_parts
 from .property import Lobe, lobe_around
-from .slow_drift import Creep, creep
+from .slow_drift import SlowDrift, slow_drift
 
 __all__ = ["LOOKS", "LongRun", "long_run"]
 
@@ -24,7 +24,7 @@ LOOKS = {200.0: 4 * np.pi, 1000.0: 16 * np.pi}
 FINE, COARSE = (
     0.01,
     0.1,
-)  # s; sampling interval up to the last look, which `creep` needs, and beyond
+)  # s; sampling interval up to the last look, which `slow_drift` needs, and beyond
 END, _FINEST = 0.5, 1e-5  # s; how much of a burst is run again, and the sampling interval there
 _STANDSTILL = 1e-5  # s; a burst has no end: a run that gets no further in 2000 steps is given up
 LONG_RUN_SIGNALS = ("zeta", "e", "r", "u")
@@ -46,7 +46,7 @@ class LongRun:
         zeta, e, r and u over `time`.
     lobe : Lobe
         The lobe of the Nussbaum function that zeta starts in.
-    predictions : tuple of Creep
+    predictions : tuple of SlowDrift
         Each made from the beginning of the run alone.
     lost : float or None
         Time (s) at which the run was given up, because its steps shrank to nothing.
@@ -61,7 +61,7 @@ class LongRun:
     time: np.ndarray = field(repr=False)
     signals: Mapping[str, np.ndarray] = field(repr=False)
     lobe: Lobe
-    predictions: tuple[Creep, ...]
+    predictions: tuple[SlowDrift, ...]
     lost: float | None
     again: tuple[float, float] | None = None
 
@@ -148,7 +148,7 @@ def long_run(
     whole = _watched(compiled, times, start, progress, settings)
     time, signals = whole.time, _signals(whole)
     predictions = tuple(
-        creep(_Beginning(time, signals, look), N, window=window)
+        slow_drift(_Beginning(time, signals, look), N, window=window)
         for look, window in LOOKS.items()
         if look <= last
     )
@@ -209,7 +209,7 @@ class _Watch:
 
 
 class _Beginning:
-    """The beginning of a run, as `creep` reads a response."""
+    """The beginning of a run, as `slow_drift` reads a response."""
 
     def __init__(self, time: np.ndarray, signals: Mapping[str, np.ndarray], end: float) -> None:
         until = time <= end + 1e-9

@@ -1,4 +1,4 @@
-r"""The creep of the Nussbaum argument: where it leads, and when.
+r"""The slow drift of the Nussbaum argument: where it leads, and when.
 
 The law (23), (24) obeys N(zeta) zeta' = r u.  While zeta crosses a lobe in which N has the right
 sign (k G N < 0), the loop spends the lobe's budget :math:`\int |N| d\zeta`,
@@ -33,7 +33,7 @@ from ..loop.response_of_loop import law_of_response
 from .energy import Drift, drift
 from .property import GainFunction, Lobe, antiderivative, lobe_around, root
 
-__all__ = ["Balance", "Creep", "burst_peak", "creep"]
+__all__ = ["Balance", "SlowDrift", "burst_peak", "slow_drift"]
 
 SAMPLED = 0.1  # mismatch beyond which the samples do not show that N is that of the law
 ERRORS, MODEL = 2.0, 0.05  # standard errors, and share of the time left, that the range allows
@@ -65,7 +65,7 @@ class Balance:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Creep:
+class SlowDrift:
     """Where zeta stands in its lobe at the end of a response, and where it drifts.
 
     Attributes
@@ -85,8 +85,8 @@ class Creep:
         turns round before; and the earliest and the latest time when mean rate and dependence on
         1/|N| are moved by two standard errors each, and the time that is left by 5 % more.  It
         is meant to hold the burst in nine of ten loops at least, and has done so in simulated ones
-        (tests/lyapunov/test_creep_forecast.py), as long as disturbance and reference go on as they
-        were.
+        (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference go on as
+        they were.
     balance : Balance
         The law fitted to all windows.
     rest, rest_range : float or None, tuple of float or None
@@ -176,7 +176,7 @@ def burst_peak(lobe: Lobe, kG: float) -> float:
     return float(np.sqrt(2 * kG * lobe.budget))
 
 
-def creep(
+def slow_drift(
     response: Any,
     N: GainFunction = functions.nussbaum,
     *,
@@ -184,8 +184,8 @@ def creep(
     window: float = 16 * np.pi,
     skip: int = 1,
     kG: float = 1.0,
-) -> Creep:
-    """Tell from a response how the creep of zeta will go on.
+) -> SlowDrift:
+    """Tell from a response how the slow drift of zeta will go on.
 
     The prediction supposes that disturbance and reference stay as they were; a chirp does not.
 
@@ -209,7 +209,7 @@ def creep(
 
     Returns
     -------
-    Creep
+    SlowDrift
 
     Raises
     ------
@@ -221,8 +221,8 @@ def creep(
     """
     N = N if loop is None else law_of_response(loop, response)
     run = drift(response, N)
-    number("creep", "window", window, above=0)
-    whole_number("creep", "skip", skip, at_least=0)
+    number("slow_drift", "window", window, above=0)
+    whole_number("slow_drift", "skip", skip, at_least=0)
     lobe = lobe_around(float(run.zeta[-1]), N)
     rates, inverse = _windows(run, N, lobe, window, skip)
     balance = _fitted(rates, inverse)
@@ -233,7 +233,7 @@ def creep(
     lasts = _forecast(rates, inverse, N, lobe, float(run.zeta[-1]))
     if stops or not _recent(rates).mean() > 0:
         lasts = (np.inf, lasts[1], np.inf)
-    return Creep(
+    return SlowDrift(
         time=time,
         zeta=float(run.zeta[-1]),
         lobe=lobe,
@@ -272,7 +272,7 @@ def _windows(
             inverse.append(trapezoid(1 / values[a : b + 1], run.time[a : b + 1]) / length)
     if len(rates) < BLOCKS:
         raise ParameterError(
-            f"creep needs {BLOCKS} windows of {window:g} s within a lobe, got {len(rates)} in "
+            f"slow_drift needs {BLOCKS} windows of {window:g} s within a lobe, got {len(rates)} in "
             f"[{run.time[0]:g}, {run.time[-1]:g}] s: take a longer response or shorter windows"
         )
     return np.array(rates), np.array(inverse)

@@ -54,7 +54,7 @@ def _finding(found: Mapping[int, Evidence], far: Mapping[str, LongRun]) -> Secti
         title="The proof, and what happens far beyond 20 s",
         items=[
             *_burst(far),
-            _creep_table(found),
+            _slow_drift_table(found),
             *(Paragraph(text=words, code=command) for words, command in text.COMMANDS),
         ],
     )
@@ -101,10 +101,10 @@ def _far_table(far: Mapping[str, LongRun]) -> Table:
     )
 
 
-def _creep_table(found: Mapping[int, Evidence]) -> Table:
+def _slow_drift_table(found: Mapping[int, Evidence]) -> Table:
     rows = []
     for number, one in found.items():
-        c = one.creep
+        c = one.slow_drift
         burst = f"{c.burst:.4g} s" if np.isfinite(c.burst) else "none"
         rest = "none" if c.rest is None else f"{c.rest:.4g}"
         if c.rest_range is not None:
@@ -112,7 +112,7 @@ def _creep_table(found: Mapping[int, Evidence]) -> Table:
         spent = f"{100 * c.share:.3g} %"
         rows.append((f"Example {number}", f"{c.zeta:.5g}", spent, c.verdict, rest, burst))
     return Table(
-        caption=f"The drift of ζ, judged after {LOOK:g} s. {text.CREEP}",
+        caption=f"The drift of ζ, judged after {LOOK:g} s. {text.SLOW_DRIFT}",
         columns=("loop", "ζ", "budget spent", "verdict", "ζ comes to rest at", "burst at"),
         rows=rows,
     )

@@ -41,7 +41,7 @@ FAR_CAPTION = (
     "continued from where today's run ends, unless the command at the end of this page has "
     "--far: then all of it was computed again."
 )
-CREEP = (
+SLOW_DRIFT = (
     "While ζ crosses an interval between two zeros of N, a lobe, it uses up the lobe's budget, the "
     "integral of |N|. Creeps: by the fitted balance of the drift it goes on until the budget is "
     "used up, and the gain changes its sign. Settles: by all fits the drift stops before. "
