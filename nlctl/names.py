@@ -142,14 +142,14 @@ class Parameters(dict[str, Any]):
 
     def _absorb(self, other: Mapping[str, Any]) -> None:
         """Add the parameters of one more subsystem; note names that do not mean one block."""
-        if not isinstance(other, Parameters):  # a foreign block: python-control's own rule
+        if not isinstance(other, Parameters):  # a third-party block: python-control's own rule
             dict.update(self, other)
             return
         elsewhere: dict[tuple[int, str], str]
         elsewhere = {(id(o), k.rpartition(".")[2]): k for k, o in self.owners.items() if o}
         self.clashes.update(other.prefix + key for key in other.clashes)
         for key, value in other.items():
-            name = other.prefix + key if "." in key else key  # bare names are foreign blocks'
+            name = other.prefix + key if "." in key else key  # bare names are third-party blocks'
             owner = other.owners.get(key)
             twin = elsewhere.get((id(owner), key.rpartition(".")[2]), name)
             if owner is not None and self.owners.get(name, owner) is not owner:
@@ -220,7 +220,7 @@ class Parameters(dict[str, Any]):
         return self.table is None and self.copies >= (2 if self.block is None else 1)
 
     def _refuse_bare_twin(self, name: str) -> None:
-        """A bare name is a foreign block's, unless it looks like one of ours cut short."""
+        """A bare name is a third-party block's, unless it looks like one of ours cut short."""
         names, _ = self._known_names()
         twins = [k for k in names if k.endswith("." + base_name(name))]
         if name not in names and twins:

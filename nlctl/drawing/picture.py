@@ -1,6 +1,7 @@
 """Block diagrams of python-control interconnections, drawn as in a control textbook.
 
-`signal_graph` reads what is joined to what, `lay_out` places it (see `_layout`), `draw` paints it.
+`signal_graph` reads what is connected to what, `lay_out` places it (see `_layout`), `draw` paints
+it.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def signal_graph(diagram: ct.InterconnectedSystem) -> tuple[tuple[_Block, ...], 
     blocks : tuple of Block
         In the order of ``diagram.syslist``; edges refer to blocks by index.
     edges : tuple of Edge
-        One per pair of blocks that are joined.  Those between blocks hold exactly the non-zero
+        One per pair of blocks that are connected.  Those between blocks hold exactly the non-zero
         entries of ``connect_map``, those from the outside ``input_map``, to it ``output_map``.
 
     Raises
@@ -191,7 +192,7 @@ def draw(
 
     Signals between the same two blocks share an arrow; ``-y`` and ``2 y`` carry their gain.
     Feedback runs below the boxes, feedforward above, external signals are grey.  A dot marks
-    where an arrow branches; lines that cross without a dot are not joined.
+    where an arrow branches; lines that cross without a dot are not connected.
 
     Parameters
     ----------

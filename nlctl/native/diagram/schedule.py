@@ -206,7 +206,7 @@ class _Ordering:
             before = _signals_before(self.nodes, every - self.known)
             if not solve_loops:
                 raise AlgebraicLoopError(
-                    f"algebraic loop: {_ring_text(self.nodes, before)} has no state in it; put one "
+                    f"algebraic loop: {_loop_text(self.nodes, before)} has no state in it; put one "
                     "in, or compile with algebraic_loops='solve'"
                 )
             loop = first_loop(before)
@@ -259,11 +259,11 @@ def signal_name(nodes: Sequence[Node], signal: Signal) -> str:
     return f"{node.path}.{node.system.output_labels[signal.index]}"
 
 
-def _ring_text(nodes: tuple[Node, ...], before: Mapping[Signal, set[Signal]]) -> str:
-    """Print a ring of signals in the order in which they act on each other."""
+def _loop_text(nodes: tuple[Node, ...], before: Mapping[Signal, set[Signal]]) -> str:
+    """Print an algebraic loop in the order in which its signals act on each other."""
     try:
         TopologicalSorter(before).prepare()
     except CycleError as error:
-        ring = error.args[1]
-        return " -> ".join(signal_name(nodes, s) for s in ring)
-    raise AssertionError("signals that cannot be ordered form a ring")
+        loop = error.args[1]
+        return " -> ".join(signal_name(nodes, s) for s in loop)
+    raise AssertionError("signals that cannot be ordered form a loop")
