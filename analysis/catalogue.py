@@ -14,11 +14,11 @@ from typing import Any
 
 from nlctl import errors
 
-GROUPS = ("plants", "actuators", "references", "controllers")
+_GROUPS = ("plants", "actuators", "references", "controllers")
 
 
 def _modules() -> list[Any]:
-    return [importlib.import_module(f"nlctl.{group}") for group in GROUPS]
+    return [importlib.import_module(f"nlctl.{group}") for group in _GROUPS]
 
 
 def block_records() -> dict[str, type]:
@@ -53,7 +53,7 @@ def block_summaries() -> dict[str, dict[str, str]]:
 
     The names are those of `block_records`, in the same order.
     """
-    return {group: _records(group) for group in GROUPS}
+    return {group: _records(group) for group in _GROUPS}
 
 
 def _records(group: str) -> dict[str, str]:

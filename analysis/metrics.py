@@ -1,8 +1,8 @@
 """Numbers of a response: one function, one number, with unit and meaning.
 
-Every function takes sample times and samples, and numba can compile it, see `machine_code`.  Peaks
-between samples are found by a parabola, integrals by Simpson's rule, the rest by straight lines
-between samples.  A response with NaN has the number NaN, or one that is no finite number.
+Every function takes sample times and samples, and numba can compile it, see `in_machine_code`.
+Peaks between samples are found by a parabola, integrals by Simpson's rule, the rest by straight
+lines between samples.  A response with NaN has the number NaN, or one that is no finite number.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from . import metrics
 __all__ = [
     "Metric",
     "absolute_integral",
-    "differences",
+    "consecutive_differences",
     "final",
     "highest",
+    "in_machine_code",
     "integral",
     "lowest",
-    "machine_code",
     "over",
     "peak",
     "reversals",
@@ -111,7 +111,7 @@ def over(t: np.ndarray, y: np.ndarray, start: float, end: float) -> tuple[np.nda
 
 
 @equation
-def differences(y):
+def consecutive_differences(y):
     """Return y_{i+1} - y_i, as `numpy.diff` does, which takes seconds to compile."""
     return y[1:] - y[:-1]
 
@@ -197,7 +197,7 @@ def integral(t, y):
     in `scipy.integrate.simpson`.  Two samples are joined by a line.  Where neighbouring intervals
     differ by more than a factor of 2, weights may be negative.
     """
-    h = differences(t)
+    h = consecutive_differences(t)
     if h.size == 1:
         return float(h[0] * (y[0] + y[1]) / 2)
     n = h.size - h.size % 2
@@ -239,7 +239,7 @@ def time_weighted_integral(t, y):
 @equation
 def total_variation(t, y):
     """Sum of |y_{i+1} - y_i|, the way that y travels; between samples it is a lower bound."""
-    return float(np.sum(np.abs(differences(y))))
+    return float(np.sum(np.abs(consecutive_differences(y))))
 
 
 @equation
@@ -274,7 +274,7 @@ def time_within(t, y, lower, upper):
     span = high - low
     level = span == 0
     share = np.maximum(inside, 0.0) / (span + level) + (level & (inside >= 0))
-    return float(np.sum(differences(t) * share))
+    return float(np.sum(consecutive_differences(t) * share))
 
 
 @equation
@@ -282,7 +282,7 @@ def reversals(t, y, above=0.0):
     """How often y turns round: the turns between swings of more than `above`."""
     if not np.all(np.isfinite(y)):
         return np.nan
-    steps = differences(y)
+    steps = consecutive_differences(y)
     moving = np.nonzero(steps)[0]
     up = steps[moving] > 0
     turns = y[moving[:-1][up[1:] != up[:-1]] + 1]
@@ -299,14 +299,16 @@ def reversals(t, y, above=0.0):
     return count
 
 
-def machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
+def in_machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of this module, or one with arguments given by `partial`, as machine code.
 
     It keeps no thread of an ensemble waiting, and agrees with the original to rounding.  Other
     functions are returned as they are.
     """
     if isinstance(function, functools.partial):
-        return functools.partial(machine_code(function.func), *function.args, **function.keywords)
+        return functools.partial(
+            in_machine_code(function.func), *function.args, **function.keywords
+        )
     own = globals().get(getattr(function, "__name__", ""))
     return _compiled(function) if own is function else function
 

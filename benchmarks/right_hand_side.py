@@ -19,7 +19,7 @@ import numpy as np
 
 import nlctl
 from nlctl.native.machine.address import call_rhs
-from nlctl.native.machine.evaluations import WIDTH, Machine, prepared_parameters
+from nlctl.native.machine.evaluations import ENSEMBLE_WIDTH, Machine, prepared_parameters
 
 ROUNDS, EVALUATIONS = 15, 5000
 
@@ -62,7 +62,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for make in (nlctl.paper.example_1, nlctl.paper.example_2):
             compiled = nlctl.compile(make())
-            for width in (1, WIDTH):
+            for width in (1, ENSEMBLE_WIDTH):
                 each = []
                 for k in range(5):
                     os.environ["NLCTL_CACHE_DIR"] = f"{folder}/{make.__name__}-{width}-{k}"

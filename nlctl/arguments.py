@@ -27,7 +27,7 @@ __all__ = [
     "whole_number",
 ]
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 def one_of(who: str, name: str, value: Any, options: Iterable[str]) -> Any:
@@ -131,7 +131,7 @@ def flag(who: str, name: str, value: Any) -> bool:
     return bool(value)
 
 
-def of_type(who: str, name: str, value: Any, kind: type[T], how: str = "") -> T:
+def of_type(who: str, name: str, value: Any, kind: type[_T], how: str = "") -> _T:
     """Return a value of the kind that a function works on.
 
     Parameters
@@ -152,7 +152,7 @@ def of_type(who: str, name: str, value: Any, kind: type[T], how: str = "") -> T:
     return value
 
 
-def tuple_of(who: str, name: str, values: Any, kind: type[T]) -> tuple[T, ...]:
+def tuple_of(who: str, name: str, values: Any, kind: type[_T]) -> tuple[_T, ...]:
     """Return a sequence of values of one kind as a tuple.
 
     Raises

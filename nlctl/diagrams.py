@@ -287,7 +287,7 @@ def initial_state(
 ) -> np.ndarray:
     """Return the initial state of a block or diagram.
 
-    Every block starts from what its record declares (the paper's values), states of foreign
+    Every block starts from what its record declares (the paper's values), states of third-party
     blocks start from 0; `values` replaces some of them.
 
     Parameters

@@ -9,10 +9,10 @@ from numba.extending import register_jitable
 
 from .errors import ParameterError
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def equation(function: Function) -> Function:
+def equation(function: _Function) -> _Function:
     """Mark a function as an equation of a block.
 
     An equation is written once, in plain Python and NumPy, and read by everybody: python-control

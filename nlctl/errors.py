@@ -22,7 +22,7 @@ class AmbiguousNameError(UsageError):
 
 
 class DiagramError(UsageError):
-    """Blocks that cannot be joined: the message names block and signal."""
+    """Blocks that cannot be connected: the message names block and signal."""
 
 
 class BlockError(DiagramError, TypeError):

@@ -16,7 +16,7 @@ import control as ct
 
 from .errors import AmbiguousNameError, UnknownNameError
 
-LISTED = 24  # names that a message lists; it says how many more there are
+_LISTED = 24  # names that a message lists; it says how many more there are
 
 
 def unknown(
@@ -33,8 +33,8 @@ def unknown(
         hint = "nearest: " + ", ".join(f"'{n}'" for n in near)
     else:
         names = sorted(dict.fromkeys(known))
-        hint = "known: " + (", ".join(f"'{n}'" for n in names[:LISTED]) or "none")
-        hint += f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        hint = "known: " + (", ".join(f"'{n}'" for n in names[:_LISTED]) or "none")
+        hint += f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     return error(f"unknown {kind} '{name}'{where and ' ' + where}; {hint}")
 
 
@@ -142,14 +142,14 @@ class Parameters(dict[str, Any]):
 
     def _absorb(self, other: Mapping[str, Any]) -> None:
         """Add the parameters of one more subsystem; note names that do not mean one block."""
-        if not isinstance(other, Parameters):  # a foreign block: python-control's own rule
+        if not isinstance(other, Parameters):  # a third-party block: python-control's own rule
             dict.update(self, other)
             return
         elsewhere: dict[tuple[int, str], str]
         elsewhere = {(id(o), k.rpartition(".")[2]): k for k, o in self.owners.items() if o}
         self.clashes.update(other.prefix + key for key in other.clashes)
         for key, value in other.items():
-            name = other.prefix + key if "." in key else key  # bare names are foreign blocks'
+            name = other.prefix + key if "." in key else key  # bare names are third-party blocks'
             owner = other.owners.get(key)
             twin = elsewhere.get((id(owner), key.rpartition(".")[2]), name)
             if owner is not None and self.owners.get(name, owner) is not owner:
@@ -220,7 +220,7 @@ class Parameters(dict[str, Any]):
         return self.table is None and self.copies >= (2 if self.block is None else 1)
 
     def _refuse_bare_twin(self, name: str) -> None:
-        """A bare name is a foreign block's, unless it looks like one of ours cut short."""
+        """A bare name is a third-party block's, unless it looks like one of ours cut short."""
         names, _ = self._known_names()
         twins = [k for k in names if k.endswith("." + base_name(name))]
         if name not in names and twins:

@@ -18,7 +18,7 @@ import numpy as np
 from .errors import ParameterError, UnknownKeywordError
 from .names import unknown
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 _KEY = "nlctl"
 
 
@@ -101,7 +101,7 @@ def param(
 @dataclass_transform(
     kw_only_default=True, frozen_default=True, field_specifiers=(dataclasses.field,)
 )
-def record(cls: type[T]) -> type[T]:
+def record(cls: type[_T]) -> type[_T]:
     """Make a class a frozen, keyword-only dataclass whose parameters are checked at birth.
 
     Bounds come from `param`; a method ``check(self)``, where the class has one, looks at rules

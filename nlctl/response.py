@@ -14,8 +14,8 @@ from .arguments import number
 from .errors import ParameterError
 from .names import unknown
 from .params import checked_times
-from .responses.arguments import Run, checked_params, unified, with_aliases
-from .responses.interpreted import METHODS, interpreted
+from .responses.arguments import RunArguments, checked_params, unified, with_aliases
+from .responses.interpreted import SOLVE_IVP_METHODS, python_control_response
 
 if TYPE_CHECKING:
     from .native import Compiled
@@ -166,7 +166,7 @@ def input_output_response(
     }
     named = with_aliases(named, aliases, defaults)
     form = {"squeeze": squeeze, "transpose": transpose, "return_states": named["return_states"]}
-    run = Run(
+    run = RunArguments(
         system=system,
         times=checked_times(named["timepts"]),
         inputs=named["inputs"],
@@ -185,7 +185,7 @@ def input_output_response(
     return _computed(unified(run), engine or "auto")
 
 
-def _computed(run: Run, engine: str) -> ct.TimeResponseData:
+def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
     interpretable = isinstance(run.system, ct.InputOutputSystem)
     if not _takes_machine_code(run, engine, interpretable):
         for name in NATIVE_ONLY:
@@ -194,7 +194,7 @@ def _computed(run: Run, engine: str) -> ct.TimeResponseData:
                     f"{name}={run.solver[name]!r} has no meaning in python-control: "
                     "engine='native' has it, solve_ivp_kwargs={'max_step': ...} bounds its steps"
                 )
-        return interpreted(run)
+        return python_control_response(run)
     from .native import AlgebraicLoopError, AuditError, Compiled, CompileError  # late: needs numba
 
     if not interpretable and not isinstance(run.system, Compiled):
@@ -207,10 +207,10 @@ def _computed(run: Run, engine: str) -> ct.TimeResponseData:
         if engine != "auto" or not interpretable:
             raise
         warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=3)
-    return interpreted(replace(run, solver=dict(run.solver) | {"method": None}))
+    return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}))
 
 
-def _takes_machine_code(run: Run, engine: str, interpretable: bool) -> bool:
+def _takes_machine_code(run: RunArguments, engine: str, interpretable: bool) -> bool:
     if engine not in ENGINES:
         raise unknown("engine", str(engine), ENGINES)
     if not interpretable and engine == "python-control":
@@ -222,14 +222,14 @@ def _takes_machine_code(run: Run, engine: str, interpretable: bool) -> bool:
     return engine == "auto" and not _asks_for_scipy(run)
 
 
-def _asks_for_scipy(run: Run) -> bool:
+def _asks_for_scipy(run: RunArguments) -> bool:
     """Whether a run is given what only python-control's integrator knows."""
     method, keywords = run.solver["method"], run.solver["solve_ivp_kwargs"] or {}
-    named = run.solver["solve_ivp_method"] is not None or method in METHODS
+    named = run.solver["solve_ivp_method"] is not None or method in SOLVE_IVP_METHODS
     return named or run.evaluation_times is None or bool(set(keywords) - {"rtol", "atol"})
 
 
-def _native(run: Run) -> ct.TimeResponseData:
+def _native(run: RunArguments) -> ct.TimeResponseData:
     """Run a compiled diagram, or one that is compiled for this run, as machine code."""
     from .native import compile as compile_diagram
     from .native.response import respond

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from analysis.lyapunov.ledger import Ledger, Line
 
 STATUSES = ("proved", "computed", "checked", "undecided", "not applicable", "violated")
-STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
+_STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
 
 
 def random_start(
@@ -63,7 +63,7 @@ def random_start(
     return {**full, **drawn}
 
 
-def replay(
+def repeat_command(
     example: str, horizon: float, settings: Sequence[str], start: Mapping[str, Any], member: int
 ) -> str:
     """Return the command that repeats one run of an ensemble, to the last digit.
@@ -115,13 +115,13 @@ def show_ledger(found: Ledger, console: Console) -> None:
             what.append("\nas in the paper", "italic")
         if line.follows:
             what.append(f"\n{line.follows}", "red" if line.reading == "corrected" else "yellow")
-        cells = (line.key, Text(line.status, STYLES.get(line.status, "")), _number(line.least))
+        cells = (line.key, Text(line.status, _STYLES.get(line.status, "")), _number(line.least))
         who = (str(line.member),) if found.members > 1 else ()
         rows.add_row(*cells, _number(line.time), what, *who)
     console.print(rows)
 
 
-def summary(found: Ledger) -> str:
+def ledger_summary(found: Ledger) -> str:
     """Return the ledger in a few lines: bound, number of lines by status, what is violated."""
     count = {status: sum(x.status == status for x in found.lines) for status in STATUSES}
     told = ", ".join(f"{number} {status}" for status, number in count.items() if number)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["show", "show_all"]
 
-KINDS = "kinds"
+_KINDS = "kinds"
 HELP = """
 nlctl list NAME shows the parameters of a block, nlctl list kinds the
 kinds of analysis of a study, nlctl list file.py:NAME one of your own."""
@@ -59,13 +59,13 @@ def show(name: str) -> None:
     from analysis.studies.kinds import KINDS as STUDIED  # takes a second
 
     kinds = {kind.name: kind for kind in STUDIED}
-    if name == KINDS:
+    if name == _KINDS:
         lines = {name: _plain(kind.answers) for name, kind in kinds.items()}
         return _show_group("Kinds of analysis", lines, max(map(len, lines)))
     if name not in kinds:
         from nlctl.names import unknown
 
-        raise unknown("block", name, [*blocks, *kinds, KINDS])
+        raise unknown("block", name, [*blocks, *kinds, _KINDS])
     return _show_kind(name, kinds[name])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from nlctl.errors import ParameterError, UsageError
 
-MOST_SAMPLES = 2_000_000  # times of one run: 16 MB a signal
+_MOST_SAMPLES = 2_000_000  # times of one run: 16 MB a signal
 
 
 def named_loop(name: str) -> Any:
@@ -37,13 +37,13 @@ def named_loop(name: str) -> Any:
         try:
             made = named_example(name)()
         except UsageError as error:
-            raise ParameterError(f"{error}; {OWN}") from None
+            raise ParameterError(f"{error}; {_OWN}") from None
     if not isinstance(made, ct.InputOutputSystem):
         raise ParameterError(f"{name} needs to return a diagram, it returned {type(made).__name__}")
     return made
 
 
-OWN = "a loop of your own is path/to/file.py:function or package.module:function"
+_OWN = "a loop of your own is path/to/file.py:function or package.module:function"
 
 
 def sampled_times(until: float, step: float) -> Any:
@@ -58,9 +58,9 @@ def sampled_times(until: float, step: float) -> Any:
 
     if not (0 < step < until < float("inf")):
         raise ParameterError(f"simulate needs 0 < step < until, got step {step:g}, until {until:g}")
-    if until / step > MOST_SAMPLES:
+    if until / step > _MOST_SAMPLES:
         raise ParameterError(
-            f"simulate needs at most {MOST_SAMPLES:.0e} samples, got until {until:g} s / step "
+            f"simulate needs at most {_MOST_SAMPLES:.0e} samples, got until {until:g} s / step "
             f"{step:g} s: take a longer --step"
         )
     return np.linspace(0, until, round(until / step) + 1)

@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from .report import register as register_reports
-from .studies import FAILS, OPEN
-from .studies import register as register_studies
+from .report import register_reports
+from .studies import FAILS, OPEN, register_studies
 
 UNPROVED = {"violated": FAILS, "undecided": OPEN}  # exit code by the answer of a ledger
 
@@ -29,7 +28,7 @@ Set = Annotated[
         help='A parameter ("actuator.b_r=0.6") or an initial state ("plant.x1(0)=0.8").',
     ),
 ]
-Loop = Annotated[
+LoopArgument = Annotated[
     str,
     typer.Argument(
         metavar="LOOP",
@@ -58,7 +57,7 @@ def version(
 
 @app.command()
 def simulate(
-    loop: Loop,
+    loop: LoopArgument,
     set_: Set = None,
     input_: Annotated[
         list[str] | None,
@@ -110,7 +109,7 @@ def simulate(
 
 @app.command()
 def check(
-    loop: Loop,
+    loop: LoopArgument,
     set_: Set = None,
     horizon: Annotated[float, typer.Option(help="Length of the runs in s.")] = 20.0,
     ensemble: Annotated[
@@ -135,7 +134,7 @@ def check(
     from analysis.lyapunov.ledger import ledger
     from nlctl.errors import ParameterError
 
-    from .check import random_start, replay, show_ledger, summary, worst_lines
+    from .check import ledger_summary, random_start, repeat_command, show_ledger, worst_lines
     from .loops import assignments, named_loop
 
     if not 0 < horizon < float("inf"):
@@ -150,10 +149,10 @@ def check(
         print(found.to_json())
     else:
         show_ledger(found, Console())
-        print(summary(found))
+        print(ledger_summary(found))
         for line in worst_lines(found) if ensemble else ():
             print(f"run {line.member}, worst in {line.key}, again (with constants of its own):")
-            print(f"  {replay(loop, horizon, set_ or [], start, line.member)}")
+            print(f"  {repeat_command(loop, horizon, set_ or [], start, line.member)}")
     if found.answer in UNPROVED:
         raise typer.Exit(UNPROVED[found.answer])
 
@@ -176,7 +175,7 @@ def list_(
 
 @app.command()
 def diagram(
-    loop: Loop,
+    loop: LoopArgument,
     out: Annotated[Path, typer.Option("-o", "--out", help="File: .svg, .png, .pdf.")],
     expand: Annotated[bool, typer.Option(help="Show what is inside nested diagrams.")] = False,
 ) -> None:

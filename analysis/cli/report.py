@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .studies import ANSWERS, INCOMPLETE, INTERRUPTED, Trust, exit_codes, run_folder
+from .studies import EXIT_CODES, INCOMPLETE, INTERRUPTED, Json, Trust, exit_codes, run_folder
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -25,13 +25,13 @@ Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser."
 Force = Annotated[
     bool, typer.Option("--force", help="Replace files of others in the folder of the page.")
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 
-def register(app: typer.Typer) -> None:
+def register_reports(app: typer.Typer) -> None:
     """Add the commands to the command line."""
-    for command in (report, compare, gallery):
-        app.command()(command)
+    app.command("report")(report)
+    app.command("compare")(compare_command)
+    app.command("gallery")(gallery)
 
 
 def report(
@@ -156,13 +156,13 @@ def _study(
         trust=trust,
     )
     if result.complete:
-        return result.verdict, page, ANSWERS.get(result.answer, 0)
+        return result.verdict, page, EXIT_CODES.get(result.answer, 0)
     if study.suffix == ".toml":
         print("nlctl: incomplete; the same command goes on", file=sys.stderr)
     return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE
 
 
-def compare(
+def compare_command(
     first: Annotated[Path, typer.Argument(help="report.json, its folder, or that of a run.")],
     second: Annotated[Path, typer.Argument(help="Another one.")],
     rtol: Annotated[float, typer.Option(help="Numbers this close count as equal.")] = 0.0,
@@ -231,7 +231,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
     UsageError, OSError
         If a file is no report, or cannot be read.
     """
-    from analysis.report.compare import compare
+    from analysis.report.compare import compare_contents
     from analysis.studies import origin_differences, run_differences
 
     paths = (first, second)
@@ -241,7 +241,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
         for path in (p for p in paths if p in without or not p.exists()):
             raise _no_report(path)
     found: list[Any] = (
-        run_differences(first, second) if as_runs else compare(first, second, rtol=rtol)
+        run_differences(first, second) if as_runs else compare_contents(first, second, rtol=rtol)
     )
     if as_runs and (told := origin_differences(first, second)):
         print(f"nlctl: the two runs were not computed from the same: {told}", file=sys.stderr)

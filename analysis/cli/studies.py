@@ -19,11 +19,14 @@ from typing import Annotated, Any
 import typer
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
-ANSWERS = {"refuted": FAILS, "not shown yet": OPEN}  # exit code by the answer to a study's claims
+EXIT_CODES = {
+    "refuted": FAILS,
+    "not shown yet": OPEN,
+}  # exit code by the answer to a study's claims
 CONNECT = "5s"  # how long a scheduler may take to answer
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY", help="The study file, .toml.")]
-Settings = Annotated[
+SetKeys = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
@@ -42,15 +45,17 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.
 Jobs = Annotated[int, typer.Option(min=0, help="Threads or processes; 0: one per core.")]
 
 
-def register(app: typer.Typer) -> None:
+def register_studies(app: typer.Typer) -> None:
     """Add the commands to the command line."""
-    for command in (run, validate, replay, schema):
-        app.command()(command)
+    app.command("run")(run_command)
+    app.command("validate")(validate)
+    app.command("replay")(replay_command)
+    app.command("schema")(schema)
 
 
-def run(
+def run_command(
     study: StudyPath,
-    set_: Settings = None,
+    set_: SetKeys = None,
     resume: Annotated[bool, typer.Option(help="Go on with what the folder holds.")] = False,
     jobs: Jobs = 0,
     executor: Annotated[
@@ -97,13 +102,13 @@ def run(
         _show(result, json)
         if not result.complete:
             raise typer.Exit(INTERRUPTED if result.interrupted else INCOMPLETE)
-        if result.answer in ANSWERS:
-            raise typer.Exit(ANSWERS[result.answer])
+        if result.answer in EXIT_CODES:
+            raise typer.Exit(EXIT_CODES[result.answer])
 
 
 def validate(
     study: StudyPath,
-    set_: Settings = None,
+    set_: SetKeys = None,
     jobs: Jobs = 0,
     trust: Trust = False,
     json: Json = False,
@@ -129,7 +134,7 @@ def validate(
         )
 
 
-def replay(
+def replay_command(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     row: Annotated[int, typer.Argument(min=0, help="Number of the row.")],
     part: Annotated[

@@ -4,16 +4,25 @@ from .faults import fault_margins, fault_pairs
 from .proof import (
     bounds,
     burst,
-    envelope,
     equality_residuals,
     inequality_margins,
     long_zeta,
     lyapunov_bound,
     story,
+    windowed_maximum,
 )
 from .rankings import paired_differences, screening, set_apart, shares, violation_rates
-from .runs import CLIP, LIMIT, Limit, fans, margins, most_frequent, quantile, running_estimate
-from .searches import degradation, deviations, failure_map, radius_steps, search
+from .runs import (
+    CLIP,
+    LIMIT,
+    Limit,
+    fans,
+    margins_figure,
+    most_frequent,
+    quantile,
+    running_estimate,
+)
+from .searches import degradation, deviations, failure_map_figure, radius_steps, search
 
 __all__ = [
     "CLIP",
@@ -23,16 +32,15 @@ __all__ = [
     "burst",
     "degradation",
     "deviations",
-    "envelope",
     "equality_residuals",
-    "failure_map",
+    "failure_map_figure",
     "fans",
     "fault_margins",
     "fault_pairs",
     "inequality_margins",
     "long_zeta",
     "lyapunov_bound",
-    "margins",
+    "margins_figure",
     "most_frequent",
     "paired_differences",
     "quantile",
@@ -44,4 +52,5 @@ __all__ = [
     "shares",
     "story",
     "violation_rates",
+    "windowed_maximum",
 ]

@@ -15,7 +15,7 @@ from .axes import WIDTH, set_style
 
 __all__ = ["arms", "number_axes", "plain"]
 
-LONGEST = 30
+_LONGEST = 30
 
 
 def plain(name: object) -> str:
@@ -24,7 +24,7 @@ def plain(name: object) -> str:
     Use it with ``parse_math=False``.  Tables show names in full.
     """
     text = "".join(_drawn(character) for character in str(name))
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 12]}…{text[-11:]}"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 12]}…{text[-11:]}"
 
 
 @cache

@@ -28,12 +28,12 @@ from .axes import (
 __all__ = [
     "bounds",
     "burst",
-    "envelope",
     "equality_residuals",
     "inequality_margins",
     "long_zeta",
     "lyapunov_bound",
     "story",
+    "windowed_maximum",
 ]
 
 
@@ -56,7 +56,7 @@ def burst(run: LongRun) -> Figure:
         ax.axvline(run.burst, color=ORANGE, linewidth=1.6, label="happened")
     shown_above = dict(zip(*whole.get_legend_handles_labels()[::-1], strict=True))
     legend_above(figure, shown_above)
-    error.semilogy(*envelope(time, np.abs(s["e"])), color=BLUE, linewidth=1.4)
+    error.semilogy(*windowed_maximum(time, np.abs(s["e"])), color=BLUE, linewidth=1.4)
     shown = left <= 100.0
     for (name, label), (colour, style) in zip(
         (("e", "$|e_1|$"), ("r", "$|r|$"), ("u", "$|u|$")), STYLES, strict=False
@@ -94,11 +94,11 @@ def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) 
     axes[0].set(xlabel=TIME)
     axes[0].margins(x=0.01)
     if run is not None:
-        _creeping(axes[1], run)
+        _drifting(axes[1], run)
     return figure
 
 
-def _creeping(ax: Axes, run: LongRun) -> None:
+def _drifting(ax: Axes, run: LongRun) -> None:
     """Draw zeta until its burst, if it bursts, and where the gain has which sign."""
     zeta, last = run.signals["zeta"], run.time[-1]
     high = run.lobe.high
@@ -120,7 +120,7 @@ def _creeping(ax: Axes, run: LongRun) -> None:
     ax.set(xlabel=TIME)
 
 
-def envelope(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi) -> np.ndarray:
+def windowed_maximum(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi) -> np.ndarray:
     """Return the largest value of y in each whole window, at the middle of the windows."""
     number = np.floor((time - time[0]) / window).astype(int)
     starts = np.flatnonzero(np.diff(number, prepend=-1))

@@ -36,12 +36,12 @@ __all__ = [
     "CLIP",
     "LIMIT",
     "Limit",
+    "clipped_margins",
     "fans",
-    "margins",
+    "margins_figure",
     "most_frequent",
     "quantile",
     "running_estimate",
-    "shown",
 ]
 
 CLIP = 2.0
@@ -53,17 +53,17 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 STRETCHES = 240  # of time, in which the ends of a band are drawn as lines
 
 
-def shown(values: object) -> np.ndarray:
+def clipped_margins(values: object) -> np.ndarray:
     """Return margins as they are drawn: clipped at -CLIP, NaN there as well."""
     y = np.asarray(values, dtype=float)
     return np.maximum(np.where(np.isnan(y), -np.inf, y), -CLIP)
 
 
-def margins(values: np.ndarray) -> Figure:
+def margins_figure(values: np.ndarray) -> Figure:
     """How many runs have which margin, and the share of runs with at most that margin."""
     figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
     counts, part = figure.subplots(1, 2)
-    y = shown(values)
+    y = clipped_margins(values)
     violated = violates(y)
     low, high = min(float(y.min()), 0.0), max(float(y.max()), 0.0)
     width = (high - low or 1.0) / 40
@@ -210,8 +210,8 @@ def most_frequent(groups: Sequence[str]) -> list[str]:
 
 def _band(samples: np.ndarray, start: float, end: float, nodes: np.ndarray) -> np.ndarray:
     """Return both ends of a band of quantiles at the nodes; nothing between them is outside."""
-    lower = -envelope(-quantile(samples, start, -np.inf), nodes)
-    return np.array([lower, envelope(quantile(samples, end, np.inf), nodes)])
+    lower = -upper_envelope(-quantile(samples, start, -np.inf), nodes)
+    return np.array([lower, upper_envelope(quantile(samples, end, np.inf), nodes)])
 
 
 def _one_legend(axes: Sequence[Axes]) -> None:
@@ -233,7 +233,7 @@ def quantile(samples: np.ndarray, part: float, missing: float) -> np.ndarray:
     return ordered[int(np.ceil(place) if missing > 0 else np.floor(place))]
 
 
-def envelope(y: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+def upper_envelope(y: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Return values at some samples so that the lines between them lie nowhere below `y`.
 
     Parameters

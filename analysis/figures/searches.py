@@ -15,9 +15,9 @@ from matplotlib.tri import LinearTriInterpolator, Triangulation
 from ..robustness.stl.spec import violates
 from .axes import BLUE, GREEN, GREY, ORANGE, PURPLE, SHORT_LINE, WIDTH, legend_above, stacked_axes
 from .labels import arms, number_axes, plain
-from .runs import shown
+from .runs import clipped_margins
 
-__all__ = ["degradation", "deviations", "failure_map", "radius_steps", "search"]
+__all__ = ["degradation", "deviations", "failure_map_figure", "radius_steps", "search"]
 
 SEARCHERS = {"corners": GREY, "uniform": BLUE, "CMA-ES": GREEN}
 INK = "#111111"  # on the map, which is light on dark pages as well
@@ -27,7 +27,7 @@ COLOURS = ListedColormap(colormaps["PuOr"](np.linspace(0.15, 0.85, 256)))  # INK
 def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
     """Lowest margin found after each run of a search, in the colour of what chose the run."""
     figure, (ax,) = stacked_axes()
-    y, names = shown(lowest), np.asarray(searchers, dtype=object)
+    y, names = clipped_margins(lowest), np.asarray(searchers, dtype=object)
     starts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1), names.size]
     labelled = set()
     for start, end in pairwise(starts):
@@ -87,7 +87,7 @@ def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | Non
 def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
     """Lowest margin that was found at each size that was looked at, and the radius."""
     figure, (ax,) = stacked_axes()
-    margin = shown(steps["margin"])
+    margin = clipped_margins(steps["margin"])
     violated = violates(margin)
     for chosen, marker, colour, name in (
         (~violated, "o", BLUE, "no violation found"),
@@ -103,7 +103,7 @@ def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
     return figure
 
 
-def failure_map(
+def failure_map_figure(
     points: pd.DataFrame,
     triangles: np.ndarray,
     names: tuple[str, str],
@@ -132,7 +132,7 @@ def failure_map(
     figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
     ax = figure.subplots()
     x, y = (points[name].to_numpy(dtype=float) for name in names)
-    margin = np.clip(shown(points["spec"]), -1.0, 1.0)
+    margin = np.clip(clipped_margins(points["spec"]), -1.0, 1.0)
     net = Triangulation(x, y, triangles)
     span = (x.min(), x.max(), y.min(), y.max())
     plane = np.meshgrid(np.linspace(*span[:2], 240), np.linspace(*span[2:], 180))

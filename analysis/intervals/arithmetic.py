@@ -29,7 +29,7 @@ def _function(name: str) -> Callable[[Any], Any]:
 
 
 JUMPS = ("floor", "ceil", "sign")
-Comparison = Callable[[arb, arb], Any]
+_Comparison = Callable[[arb, arb], Any]
 
 
 class NumPyFunctions:
@@ -192,7 +192,7 @@ class Ball(NumPyFunctions):
             return Ball(value)
         return self.chain(value, as_ball(row.derivative[0](Ball(self.value))).value)
 
-    def _compare(self, other: Any, yes: Comparison, no: Comparison) -> Any:
+    def _compare(self, other: Any, yes: _Comparison, no: _Comparison) -> Any:
         """Return yes(self, other), where `no` is its negation; see `branch`."""
         other = as_ball(other)
         if other is NotImplemented:

@@ -29,7 +29,7 @@ from .paths import Undecided, every_way
 
 __all__ = ["Ball", "Box", "Proof", "Range", "Undecided", "enclose", "prove", "upper"]
 
-Function = Callable[[tuple[Any, ...]], Any]
+_Function = Callable[[tuple[Any, ...]], Any]
 HOPELESS = 5_000  # boxes after which a function still without bound somewhere is given up
 
 
@@ -88,7 +88,7 @@ class Proof:
     seconds: float
 
 
-def enclose(function: Function, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) -> Range:
+def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) -> Range:
     """Enclose the range of a function on a box, by branch and bound.
 
     Parameters
@@ -131,7 +131,7 @@ def enclose(function: Function, box: Box, *, tol: float = 1e-3, max_boxes: int =
 
 
 def prove(
-    function: Function,
+    function: _Function,
     box: Box,
     *,
     low: float = -np.inf,
@@ -189,7 +189,7 @@ def prove(
 
 
 def _supremum(
-    function: Function, box: Box, tol: float, max_boxes: int
+    function: _Function, box: Box, tol: float, max_boxes: int
 ) -> tuple[float, float, int, int]:
     """Return a proved upper bound, the largest value met, boxes used and boxes undecided."""
     order, boxes, best = itertools.count(), 0, -np.inf
@@ -240,7 +240,7 @@ def _interval(a: float, b: float) -> arb:
     return arb(a) if a == b else arb(a).union(arb(b)) if np.isfinite(b - a) else arb(0, "inf")
 
 
-def _bounds(function: Function, cell: Cell) -> tuple[arb, arb, tuple[arb, ...] | None]:
+def _bounds(function: _Function, cell: Cell) -> tuple[arb, arb, tuple[arb, ...] | None]:
     """Return the range on a cell, the value at its centre, and the gradient's range.
 
     The gradient is None where the function, having branches there, need not be continuous.
@@ -261,7 +261,7 @@ def _bounds(function: Function, cell: Cell) -> tuple[arb, arb, tuple[arb, ...] |
     return common(value.value, mean), centre, gradient
 
 
-def _every_branch(function: Function, coordinates: Sequence[arb]) -> arb:
+def _every_branch(function: _Function, coordinates: Sequence[arb]) -> arb:
     """Return the hull over every way through the function; NaN if there is no end of them."""
     balls, hull = tuple(map(Ball, coordinates)), None
     try:

@@ -10,8 +10,8 @@ from .bounds.provenance import Constant, Constants
 from .bounds.sector import Sector, sector
 from .bounds.weights import approximation_error, minimax_weights, tightest_weights
 from .certificate.certify import Certificate, certify
-from .certificate.gains import Design, design
-from .conservatism import Comparison, Conservatism, comparison, conservatism
+from .certificate.gains import GainDesign, design
+from .conservatism import Conservatism, DirectBound, comparison, conservatism
 from .examination import Examination, examine
 from .inequalities import inequalities
 from .ledger import Ledger, ledger
@@ -22,22 +22,21 @@ from .loop.roles import Parts, read_parts
 from .loop.signals import Margin, Signals, signals_of
 from .nussbaum.energy import Drift, drift, drift_margin, safe_horizon
 from .nussbaum.property import nussbaum_property
-from .nussbaum.slow_drift import Creep, burst_peak, creep
+from .nussbaum.slow_drift import SlowDrift, burst_peak, slow_drift
 from .tighten import Tightened, tighten
 
 __all__ = [
     "Box",
     "Certificate",
-    "Comparison",
     "Conservatism",
     "Constant",
     "Constants",
-    "Creep",
     "Decomposition",
     "DecompositionError",
-    "Design",
+    "DirectBound",
     "Drift",
     "Examination",
+    "GainDesign",
     "Ledger",
     "Line",
     "Margin",
@@ -48,6 +47,7 @@ __all__ = [
     "Range",
     "Sector",
     "Signals",
+    "SlowDrift",
     "Tightened",
     "approximation_error",
     "burst_peak",
@@ -56,7 +56,6 @@ __all__ = [
     "comparison",
     "conservatism",
     "constants",
-    "creep",
     "decompose",
     "design",
     "disturbance",
@@ -79,6 +78,7 @@ __all__ = [
     "sector",
     "sharpest",
     "signals_of",
+    "slow_drift",
     "tighten",
     "tightest_weights",
     "visited_box",

@@ -19,16 +19,16 @@ from .bounds.premises import Premises, premises
 from .bounds.provenance import Constants
 from .inequalities import terms
 from .lines import Line
-from .loop.simulation import Run
+from .loop.simulation import MemberRun
 from .nussbaum.energy import drift, drift_margin, safe_horizon
 from .nussbaum.property import antiderivative, lobe_around, nussbaum_property
-from .nussbaum.slow_drift import Creep, creep
+from .nussbaum.slow_drift import SlowDrift, slow_drift
 
-__all__ = ["closure", "conclusions", "creep_of"]
+__all__ = ["closure", "conclusions", "slow_drift_of"]
 
 SAFE = "zeta cannot cross its lobe before T"
-WINDOW = 4 * np.pi  # s; period of the paper's reference
-LEMMA = (
+_WINDOW = 4 * np.pi  # s; period of the paper's reference
+_LEMMA = (
     "false on [0, inf): with zeta' = c1 c2/(2 + exp(zeta^2)), V = c1 + I and g = 1 its premise "
     "holds and zeta is unbounded"
 )
@@ -39,37 +39,37 @@ NO_BOUND = (
 
 
 class _Response:
-    """A run as `drift` and `creep` read a response."""
+    """A run as `drift` and `slow_drift` read a response."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: MemberRun) -> None:
         names = ("zeta", "r", "u")
         self.time, self.output_labels = run.signals.t, list(names)
         self.outputs = np.array([run.signals[name] for name in names])
 
 
-def creep_of(run: Run) -> Creep | None:
-    """Return where the creep of zeta leads; None if the run does not tell."""
-    found = _creep_or_reason(run)
+def slow_drift_of(run: MemberRun) -> SlowDrift | None:
+    """Return where the slow drift of zeta leads; None if the run does not tell."""
+    found = _slow_drift_or_reason(run)
     return None if isinstance(found, str) else found
 
 
-def _creep_or_reason(run: Run) -> Creep | str:
-    """Return where the creep leads, or why that cannot be told."""
+def _slow_drift_or_reason(run: MemberRun) -> SlowDrift | str:
+    """Return where the slow drift leads, or why that cannot be told."""
     length = run.signals.t[-1] - run.signals.t[0]
-    if length < 6 * WINDOW:
-        return f"{length:g} s show nothing of it: run {np.ceil(6 * WINDOW):g} s at least"
+    if length < 6 * _WINDOW:
+        return f"{length:g} s show nothing of it: run {np.ceil(6 * _WINDOW):g} s at least"
     try:
-        return creep(_Response(run), run.parts.law.N, window=WINDOW)
+        return slow_drift(_Response(run), run.parts.law.N, window=_WINDOW)
     except ParameterError as error:
         return str(error)
 
 
-def conclusions(loop: ct.InterconnectedSystem, run: Run, found: Constants) -> list[Line]:
-    """Return the lines of (12), Lemma 1, what remains true of it, the creep and the closure."""
+def conclusions(loop: ct.InterconnectedSystem, run: MemberRun, found: Constants) -> list[Line]:
+    """Return the lines of (12), Lemma 1, what remains of it, the slow drift and the closure."""
     given = premises(found, run.gains)
     lines = [_property(given), _lemma(), *_bounded(run, given)]
     if np.isfinite(run.signals["zeta"]).all():
-        lines += [*_remains(run, given, found), _creep(run)]
+        lines += [*_remains(run, given, found), _slow_drift_line(run)]
     return [*lines, closure(loop, run, found, given)]
 
 
@@ -98,13 +98,13 @@ def _lemma() -> Line:
         key="Lemma 1",
         statement="V, zeta and int k G N dzeta are bounded if (32) holds",
         status="violated",
-        evidence=LEMMA,
+        evidence=_LEMMA,
         follows=NO_BOUND,
         reading="paper",
     )
 
 
-def _bounded(run: Run, given: Premises) -> list[Line]:
+def _bounded(run: MemberRun, given: Premises) -> list[Line]:
     """Lemma 1's conclusion over the horizon, and the readings of Q."""
     s = run.signals
     zeta, horizon = s["zeta"], f"{s.t[-1]:g} s"
@@ -145,7 +145,7 @@ def _bounded(run: Run, given: Premises) -> list[Line]:
     return lines
 
 
-def _remains(run: Run, given: Premises, found: Constants) -> list[Line]:
+def _remains(run: MemberRun, given: Premises, found: Constants) -> list[Line]:
     """Inequality 2.3 (c), and the safe horizon (b)."""
     x = terms(run.signals, given)
     low, high = found["k_1"] * given.G_min, found["k_2"] * given.G_max
@@ -186,9 +186,9 @@ def _remains(run: Run, given: Premises, found: Constants) -> list[Line]:
     return [c, b]
 
 
-def _creep(run: Run) -> Line:
+def _slow_drift_line(run: MemberRun) -> Line:
     statement = "the drift of zeta ends before N changes its sign"
-    found = _creep_or_reason(run)
+    found = _slow_drift_or_reason(run)
     if isinstance(found, str):
         return Line(key="creep", statement=statement, status="undecided", evidence=found)
     calm = found.verdict in ("settles", "turned round")
@@ -204,7 +204,9 @@ def _creep(run: Run) -> Line:
     )
 
 
-def closure(loop: ct.InterconnectedSystem, run: Run, found: Constants, given: Premises) -> Line:
+def closure(
+    loop: ct.InterconnectedSystem, run: MemberRun, found: Constants, given: Premises
+) -> Line:
     """Return the line that tells whether |r| <= C_0 keeps the state in the box."""
     statement, key = "|r| <= C_0 keeps x in the box that C_0 was computed on", "closure"
     path = run.parts.paths["reference"]

@@ -24,7 +24,7 @@ from .nussbaum.property import root
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Comparison", "Conservatism", "Share", "comparison", "conservatism"]
+__all__ = ["Conservatism", "DirectBound", "Share", "comparison", "conservatism"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class Share:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
+class DirectBound:
     """A bound of |r| on [start, end] by direct comparison, without V and without Lemma 1.
 
     Attributes
@@ -108,7 +108,7 @@ class Conservatism:
     C_0_along: float
     C_0_fitted: float
     sqrt_2V: float
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[DirectBound, ...]
     e_1: float
     tail_max_e_1: float
 
@@ -237,7 +237,7 @@ def _fitted(s: Signals, given: Premises, Q: float) -> float:
     return _bound_with(given, float(np.max(np.abs(target - psi @ W))), W, Q)
 
 
-def comparison(signals: Signals, given: Premises, start: float, end: float) -> Comparison:
+def comparison(signals: Signals, given: Premises, start: float, end: float) -> DirectBound:
     """Bound |r| on an interval by comparison, from the signals along a run.
 
     While k G N < 0,  |r|' <= k G |N| (M - beta |r| - delta_hat tanh(|r|/tau)),
@@ -270,7 +270,7 @@ def comparison(signals: Signals, given: Premises, start: float, end: float) -> C
             lambda z: gains.beta * z + estimate * float(smooth_sign(z, gains.tau)) - largest,
             0.0, largest / gains.beta + 1e-12,
         )  # fmt: skip
-    return Comparison(
+    return DirectBound(
         start=float(t[0]),
         end=float(t[-1]),
         rho=rho,

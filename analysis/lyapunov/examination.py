@@ -19,15 +19,15 @@ from .bounds.decomposition import Decomposition, decompose
 from .bounds.provenance import Constants
 from .loop.integral import sharpest
 from .loop.roles import read_parts
-from .loop.simulation import Member, Run, members_of, observe, observed_loop
+from .loop.simulation import Member, MemberRun, members_of, observe, observed_loop
 
-__all__ = ["U_MAX", "Examination", "Runs", "compile_ahead", "examine"]
+__all__ = ["U_MAX", "Examination", "_Runs", "compile_examination_ahead", "examine"]
 
 U_MAX = 60.0  # a split that is proved and not computed holds for |u| <= 2 U_MAX
 
 
 @dataclass(frozen=True, kw_only=True)
-class Runs:
+class _Runs:
     """Runs of the members; more than one are made anew at each iteration, one after the other.
 
     Attributes
@@ -45,13 +45,13 @@ class Runs:
     split: Decomposition
     max_steps: int = 2_000_000
 
-    def __iter__(self) -> Iterator[Run]:
+    def __iter__(self) -> Iterator[MemberRun]:
         if len(self.members) == 1:
             return iter([self.first])
         return observe(self.loop, self.members, self.split, self.max_steps)
 
     @cached_property
-    def first(self) -> Run:
+    def first(self) -> MemberRun:
         """The first run."""
         return next(observe(self.loop, self.members[:1], self.split, self.max_steps))
 
@@ -68,7 +68,7 @@ class Examination:
     """
 
     loop: ct.InterconnectedSystem
-    runs: Runs
+    runs: _Runs
     constants: Constants
 
 
@@ -129,7 +129,7 @@ def examine(
         fixed = dict(members[0].start), dict(members[0].params)
     parts = read_parts(loop, *fixed)
     split = _split(parts.actuator, k)
-    runs = Runs(loop=loop, members=members, split=split, max_steps=max_steps)
+    runs = _Runs(loop=loop, members=members, split=split, max_steps=max_steps)
     box = _visited(runs) if box is None else box
     sides = [name for name in box.names if name != "u"]
     weights = None if isinstance(W, str) and W == "tightest" else W
@@ -140,7 +140,7 @@ def examine(
     return Examination(loop=loop, runs=runs, constants=found)
 
 
-def compile_ahead(loop: ct.InterconnectedSystem) -> None:
+def compile_examination_ahead(loop: ct.InterconnectedSystem) -> None:
     """Compile the diagram that `examine` runs, which otherwise happens with the first run."""
     native.compile_ahead(observed_loop(loop, _split(read_parts(loop).actuator)))
 
@@ -154,7 +154,7 @@ def _numbers(values: Mapping[str, Any] | None) -> dict[str, Any]:
     return {k: v for k, v in (values or {}).items() if np.ndim(v) == 0 or isinstance(v, tuple)}
 
 
-def _visited(runs: Runs) -> Box:
+def _visited(runs: _Runs) -> Box:
     reached = []
     for run in runs:
         names = [n for n in run.signals.values if n == "v" or (n[:1] == "x" and n[1:].isdigit())]

@@ -16,17 +16,17 @@ from nlctl.names import unknown
 from ..json_values import as_json
 from ..metrics import peak
 from .bounds.provenance import Constants
-from .conclusions import conclusions, creep_of
+from .conclusions import conclusions, slow_drift_of
 from .examination import U_MAX, Examination, examine
 from .lines import Line, assumption_lines, decay_line, inequality_lines, run_line
-from .nussbaum.slow_drift import Creep
+from .nussbaum.slow_drift import SlowDrift
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["Ledger", "Line", "ledger"]
 
-SETTINGS = ("box", "W", "k", "start", "params", "step", "max_steps")
+_SETTINGS = ("box", "W", "k", "start", "params", "step", "max_steps")
 """What `examine` takes by name."""
 
 
@@ -46,7 +46,7 @@ class Ledger:
         Number of runs.
     Q, max_r : float
         sup I(t) of (33) and max |r|, over all runs.
-    creep : Creep or None
+    slow_drift : SlowDrift or None
         Of the first run, if it is long enough.
     """
 
@@ -57,7 +57,7 @@ class Ledger:
     members: int
     Q: float
     max_r: float
-    creep: Creep | None
+    slow_drift: SlowDrift | None
 
     @property
     def violated(self) -> tuple[Line, ...]:
@@ -154,8 +154,8 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
         As `examine` does.
     """
     for name in settings:
-        if name not in SETTINGS:
-            raise unknown("setting", name, SETTINGS, "of ledger", UnknownKeywordError)
+        if name not in _SETTINGS:
+            raise unknown("setting", name, _SETTINGS, "of ledger", UnknownKeywordError)
     found = loop if isinstance(loop, Examination) else examine(loop, run, **settings)
     return _assembled(found)
 
@@ -189,5 +189,5 @@ def _assembled(study: Examination) -> Ledger:
         members=count,
         Q=Q,
         max_r=max_r,
-        creep=creep_of(study.runs.first),
+        slow_drift=slow_drift_of(study.runs.first),
     )

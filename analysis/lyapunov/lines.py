@@ -16,13 +16,13 @@ from .bounds.provenance import Constants, Provenance
 from .inequalities import inequalities
 from .loop.declared_terms import update_is_declared
 from .loop.signals import Margin, Signals
-from .loop.simulation import Run
+from .loop.simulation import MemberRun
 
-__all__ = ["Line", "Status", "assumption_lines", "decay_line", "inequality_lines", "run_line"]
+__all__ = ["Line", "LineStatus", "assumption_lines", "decay_line", "inequality_lines", "run_line"]
 
-Status = Literal["proved", "computed", "checked", "violated", "not applicable", "undecided"]
+LineStatus = Literal["proved", "computed", "checked", "violated", "not applicable", "undecided"]
 RANK = {"violated": 0, "undecided": 1, "checked": 2, "computed": 3, "proved": 4}
-KNOWN: dict[Provenance, Status] = {
+KNOWN: dict[Provenance, LineStatus] = {
     "proved": "proved",
     "computed": "computed",
     "given": "checked",
@@ -85,7 +85,7 @@ class Line:
 
     key: str
     statement: str
-    status: Status
+    status: LineStatus
     least: float = np.nan
     time: float = np.nan
     first: float = np.nan
@@ -120,7 +120,7 @@ class Line:
         ).rstrip()
 
 
-def run_line(run: Run) -> Line:
+def run_line(run: MemberRun) -> Line:
     """Return the line that tells whether a run reached its horizon."""
     asked, reached = float(run.member.times[-1]), float(run.signals.t[-1])
     lost = run.lost is not None
@@ -136,7 +136,7 @@ def run_line(run: Run) -> Line:
     )
 
 
-def decay_line(run: Run) -> Line:
+def decay_line(run: MemberRun) -> Line:
     """Return the line that tells whether V decays: every rate of (31) is positive."""
     gains = run.gains
     rates = {"2 beta": 2 * gains.beta, "sigma_2 gamma": gains.sigma_2 * gains.gamma}
@@ -154,7 +154,7 @@ def decay_line(run: Run) -> Line:
     )
 
 
-def assumption_lines(run: Run, found: Constants, u_max: float) -> list[Line]:
+def assumption_lines(run: MemberRun, found: Constants, u_max: float) -> list[Line]:
     """Return the lines of Assumptions 1 to 3, (10) and the compact set."""
     given = premises(found, run.gains)
     how = found.table()
@@ -180,7 +180,7 @@ def assumption_lines(run: Run, found: Constants, u_max: float) -> list[Line]:
     return lines
 
 
-def inequality_lines(run: Run, found: Constants) -> list[Line]:
+def inequality_lines(run: MemberRun, found: Constants) -> list[Line]:
     """Return the lines of the numbered inequalities, corrected and, where it fails, as printed."""
     given = premises(found, run.gains)
     margins = [*inequalities(run.signals, given), *([run.reference] if run.reference else [])]
@@ -219,8 +219,8 @@ def _beyond_samples(line: Line) -> Line:
     return line
 
 
-def _line(margin: Margin, signals: Signals, known: Status, evidence: str) -> Line:
-    status: Status = known if margin.holds else "violated"
+def _line(margin: Margin, signals: Signals, known: LineStatus, evidence: str) -> Line:
+    status: LineStatus = known if margin.holds else "violated"
     if margin.kind == "inequality" and not np.isfinite(margin.margin).all():
         finite = np.isfinite(np.stack([signals["r"], signals["u"], signals["I"]])).all()
         status = "undecided" if finite else status

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Tightened", "TrialBound", "tighten"]
 
-BOUNDS = ("C_0", "ultimate")
-TOLERANCE = 1e-2  # of the branch and bounds in the search
+_BOUNDS = ("C_0", "ultimate")
+_TOLERANCE = 1e-2  # of the branch and bounds in the search
 OVER = 10.0  # weight of log(|u| / limit) in the cost
 
 
@@ -157,8 +157,8 @@ def tighten(
     ParameterError
         If no gains that were looked at keep the limit, or it is not positive.
     """
-    if bound not in BOUNDS:
-        raise unknown("bound", bound, BOUNDS)
+    if bound not in _BOUNDS:
+        raise unknown("bound", bound, _BOUNDS)
     u_limit = number("tighten", "u_limit", u_limit, above=0)
     horizon = number("tighten", "horizon", horizon, above=0)
     evaluations = whole_number("tighten", "evaluations", evaluations, at_least=1)
@@ -254,8 +254,8 @@ def _bounds(search: _Search, gains: Gains, box: Box, Q: float) -> tuple[float, f
     """C_0 and the ultimate bound with the tightest W on a box, eps* on a grid."""
     parts, n = search.parts, search.parts.order
     states = box.only(*coordinate_names(n))
-    G_max = sector(parts.plant, box.only(*states.names, "v"), tol=TOLERANCE).G_max
-    d = disturbance(parts.plant, states, (0.0, np.inf), tol=TOLERANCE).magnitude
+    G_max = sector(parts.plant, box.only(*states.names, "v"), tol=_TOLERANCE).G_max
+    d = disturbance(parts.plant, states, (0.0, np.inf), tol=_TOLERANCE).magnitude
     rest = float(total_error(G_max, search.split.eps_star, d, 0.0))
     if not np.isfinite(rest):
         return np.inf, np.inf
@@ -269,7 +269,9 @@ def _bounds(search: _Search, gains: Gains, box: Box, Q: float) -> tuple[float, f
 def _weights(parts: Parts, gains: Gains, box: Box, rest: float) -> tuple[np.ndarray, float]:
     """Return the tightest weights on a coarse grid, and eps* there."""
     if not gains.W_hat_0:
-        return np.zeros(0), approximation_error(parts.plant, None, (), box, tol=TOLERANCE).magnitude
+        return np.zeros(0), approximation_error(
+            parts.plant, None, (), box, tol=_TOLERANCE
+        ).magnitude
     network = network_on_grid(parts.plant, parts.basis, box, per_side=max(7, 43 // parts.order))
     W = tightest_weights(network, gains, rest)
     return W, network.error(W)

@@ -1,18 +1,18 @@
 """What is only about Lv et al. (2017): its reproduction, loops, controllers, page."""
 
 from .cases import CASES, HORIZON, METRICS, TAIL, Case
-from .controllers import contenders
+from .controllers import compared_controllers
 from .numerics import numerics
 from .reproduction import (
+    CaseRun,
     Check,
     Expectation,
-    Run,
     checks,
-    compile_ahead,
+    compile_cases_ahead,
     expectations,
     measured,
-    run,
     run_all,
+    run_case,
     sample_times,
 )
 
@@ -22,16 +22,16 @@ __all__ = [
     "METRICS",
     "TAIL",
     "Case",
+    "CaseRun",
     "Check",
     "Expectation",
-    "Run",
     "checks",
-    "compile_ahead",
-    "contenders",
+    "compared_controllers",
+    "compile_cases_ahead",
     "expectations",
     "measured",
     "numerics",
-    "run",
     "run_all",
+    "run_case",
     "sample_times",
 ]

@@ -31,7 +31,7 @@ from nlctl.references import BandLimitedNoise
 from ..metrics import tracking_metrics
 from .tuning import Tuned, tune
 
-__all__ = ["baselines", "contenders", "sensor", "tuned"]
+__all__ = ["baselines", "compared_controllers", "sensor", "tuned"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +81,7 @@ GAINS = {
 }
 
 
-def contenders(example: str) -> dict[str, ct.InputOutputSystem]:
+def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
     """Return every controller of an example by label, the paper's first.
 
     Parameters

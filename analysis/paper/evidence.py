@@ -19,31 +19,31 @@ from ..lyapunov.assumptions import assumptions
 from ..lyapunov.bounds.premises import premises
 from ..lyapunov.certificate.certify import Certificate, certify
 from ..lyapunov.conservatism import Conservatism, conservatism
-from ..lyapunov.examination import compile_ahead as examine_ahead
+from ..lyapunov.examination import compile_examination_ahead as examine_ahead
 from ..lyapunov.examination import examine
 from ..lyapunov.inequalities import inequalities, terms
 from ..lyapunov.ledger import Ledger, ledger
 from ..lyapunov.loop.signals import Margin
 from ..lyapunov.nussbaum.energy import signal
 from ..lyapunov.nussbaum.long_run import LOOKS, LongRun, long_run
-from ..lyapunov.nussbaum.slow_drift import Creep
+from ..lyapunov.nussbaum.slow_drift import SlowDrift
 from ..metrics import peak
-from .controllers import contenders
+from .controllers import compared_controllers
 from .reference_run import continued, read_record
 
 __all__ = [
-    "FAR",
+    "FAR_HORIZONS",
     "LOOK",
     "Evidence",
-    "compile_ahead",
+    "compile_evidence_ahead",
     "evidence",
     "far_runs_in_background",
     "known_sign",
 ]
 
 SPLIT = {"example_1": (0.6, 1.3)}  # bounds of the dead zone's k that make eps_u* small
-LOOK = min(LOOKS)  # s; from so much of a run the creep of zeta is told
-FAR = {  # key of a run far beyond 20 s: what it is, and its horizon (s)
+LOOK = min(LOOKS)  # s; from so much of a run the slow drift of zeta is told
+FAR_HORIZONS = {  # key of a run far beyond 20 s: what it is, and its horizon (s)
     "2": ("Example 2 as published", 9_600.0),
     "1": ("Example 1 as printed, cos(w(t) t)", 1_000.0),
     "1-integral": ("Example 1 with the phase ∫ w dt", 1_000.0),
@@ -58,7 +58,7 @@ class Evidence:
     ----------
     ledger : Ledger
     conservatism : Conservatism
-    creep : Creep
+    slow_drift : SlowDrift
         Told from the first 200 s.
     certificate : Certificate
         Of the same plant and actuator with the law that knows the sign of the gain.
@@ -73,7 +73,7 @@ class Evidence:
 
     ledger: Ledger
     conservatism: Conservatism
-    creep: Creep
+    slow_drift: SlowDrift
     certificate: Certificate
     certified_max_r: float
     t: np.ndarray = field(repr=False)
@@ -102,7 +102,7 @@ def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
     return Evidence(
         ledger=ledger(study),
         conservatism=conservatism(study),
-        creep=long_run(loop, LOOK, rtol=1e-7).predictions[0],
+        slow_drift=long_run(loop, LOOK, rtol=1e-7).predictions[0],
         certificate=certify(tame, k=SPLIT.get(str(loop.name))),
         certified_max_r=_max_r(tame, s.t),
         t=s.t,
@@ -119,7 +119,7 @@ def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
     )
 
 
-def compile_ahead(loop: ct.InterconnectedSystem) -> None:
+def compile_evidence_ahead(loop: ct.InterconnectedSystem) -> None:
     """Compile the diagrams that `evidence` runs besides the example itself."""
     examine_ahead(loop)
     native.compile_ahead(compiled(known_sign(loop)))
@@ -133,12 +133,12 @@ def _max_r(loop: ct.InterconnectedSystem, times: np.ndarray) -> float:
 def known_sign(loop: ct.InterconnectedSystem) -> ct.InterconnectedSystem:
     """Return an example with the law that knows the sign of the gain, and gains that suit it."""
     name = str(loop.name)
-    return paper.EXAMPLES[name](controller=contenders(name)["certified"])
+    return paper.EXAMPLES[name](controller=compared_controllers(name)["certified"])
 
 
 @contextmanager
 def far_runs_in_background(*, whole: bool = False) -> Iterator[Future[dict[str, LongRun]]]:
-    """Run the loops of `FAR` in a thread while the body goes on; an early exit ends the runs.
+    """Run `FAR_HORIZONS` in a thread while the body goes on; an early exit ends the runs.
 
     Example 2 is run as far as its burst is foretold from, and goes on with the record of
     `analysis.paper.reference_run`; with `whole` it is run to its burst, which takes minutes.
@@ -162,7 +162,7 @@ def _far_runs(stop: Event, whole: bool) -> dict[str, LongRun]:
         if stop.is_set():
             raise InterruptedError
 
-    ends = {key: end for key, (_, end) in FAR.items()}
+    ends = {key: end for key, (_, end) in FAR_HORIZONS.items()}
     if not whole:
         ends["2"] = max(LOOKS)
     with ThreadPoolExecutor(2) as pool:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from nlctl.functions import nussbaum
 
 from ..figures.axes import BLUE, GREY, TIME, draw_lines, set_style, stacked_axes
-from . import TAIL, Run
+from . import TAIL, CaseRun
 
 __all__ = [
     "actuator_path",
@@ -33,12 +33,12 @@ def _one(time: np.ndarray, curves: Mapping[str, np.ndarray], label: str) -> Figu
     return figure
 
 
-def tracking(run: Run) -> Figure:
+def tracking(run: CaseRun) -> Figure:
     """Output y against the reference yd."""
     return _one(run.time, {"$y$": run.signals["y"], "$y_d$": run.signals["yd"]}, "output")
 
 
-def tracking_error(run: Run) -> Figure:
+def tracking_error(run: CaseRun) -> Figure:
     """Tracking error e1, with the largest one of the last half marked."""
     figure, (ax,) = stacked_axes()
     bound = run.metrics["tail_max_e"]
@@ -56,20 +56,20 @@ def tracking_error(run: Run) -> Figure:
     return figure
 
 
-def upper_states(run: Run) -> Figure:
+def upper_states(run: CaseRun) -> Figure:
     """The states x2, ..., xn."""
     numbers = [i for i in range(2, 10) if f"x{i}" in run.signals]
     curves = {f"$x_{i}$": run.signals[f"x{i}"] for i in numbers}
     return _one(run.time, curves, "state " + ", ".join(curves))
 
 
-def control_input(run: Run) -> Figure:
+def control_input(run: CaseRun) -> Figure:
     """Control input u and what the actuator makes of it, v."""
     curves = {"$u$": run.signals["u"], "$v$": run.signals["v"]}
     return _one(run.time, curves, "input $u$, actuator output $v$")
 
 
-def actuator_path(run: Run) -> Figure:
+def actuator_path(run: CaseRun) -> Figure:
     """The part of the actuator's characteristic that was travelled: v over u."""
     figure = Figure(figsize=(4.6, 3.6), layout="constrained")
     ax = figure.subplots()
@@ -83,7 +83,7 @@ def actuator_path(run: Run) -> Figure:
     return figure
 
 
-def nussbaum_gain(run: Run) -> Figure:
+def nussbaum_gain(run: CaseRun) -> Figure:
     """The argument zeta, and the gain N(zeta) that it gives."""
     figure, (top, bottom) = stacked_axes(rows=2, height=1.9)
     zeta = run.signals["zeta"]
@@ -94,13 +94,13 @@ def nussbaum_gain(run: Run) -> Figure:
     return figure
 
 
-def adaptation(run: Run) -> Figure:
+def adaptation(run: CaseRun) -> Figure:
     """Norm of the network's weights, and the estimate delta_hat."""
     curves = {"$\\|\\hat W\\|$": run.signals["W_norm"], "$\\hat\\delta$": run.signals["delta_hat"]}
     return _one(run.time, curves, ", ".join(curves))
 
 
-def error_comparison(runs: Sequence[Run], labels: Sequence[str]) -> Figure:
+def error_comparison(runs: Sequence[CaseRun], labels: Sequence[str]) -> Figure:
     """Tracking errors of up to four runs above each other."""
     curves = dict(zip(labels, (run.signals["e"] for run in runs), strict=True))
     return _one(runs[0].time, curves, "tracking error $e_1$")

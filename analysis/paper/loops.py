@@ -16,11 +16,11 @@ from nlctl.actuators import Backlash, DeadZone, Gain, Saturation, cascade
 from nlctl.diagrams import interconnect
 from nlctl.names import unknown
 
-from .controllers import contenders, sensor
+from .controllers import compared_controllers, sensor
 
 __all__ = ["example_1", "example_2", "true_error"]
 
-WIDE = 1e6  # a saturation beyond every |u| of a run that is worth keeping
+_WIDE = 1e6  # a saturation beyond every |u| of a run that is worth keeping
 
 
 def example_1(
@@ -28,7 +28,7 @@ def example_1(
     controller: Any = "paper",
     actuator: Any = None,
     gain: float = 1.0,
-    limit: float = WIDE,
+    limit: float = _WIDE,
     noise: float | None = None,
 ) -> ct.InterconnectedSystem:
     """Example 1 with another controller, gain, saturation or noise.
@@ -36,7 +36,7 @@ def example_1(
     Parameters
     ----------
     controller : str, record or control.InputOutputSystem, optional
-        A label of `contenders.contenders`, or a controller.
+        A label of `controllers.compared_controllers`, or a controller.
     actuator : record, optional
         The ``body`` of the cascade; the example's by default.
     gain : float, optional
@@ -44,7 +44,7 @@ def example_1(
     limit : float, optional
         Largest |u| that passes; none by default.
     noise : float, optional
-        RMS of measurement noise on each state, see `contenders.sensor`; without it there is no
+        RMS of measurement noise on each state, see `controllers.sensor`; without it there is no
         sensor, with 0 there is one whose ``sensor.rms`` and ``sensor.seed`` may be varied.
 
     Returns
@@ -66,7 +66,7 @@ def example_2(
     controller: Any = "paper",
     actuator: Any = None,
     gain: float = 1.0,
-    limit: float = WIDE,
+    limit: float = _WIDE,
     noise: float | None = None,
 ) -> ct.InterconnectedSystem:
     """Example 2 with another controller, gain, saturation or noise; see `example_1`."""
@@ -99,7 +99,7 @@ def _loop(
     example: str, body: Any, controller: Any, gain: float, limit: float, noise: float | None
 ) -> ct.InterconnectedSystem:
     if isinstance(controller, str):
-        known = contenders(example)
+        known = compared_controllers(example)
         if controller not in known:
             raise unknown("controller", controller, known)
         controller = known[controller]

@@ -14,8 +14,8 @@ from .reproduction import sample_times
 
 __all__ = ["numerics"]
 
-REFERENCE = ("tsit5", 1e-10)
-OTHERS = (("tsit5", 1e-9), ("tsit5", 1e-8), ("rodas5p", 1e-8))  # the report's own is the first
+_REFERENCE = ("tsit5", 1e-10)
+_OTHERS = (("tsit5", 1e-9), ("tsit5", 1e-8), ("rodas5p", 1e-8))  # the report's own is the first
 
 
 def numerics() -> pd.DataFrame:
@@ -30,8 +30,8 @@ def numerics() -> pd.DataFrame:
     """
     rows = []
     for case in (c for c in CASES if c.group == "published"):
-        best = _signals(case, *REFERENCE)
-        for method, rtol in OTHERS:
+        best = _signals(case, *_REFERENCE)
+        for method, rtol in _OTHERS:
             apart = np.max(np.abs(_signals(case, method, rtol) - best), axis=1)
             row = {"case": case.key, "method": method, "rtol": rtol}
             rows.append(row | {"e": float(apart[0]), "zeta": float(apart[1])})

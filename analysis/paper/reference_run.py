@@ -13,18 +13,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..lyapunov.nussbaum.long_run import LOOKS, SIGNALS, LongRun
+from ..lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LOOKS, LongRun
 
-__all__ = ["AGREE", "RECORD", "agreed", "continued", "read_record", "thinned", "write_record"]
+__all__ = ["AGREE", "RECORD", "agreed", "continued", "read_record", "thinned_run", "write_record"]
 
 RECORD = Path(__file__).with_name("example-2-burst.csv")
 TOLERANCES = (1e-6, 1e-7)  # relative; the record is of the second
 AGREE = 5.0  # s; bursts at two tolerances differ by less
-WINDOW = 4 * np.pi  # s; period of the paper's reference: one row in each, where |e| is largest
-LAST, STEP, PER_DECADE = 100.0, 0.5, 60  # s, s; the last seconds by time left until the end
+_WINDOW = 4 * np.pi  # s; period of the paper's reference: one row in each, where |e| is largest
+LAST, _STEP, PER_DECADE = 100.0, 0.5, 60  # s, s; the last seconds by time left until the end
 
 
-def thinned(run: LongRun) -> LongRun:
+def thinned_run(run: LongRun) -> LongRun:
     """Return a run with fewer samples, which its figure and its `burst` and `calm` do not miss.
 
     Kept are the largest \\|e\\| of each period, the two samples around the burst, one in half a
@@ -32,11 +32,11 @@ def thinned(run: LongRun) -> LongRun:
     at which predictions are made.
     """
     time, error = run.time, np.abs(run.signals["e"])
-    number = np.floor(time / WINDOW).astype(int)
+    number = np.floor(time / _WINDOW).astype(int)
     starts = np.flatnonzero(np.diff(number, prepend=-1))
     ends = [*starts[1:], time.size]
     peaks = [a + int(np.argmax(error[a:b])) for a, b in zip(starts, ends, strict=True)]
-    left = np.concatenate([np.arange(LAST, 1.0, -STEP), np.geomspace(1.0, 1e-5, 5 * PER_DECADE)])
+    left = np.concatenate([np.arange(LAST, 1.0, -_STEP), np.geomspace(1.0, 1e-5, 5 * PER_DECADE)])
     late = np.searchsorted(time, time[-1] - left)
     cross = np.searchsorted(run.signals["zeta"], run.lobe.high) + np.array([-1, 0])
     calm = np.searchsorted(time, run.burst - 1.0, "right") - 1
@@ -67,9 +67,9 @@ def agreed(run: LongRun, other: LongRun) -> LongRun:
 def write_record(run: LongRun, path: Path = RECORD) -> None:
     """Write a run as CSV; the first line says what it is, in JSON."""
     about = {name: getattr(run, name) for name in ("loop", "horizon", "rtol", "lost", "again")}
-    rows = np.column_stack([run.time, *(run.signals[name] for name in SIGNALS)])
-    names = ",".join(["time", *SIGNALS])
-    formats = ["%.6f", *["%.7g"] * len(SIGNALS)]
+    rows = np.column_stack([run.time, *(run.signals[name] for name in LONG_RUN_SIGNALS)])
+    names = ",".join(["time", *LONG_RUN_SIGNALS])
+    formats = ["%.6f", *["%.7g"] * len(LONG_RUN_SIGNALS)]
     header = f"{json.dumps(about)}\n{names}"
     np.savetxt(path, rows, fmt=formats, delimiter=",", header=header, comments="# ")
 
@@ -79,7 +79,7 @@ def read_record(beginning: LongRun, path: Path = RECORD) -> LongRun:
     with path.open(encoding="utf-8") as file:
         about = json.loads(file.readline().removeprefix("# "))
         time, *rows = np.loadtxt(file, delimiter=",").T
-    signals = dict(zip(SIGNALS, rows, strict=True))
+    signals = dict(zip(LONG_RUN_SIGNALS, rows, strict=True))
     about["again"] = about["again"] and tuple(about["again"])
     return replace(beginning, time=time, signals=signals, **about)
 
@@ -107,7 +107,7 @@ def continued(beginning: LongRun, record: LongRun) -> LongRun:
     return replace(record, time=np.append(beginning.time, record.time[later]), signals=signals)
 
 
-def main() -> None:
+def _main() -> None:
     """Make the record again, the two runs side by side."""
     from nlctl import paper
 
@@ -117,9 +117,9 @@ def main() -> None:
         waiting = [pool.submit(long_run, paper.example_2(), rtol=rtol) for rtol in TOLERANCES]
         other, run = (each.result() for each in waiting)
     made = agreed(run, other)
-    write_record(thinned(made))
+    write_record(thinned_run(made))
     print(f"{made}\n{RECORD}: the predictions need {max(LOOKS):g} s of a run and are not kept")
 
 
 if __name__ == "__main__":
-    main()
+    _main()

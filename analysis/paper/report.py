@@ -21,7 +21,7 @@ from ..lyapunov.nussbaum.long_run import LongRun
 from ..report.document import Report, Section
 from ..report.svg import Drawn, draw_ahead
 from ..robustness import prepare
-from ..robustness.runs.experiment import compile_ahead as compile_experiment
+from ..robustness.runs.experiment import compile_experiment_ahead as compile_experiment
 from ..studies import load_result, read_study, run, shipped
 from ..studies.folder import remove_run
 from ..studies.page.redrawn import loop_again, rows_again
@@ -32,13 +32,13 @@ from .numerics import numerics
 from .page.proof import lyapunov_sections
 from .page.report import paper_report, paper_sections
 from .page.text import PUBLISHED
-from .reproduction import Run, checks, run_all
-from .reproduction import compile_ahead as compile_cases
+from .reproduction import CaseRun, checks, run_all
+from .reproduction import compile_cases_ahead as compile_cases
 
 __all__ = [
     "QUICK",
     "Composed",
-    "Watch",
+    "ProgressWatch",
     "clear",
     "compose",
     "proof",
@@ -49,7 +49,7 @@ __all__ = [
 QUICK = ("example-1-quick", "example-2-quick")
 """The studies of the report, of those that come with nlctl."""
 
-Watch = Callable[[str, float], AbstractContextManager[Callable[[float], object]]]
+ProgressWatch = Callable[[str, float], AbstractContextManager[Callable[[float], object]]]
 """``watch(what, total)`` is entered around a part of the work; what it gives is called with how
 much more of `total` is done."""
 
@@ -89,13 +89,13 @@ class _Here(Executor):
         return made
 
 
-def reproduction(watch: Watch = _unwatched) -> list[Section]:
+def reproduction(watch: ProgressWatch = _unwatched) -> list[Section]:
     """Run both examples, and return the report's first part: their figures and numbers.
 
     Parameters
     ----------
     watch : callable, optional
-        See `Watch`.
+        See `ProgressWatch`.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def reproduction(watch: Watch = _unwatched) -> list[Section]:
 def proof(
     horizon: float = HORIZON,
     far: Mapping[str, LongRun] | None = None,
-    watch: Watch = _unwatched,
+    watch: ProgressWatch = _unwatched,
 ) -> list[Section]:
     """Check the proof for both examples, and return the report's second part.
 
@@ -121,7 +121,7 @@ def proof(
     far : mapping of str to LongRun, optional
         Runs far beyond that, see `evidence.far_runs_in_background`.
     watch : callable, optional
-        See `Watch`.
+        See `ProgressWatch`.
     """
     return lyapunov_sections(_proved(horizon, watch), far)
 
@@ -162,7 +162,7 @@ def compose(
     whole: bool = False,
     threads: int | None = None,
     beside: Executor | None = None,
-    watch: Watch = _unwatched,
+    watch: ProgressWatch = _unwatched,
     tell: Callable[[str], object] = _untold,
 ) -> Composed:
     """Reproduce the paper, check its proof, run the studies, and compose the report of it all.
@@ -185,7 +185,7 @@ def compose(
     beside : concurrent.futures.Executor, optional
         One other process, for the other core; by default all runs in this one.
     watch, tell : callable, optional
-        See `Watch` and `robustness`.
+        See `ProgressWatch` and `robustness`.
 
     Raises
     ------
@@ -231,7 +231,7 @@ def clear(folder: Path, studies: Sequence[str] = QUICK, *, force: bool = False) 
             remove_run(folder / name, force=force)
 
 
-def _proved(horizon: float, watch: Watch) -> dict[int, proofs.Evidence]:
+def _proved(horizon: float, watch: ProgressWatch) -> dict[int, proofs.Evidence]:
     found = {}
     with watch("checking the proof", 2) as advance:
         for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
@@ -251,8 +251,12 @@ def _far_away(far: bool, whole: bool) -> Iterator[Future[dict[str, LongRun]]]:
 
 
 def _runs(
-    beside: Executor, folder: Path, studies: Sequence[str], threads: int | None, watch: Watch
-) -> tuple[dict[str, Run], list[Future[Any]]]:
+    beside: Executor,
+    folder: Path,
+    studies: Sequence[str],
+    threads: int | None,
+    watch: ProgressWatch,
+) -> tuple[dict[str, CaseRun], list[Future[Any]]]:
     """Run the paper's cases; return them, and what runs in the other process meanwhile.
 
     That is the studies, and last the numerics.  Both processes need the integrators: where nothing
@@ -274,8 +278,8 @@ def _run_shipped(names: Sequence[str], folder: Path, threads: int | None) -> Non
 
 def _compile_ahead(studies: Sequence[str]) -> None:
     """Compile what is needed besides the integrators, first what the other process needs late."""
-    proofs.compile_ahead(paper.example_1())
-    proofs.compile_ahead(paper.example_2())
+    proofs.compile_evidence_ahead(paper.example_1())
+    proofs.compile_evidence_ahead(paper.example_2())
     compile_cases(CASES)  # by now the other process has the first two
     for name in studies:
         compile_experiment(prepare(read_study(shipped(name)).experiment))

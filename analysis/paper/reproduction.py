@@ -56,7 +56,7 @@ def _half_unit(printed: str) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class CaseRun:
     """A simulated case: times (s), signals by name, and its metrics by key."""
 
     case: Case
@@ -95,7 +95,7 @@ def sample_times(horizon: float = HORIZON) -> np.ndarray:
     )
 
 
-def run(case: Case) -> Run:
+def run_case(case: Case) -> CaseRun:
     """Simulate a case over the paper's horizon, its diagram compiled to machine code.
 
     The tests compare the published cases with plain python-control.
@@ -111,34 +111,34 @@ def run(case: Case) -> Run:
     return measured(case, response.time, dict(zip(diagram.output_labels, response.y, strict=True)))
 
 
-def measured(case: Case, time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Run:
+def measured(case: Case, time: np.ndarray, signals: Mapping[str, np.ndarray]) -> CaseRun:
     """Return a run with its metrics, whatever simulated it."""
     metrics = {m.key: m.function(*over(time, signals[m.signal], m.start, m.end)) for m in METRICS}
-    return Run(case=case, time=time, signals=signals, metrics=metrics)
+    return CaseRun(case=case, time=time, signals=signals, metrics=metrics)
 
 
 def run_all(
     cases: Iterable[Case], *, done: Callable[[Case], object] | None = None
-) -> dict[str, Run]:
+) -> dict[str, CaseRun]:
     """Simulate cases and return them by key, in order.
 
     `done` is called with each case when it is finished.
     """
     results = {}
     for case in cases:
-        results[case.key] = run(case)
+        results[case.key] = run_case(case)
         if done is not None:
             done(case)
     return results
 
 
-def compile_ahead(cases: Iterable[Case]) -> None:
+def compile_cases_ahead(cases: Iterable[Case]) -> None:
     """Compile the diagrams of cases, which otherwise happens when they are run."""
     for case in cases:
         native.compile_ahead(compile(case.diagram))
 
 
-def checks(runs: Mapping[str, Run]) -> list[Check]:
+def checks(runs: Mapping[str, CaseRun]) -> list[Check]:
     """Compare runs with the figures to reach; cases that were not run are left out."""
     by_key = {m.key: m for m in METRICS}
     return [

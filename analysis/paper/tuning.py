@@ -15,7 +15,7 @@ from ..metrics import Metric
 
 __all__ = ["Tuned", "tune"]
 
-REFUSED = 1e6  # cost of gains that break the limit, beyond every cost that a run can have
+_REFUSED = 1e6  # cost of gains that break the limit, beyond every cost that a run can have
 LOST = 1e3  # what counts as the excess of a run that did not reach its end
 
 
@@ -91,13 +91,13 @@ def tune(
         ).table
         runs += len(table)
         excess = np.fmin(np.maximum(table[limited.key].to_numpy() / limit - 1, 0), LOST)
-        return np.where(excess > 0, REFUSED * (1 + excess), table[cost.key].to_numpy())
+        return np.where(excess > 0, _REFUSED * (1 + excess), table[cost.key].to_numpy())
 
     found = differential_evolution(
         costs, np.log(np.array(list(bounds.values()))), maxiter=generations, popsize=10, tol=1e-6,
         polish=False, vectorized=True, updating="deferred", rng=seed,
     )  # fmt: skip
-    if not found.fun < REFUSED:
+    if not found.fun < _REFUSED:
         raise ParameterError(
             f"no gains keep {limited.key} <= {limit:g} within these bounds: widen them"
         )

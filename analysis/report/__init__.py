@@ -1,7 +1,7 @@
 """Reports: sections as data, one template, one self-contained page."""
 
 from .browser import write_pdf
-from .compare import compare
+from .compare import compare_contents
 from .document import Claim, Equation, Figure, History, Paragraph, Report, Section, Table
 from .gallery import write_gallery
 from .render import file_hashes, render_html, render_json, write_report
@@ -15,7 +15,7 @@ __all__ = [
     "Report",
     "Section",
     "Table",
-    "compare",
+    "compare_contents",
     "file_hashes",
     "render_html",
     "render_json",

@@ -17,7 +17,7 @@ from nlctl.host.files import replace_file
 __all__ = ["find_browser", "open_page", "write_pdf"]
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-PATIENCE = 300  # s after which it is looked at whether the browser does anything
+BROWSER_TIMEOUT = 300  # s after which it is looked at whether the browser does anything
 BUSY = 1.0  # s of CPU time in that time are a sign of life, also on a machine with other work
 FLAGS = (
     *("--headless", "--disable-gpu", "--disable-quic", "--no-first-run"),
@@ -91,11 +91,11 @@ def _run_while_busy(command: list[str], errors: Path) -> str:
     try:
         while True:
             try:
-                process.wait(PATIENCE)
+                process.wait(BROWSER_TIMEOUT)
             except subprocess.TimeoutExpired:
                 before, spent = spent, _cpu_time(process.pid)
                 if spent - before < BUSY:
-                    return f"no sign of work for {PATIENCE} s"
+                    return f"no sign of work for {BROWSER_TIMEOUT} s"
             else:
                 told = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
                 return (told or ["no message"])[-1]

@@ -17,7 +17,7 @@ from nlctl.errors import ParameterError, UsageError
 from .outline import sort_key
 from .page import PARTS
 
-__all__ = ["Difference", "compare", "read_report"]
+__all__ = ["Difference", "compare_contents", "read_report"]
 
 ABSENT = "absent"
 FOLDER = re.compile(r"\b(nlctl (?:replay|report|run)) (?:'[^']*'|\"[^\"]*\"|[^\s'\"])+")
@@ -35,7 +35,7 @@ class Difference:
         return f"{self.where}: {self.first} -> {self.second}"
 
 
-def compare(
+def compare_contents(
     first: str | os.PathLike[str], second: str | os.PathLike[str], rtol: float = 0.0
 ) -> list[Difference]:
     """Compare what two reports claim, measure and list.

@@ -10,7 +10,7 @@ from .document import History
 
 __all__ = ["chart", "thinned"]
 
-COUNT = 2000  # samples of each signal on the page
+_COUNT = 2000  # samples of each signal on the page
 DIGITS = 6
 
 
@@ -31,7 +31,7 @@ def chart(history: History) -> dict[str, Any]:
     }
 
 
-def thinned(signals: np.ndarray, count: int = COUNT) -> np.ndarray:
+def thinned(signals: np.ndarray, count: int = _COUNT) -> np.ndarray:
     """Choose the samples that show what long signals do.
 
     Half of them are evenly spaced.  The others are the least and the largest value of each

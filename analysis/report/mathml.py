@@ -50,11 +50,11 @@ IGNORED = frozenset(["mathbackground", "mathcolor", "xmlns"])  # the page has it
 ACCENTS = {"^": "ˆ", "~": "˜", "¯": "¯", "˙": "˙", "¨": "¨", "→": "→"}
 UPRIGHT = frozenset("ΓΔΘΛΞΠΣΥΦΨΩ")
 COMBINING = {"ˆ": "\u0302", "˜": "\u0303", "¯": "\u0304", "˙": "\u0307", "¨": "\u0308"}
-BINARY = frozenset("=≤≥<>+−-∈±→")
-SIGNS = frozenset("+−±-")
-CLOSING = frozenset(")]}⟩‖|!…")
+_BINARY = frozenset("=≤≥<>+−-∈±→")
+_SIGNS = frozenset("+−±-")
+_CLOSING = frozenset(")]}⟩‖|!…")
 OPERANDS = frozenset(["mfrac", "mi", "mn", "mover", "msqrt", "msub", "msubsup", "msup"])
-THIN, WIDE = "0.167em", "0.8em"
+THIN, _WIDE = "0.167em", "0.8em"
 FUNCTION = re.compile("[A-Za-z]{2,}")
 
 
@@ -96,7 +96,7 @@ def _letters(element: ElementTree.Element) -> str:
     text = element.text or ""
     if element.tag == "mo" and text == ",":
         return ", "
-    spaced = element.tag == "mo" and text in BINARY and element.get("form") != "prefix"
+    spaced = element.tag == "mo" and text in _BINARY and element.get("form") != "prefix"
     row = f" {text} " if spaced else text + "".join(parts)
     return f"−{row[3:]}" if row.startswith(" − ") and parts else row  # the sign of the first term
 
@@ -154,7 +154,7 @@ def _accent(element: ElementTree.Element) -> None:
         if element[0].tag == "mi":
             element[1].set("stretchy", "false")
     if element.tag in ("msup", "msubsup"):
-        lean = {"mover": THIN, "∫": WIDE}.get(element[0].text or element[0].tag)
+        lean = {"mover": THIN, "∫": _WIDE}.get(element[0].text or element[0].tag)
         if lean:
             high = ElementTree.Element("mrow")
             high.extend([ElementTree.Element("mspace", width=lean), element[-1]])
@@ -168,7 +168,7 @@ def _set_row(row: ElementTree.Element) -> None:
     parts = list(row)
     for place in range(len(parts) - 1, 0, -1):
         before, here = parts[place - 1], parts[place]
-        if here.tag == "mo" and here.text in SIGNS and _opens(before):
+        if here.tag == "mo" and here.text in _SIGNS and _opens(before):
             here.set("form", "prefix")
         name, last = _name(here), _name(before)
         if (name and before.tag not in ("mo", "mspace")) or (last and here.tag in OPERANDS):
@@ -176,7 +176,7 @@ def _set_row(row: ElementTree.Element) -> None:
 
 
 def _opens(element: ElementTree.Element) -> bool:
-    return element.tag == "mo" and element.text not in CLOSING
+    return element.tag == "mo" and element.text not in _CLOSING
 
 
 def _name(element: ElementTree.Element) -> bool:

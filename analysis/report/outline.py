@@ -16,19 +16,19 @@ import numpy as np
 from .document import Claim, Figure, History, Item, Report, Section, Table
 
 __all__ = [
-    "Cell",
     "Placed",
+    "TableCell",
+    "_shown",
     "cells",
     "claim_status",
-    "evidence",
+    "evidence_anchors",
     "is_long",
     "is_short",
     "kind",
     "light",
     "meanings",
     "numeric",
-    "place",
-    "shown",
+    "place_anchors",
     "sort_key",
     "summary",
 ]
@@ -36,8 +36,8 @@ __all__ = [
 SHELL = frozenset(
     ["claims", "contents", "provenance", "files", "lead", "lead-title", "lead-desc"]
 )  # anchors of the page itself
-LONG = 32  # characters of a word that must be broken to fit a column
-SHORT = 24  # characters of a text that stays on one line
+_LONG = 32  # characters of a word that must be broken to fit a column
+_SHORT = 24  # characters of a text that stays on one line
 
 # Statuses by the look of their badge.  What is proved never looks like what is sampled.
 LIGHTS = {
@@ -68,7 +68,7 @@ _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in s
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell:
+class TableCell:
     """One cell of a table as shown: text, number to sort by, look of its badge."""
 
     text: str
@@ -86,7 +86,7 @@ class Placed:
     items: Sequence[tuple[str, str, Item]]
 
 
-def place(report: Report) -> list[Placed]:
+def place_anchors(report: Report) -> list[Placed]:
     """Give sections, tables, figures and histories anchors that nothing else on the page has."""
     taken = set(SHELL)
     taken |= {name for name in ("methods", "limits", "references") if getattr(report, name)}
@@ -103,7 +103,7 @@ def place(report: Report) -> list[Placed]:
     return placed
 
 
-def evidence(placed: Sequence[Placed]) -> Mapping[str, str]:
+def evidence_anchors(placed: Sequence[Placed]) -> Mapping[str, str]:
     """Return the anchor of each key that a claim may name; a section's wins over a figure's."""
     figures = {i.key: a for p in placed for a, _, i in p.items if isinstance(i, Figure)}
     return figures | {p.section.key: p.anchor for p in reversed(placed)}
@@ -130,7 +130,7 @@ def _anchor(key: str, taken: set[str], endings: Sequence[str]) -> str:
     return name
 
 
-def cells(table: Table) -> list[list[Cell]]:
+def cells(table: Table) -> list[list[TableCell]]:
     """Return the rows of a table as they are shown, all of one length."""
     width = max([len(table.columns), *map(len, table.rows)])
     titles = [*table.columns, *[""] * (width - len(table.columns))]
@@ -159,24 +159,24 @@ def numeric(table: Table) -> list[bool]:
     ]
 
 
-def _cell(value: Any, is_status: bool) -> Cell:
-    text = shown(value)
+def _cell(value: Any, is_status: bool) -> TableCell:
+    text = _shown(value)
     if is_status:
-        return Cell(text=text, badge=light(text))
-    return Cell(text=text, value=sort_key(value))
+        return TableCell(text=text, badge=light(text))
+    return TableCell(text=text, value=sort_key(value))
 
 
 def is_long(text: str) -> bool:
     """Whether a text has a word that no column is wide enough for."""
-    return max(map(len, text.split()), default=0) > LONG
+    return max(map(len, text.split()), default=0) > _LONG
 
 
 def is_short(text: str) -> bool:
     """Whether a text is better not broken into lines."""
-    return len(text) <= SHORT
+    return len(text) <= _SHORT
 
 
-def shown(value: Any) -> str:
+def _shown(value: Any) -> str:
     """Return a cell's text: numbers with the digits that a reader can use."""
     if isinstance(value, float | np.floating):
         return f"{value:.6g}"

@@ -20,7 +20,7 @@ from nlctl.host.files import replace_file
 
 from .mathml import font_face, inline, mathml
 from .outline import cells, claim_status, is_long, is_short, numeric
-from .typography import pieces, plain
+from .typography import pieces, plain_text
 
 __all__ = [
     "PARTS",
@@ -91,7 +91,7 @@ def _environment() -> Environment:
         "mathml": mathml,
         "numeric": numeric,
         "pieces": pieces,
-        "plain": plain,
+        "plain": plain_text,
     }
     return environment
 

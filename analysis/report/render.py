@@ -21,14 +21,14 @@ from nlctl.errors import ParameterError
 from ..json_values import as_json
 from .document import Figure, History, Item, Report, Table
 from .history import chart
-from .outline import evidence, kind, meanings, place, summary
+from .outline import evidence_anchors, kind, meanings, place_anchors, summary
 from .page import check_report_folder, fill, to_bytes, write_files
 from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
 
 __all__ = ["file_hashes", "render_html", "render_json", "write_report"]
 
 DRAWN = ("figure", "time", "signals")  # curves are on the page only
-TITLES = {
+_TITLES = {
     "methods": "How it was found",
     "limits": "Limits of validity",
     "references": "References",
@@ -55,7 +55,7 @@ def render_html(
     drawn : mapping, optional
         Figures that are drawn already, see `analysis.report.svg.draw_ahead`.
     """
-    placed = place(report)
+    placed = place_anchors(report)
     light, told = summary(report.claims)
     items = {anchor: item for part in placed for anchor, _, item in part.items}
     figures = {} if report.lead is None else {"lead": report.lead}
@@ -80,8 +80,8 @@ def render_html(
         placed=placed,
         drawings=drawings,
         shapes=shapes_svg(shapes),
-        evidence=evidence(placed),
-        extra={k: t for k, t in TITLES.items() if getattr(report, k) or k == "provenance"},
+        evidence=evidence_anchors(placed),
+        extra={k: t for k, t in _TITLES.items() if getattr(report, k) or k == "provenance"},
         light=light,
         told=told,
         margins=any(claim.margin for claim in report.claims),
@@ -112,7 +112,7 @@ def render_json(report: Report) -> str:
                 "title": part.section.title,
                 "items": [_plain(item) for _, _, item in part.items],
             }
-            for part in place(report)
+            for part in place_anchors(report)
         },
         "numbers": report.numbers,
         "command": report.command,

@@ -20,7 +20,7 @@ from nlctl.drawing import picture
 
 from ..figures import axes
 from .document import Figure, Section
-from .typography import plain
+from .typography import plain_text
 
 __all__ = ["compact", "draw_ahead", "shapes_svg", "shared_shape", "short_path", "svg", "svg_files"]
 
@@ -28,7 +28,7 @@ __all__ = ["compact", "draw_ahead", "shapes_svg", "shared_shape", "short_path", 
 THEME = {
     "#000000": "currentColor",
     picture.INK: "currentColor",
-    picture.GREY: "var(--soft)",
+    picture.WIRE_GREY: "var(--soft)",
     picture.FILL: "var(--panel)",
     axes.GREY: "var(--soft)",
     axes.BLUE.lower(): "var(--blue)",
@@ -36,8 +36,8 @@ THEME = {
     axes.GREEN.lower(): "var(--green)",
     axes.PURPLE.lower(): "var(--purple)",
 }
-SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": 9.0}
-WIDE, BROAD = 400.0, 560.0  # points; as wide as the text, and as wide as the page
+_SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": 9.0}
+_WIDE, BROAD = 400.0, 560.0  # points; as wide as the text, and as wide as the page
 DECIMALS = re.compile(r"-?\d+\.\d{2,}")
 PLACE = re.compile(r"translate\([^)]*\)|^[-\d.]+$")
 TAG = re.compile(r"<(\w+)")
@@ -81,7 +81,7 @@ def draw_ahead(sections: Iterable[Section], until: Callable[[], bool]) -> Drawn:
 
 def _svg_file(figure: MatplotlibFigure) -> bytes:
     buffer = io.BytesIO()
-    with mpl.rc_context(SETTINGS):
+    with mpl.rc_context(_SETTINGS):
         figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
     return buffer.getvalue()
 
@@ -114,12 +114,12 @@ def svg(figure: Figure, file: bytes, key: str, shapes: dict[str, str]) -> Markup
     compact(root, shapes)
     attributes = {"role": "img", "aria-labelledby": f"{key}-title {key}-desc"}
     width = float(root.get("width", "0pt").removesuffix("pt"))
-    if width > WIDE:
+    if width > _WIDE:
         attributes["class"] = "broad" if width > BROAD else "wide"
     root.attrib = attributes | {k: v for k, v in root.attrib.items() if k != "version"}
     title = ElementTree.Element("title", id=f"{key}-title")
     description = ElementTree.Element("desc", id=f"{key}-desc")
-    title.text, description.text = plain(figure.caption), plain(figure.description)
+    title.text, description.text = plain_text(figure.caption), plain_text(figure.description)
     root[:] = [title, description, *root]
     return Markup(ElementTree.tostring(root, encoding="unicode"))
 
@@ -198,10 +198,10 @@ def _local(name: str) -> str:
 
 
 DECIMALS = re.compile(r"-?\d+\.\d{2,}")
-NUMBER = re.compile(r"-?\d+(?:\.\d*)?")
+_NUMBER = re.compile(r"-?\d+(?:\.\d*)?")
 CURVED = re.compile("[CQ]")
 PLACE = re.compile(r"translate\((-?[\d.]+)[ ,](-?[\d.]+)\)")
-STRAIGHT = re.compile(r"M[^MLCQz]*L?[^MLCQz]*")
+_STRAIGHT = re.compile(r"M[^MLCQz]*L?[^MLCQz]*")
 INITIAL = {"stroke-linejoin": "miter", "stroke-dashoffset": "0"}  # what SVG has without them
 FRAME = {"x", "y", "transform", "href", "clip-path"}  # of a mark: where it is; the rest is how
 
@@ -274,9 +274,9 @@ def _join_lines(parent: Element) -> None:
     first: dict[tuple[tuple[str, str], ...], Element] = {}
     for child in list(parent):
         d = child.get("d", "")
-        if child.tag != "path" or not STRAIGHT.fullmatch(" ".join(d.split())):
+        if child.tag != "path" or not _STRAIGHT.fullmatch(" ".join(d.split())):
             continue
-        if len(NUMBER.findall(d)) != 4 or "stroke-dasharray" in child.attrib:
+        if len(_NUMBER.findall(d)) != 4 or "stroke-dasharray" in child.attrib:
             continue
         look = tuple((k, v) for k, v in child.attrib.items() if k != "d")
         if look in first:
@@ -326,7 +326,7 @@ def short_path(path: str) -> str:
     here = (0, 0)
     told = ""
     for part in re.findall(r"[MLz][^MLz]*", path):
-        numbers = [round(10 * float(n)) for n in NUMBER.findall(part)]
+        numbers = [round(10 * float(n)) for n in _NUMBER.findall(part)]
         told += {"M": "m", "L": "l" if told.endswith("z") else "", "z": "z"}[part[0]]
         for x, y in zip(numbers[::2], numbers[1::2], strict=True):
             told += _tenths(x - here[0], told) + _tenths(y - here[1], "0")

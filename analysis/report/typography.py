@@ -1,7 +1,8 @@
 """Text as it is set in print: minus signs, powers, units that stay with their number, formulas.
 
 Whatever a report says is plain text; a formula inside it is written as LaTeX between ``\\(`` and
-``\\)``.  `pieces` says what the page shows of it, `plain` how it reads where only text can stand.
+``\\)``.  `pieces` says what the page shows of it, `plain_text` how it reads where only text can
+stand.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from .mathml import spoken
 
-__all__ = ["Piece", "in_print", "pieces", "plain"]
+__all__ = ["Piece", "in_print", "pieces", "plain_text"]
 
 NO_BREAK = "\u00a0"
 UNITS = (
@@ -92,6 +93,6 @@ def pieces(text: str) -> list[Piece]:
     return [piece for piece in found if piece != Piece()]
 
 
-def plain(text: str) -> str:
+def plain_text(text: str) -> str:
     """Return a text whose formulas are written in letters, for titles and descriptions."""
     return in_print(FORMULA.sub(lambda found: spoken(found[1]), text))

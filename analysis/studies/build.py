@@ -49,7 +49,7 @@ __all__ = [
     "times",
 ]
 
-MOST_SAMPLES = 10_000_000
+_MOST_SAMPLES = 10_000_000
 METRIC = ("key", "signals", "unit", "meaning", "function", "start", "end")
 SIGNALS = ("error", "control", "actuated", "weights", "gain")
 
@@ -117,9 +117,9 @@ def times(study: Study) -> np.ndarray:
         If the step is no whole part of the end, or far too short.
     """
     end, step = study.time.end, study.time.step
-    if end / step > MOST_SAMPLES:
+    if end / step > _MOST_SAMPLES:
         raise ParameterError(
-            f"a run has at most {MOST_SAMPLES:,} samples, got {end:g} s / {step:g} s"
+            f"a run has at most {_MOST_SAMPLES:,} samples, got {end:g} s / {step:g} s"
         )
     count = round(end / step)
     if count < 2 or abs(count * step - end) > 1e-9 * end:

@@ -52,8 +52,8 @@ __all__ = [
     "save_finding",
 ]
 
-OWN = ("study.toml", "run.json", "results.json", "rows", ".lock", ".owner")
-OWN += ("index.html", "report.json", "report.pdf")
+_OWN = ("study.toml", "run.json", "results.json", "rows", ".lock", ".owner")
+_OWN += ("index.html", "report.json", "report.pdf")
 METRIC_COLUMNS = ("key", "signal", "unit", "meaning")
 
 
@@ -123,7 +123,7 @@ def remove_run(folder: Path, *, force: bool = False) -> None:
         If it holds something else, and `force` is False.
     """
     if not force:
-        known = {*OWN, *keyed(load_study(folder))} if (folder / "study.toml").exists() else set()
+        known = {*_OWN, *keyed(load_study(folder))} if (folder / "study.toml").exists() else set()
         others = sorted(p.name for p in folder.iterdir() if p.name not in known)
         if others:
             raise RunFolderError(

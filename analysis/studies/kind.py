@@ -51,7 +51,7 @@ __all__ = [
     "unanswered",
 ]
 
-NAME = re.compile(r"[a-z][a-z0-9]*([ -][a-z0-9]+)*")
+_NAME = re.compile(r"[a-z][a-z0-9]*([ -][a-z0-9]+)*")
 
 
 class Asked(Strict):
@@ -258,7 +258,7 @@ class Kind:
     witness: Callable[[Finding], tuple[Mapping[str, Any], float]] | None = None
 
     def __post_init__(self) -> None:
-        if not NAME.fullmatch(self.name):
+        if not _NAME.fullmatch(self.name):
             raise ParameterError(
                 f"Kind needs a name of lower-case words and digits, got {self.name!r}"
             )

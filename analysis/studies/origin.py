@@ -27,7 +27,7 @@ __all__ = [
     "version_differences",
 ]
 
-MOST = 4  # differences that a sentence names
+_MOST = 4  # differences that a sentence names
 
 
 def origin_of(file: StudyFile, prepared: Prepared) -> dict[str, Any]:
@@ -104,8 +104,8 @@ def loop_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 
 
 def _listed(texts: Sequence[str]) -> str:
-    more = f"; and {len(texts) - MOST} more" if len(texts) > MOST else ""
-    return "; ".join(texts[:MOST]) + more
+    more = f"; and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
+    return "; ".join(texts[:_MOST]) + more
 
 
 def _settings(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:

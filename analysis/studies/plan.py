@@ -17,9 +17,9 @@ from .kind import Setup
 
 __all__ = ["Plan", "plan"]
 
-TIMED = 32
+_TIMED = 32
 """Rows that are run to see how long one takes."""
-NUMBER = 8
+_NUMBER = 8
 """Bytes of one number on disk; compression makes it less."""
 
 
@@ -76,14 +76,14 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
         runs=runs,
         at_most=tuple(at_most),
         seconds=sum(runs.values()) * _seconds(prepared, study.study.seed, threads),
-        size=float(NUMBER * width * kept),
+        size=float(_NUMBER * width * kept),
     )
 
 
 def _seconds(prepared: Prepared, seed: int, threads: int | None) -> float:
     """Return the time of one row when many are run."""
-    table: pd.DataFrame = independent(prepared.experiment.space, TIMED, seed).table
+    table: pd.DataFrame = independent(prepared.experiment.space, _TIMED, seed).table
     evaluate(prepared, table.iloc[:1], threads=threads)  # compiled once
     start = time.perf_counter()
     evaluate(prepared, table, threads=threads)
-    return (time.perf_counter() - start) / TIMED
+    return (time.perf_counter() - start) / _TIMED

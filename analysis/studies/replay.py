@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures.axes import BLUE, ORANGE, TIME, stacked_axes
 from analysis.robustness import Experiment, Prepared, evaluate, prepare
-from analysis.robustness.runs.experiment import by_diagram, simulate
+from analysis.robustness.runs.experiment import by_diagram, simulate_rows
 from analysis.robustness.stl.formula import Band, parts_of
 from nlctl.errors import ParameterError
 
@@ -26,7 +26,7 @@ from .sealed import RunFolderError, as_json, origin_key
 
 __all__ = ["Replay", "replay", "replay_figure"]
 
-MOST = 8  # panels of a figure
+_MOST = 8  # panels of a figure
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -150,7 +150,7 @@ def _same(one: Any, other: Any) -> bool:
 def _signals(prepared: Prepared, row: pd.DataFrame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return all outputs of a row over time."""
     ((loop, _),) = by_diagram(prepared, row)
-    found = simulate(prepared.experiment, loop, row, keep=loop.system.output_labels)
+    found = simulate_rows(prepared.experiment, loop, row, keep=loop.system.output_labels)
     return found.time, {name: samples[0] for name, samples in found.signals.items()}
 
 
@@ -168,7 +168,7 @@ def replay_figure(made: Replay) -> Figure:
                 bounds.setdefault(band.signal, set()).update(ends)
         for signal in requirement.signals:
             texts.setdefault(signal, []).append(f"{requirement.key}: {requirement.formula}")
-    names = [*bounds, *(name for name in made.signals if name not in bounds)][:MOST]
+    names = [*bounds, *(name for name in made.signals if name not in bounds)][:_MOST]
     figure, axes = stacked_axes(rows=len(names), height=1.7)
     for ax, name in zip(axes, names, strict=True):
         ax.plot(made.time, made.signals[name], color=BLUE, linewidth=1.2)

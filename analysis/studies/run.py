@@ -37,7 +37,7 @@ from .sealed import RunFolderError, origin_key, write_json
 
 __all__ = ["Reopened", "Watch", "reopened", "rerun_file", "run"]
 
-OWN = (
+_OWN = (
     ".lock",
     ".owner",
     "..owner.",
@@ -247,7 +247,7 @@ def _claim(file: StudyFile, folder: Path, resume: bool, force: bool) -> None:
                 "another folder with --out"
             )
         return
-    others = sorted(p.name for p in folder.iterdir() if not p.name.startswith(OWN))
+    others = sorted(p.name for p in folder.iterdir() if not p.name.startswith(_OWN))
     if others and not force:
         told = ", ".join(others[:3]) + (", ..." if len(others) > 3 else "")
         raise RunFolderError(

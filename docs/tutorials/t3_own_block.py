@@ -54,7 +54,7 @@ class Peak:
 
     inputs, outputs, states, feedthrough = ("u",), ("v",), ("largest",), True
     memory = ("largest",)
-    initial = {"largest": -10.0}  # noqa: RUF012
+    initial = {"largest": -10.0}
 
     @staticmethod
     @nlctl.equation

@@ -1,4 +1,4 @@
-"""The paper's controller: its blocks, joined."""
+"""The paper's controller: its blocks, connected."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def adaptive_neural(
         `NussbaumLaw` with the values of Example 1 (lambdas of (s+1)^(n-1) for n > 2).  Replace
         any by a block with the same signals, or by `Zero` to leave it out.
     name : str, optional
-        Name of the joined controller; parameters are then ``"controller.law.beta"`` or, where
+        Name of the connected controller; parameters are then ``"controller.law.beta"`` or, where
         that is unambiguous, ``"law.beta"``.
 
     Returns

@@ -1,4 +1,4 @@
-"""Nussbaum laws with another zeta' than (24), against the creep of zeta.
+"""Nussbaum laws with another zeta' than (24), against the slow drift of zeta.
 
 By (23), (24) N(zeta) zeta' = r u: zeta drifts as long as r u has a mean, and where it passes a
 zero of N the loop loses its sign.  These blocks have the signals of `NussbaumLaw` and stand in

@@ -8,14 +8,14 @@ from itertools import pairwise
 from math import ceil, floor, inf
 from statistics import fmean
 
-from .order import Plan, side
+from .order import LayoutPlan, side
 from .records import (
+    EXTERNAL,
     GRID,
-    LANE,
-    OUTSIDE,
+    LANE_WIDTH,
     ROW_GAP,
     Heights,
-    Node,
+    LayoutNode,
 )
 
 
@@ -36,7 +36,7 @@ def _up(value: float) -> float:
     return GRID * ceil(value / GRID - 1e-9)
 
 
-def _outlets(plan: Plan, n: int) -> tuple[dict[int, float], float]:
+def _outlets(plan: LayoutPlan, n: int) -> tuple[dict[int, float], float]:
     """Heights of a block's outlets below its axis, and half the height that they need.
 
     Wires to the next column leave on the axis, those to the channels outside of them; the
@@ -53,31 +53,31 @@ def _outlets(plan: Plan, n: int) -> tuple[dict[int, float], float]:
     label = plan.nodes[n].outlet
     if label.text:
         ways = [way for way, _ in rank.values()]  # where it keeps the box small
-        rank[OUTSIDE] = (-1 if 0 in ways and 2 in ways and -2 not in ways else 1, 0)
+        rank[EXTERNAL] = (-1 if 0 in ways and 2 in ways and -2 not in ways else 1, 0)
     order = sorted(rank, key=lambda i: (rank[i], i))
-    room = {i: (plan.wires[i].label.h + 3, 5.0) for i in order if i != OUTSIDE}
-    room[OUTSIDE] = (label.h / 2 + 3, label.h / 2 + 3)
+    room = {i: (plan.wires[i].label.h + 3, 5.0) for i in order if i != EXTERNAL}
+    room[EXTERNAL] = (label.h / 2 + 3, label.h / 2 + 3)
     at: dict[int, float] = dict.fromkeys(order[:1], 0.0)
     for above, below in pairwise(order):
         at[below] = _up(at[above] + room[above][1] + room[below][0])
-    on_axis = [at[i] for i in order if rank[i][0] == 0] or [at[i] for i in order if i == OUTSIDE]
+    on_axis = [at[i] for i in order if rank[i][0] == 0] or [at[i] for i in order if i == EXTERNAL]
     ends = on_axis or list(at.values()) or [0.0]
     axis = GRID * round((ends[0] + ends[-1]) / 2 / GRID)
     need = [max(room[i][0] + axis - at[i], at[i] - axis + room[i][1]) for i in order]
     return {i: at[i] - axis for i in order}, max(need, default=0.0)
 
 
-def _inlet_room(node: Node, i: int) -> float:
+def _inlet_room(node: LayoutNode, i: int) -> float:
     """Height of the slot of an arrow that enters a block."""
-    return 2 * GRID if i != OUTSIDE else 2 * _up(node.inlet.h / 2 + 2)
+    return 2 * GRID if i != EXTERNAL else 2 * _up(node.inlet.h / 2 + 2)
 
 
-def _centres(plan: Plan, leave: Heights, half: Sequence[float]) -> list[float]:
+def _centres(plan: LayoutPlan, leave: Heights, half: Sequence[float]) -> list[float]:
     """Heights of the boxes: each is drawn towards its neighbours, in the order of its column."""
     pulls: list[list[tuple[int, float]]] = [[] for _ in plan.nodes]
     stacks: dict[tuple[int, int], list[int]] = {}
     for (n, i), offset in leave.items():
-        for t in plan.wires[i].targets if i != OUTSIDE else ():
+        for t in plan.wires[i].targets if i != EXTERNAL else ():
             if (i, plan.places[t].column) not in plan.channel:
                 pulls[t].append((n, offset))
                 pulls[n].append((t, -offset))
@@ -105,17 +105,17 @@ def _spread(wish: Sequence[float], gaps: Sequence[float]) -> list[float]:
 
 
 def _bands(
-    plan: Plan, centre: Sequence[float], half: Sequence[float]
+    plan: LayoutPlan, centre: Sequence[float], half: Sequence[float]
 ) -> tuple[list[float], dict[tuple[int, int], float], float]:
     """Shift of each band down the page, heights of the channels' lanes, height of the page."""
     bands = 1 + max(place.band for place in plan.places)
     y, shift, lane_y = 0.0, [], {}
     for k in range(bands + 1):
         rows = {key: row for key, row in plan.lane.items() if key[1] == k}
-        depth = (max(rows.values()) + 1) * LANE + ROW_GAP / 2 if rows else 0.0
+        depth = (max(rows.values()) + 1) * LANE_WIDTH + ROW_GAP / 2 if rows else 0.0
         depth = _up(max(ROW_GAP, depth + ROW_GAP / 2) if 0 < k < bands else depth)
         for key, row in rows.items():
-            inset = ROW_GAP / 2 + row * LANE
+            inset = ROW_GAP / 2 + row * LANE_WIDTH
             lane_y[key] = y + (depth - inset if k == 0 else inset)
         y += depth
         if k < bands:
@@ -125,7 +125,7 @@ def _bands(
     return shift, lane_y, y
 
 
-def _half_for_inlets(plan: Plan, n: int) -> float:
+def _half_for_inlets(plan: LayoutPlan, n: int) -> float:
     """Half the height of a box in which the main inlets stand on the axis."""
     room: dict[int, float] = {-2: 0.0, -1: 0.0, 0: 0.0, 2: 0.0}
     for i, (way, _) in plan.inlets[n].items():
@@ -137,7 +137,7 @@ def _half_for_inlets(plan: Plan, n: int) -> float:
 
 
 def _straightened(
-    plan: Plan,
+    plan: LayoutPlan,
     centre: Sequence[float],
     half: Sequence[float],
     offset: Heights,
@@ -172,14 +172,16 @@ def _straightened(
     return y
 
 
-def _inlets(plan: Plan, n: int, centre: float, half: float, leave: Heights) -> dict[int, float]:
+def _inlets(
+    plan: LayoutPlan, n: int, centre: float, half: float, leave: Heights
+) -> dict[int, float]:
     """Heights of the arrows into a block: straight ones if possible, never at a rival's height."""
     rank = plan.inlets[n]
     wish = {i: leave[plan.wires[i].source, i] for i, group in rank.items() if group == (0, 0)}
     order = sorted(rank, key=lambda i: (rank[i], wish.get(i, 0.0), i))
     room = {i: _inlet_room(plan.nodes[n], i) for i in order}
     if order and not wish:
-        wish[OUTSIDE if OUTSIDE in rank else order[len(order) // 2]] = centre
+        wish[EXTERNAL if EXTERNAL in rank else order[len(order) // 2]] = centre
     for above, below in reversed(list(pairwise(order))):
         if below in wish:
             wish.setdefault(above, wish[below] - (room[above] + room[below]) / 2)
@@ -188,19 +190,19 @@ def _inlets(plan: Plan, n: int, centre: float, half: float, leave: Heights) -> d
     place, taken = plan.places[n], {}
     for (m, i), y in leave.items():
         other = plan.places[m]
-        if i != OUTSIDE and (other.band, other.column) == (place.band, place.column - 1):
+        if i != EXTERNAL and (other.band, other.column) == (place.band, place.column - 1):
             taken[y] = i
     low, rest, at = centre - half, sum(room.values()), {}
     for i in order:
         rest -= room[i]
         high = centre + half - rest - room[i] / 2 - GRID
         y = max(_up(low + room[i] / 2), min(high, GRID * round(wish[i] / GRID)))
-        at[i] = y + GRID / 2 if i != OUTSIDE and taken.get(y, i) != i else y
+        at[i] = y + GRID / 2 if i != EXTERNAL and taken.get(y, i) != i else y
         low = at[i] + room[i] / 2 - GRID / 2
     return at
 
 
-def all_heights(plan: Plan) -> HeightMap:
+def all_heights(plan: LayoutPlan) -> HeightMap:
     """All vertical coordinates of a diagram."""
     offset: dict[tuple[int, int], float] = {}
     half: list[float] = []

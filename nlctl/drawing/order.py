@@ -8,16 +8,16 @@ from graphlib import TopologicalSorter
 from statistics import fmean
 
 from .records import (
-    OUTSIDE,
+    EXTERNAL,
+    GridCell,
+    LayoutNode,
     Links,
-    Node,
-    Place,
     Wire,
 )
 
 
 @dataclass(frozen=True)
-class Plan:
+class LayoutPlan:
     """All that is decided before the first coordinate.
 
     ``channel[wire, gutter]`` is the channel that brings a wire to a gutter other than the one it
@@ -26,9 +26,9 @@ class Plan:
     from top to bottom; it is (0, 0) for those straight from the column before.
     """
 
-    nodes: Sequence[Node]
+    nodes: Sequence[LayoutNode]
     wires: Sequence[Wire]
-    places: Sequence[Place]
+    places: Sequence[GridCell]
     channel: Mapping[tuple[int, int], int]
     spans: Mapping[tuple[int, int], Sequence[int]]
     lane: Mapping[tuple[int, int], int]
@@ -110,11 +110,14 @@ def layers(count: int, links: Links, entries: set[int]) -> list[list[int]]:
 
 
 def make_plan(
-    nodes: Sequence[Node], wires: Sequence[Wire], ordered: Sequence[Sequence[int]], columns: int
-) -> Plan:
+    nodes: Sequence[LayoutNode],
+    wires: Sequence[Wire],
+    ordered: Sequence[Sequence[int]],
+    columns: int,
+) -> LayoutPlan:
     """Write the layers into bands of `columns` each and choose the arrows' channels."""
     cells = {
-        n: Place(rank // columns, rank % columns, (row + 0.5) / len(layer))
+        n: GridCell(rank // columns, rank % columns, (row + 0.5) / len(layer))
         for rank, layer in enumerate(ordered)
         for row, n in enumerate(layer)
     }
@@ -122,17 +125,17 @@ def make_plan(
     channel = _channels(wires, places)
     spans = _spans(wires, places, channel)
     inlets: list[dict[int, tuple[int, int]]] = [
-        {OUTSIDE: (-1, 0)} if node.inlet.text else {} for node in nodes
+        {EXTERNAL: (-1, 0)} if node.inlet.text else {} for node in nodes
     ]
     for i, wire in enumerate(wires):
         home = places[wire.source]
         for t in wire.targets:
             way = side(places[t], home, channel.get((i, places[t].column)))
             inlets[t][i] = (2 * way, -way * abs(places[t].column - home.column - 1))
-    return Plan(nodes, wires, places, channel, spans, _lanes(spans), inlets)
+    return LayoutPlan(nodes, wires, places, channel, spans, _lanes(spans), inlets)
 
 
-def _channels(wires: Sequence[Wire], places: Sequence[Place]) -> dict[tuple[int, int], int]:
+def _channels(wires: Sequence[Wire], places: Sequence[GridCell]) -> dict[tuple[int, int], int]:
     """Channels: feedback runs below the boxes, feedforward above, unless the way is far.
 
     Between bands, a wire changes height at the outer edge of the diagram where it can.
@@ -153,7 +156,7 @@ def _channels(wires: Sequence[Wire], places: Sequence[Place]) -> dict[tuple[int,
 
 
 def _spans(
-    wires: Sequence[Wire], places: Sequence[Place], channel: Mapping[tuple[int, int], int]
+    wires: Sequence[Wire], places: Sequence[GridCell], channel: Mapping[tuple[int, int], int]
 ) -> dict[tuple[int, int], list[int]]:
     """Gutters, from left to right, that ``[wire, channel]`` joins."""
     joined: dict[tuple[int, int], set[int]] = {}
@@ -177,7 +180,7 @@ def _lanes(joined: Mapping[tuple[int, int], list[int]]) -> dict[tuple[int, int],
     return lane
 
 
-def side(place: Place, other: Place, channel: int | None) -> int:
+def side(place: GridCell, other: GridCell, channel: int | None) -> int:
     """-1, 0 or 1: at `place` the wire to or from `other` runs up, straight across, or down."""
     if channel is not None:
         return 1 if channel > place.band else -1

@@ -1,6 +1,7 @@
 """Block diagrams of python-control interconnections, drawn as in a control textbook.
 
-`signal_graph` reads what is joined to what, `lay_out` places it (see `_layout`), `draw` paints it.
+`signal_graph` reads what is connected to what, `lay_out` places it (see `_layout`), `draw` paints
+it.
 """
 
 from __future__ import annotations
@@ -17,16 +18,27 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from .figure import Drawing
-from .records import FONT, Box, Layout, Node, Route, Text, Wire, bundle, measured, strokes
+from .records import (
+    FONT,
+    BlockFrame,
+    Layout,
+    LayoutNode,
+    Route,
+    Text,
+    Wire,
+    bundle,
+    measured_text,
+    strokes,
+)
 from .routes import arrange
 
-WIDTH, MARGIN = 648.0, 12.0  # of the figure, in points
-NAME, SMALL, TITLE = 9.0, 8.0, 11.0  # type sizes
-INK, GREY, FILL = "#16202b", "#5c6670", "#f0f3f7"
+_WIDTH, MARGIN = 648.0, 12.0  # of the figure, in points
+_NAME, _SMALL, TITLE = 9.0, 8.0, 11.0  # type sizes
+INK, WIRE_GREY, FILL = "#16202b", "#5c6670", "#f0f3f7"
 
 
 @dataclass(frozen=True)
-class Block:
+class _Block:
     """A subsystem as it is shown: its name, what it is, its signals."""
 
     name: str
@@ -37,7 +49,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Signal:
+class _Signal:
     """One entry of a connection map: ``gain`` times port `output` goes to port `input`.
 
     `text` is how it is written on the arrow.  Ports count within their block (or among the
@@ -52,15 +64,15 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class Edge:
+class _Edge:
     """All signals from block `source` to block `target`; None stands for the outside."""
 
     source: int | None
     target: int | None
-    signals: tuple[Signal, ...]
+    signals: tuple[_Signal, ...]
 
 
-def signal_graph(diagram: ct.InterconnectedSystem) -> tuple[tuple[Block, ...], tuple[Edge, ...]]:
+def signal_graph(diagram: ct.InterconnectedSystem) -> tuple[tuple[_Block, ...], tuple[_Edge, ...]]:
     """Read the blocks of a diagram and the signals between them.
 
     Parameters
@@ -72,7 +84,7 @@ def signal_graph(diagram: ct.InterconnectedSystem) -> tuple[tuple[Block, ...], t
     blocks : tuple of Block
         In the order of ``diagram.syslist``; edges refer to blocks by index.
     edges : tuple of Edge
-        One per pair of blocks that are joined.  Those between blocks hold exactly the non-zero
+        One per pair of blocks that are connected.  Those between blocks hold exactly the non-zero
         entries of ``connect_map``, those from the outside ``input_map``, to it ``output_map``.
 
     Raises
@@ -99,10 +111,10 @@ def signal_graph(diagram: ct.InterconnectedSystem) -> tuple[tuple[Block, ...], t
     return blocks, tuple(edges)
 
 
-def _block(system: Any, name: str) -> Block:
+def _block(system: Any, name: str) -> _Block:
     nested = isinstance(system, ct.InterconnectedSystem)
     signals = tuple(system.input_labels), tuple(system.output_labels)
-    return Block(name, _kind(system), nested, *signals)
+    return _Block(name, _kind(system), nested, *signals)
 
 
 def _kind(system: Any) -> str:
@@ -126,9 +138,9 @@ def _times(gain: float, name: str) -> str:
     return name if gain == 1 else f"-{name}" if gain == -1 else f"{gain:g} {name}"
 
 
-def _edges(gains: np.ndarray, sources: Sequence[Any], targets: Sequence[Any]) -> list[Edge]:
+def _edges(gains: np.ndarray, sources: Sequence[Any], targets: Sequence[Any]) -> list[_Edge]:
     """Bundle the non-zero `gains` (targets by sources) by the blocks that they join."""
-    bundles: dict[tuple[int | None, int | None], list[Signal]] = {}
+    bundles: dict[tuple[int | None, int | None], list[_Signal]] = {}
     for column, row in np.argwhere(np.asarray(gains).T):
         (source, output, name), (target, port, wanted) = sources[column], targets[row]
         gain = float(gains[row, column])
@@ -136,8 +148,8 @@ def _edges(gains: np.ndarray, sources: Sequence[Any], targets: Sequence[Any]) ->
         if target is None:  # an external output has a name of its own
             alone = np.count_nonzero(gains[row]) == 1
             text = wanted if gain == 1 and alone else f"{wanted} = {text}" + " + ..." * (not alone)
-        bundles.setdefault((source, target), []).append(Signal(text, gain, output, port))
-    return [Edge(*ends, tuple(signals)) for ends, signals in bundles.items()]
+        bundles.setdefault((source, target), []).append(_Signal(text, gain, output, port))
+    return [_Edge(*ends, tuple(signals)) for ends, signals in bundles.items()]
 
 
 def lay_out(diagram: ct.InterconnectedSystem) -> Layout:
@@ -163,14 +175,14 @@ def lay_out(diagram: ct.InterconnectedSystem) -> Layout:
             outside[("in", edge.target) if edge.source is None else ("out", edge.source)] = names
     nodes = []
     for n, block in enumerate(blocks):
-        name, kind = measured(block.name, NAME, "bold"), measured(block.kind, SMALL)
-        ends = [measured(bundle(outside.get((way, n), ())), SMALL) for way in ("in", "out")]
-        nodes.append(Node(max(name.w + 16, kind.w + 16, 56.0), name.h + kind.h + 16, *ends))
+        name, kind = measured_text(block.name, _NAME, "bold"), measured_text(block.kind, _SMALL)
+        ends = [measured_text(bundle(outside.get((way, n), ())), _SMALL) for way in ("in", "out")]
+        nodes.append(LayoutNode(max(name.w + 16, kind.w + 16, 56.0), name.h + kind.h + 16, *ends))
     wires = [
-        Wire(source, tuple(ends), measured(bundle(names), SMALL))
+        Wire(source, tuple(ends), measured_text(bundle(names), _SMALL))
         for (source, names), ends in targets.items()
     ]
-    return arrange(nodes, wires, WIDTH - 2 * MARGIN)
+    return arrange(nodes, wires, _WIDTH - 2 * MARGIN)
 
 
 def draw(
@@ -180,7 +192,7 @@ def draw(
 
     Signals between the same two blocks share an arrow; ``-y`` and ``2 y`` carry their gain.
     Feedback runs below the boxes, feedforward above, external signals are grey.  A dot marks
-    where an arrow branches; lines that cross without a dot are not joined.
+    where an arrow branches; lines that cross without a dot are not connected.
 
     Parameters
     ----------
@@ -203,7 +215,7 @@ def draw(
         If `diagram` is not an interconnection of blocks.
     """
     panels = list(_panels(diagram, title or "", "", expand))
-    width = max([WIDTH, *(panel.layout.width + 2 * MARGIN for panel in panels)])
+    width = max([_WIDTH, *(panel.layout.width + 2 * MARGIN for panel in panels)])
     height = sum(panel.height for panel in panels)
     figure = Drawing(figsize=(width / 72, height / 72), facecolor="white")
     bottom = height
@@ -219,7 +231,7 @@ class _Panel:
     """One diagram of a figure with the words above it."""
 
     head: str
-    blocks: tuple[Block, ...]
+    blocks: tuple[_Block, ...]
     layout: Layout
 
     @property
@@ -244,11 +256,11 @@ def _paint(axes: Axes, panel: _Panel, width: float, *, framed: bool) -> None:
     axes.set_axis_off()
     if framed:
         frame = Rectangle((left + 4, top + 2), width - 8, panel.height - 4)
-        frame.set(fill=False, edgecolor=GREY, linewidth=0.6)
+        frame.set(fill=False, edgecolor=WIRE_GREY, linewidth=0.6)
         axes.add_patch(frame)
     _write(axes, left + MARGIN, top + MARGIN, Text(panel.head), TITLE, weight="bold", ha="left")
     for wire, routes in groupby(panel.layout.routes, key=lambda route: route.wire):
-        _paint_wire(axes, list(routes), GREY if wire is None else INK)
+        _paint_wire(axes, list(routes), WIRE_GREY if wire is None else INK)
     for dot in panel.layout.dots:
         axes.add_patch(Circle(dot, 2.2, color=INK, linewidth=0, zorder=3))
     for block, box in zip(panel.blocks, panel.layout.boxes, strict=True):
@@ -265,21 +277,21 @@ def _paint_wire(axes: Axes, routes: Sequence[Route], colour: str) -> None:
         head.set(facecolor=colour, linewidth=0, zorder=3)
         axes.add_patch(head)
         if label := route.label:
-            _write(axes, label.x, label.y, label.text, SMALL, color=colour)
+            _write(axes, label.x, label.y, label.text, _SMALL, color=colour)
     style = {"colors": colour, "linewidths": 1.0, "capstyle": "projecting"}
     axes.add_collection(LineCollection(strokes(shafts), **style), autolim=False)
 
 
-def _paint_box(axes: Axes, block: Block, box: Box) -> None:
+def _paint_box(axes: Axes, block: _Block, box: BlockFrame) -> None:
     """A box with its name and kind in the middle; a double line where there is more inside."""
     for inset in (0.0, 2.5)[: 1 + block.nested]:
         outline = Rectangle((box.x + inset, box.y + inset), box.w - 2 * inset, box.h - 2 * inset)
         outline.set(facecolor=FILL, edgecolor=INK, linewidth=1.2 - 0.2 * inset, zorder=2)
         axes.add_patch(outline)
-    name, kind = measured(block.name, NAME, "bold"), measured(block.kind, SMALL)
+    name, kind = measured_text(block.name, _NAME, "bold"), measured_text(block.kind, _SMALL)
     middle, top = box.x + box.w / 2, box.y + (box.h - name.h - kind.h) / 2
-    _write(axes, middle - name.w / 2, top, name, NAME, weight="bold")
-    _write(axes, middle - kind.w / 2, top + name.h, kind, SMALL, color=GREY)
+    _write(axes, middle - name.w / 2, top, name, _NAME, weight="bold")
+    _write(axes, middle - kind.w / 2, top + name.h, kind, _SMALL, color=WIRE_GREY)
 
 
 def _write(

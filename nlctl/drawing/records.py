@@ -12,9 +12,9 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
 
 FONT = "DejaVu Sans"  # comes with matplotlib, so a figure is the same on every machine
-GRID, LANE, STUB, ROW_GAP, APART = 8.0, 9.0, 16.0, 24.0, 48.0
-OUTSIDE = -1  # in place of a wire: the arrow from or to the outside
-Point = tuple[float, float]
+GRID, LANE_WIDTH, STUB, ROW_GAP, APART = 8.0, 9.0, 16.0, 24.0, 48.0
+EXTERNAL = -1  # in place of a wire: the arrow from or to the outside
+_Point = tuple[float, float]
 Links = set[tuple[int, int]]  # (source, target)
 Heights = Mapping[tuple[int, int], float]  # [block, wire]
 
@@ -29,7 +29,7 @@ class Text:
 
 
 @dataclass(frozen=True)
-class Node:
+class LayoutNode:
     """What the layout knows of a block: its smallest size, its external inputs and outputs."""
 
     w: float
@@ -48,7 +48,7 @@ class Wire:
 
 
 @dataclass(frozen=True)
-class Place:
+class GridCell:
     """Cell of a block; `share` runs from 0 (top of its column) to 1 (bottom)."""
 
     band: int
@@ -57,7 +57,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Box:
+class BlockFrame:
     """Rectangle of a block; `x, y` is its upper left corner."""
 
     x: float
@@ -82,7 +82,7 @@ class Route:
     The routes of one wire start together; the first of them carries the label.
     """
 
-    points: tuple[Point, ...]
+    points: tuple[_Point, ...]
     label: Label | None
     source: int | None
     target: int | None
@@ -95,9 +95,9 @@ class Layout:
 
     width: float
     height: float
-    boxes: tuple[Box, ...]
+    boxes: tuple[BlockFrame, ...]
     routes: tuple[Route, ...]
-    dots: tuple[Point, ...]
+    dots: tuple[_Point, ...]
 
 
 def bundle(names: Sequence[str], letters: int = 14) -> str:
@@ -135,21 +135,21 @@ def _successor(name: str) -> str | None:
     return parts and f"{parts[1]}{int(parts[2]) + 1}{parts[3]}"
 
 
-def measured(text: str, size: float, weight: str = "normal") -> Text:
+def measured_text(text: str, size: float, weight: str = "normal") -> Text:
     """Text in `FONT` with its size on paper."""
     font, lines = FontProperties(family=FONT, size=size, weight=weight), text.split("\n")
     widths = [text_to_path.get_text_width_height_descent(s, font, False)[0] for s in lines if s]
     return Text(text, max(widths, default=0.0), 1.25 * size * len(lines) if text else 0.0)
 
 
-def strokes(routes: Sequence[Route]) -> list[tuple[Point, Point]]:
+def strokes(routes: Sequence[Route]) -> list[tuple[_Point, _Point]]:
     """Straight pen strokes that draw some routes, each stretch once though they share it."""
     lines: dict[tuple[int, float], list[tuple[float, float]]] = {}
     for start, end in [pair for route in routes for pair in pairwise(route.points)]:
         along = int(start[0] == end[0])
         span = min(start[along], end[along]), max(start[along], end[along])
         lines.setdefault((along, start[1 - along]), []).append(span)
-    drawn: list[tuple[Point, Point]] = []
+    drawn: list[tuple[_Point, _Point]] = []
     for (along, at), spans in lines.items():
         merged: list[list[float]] = []
         for low, high in sorted(spans):

@@ -15,16 +15,16 @@ from dataclasses import dataclass
 from math import ceil
 
 from .heights import HeightMap, all_heights
-from .order import Plan, layers, make_plan
+from .order import LayoutPlan, layers, make_plan
 from .records import (
     APART,
-    LANE,
-    OUTSIDE,
+    EXTERNAL,
+    LANE_WIDTH,
     STUB,
-    Box,
+    BlockFrame,
     Label,
     Layout,
-    Node,
+    LayoutNode,
     Route,
     Wire,
 )
@@ -40,14 +40,16 @@ class _Gutter:
     right: float
 
 
-def _joints(plan: Plan, heights: HeightMap, g: int) -> dict[int, tuple[set[float], set[float]]]:
+def _joints(
+    plan: LayoutPlan, heights: HeightMap, g: int
+) -> dict[int, tuple[set[float], set[float]]]:
     """Heights at which each wire joins its lane in gutter `g` from the left and the right."""
     joints: dict[int, tuple[set[float], set[float]]] = {}
     for (n, i), y in heights.leave.items():
-        if i != OUTSIDE and plan.places[n].column + 1 == g:
+        if i != EXTERNAL and plan.places[n].column + 1 == g:
             joints.setdefault(i, (set(), set()))[0].add(y)
     for (n, i), y in heights.enter.items():
-        if i != OUTSIDE and plan.places[n].column == g:
+        if i != EXTERNAL and plan.places[n].column == g:
             joints.setdefault(i, (set(), set()))[1].add(y)
     for (i, k), gutters in plan.spans.items():
         if g in gutters:
@@ -83,17 +85,17 @@ def _lanes_in_gutter(joints: Mapping[int, tuple[set[float], set[float]]]) -> dic
 
 def _run(lane: Mapping[int, int]) -> float:
     """Width of the lanes of a gutter."""
-    return LANE * (1 + max(lane.values(), default=-1))
+    return LANE_WIDTH * (1 + max(lane.values(), default=-1))
 
 
-def _gutters(plan: Plan, heights: HeightMap, widths: Sequence[float], page: float):
+def _gutters(plan: LayoutPlan, heights: HeightMap, widths: Sequence[float], page: float):
     """Horizontal coordinates, with the space left over on the page given to the gutters."""
     last, parts = len(widths), []
     for g in range(last + 1):
         before = [n for n, place in enumerate(plan.places) if place.column == g - 1]
         behind = [n for n, place in enumerate(plan.places) if place.column == g]
         lead = [wire.label.w + 14 for wire in plan.wires if wire.source in before]
-        tail = [STUB for (n, i) in heights.enter if i != OUTSIDE and n in behind] + [0.0]
+        tail = [STUB for (n, i) in heights.enter if i != EXTERNAL and n in behind] + [0.0]
         names_out = [plan.nodes[n].outlet.w for n in before if plan.nodes[n].outlet.text]
         names_in = [plan.nodes[n].inlet.w for n in behind if plan.nodes[n].inlet.text]
         # The outermost gutters have the names outside of the lanes, so that signals come
@@ -109,13 +111,13 @@ def _gutters(plan: Plan, heights: HeightMap, widths: Sequence[float], page: floa
     x, gutters = 0.0, []
     for g, (lead, lane, tail) in enumerate(parts):
         start = x + lead + (slack if 0 < g < last else 0.0)
-        lanes = {i: start + (k + 0.5) * LANE for i, k in lane.items()}
+        lanes = {i: start + (k + 0.5) * LANE_WIDTH for i, k in lane.items()}
         gutters.append(_Gutter(x, start, lanes, start + _run(lane) + tail))
         x = gutters[-1].right + (widths[g] if g < last else 0.0)
     return gutters
 
 
-def _path(plan: Plan, heights: HeightMap, gutters: Sequence[_Gutter], i: int, t: int):
+def _path(plan: LayoutPlan, heights: HeightMap, gutters: Sequence[_Gutter], i: int, t: int):
     """Corners of wire `i` from its source to target `t`."""
     source, column = plan.wires[i].source, plan.places[t].column
     first, final = gutters[plan.places[source].column + 1], gutters[column]
@@ -134,7 +136,7 @@ def _path(plan: Plan, heights: HeightMap, gutters: Sequence[_Gutter], i: int, t:
     return tuple(corners)
 
 
-def _wire_routes(plan: Plan, heights: HeightMap, gutters: Sequence[_Gutter]) -> list[Route]:
+def _wire_routes(plan: LayoutPlan, heights: HeightMap, gutters: Sequence[_Gutter]) -> list[Route]:
     """Arrows between blocks; the name stands above the first stretch."""
     routes = []
     for i, wire in enumerate(plan.wires):
@@ -150,25 +152,27 @@ def _wire_routes(plan: Plan, heights: HeightMap, gutters: Sequence[_Gutter]) -> 
     return routes
 
 
-def _outside_routes(plan: Plan, heights: HeightMap, gutters: Sequence[_Gutter]) -> list[Route]:
+def _outside_routes(
+    plan: LayoutPlan, heights: HeightMap, gutters: Sequence[_Gutter]
+) -> list[Route]:
     """Short arrows for the external inputs and outputs of each block."""
     routes = []
     for n, node in enumerate(plan.nodes):
         before, behind = gutters[plan.places[n].column], gutters[plan.places[n].column + 1]
         if node.inlet.text:
-            y, text = heights.enter[n, OUTSIDE], node.inlet
+            y, text = heights.enter[n, EXTERNAL], node.inlet
             x = before.start if before is gutters[0] else before.right - STUB
             label = Label(x - 4 - text.w, y - text.h / 2, text)
             routes.append(Route(((x, y), (before.right, y)), label, None, n))
         if node.outlet.text:
-            y, text, outermost = heights.leave[n, OUTSIDE], node.outlet, behind is gutters[-1]
+            y, text, outermost = heights.leave[n, EXTERNAL], node.outlet, behind is gutters[-1]
             x = max([behind.start, *behind.lanes.values()]) if outermost else behind.left
             label = Label(x + STUB + 4, y - text.h / 2, text)
             routes.append(Route(((behind.left, y), (x + STUB, y)), label, n, None))
     return routes
 
 
-def _dots(plan: Plan, heights: HeightMap, gutters: Sequence[_Gutter]):
+def _dots(plan: LayoutPlan, heights: HeightMap, gutters: Sequence[_Gutter]):
     """Points where at least three stretches of one wire meet."""
     dots = []
     for g, gutter in enumerate(gutters):
@@ -182,7 +186,7 @@ def _dots(plan: Plan, heights: HeightMap, gutters: Sequence[_Gutter]):
     return tuple(dots)
 
 
-def arrange(nodes: Sequence[Node], wires: Sequence[Wire], page: float = 624.0) -> Layout:
+def arrange(nodes: Sequence[LayoutNode], wires: Sequence[Wire], page: float = 624.0) -> Layout:
     """Place the blocks of a diagram and route its wires.
 
     Parameters
@@ -211,7 +215,7 @@ def arrange(nodes: Sequence[Node], wires: Sequence[Wire], page: float = 624.0) -
     return min(tries, key=lambda layout: max(layout.width, page + 1))
 
 
-def _fitted(plan: Plan, page: float) -> Layout:
+def _fitted(plan: LayoutPlan, page: float) -> Layout:
     """Coordinates for a plan."""
     columns = range(1 + max(place.column for place in plan.places))
     cells = list(zip(plan.nodes, plan.places, strict=True))
@@ -219,7 +223,7 @@ def _fitted(plan: Plan, page: float) -> Layout:
     heights = all_heights(plan)
     gutters = _gutters(plan, heights, widths, page)
     boxes = tuple(
-        Box(gutters[place.column].right, y - half, widths[place.column], 2 * half)
+        BlockFrame(gutters[place.column].right, y - half, widths[place.column], 2 * half)
         for y, half, place in zip(heights.centre, heights.half, plan.places, strict=True)
     )
     routes = _wire_routes(plan, heights, gutters) + _outside_routes(plan, heights, gutters)

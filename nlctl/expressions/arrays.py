@@ -118,9 +118,9 @@ class Tracer:
     def __getitem__(self, key: Any) -> Tracer:
         if isinstance(key, np.ndarray | list) and np.ndim(key):
             return self._taken(np.asarray(key))
-        keys = full_key(key, self.ndim)
+        keys = full_index(key, self.ndim)
         if self.axis is None:
-            cells = boxed(self.cells[tuple(keys)])
+            cells = as_array(self.cells[tuple(keys)])
             place = self._place(keys[0]) if len(keys) == 1 else None
             if not cells.shape:
                 return Tracer(self.graph, cells)
@@ -128,7 +128,7 @@ class Tracer:
         position = [i for i, k in enumerate(keys) if k is not None][self.axis]
         before = sum(k is None or isinstance(k, slice) for k in keys[:position])
         along = keys.pop(position)
-        cells = boxed(self.cells[tuple(keys)])
+        cells = as_array(self.cells[tuple(keys)])
         if not isinstance(along, slice):
             k = range(self.length)[along]
             parts = mapped(lambda e: self.graph.item(e, k), cells)
@@ -162,7 +162,7 @@ class Tracer:
         if step == 0 or any(b - a != step for a, b in pairwise(indices)):
             raise Untraceable("many elements at irregular places")
         part = self.graph.part(self.only, start, step, len(indices))
-        return Tracer(self.graph, boxed(part), 0, len(indices))
+        return Tracer(self.graph, as_array(part), 0, len(indices))
 
     def copy(self) -> Tracer:
         """Return a copy."""
@@ -201,7 +201,7 @@ class Tracer:
         if self.ndim != 1:
             raise Untraceable("a large matrix")
         pieces = [(e, 1) for e in self.cells.flat]
-        made = Tracer(self.graph, boxed(self.graph.joined(pieces)), 0, self.size)
+        made = Tracer(self.graph, as_array(self.graph.joined(pieces)), 0, self.size)
         made.watched = (self.values, tuple(self.values.flat))
         return made
 
@@ -217,7 +217,7 @@ class Tracer:
         return self.cells.reshape(-1)[0]
 
 
-def boxed(cells: Any) -> np.ndarray:
+def as_array(cells: Any) -> np.ndarray:
     """Return cells as an array; NumPy hands out a single element as it is."""
     if isinstance(cells, np.ndarray):
         return cells
@@ -227,7 +227,7 @@ def boxed(cells: Any) -> np.ndarray:
 
 
 def mapped(function: Callable[..., Expr], *cells: np.ndarray) -> np.ndarray:
-    return boxed(np.frompyfunc(function, len(cells), 1)(*cells))
+    return as_array(np.frompyfunc(function, len(cells), 1)(*cells))
 
 
 def _stacked(parts: Sequence[np.ndarray], axis: int, shape: tuple[int, ...]) -> np.ndarray:
@@ -236,7 +236,7 @@ def _stacked(parts: Sequence[np.ndarray], axis: int, shape: tuple[int, ...]) -> 
     return np.empty((*shape[:axis], 0, *shape[axis:]), dtype=object)
 
 
-def full_key(key: Any, ndim: int) -> list[Any]:
+def full_index(key: Any, ndim: int) -> list[Any]:
     """Return an index as a list with an entry for every axis."""
     keys = list(key) if isinstance(key, tuple) else [key]
     if any(isinstance(k, list | np.ndarray) or getattr(k, "shape", ()) for k in keys):
@@ -249,9 +249,9 @@ def full_key(key: Any, ndim: int) -> list[Any]:
     return [*keys, *missing]
 
 
-def number(graph: Graph, expr: Expr) -> Tracer:
+def scalar(graph: Graph, expr: Expr) -> Tracer:
     """Return an array without axes that holds one expression."""
-    return Tracer(graph, boxed(expr))
+    return Tracer(graph, as_array(expr))
 
 
 def traced(graph: Graph, value: Any) -> Tracer:
@@ -291,7 +291,9 @@ def _constants(graph: Graph, array: np.ndarray) -> Tracer:
     return Tracer(graph, cells, long[0], array.shape[long[0]])
 
 
-def vector(graph: Graph, array: str, start: int, shape: tuple[int, ...], kind: str = "f") -> Tracer:
+def leaf_vector(
+    graph: Graph, array: str, start: int, shape: tuple[int, ...], kind: str = "f"
+) -> Tracer:
     """Return part of an argument of the program as an array of the given shape."""
     numbers = np.arange(start, start + int(np.prod(shape))).reshape(shape)
     long = [i for i, n in enumerate(shape) if n > SMALL]
@@ -341,4 +343,4 @@ def concatenated(graph: Graph, parts: Sequence[Tracer]) -> Tracer:
             pieces += [(e, 1) for e in part.cells.reshape(-1)]
         else:
             pieces.append((part.only, part.length))
-    return Tracer(graph, boxed(graph.joined(pieces)), 0, size)
+    return Tracer(graph, as_array(graph.joined(pieces)), 0, size)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from .arrays import number
+from .arrays import scalar
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
 from .stage import Stage
@@ -120,5 +120,5 @@ class _Reader:
         if (node.op, i) not in self._partials:
             function = FUNCTIONS[node.op].derivative[i]
             self._partials[node.op, i] = self._stage.copied(function)
-        given = [number(self.graph, self.graph.number(arg)) for arg in node.args]
+        given = [scalar(self.graph, self.graph.number(arg)) for arg in node.args]
         return self._partials[node.op, i](*given).only

@@ -8,10 +8,12 @@ import numpy as np
 
 from .graph import Expr, Untraceable, needed, numpy_function
 
-__all__ = ["evaluate"]
+__all__ = ["evaluate_expressions"]
 
 
-def evaluate(results: Iterable[Expr], arrays: Mapping[str, np.ndarray]) -> list[np.ndarray]:
+def evaluate_expressions(
+    results: Iterable[Expr], arrays: Mapping[str, np.ndarray]
+) -> list[np.ndarray]:
     """Return the values of expressions.
 
     Parameters

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["FUNCTIONS", "MATH", "Function"]
+__all__ = ["FUNCTIONS", "MATH", "RealFunction"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Function:
+class RealFunction:
     """One function of real numbers.
 
     Attributes
@@ -75,9 +75,9 @@ def _row(
     *derivative: Callable[..., Any],
     ball: Callable[..., Any] | None = None,
     math: str = "",
-) -> Function:
+) -> RealFunction:
     names = tuple((math or name).split()) if math != "-" else ()
-    return Function(
+    return RealFunction(
         name=name, code=code, derivative=derivative, enclosure=ball, latex=latex, math=names
     )
 

@@ -19,9 +19,9 @@ UNLIMITED = 10**9
 COMPARISONS = {"lt": "less", "le": "less_equal", "gt": "greater", "ge": "greater_equal",
                "eq": "equal", "ne": "not_equal"}  # fmt: skip
 LOGIC = {"and": "logical_and", "or": "logical_or", "xor": "logical_xor", "not": "logical_not"}
-ARITHMETIC = {"add": "add", "sub": "subtract", "mul": "multiply", "div": "true_divide",
-              "neg": "negative", "select": "where"}  # fmt: skip
-NUMPY = COMPARISONS | LOGIC | ARITHMETIC
+_ARITHMETIC = {"add": "add", "sub": "subtract", "mul": "multiply", "div": "true_divide",
+               "neg": "negative", "select": "where"}  # fmt: skip
+NUMPY = COMPARISONS | LOGIC | _ARITHMETIC
 BOOLEAN = {"mul": "and", "maximum": "or", "minimum": "and", "absolute": "",
            "add": None, "sub": None, "neg": None}  # fmt: skip  # of truth values alone
 INTEGER = ("add", "sub", "mul", "neg")  # of integers they are integers
@@ -89,7 +89,7 @@ def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, .
     return tuple(sorted(found, key=lambda e: e.index))
 
 
-class Undecided(BaseException):  # (what is traced may catch exceptions)
+class OpenCondition(BaseException):  # (what is traced may catch exceptions)
     """A function asks whether a condition holds that is not known when it is traced."""
 
     def __init__(self, condition: Expr) -> None:
@@ -128,7 +128,7 @@ class Graph:
         if condition.op == "const":
             return bool(condition.data)
         if condition not in self.decisions:
-            raise Undecided(condition)
+            raise OpenCondition(condition)
         return self.decisions[condition]
 
     def assumed(self, integer: Expr) -> int:

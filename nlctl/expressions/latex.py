@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 from .functions import FUNCTIONS
 from .graph import Expr, Untraceable, needed
 
-__all__ = ["Index", "Writer", "index_text", "number_text", "symbol"]
+__all__ = ["Index", "LatexWriter", "index_text", "number_text", "symbol"]
 
-GREEK = """alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma
+_GREEK = """alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma
 tau upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"""
-GREEK_LETTERS = frozenset(GREEK.split())
+GREEK_LETTERS = frozenset(_GREEK.split())
 MARKS = {"hat": r"\hat", "bar": r"\bar", "tilde": r"\tilde", "dot": r"\dot", "ddot": r"\ddot"}
-RELATIONS = {"lt": "<", "le": r"\le", "gt": ">", "ge": r"\ge", "eq": "=", "ne": r"\ne"}
-WORDS = {"and": r"\text{ and }", "or": r"\text{ or }", "xor": r"\text{ xor }"}
+_RELATIONS = {"lt": "<", "le": r"\le", "gt": ">", "ge": r"\ge", "eq": "=", "ne": r"\ne"}
+_WORDS = {"and": r"\text{ and }", "or": r"\text{ or }", "xor": r"\text{ xor }"}
 WORD, SUM, TERM, SIGNED, FACTOR, ATOM = range(6)  # how tightly a formula holds together
 LETTERS = "ijklm"
 Index = tuple[int, int, str]  # element start + step (letter - 1) of a vector, from 0
@@ -85,7 +85,7 @@ def number_text(value: float) -> str:
 
 
 @dataclass(kw_only=True)
-class Writer:
+class LatexWriter:
     """Writes the formulas of one function.
 
     Attributes
@@ -249,14 +249,14 @@ class Writer:
         return row.latex.format(*parts), ATOM if all(enclosed) else FACTOR
 
     def _other(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
-        if expr.op in RELATIONS:
+        if expr.op in _RELATIONS:
             left, right = (self._held(arg, index, depth, SUM) for arg in expr.args)
-            return f"{left} {RELATIONS[expr.op]} {right}", SUM
-        if expr.op in WORDS:
+            return f"{left} {_RELATIONS[expr.op]} {right}", SUM
+        if expr.op in _WORDS:
             least = [WORD if arg.op == expr.op != "xor" else SUM for arg in expr.args]
             pairs = zip(expr.args, least, strict=True)
             left, right = (self._held(arg, index, depth, own) for arg, own in pairs)
-            return f"{left}{WORDS[expr.op]}{right}", WORD
+            return f"{left}{_WORDS[expr.op]}{right}", WORD
         raise Untraceable(f"{expr.op} of {expr.data} has no formula")
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Tracer, boxed, concatenated, full, full_key, mapped, traced
+from .arrays import Tracer, as_array, concatenated, full, full_index, mapped, traced
 from .graph import Ambiguous, Expr, Graph, Untraceable
 
 
@@ -41,12 +41,12 @@ def total(array: Tracer, axis: Any = None) -> Tracer:
     short = [i - (long is not None and i > long) for i in along if i != long]
     for i in sorted(short, reverse=True):
         parts = np.moveaxis(cells, i, 0)
-        cells = boxed(parts[0]) if len(parts) else boxed(graph.const(0.0))
+        cells = as_array(parts[0]) if len(parts) else as_array(graph.const(0.0))
         for part in parts[1:]:
-            cells = mapped(lambda a, b: graph.op("add", a, b), cells, boxed(part))
+            cells = mapped(lambda a, b: graph.op("add", a, b), cells, as_array(part))
     if long is None or long in along:
-        return Tracer(graph, boxed(cells))
-    return Tracer(graph, boxed(cells), long - sum(i < long for i in along), array.length)
+        return Tracer(graph, as_array(cells))
+    return Tracer(graph, as_array(cells), long - sum(i < long for i in along), array.length)
 
 
 def product(a: Tracer, b: Tracer) -> Tracer:
@@ -74,11 +74,11 @@ def _assign(self: Tracer, key: Any, value: Any) -> None:
             raise Untraceable("a long array assigned to a short one")
         if isinstance(key, np.ndarray | list | Tracer):
             raise Untraceable("assignment to places in an array")
-        self.cells[tuple(full_key(key, self.ndim))] = value.cells if value.shape else value.only
+        self.cells[tuple(full_index(key, self.ndim))] = value.cells if value.shape else value.only
     else:
         if self.ndim > 1:
             raise Untraceable("assignment to a part of a large matrix")
-        (along,) = full_key(key, 1)
+        (along,) = full_index(key, 1)
         whole = range(self.length)
         k = None if isinstance(along, slice) else whole[along]
         _write(self, whole[along] if k is None else range(k, k + 1), value)
@@ -94,7 +94,7 @@ def _check_kinds(self: Tracer, value: Tracer) -> None:
 def _assign_to_part(self: Tracer, key: Any, value: Tracer) -> None:
     assert self.origin is not None
     _ = self.cells  # is it still what the whole has there?
-    (along,) = full_key(key, self.ndim) if self.ndim == 1 else (None,)
+    (along,) = full_index(key, self.ndim) if self.ndim == 1 else (None,)
     if self.place is None or self.place.step != 1 or along is None:
         raise Untraceable("assignment to a part of a long array")
     k = None if isinstance(along, slice) else self.place[along]
@@ -199,8 +199,8 @@ def _in_place(name: str) -> Callable[[Any, Any], Any]:
     return method
 
 
-BINARY = {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div", "mod": "remainder"}
-for _name, _op in (BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
+_BINARY = {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div", "mod": "remainder"}
+for _name, _op in (_BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
     setattr(Tracer, f"__{_name}__", _operator(_op))
     setattr(Tracer, f"__r{_name}__", _operator(_op, swapped=True))
     setattr(Tracer, f"__i{_name}__", _in_place(_op))

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Tracer, concatenated, number, traced
-from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, Undecided, Untraceable
+from .arrays import Tracer, concatenated, scalar, traced
+from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, OpenCondition, Untraceable
 from .operators import elementwise
 from .stage import Stage
 
@@ -62,7 +62,7 @@ def _followed(
     graph.decisions, graph.guards = decisions, []
     try:
         result = _guarded(graph, run())
-    except Undecided as question:
+    except OpenCondition as question:
         condition = question.condition
     else:
         left[0] -= 1
@@ -75,13 +75,13 @@ def _followed(
     no = _followed(graph, run, {**decisions, condition: False}, left)
     if yes.shape != no.shape:
         raise Untraceable("results of different sizes")
-    return elementwise(graph, "select", number(graph, condition), yes, no)
+    return elementwise(graph, "select", scalar(graph, condition), yes, no)
 
 
 def _guarded(graph: Graph, result: Tracer) -> Tracer:
     """Return a result, NaN where Python would have raised an error on the way."""
     for condition in graph.guards:
-        result = elementwise(graph, "select", number(graph, condition), result, np.nan)
+        result = elementwise(graph, "select", scalar(graph, condition), result, np.nan)
     return result
 
 

@@ -4,7 +4,7 @@
 once on symbols (`_lower_blocks`), and what they compute is planned for one member or several
 (`_lower`); one generator writes LLVM IR from the plan, and its object code is kept on disk
 (`codegen`).  What cannot be traced is called as it stands, as numba compiles it or back in Python
-(`_called`); rings without a state in them are refused, or solved by Newton's method with the
+(`_called`); algebraic loops are refused, or solved by Newton's method with the
 derivatives of their own expressions (`_tearing`, `_newton`).  `_program` says which arrays there
 are, `_machine` holds the functions that come out of it, `_routine` calls them.
 

@@ -26,8 +26,8 @@ from .machine.evaluations import Machine, prepared_parameters
 from .machine.routine import lowered_code
 from .thirdparty.python_control import block_inputs, block_outputs, block_rates
 
-POINTS = 5  # of a trajectory, its start and end among them
-ROUNDING = 1e-10  # relative difference that rounding explains without a closer look
+_POINTS = 5  # of a trajectory, its start and end among them
+_ROUNDING = 1e-10  # relative difference that rounding explains without a closer look
 SHAKEN = 1e-13  # relative change of states and inputs that shows what rounding does to a value
 _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
 
@@ -99,7 +99,7 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
 
 def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
     finite = np.flatnonzero(np.isfinite(trial.states).all(axis=0))
-    for k in np.unique(np.linspace(0, finite.size - 1, POINTS).astype(int)) if finite.size else ():
+    for k in np.unique(np.linspace(0, finite.size - 1, _POINTS).astype(int)) if finite.size else ():
         m = finite[k]
         yield float(trial.time[m]), trial.states[:, m].copy(), trial.inputs[:, m].copy()
 
@@ -162,7 +162,7 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
             raise _difference(labels[wrong[0]], system.name, (a[wrong[0]], b[wrong[0]]), point[0])
 
 
-def _close(a: np.ndarray, b: np.ndarray, relative: float = ROUNDING, absolute: Any = 0.0) -> Any:
+def _close(a: np.ndarray, b: np.ndarray, relative: float = _ROUNDING, absolute: Any = 0.0) -> Any:
     """Whether values are equal to rounding; NaN equals nothing."""
     return (a == b) | (np.abs(a - b) <= relative * np.maximum(np.abs(a), np.abs(b)) + absolute)
 

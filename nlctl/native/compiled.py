@@ -228,7 +228,7 @@ def compile(  # noqa: A001 (what it does)
         nlctl's blocks, ``ct.nlsys``, ``ct.ss``, ``ct.tf``, and diagrams of them.
     params : mapping, optional
         Parameters that will be overridden although no block declares them, such as those that a
-        foreign function reads with ``params.get``; the values given here are not kept.
+        third-party function reads with ``params.get``; the values given here are not kept.
     algebraic_loops : {"error", "solve"}, optional
         What is done with signals that depend on each other at the same instant: refuse the
         diagram, or solve for them by Newton's method in every evaluation.  A linear loop is then

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
-from .codegen.program import Program, corners, memory
+from .codegen.program import Program, count_switching_functions, memory
 from .diagram.schedule import Node, signal_name
 from .jacobians import inexact
 from .parameters import Slot
@@ -20,7 +20,7 @@ USE = (
     "nlctl.input_output_response, nlctl.ensemble_response, .linearize(x0, u0); "
     "python-control's functions take .system"
 )
-SHOWN = 8  # names that are listed before the rest is only counted
+_SHOWN = 8  # names that are listed before the rest is only counted
 
 
 def described(compiled: Compiled) -> str:
@@ -88,7 +88,7 @@ def _facts(i: int, node: Node, program: Program, p: np.ndarray) -> Iterator[tupl
     parameters = [f"{name} = {_value(slot, p)}" for name, slot in program.layout[i].items()]
     parameters += [f"{k} = {value!r} (fixed)" for k, value in program.fixed.get(i, {}).items()]
     yield "parameters", _listed(parameters)
-    yield "corners", str(corners(node) or "")
+    yield "corners", str(count_switching_functions(node) or "")
     yield "memory", _listed([labels[j - first] for j in memory(node)])
 
 
@@ -96,14 +96,14 @@ def _value(slot: Slot, p: np.ndarray) -> str:
     values = p[slot.offset : slot.offset + slot.size]
     if not slot.shape:
         return f"{values[0]:g}"
-    if slot.size > SHOWN:
+    if slot.size > _SHOWN:
         return f"{' x '.join(map(str, slot.shape))} values"
     return np.array2string(values.reshape(slot.shape), separator=", ").replace("\n", "")
 
 
 def _listed(names: Sequence[str]) -> str:
-    more = len(names) - SHOWN
-    return ", ".join(names if more <= 1 else [*names[:SHOWN], f"and {more} more"])
+    more = len(names) - _SHOWN
+    return ", ".join(names if more <= 1 else [*names[:_SHOWN], f"and {more} more"])
 
 
 def _count(number: int | None, what: str) -> str:

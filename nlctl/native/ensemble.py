@@ -33,7 +33,7 @@ from .integrate.driver import (
 )
 from .integrate.state import RUNNING, STIFF, Status
 from .machine.ahead import compile_for
-from .machine.evaluations import WIDTH, fitting
+from .machine.evaluations import ENSEMBLE_WIDTH, fitting
 from .members import Members, members
 
 if TYPE_CHECKING:
@@ -181,8 +181,8 @@ def ensemble_response(
     u = input_array(compiled.system, inputs, times)
     settings = Settings(rtol=rtol, atol=atol, max_steps=max_steps, method=method or "auto")
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
-    _, p = every.batch(range(1), WIDTH)  # checks all members before anything runs
-    compile_for(compiled, p, WIDTH)  # once, before the threads start
+    _, p = every.batch(range(1), ENSEMBLE_WIDTH)  # checks all members before anything runs
+    compile_for(compiled, p, ENSEMBLE_WIDTH)  # once, before the threads start
 
     audited = {0, every.size // 2, every.size - 1} if audit else ()
 
@@ -207,7 +207,7 @@ def _audit(every: Members, number: int, run: Trajectory, u: np.ndarray, wanted: 
     _, p = every.batch(range(number, number + 1), 1)
     trial = Trial(
         time=run.time, states=run.states, inputs=u, p=p[:, 0], params=every.given(number),
-        width=WIDTH,
+        width=ENSEMBLE_WIDTH,
     )  # fmt: skip
     compare(every.compiled, trial, wanted)
 
@@ -227,7 +227,7 @@ def _group(
     stop: _Stop,
 ) -> Iterator[Trajectory]:
     """Run up to WIDTH members side by side; yield them in their order."""
-    compiled, (x0, p) = every.compiled, every.batch(numbers, WIDTH)
+    compiled, (x0, p) = every.compiled, every.batch(numbers, ENSEMBLE_WIDTH)
     alone = settings.method == "rodas5p" or not ct.isctime(compiled.system)
     if alone:
         for j in range(len(numbers)):
@@ -238,9 +238,9 @@ def _group(
     found: dict[int, tuple[Run, np.ndarray]] = {}
     while stop.wanted and (left := [j for j in range(len(numbers)) if j not in found]):
         first = left[0]  # members whose integers steer the equations otherwise run apart
-        fits = np.roll(fitting(compiled, np.roll(p, -first, axis=1), WIDTH), first)
+        fits = np.roll(fitting(compiled, np.roll(p, -first, axis=1), ENSEMBLE_WIDTH), first)
         # others' places are taken by copies: what runs beside a member changes nothing
-        columns = np.where(fits, np.arange(WIDTH), first)
+        columns = np.where(fits, np.arange(ENSEMBLE_WIDTH), first)
         ran = _ran(compiled, times, inputs, (x0[:, columns], p[:, columns]), settings, stop)
         found |= {int(j): ran for j in np.flatnonzero(fits)}
     for j in range(len(numbers) if stop.wanted else 0):
@@ -296,7 +296,7 @@ def _run(
     """Run all members in groups; after Ctrl-C return those that are finished."""
     rows: dict[int, dict[str, Any]] = {}
     stop = _Stop()
-    groups = iter(range(i, min(i + WIDTH, count)) for i in range(0, count, WIDTH))
+    groups = iter(range(i, min(i + ENSEMBLE_WIDTH, count)) for i in range(0, count, ENSEMBLE_WIDTH))
     pool = ThreadPoolExecutor(threads)
     waiting = {pool.submit(one, group, stop) for group in islice(groups, 2 * threads)}
     try:

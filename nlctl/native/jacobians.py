@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from ..errors import CompileError, ParameterError, UsageError
 from ..expressions.derivatives import tangents
-from ..expressions.evaluate import evaluate
+from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Untraceable, needed
 from ..names import unknown
 from ..responses.arguments import state_array
@@ -149,7 +149,7 @@ def jacobian(
     arrays[DIRECTION] = directions
     count, found = directions.shape[1], {}
     for name, rows in made.rows.items():
-        values = iter(evaluate([e for e, _ in rows if e is not None], arrays))
+        values = iter(evaluate_expressions([e for e, _ in rows if e is not None], arrays))
         parts = [
             np.broadcast_to(0.0 if expr is None else next(values), (size, count))
             for expr, size in rows

@@ -69,8 +69,8 @@ class Members:
     def varied(self) -> tuple[np.ndarray, np.ndarray]:
         """Places in the parameter vector that vary, and their values (places, members).
 
-        nlctl's blocks check and derive their own parameters, and only those that vary do; foreign
-        parameters go through python-control, member by member.
+        nlctl's blocks check and derive their own parameters, and only those that vary do;
+        third-party parameters go through python-control, member by member.
 
         Raises
         ------
@@ -123,7 +123,7 @@ class Members:
 
     @cached_property
     def _owners(self) -> list[tuple[Block, Mapping[str, Slot], dict[str, str]]] | None:
-        """Blocks whose parameters vary, with their places; None if foreign ones do."""
+        """Blocks whose parameters vary, with their places; None if third-party ones do."""
         self._first_vector  # noqa: B018 (names and fixed values are resolved first)
         known = self.compiled.system.params
         nodes = [node.system for node in self.compiled.schedule.nodes]

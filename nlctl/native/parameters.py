@@ -24,7 +24,7 @@ class Slot:
     Attributes
     ----------
     name : str
-        Qualified name for nlctl's blocks; path and key for foreign ones.
+        Qualified name for nlctl's blocks; path and key for third-party ones.
     offset : int
         Where it begins.
     shape : tuple of int
@@ -60,7 +60,7 @@ class Slot:
 def current_values(system: Any) -> Mapping[str, Any]:
     """Return a block's parameters as python-control has resolved them.
 
-    A foreign block in a diagram with nlctl's blocks is handed their qualified names as well;
+    A third-party block in a diagram with nlctl's blocks is handed their qualified names as well;
     they are none of its business.
     """
     if isinstance(system, Block):
@@ -87,7 +87,7 @@ def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
     Raises
     ------
     UsageError
-        If a foreign block's parameter name is no string.
+        If a third-party block's parameter name is no string.
     """
     found: dict[int, dict[str, Slot]] = {}
     offset = 0

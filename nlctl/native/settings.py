@@ -9,15 +9,15 @@ from ..errors import ParameterError
 from ..names import unknown
 from .integrate.driver import Settings
 
-STIFF = "method='rodas5p' is its stiff method"
-EXPLICIT = "method='tsit5' is its explicit Runge-Kutta pair of orders 5(4)"
-METHODS = {  # of `scipy.integrate.solve_ivp` -> what comes nearest
-    **dict.fromkeys(("RK23", "RK45", "DOP853"), EXPLICIT),
-    **dict.fromkeys(("Radau", "BDF"), STIFF),
+_STIFF = "method='rodas5p' is its stiff method"
+_EXPLICIT = "method='tsit5' is its explicit Runge-Kutta pair of orders 5(4)"
+_METHODS = {  # of `scipy.integrate.solve_ivp` -> what comes nearest
+    **dict.fromkeys(("RK23", "RK45", "DOP853"), _EXPLICIT),
+    **dict.fromkeys(("Radau", "BDF"), _STIFF),
     "LSODA": "method='auto' changes between an explicit and a stiff method",
 }
 JACOBIAN = "its stiff method makes the Jacobian itself"
-REFUSED = {  # of the keywords of `solve_ivp` -> what there is instead
+_REFUSED = {  # of the keywords of `solve_ivp` -> what there is instead
     "max_step": "step= is a fixed step, and corners of the inputs are never stepped over",
     "min_step": "step= is a fixed step, max_steps= bounds their number",
     "first_step": "it chooses its first step by the tolerances; step= is a fixed step",
@@ -57,16 +57,16 @@ def solver_settings(
     keywords = dict(solve_ivp_kwargs or {})
     asked = keywords.pop("method", None) or solve_ivp_method
     if asked:
-        nearest = METHODS.get(str(asked), f"{EXPLICIT}, {STIFF}")
+        nearest = _METHODS.get(str(asked), f"{_EXPLICIT}, {_STIFF}")
         raise ParameterError(
             f"solve_ivp_method={asked!r} has no meaning in machine code: {nearest}"
         )
     for name in keywords:
-        if name in REFUSED:
+        if name in _REFUSED:
             raise ParameterError(
-                f"solve_ivp_kwargs with '{name}' has no meaning in machine code: {REFUSED[name]}"
+                f"solve_ivp_kwargs with '{name}' has no meaning in machine code: {_REFUSED[name]}"
             )
         if name not in ("rtol", "atol"):
-            raise unknown("keyword", name, ["rtol", "atol", *REFUSED], "in solve_ivp_kwargs")
+            raise unknown("keyword", name, ["rtol", "atol", *_REFUSED], "in solve_ivp_kwargs")
     given = {name: value for name, value in settings.items() if value is not None}
     return Settings(**given | keywords, method=method or "auto")

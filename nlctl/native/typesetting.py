@@ -18,13 +18,13 @@ from ..blocks import Block
 from ..errors import CompileError
 from ..expressions.arrays import Tracer
 from ..expressions.graph import Expr, Graph, needed
-from ..expressions.latex import Index, Writer, index_text, number_text, symbol
+from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol
 from ..params import declared_params
 from .codegen.blocks import Reader
 from .diagram.schedule import Node, Schedule, Signal, schedule
 from .parameters import Slot, slots_of
 
-OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
+_OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
 WORTH = 12  # parts from which an expression that is used twice gets a letter
 
 
@@ -110,7 +110,7 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     for call in reader.calls.values():
         raise CompileError(f"block '{node.path}' has no formula: {call.reason}")
     leaf = _symbols(system, slots)
-    writer = Writer(leaf=leaf, known=_known(found, names, leaf))
+    writer = LatexWriter(leaf=leaf, known=_known(found, names, leaf))
     derivative = _dotted if ct.isctime(system) else (lambda s: rf"{s}^{{+}}")
     lines = [
         *_lines(writer, found["x"], [derivative(s) for s in _names(system.state_labels)]),
@@ -139,7 +139,7 @@ def _names(labels: list[str]) -> list[str]:
     return [symbol(label) for label in labels]
 
 
-def _lines(writer: Writer, array: Tracer, names: list[str]) -> Iterator[str]:
+def _lines(writer: LatexWriter, array: Tracer, names: list[str]) -> Iterator[str]:
     """Yield an equation per number, and one per vector."""
     at = 0
     for expr, size in _split(array):
@@ -216,7 +216,7 @@ def _local_names() -> Iterator[dict[Expr, str]]:
     before = sys.getprofile()
 
     def noted(frame: Any, event: str, _: Any) -> None:
-        if event != "return" or frame.f_code.co_filename.startswith(OWN):
+        if event != "return" or frame.f_code.co_filename.startswith(_OWN):
             return  # (also what dataclasses write: "<string>")
         for name, value in frame.f_locals.items():
             if isinstance(value, Tracer) and value.values.size == 1 and value.origin is None:
@@ -254,7 +254,7 @@ def _known(
     return known
 
 
-def _definitions(writer: Writer) -> Iterator[str]:
+def _definitions(writer: LatexWriter) -> Iterator[str]:
     """Yield what the symbols stand for, until no new one turns up."""
     done: set[Expr] = set()
     while set(writer.used) - done:

@@ -23,7 +23,7 @@ ALIASES = {  # python-control's short names
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class RunArguments:
     """The arguments of a run that both engines take."""
 
     system: Any
@@ -90,7 +90,7 @@ def with_aliases(
     return found
 
 
-def unified(run: Run) -> Run:
+def unified(run: RunArguments) -> RunArguments:
     """Return a run with each of SciPy's arguments in one place.
 
     ``solve_ivp_kwargs`` may hold ``method`` and ``t_eval``, which are arguments as well.

@@ -14,15 +14,22 @@ from ..diagrams import leaves
 from ..errors import DivergedError, ParameterError
 from ..names import unknown
 from ..sampling.system import Sampled
-from .arguments import Run, evaluation_array, input_array, state_array
+from .arguments import RunArguments, evaluation_array, input_array, state_array
 from .sampled import from_sample_to_sample
 from .time_response import as_response
 
-METHODS = ("LSODA", "RK23", "RK45", "DOP853", "Radau", "BDF")  # of scipy.integrate.solve_ivp
-STANDSTILL = 200  # steps in a row that do not advance the time
+SOLVE_IVP_METHODS = (
+    "LSODA",
+    "RK23",
+    "RK45",
+    "DOP853",
+    "Radau",
+    "BDF",
+)  # of scipy.integrate.solve_ivp
+_STANDSTILL = 200  # steps in a row that do not advance the time
 
 
-def interpreted(run: Run) -> ct.TimeResponseData:
+def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     """Run a diagram in python-control.
 
     Raises
@@ -47,8 +54,8 @@ def interpreted(run: Run) -> ct.TimeResponseData:
         simulate = partial(from_sample_to_sample, simulate)
     watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
     method = solver["method"] or solver["solve_ivp_method"] or "LSODA"
-    if isinstance(method, str) and method not in METHODS:
-        raise unknown("method", method, METHODS, "of python-control's solve_ivp")
+    if isinstance(method, str) and method not in SOLVE_IVP_METHODS:
+        raise unknown("method", method, SOLVE_IVP_METHODS, "of python-control's solve_ivp")
     settings = {"rtol": solver["rtol"], "atol": solver["atol"], "events": watch}
     with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
         try:
@@ -89,7 +96,7 @@ class _Watch:
 
     def __call__(self, t: float, x: np.ndarray) -> float:
         self.repeated = self.repeated + 1 if t <= self.reached else 0
-        if self.repeated > STANDSTILL or not np.all(np.isfinite(x)):
+        if self.repeated > _STANDSTILL or not np.all(np.isfinite(x)):
             raise _diverged(self.system, self.reached)
         self.reached = max(float(t), self.reached)
         if self.progress is not None:

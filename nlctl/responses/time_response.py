@@ -7,7 +7,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-SHOWN = 6  # names that are listed before the rest is only counted
+_SHOWN = 6  # names that are listed before the rest is only counted
 
 
 class Response(ct.TimeResponseData):
@@ -50,5 +50,5 @@ def as_response(response: ct.TimeResponseData) -> Response:
 
 def _names(labels: Any) -> str:
     names = list(labels or ())
-    rest = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-    return (", ".join(names[:SHOWN]) or "none") + rest
+    rest = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return (", ".join(names[:_SHOWN]) or "none") + rest

@@ -11,7 +11,7 @@ from analysis.lyapunov import certify
 from analysis.lyapunov.nussbaum.forecast import BurstForecast
 from analysis.metrics import Metric, absolute_integral, final, peak
 from analysis.paper import loops
-from analysis.paper.controllers import baselines, contenders, sensor
+from analysis.paper.controllers import baselines, compared_controllers, sensor
 from analysis.paper.tuning import tune
 from nlctl.params import equation_arguments
 
@@ -192,11 +192,11 @@ class TestAblations:
         assert held == pytest.approx(at(nlctl.NussbaumLaw(), (zeta,), u)[0], rel=1e-12, abs=1e-12)
 
 
-class TestContenders:
+class TestComparedControllers:
     @pytest.mark.parametrize("example", EXAMPLES)
     def test_all_of_them_fit_into_the_example(self, example):
         """Eleven loops with the signals that a comparison needs."""
-        made = contenders(example)
+        made = compared_controllers(example)
         assert len(made) == 11
         assert next(iter(made)) == "paper"
         for controller in made.values():
@@ -215,13 +215,15 @@ class TestContenders:
         for example, build in EXAMPLES.items():
             loop = build()
             zeta = run(loop, T).outputs[loop.output_index["zeta"], -1]
-            (law,) = (s for s in contenders(example)["fixed gain"].syslist if s.name == "law")
+            (law,) = (
+                s for s in compared_controllers(example)["fixed gain"].syslist if s.name == "law"
+            )
             assert law.spec.kappa == pytest.approx(-nlctl.functions.nussbaum(zeta), rel=2e-3)
 
     @pytest.mark.parametrize("example", EXAMPLES)
     def test_the_certified_one_is_certified(self, example):
         """|r| <= C_0 for all time, proved; C_0 is no larger than the initial error."""
-        loop = EXAMPLES[example](controller=contenders(example)["certified"])
+        loop = EXAMPLES[example](controller=compared_controllers(example)["certified"])
         assert certify(loop).C_0 < 1.0
 
     @pytest.mark.slow
@@ -296,7 +298,7 @@ class TestQuestions:
             (v,) = at(nlctl.DeadZone(), (), (k * np.clip(values["u"], -limit, limit),))
             assert values["v"] == pytest.approx(v, rel=1e-12)
 
-    def test_the_forecast_of_a_burst_is_that_of_the_law_of_creep(self):
+    def test_the_forecast_of_a_burst_is_that_of_the_law_of_the_slow_drift(self):
         """zeta made so that A = int |N| grows at a constant rate from 0: A = 0.4 t."""
         N = nlctl.functions.nussbaum_integral
         grid = np.linspace(1, 3, 4001)

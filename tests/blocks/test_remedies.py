@@ -1,4 +1,4 @@
-"""Remedies for the creep of zeta: dead zone, leakage, monotone base."""
+"""Remedies for the slow drift of zeta: dead zone, leakage, monotone base."""
 
 import numpy as np
 import pytest

@@ -12,7 +12,13 @@ from command_line import nlctl_here
 from rich.console import Console
 from rows import each_row
 
-from analysis.cli.check import random_start, replay, show_ledger, summary, worst_lines
+from analysis.cli.check import (
+    ledger_summary,
+    random_start,
+    repeat_command,
+    show_ledger,
+    worst_lines,
+)
 from analysis.lyapunov.ledger import ledger
 from nlctl import paper
 from nlctl.diagrams import initial_state, state_names
@@ -114,7 +120,7 @@ def test_replay_keeps_every_digit_and_every_kind_of_parameter():
     """Vectors and truth values go through as they were typed."""
     typed = ["filtered_error.lambdas=1,2", "plant.integrate_w=true", "plant.x1(0)=9"]
     start = {"plant.x1": np.array([0.1, 1 / 3]), "law.zeta": 1.25}
-    parts = shlex.split(replay("example-1", 0.1, typed, start, 1))
+    parts = shlex.split(repeat_command("example-1", 0.1, typed, start, 1))
     assert float(parts[parts.index("--horizon") + 1]) == 0.1
     told = dict(a.split("=") for o, a in itertools.pairwise(parts) if o == "--set")
     assert told["filtered_error.lambdas"] == "1,2"
@@ -176,7 +182,7 @@ def test_one_line_that_is_violated_or_undecided_is_the_answer(found):
 
 def test_summary_counts_every_line_once_and_names_what_fails(found):
     """Statements of the paper that fail are named apart from corrected ones."""
-    said = summary(found)
+    said = ledger_summary(found)
     counts = said.splitlines()[1].partition(":")[2].split(",")
     assert sum(int(part.split()[0]) for part in counts) == len(found.lines)
     assert "none of the corrected statements" in said

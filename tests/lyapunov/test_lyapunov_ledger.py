@@ -19,7 +19,7 @@ from analysis.lyapunov import (
     literal,
     premises,
 )
-from analysis.lyapunov.conclusions import creep_of
+from analysis.lyapunov.conclusions import slow_drift_of
 from nlctl import ParameterError, UnknownNameError
 
 BOXES = {
@@ -79,7 +79,7 @@ def test_the_examples_hold_as_corrected(number):
     assert statuses["(31)"] == statuses["(32)"] == statuses["Lemma 1, horizon"] == "checked"
     assert statuses["(b)"] == "not applicable"  # zeta falls at times
     assert statuses["creep"] == "undecided"
-    assert creep_of(study(number).runs.first) is None
+    assert slow_drift_of(study(number).runs.first) is None
 
 
 @pytest.mark.parametrize(
@@ -242,15 +242,15 @@ def test_without_a_box_it_is_what_the_run_visits():
     assert found.holds
 
 
-def test_a_long_run_tells_where_the_creep_leads():
+def test_a_long_run_tells_where_the_slow_drift_leads():
     """Example 2 spends its budget slowly: some percent, and a time long after the run."""
     found = ledger(example(2), 320.0, box=BOXES[2], W=np.zeros(27), step=0.04)
-    assert found.creep is not None
-    assert found.creep.burst > 5000
+    assert found.slow_drift is not None
+    assert found.slow_drift.burst > 5000
     line = found["creep"]
     assert line.status == "undecided"
     assert line.evidence.startswith("creeps")
-    assert line.least == pytest.approx(1 - found.creep.share)
+    assert line.least == pytest.approx(1 - found.slow_drift.share)
     assert "budget spent by" in line.evidence
     assert found["(c)"].status == found["Lemma 1, horizon"].status == "checked"
 

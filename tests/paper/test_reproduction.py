@@ -6,8 +6,8 @@ import pytest
 
 import nlctl
 from analysis import metrics
-from analysis.paper import CASES, METRICS, checks, expectations, measured, run, sample_times
-from analysis.paper.reproduction import Run
+from analysis.paper import CASES, METRICS, checks, expectations, measured, run_case, sample_times
+from analysis.paper.reproduction import CaseRun
 
 CASE = {case.key: case for case in CASES}
 
@@ -48,7 +48,7 @@ def plain_run(case, system=interpreted, *, timepts=None, **solver):
             system(diagram), timepts, 0, nlctl.initial_state(diagram), **solver
         )
     signals = {name: response.y[i] for name, i in diagram.output_index.items()}
-    return Run(case=case, time=response.time, signals=signals, metrics={})
+    return CaseRun(case=case, time=response.time, signals=signals, metrics={})
 
 
 def measure(result):
@@ -89,7 +89,7 @@ def test_diagrams_as_they_stand_reach_their_figures_in_python_control(key):
 
 def test_every_case_reaches_its_figures():
     """Machine code of every case, to the tolerance in the table."""
-    found = checks({case.key: run(case) for case in CASES})
+    found = checks({case.key: run_case(case) for case in CASES})
     assert len(found) == len(expectations())
     for check in found:
         assert check.passed, (check.metric.key, check.value, check.expectation)
@@ -136,10 +136,10 @@ def test_a_wrong_figure_fails_and_nan_fails():
     """A check can fail: a wrong value does, and so does NaN."""
     case = CASE["1"]
     right = {e.metric: e.value for e in expectations() if e.case == "1"}
-    exact = Run(case=case, time=np.zeros(1), signals={}, metrics=right)
+    exact = CaseRun(case=case, time=np.zeros(1), signals={}, metrics=right)
     assert all(check.passed for check in checks({"1": exact}))
     for wrong in (right["max_r"] + 1e-4, np.nan, np.inf):
-        spoiled = Run(case=case, time=np.zeros(1), signals={}, metrics=right | {"max_r": wrong})
+        spoiled = CaseRun(case=case, time=np.zeros(1), signals={}, metrics=right | {"max_r": wrong})
         failed = [c.metric.key for c in checks({"1": spoiled}) if not c.passed]
         assert failed == ["max_r"]
 
@@ -147,6 +147,6 @@ def test_a_wrong_figure_fails_and_nan_fails():
 def test_variants_move_the_loop_and_processes_change_nothing():
     """A run in this process equals the same run again, bit for bit."""
     case = CASE["1-p1"]
-    first, second = run(case), run(case)
+    first, second = run_case(case), run_case(case)
     assert first.metrics == second.metrics
     assert first.metrics["tail_max_e"] != pytest.approx(0.11741705334, abs=1e-5)

@@ -8,7 +8,7 @@ import pytest
 from places import ROOT
 from rows import each_row
 
-from analysis.lyapunov.lines import Status
+from analysis.lyapunov.lines import LineStatus
 from analysis.report.outline import ANSWERS
 from analysis.robustness.stl.text import parse_formula
 from analysis.robustness.uncertainty.quantity import QUANTILES
@@ -76,7 +76,7 @@ def test_the_table_of_kinds_is_that_of_the_list():
     assert lines[1:] == told  # below the heading
 
 
-@each_row("word", [*get_args(Status), *ANSWERS])
+@each_row("word", [*get_args(LineStatus), *ANSWERS])
 def test_the_glossary_explains_every_status(word):
     """What a ledger or a claim may say."""
     glossary = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")

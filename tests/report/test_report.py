@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as MatplotlibFigure
 
-from analysis.paper import CASES, METRICS, TAIL, Run, expectations
+from analysis.paper import CASES, METRICS, TAIL, CaseRun, expectations
 from analysis.paper.page.report import paper_report
 from analysis.report import (
     Claim,
@@ -38,7 +38,7 @@ def made_up_runs():
         names = case.diagram.output_labels
         signals = {name: np.sin(t + i) for i, name in enumerate(names)} | {"zeta": 1 + t / 40}
         metrics = {m.key: wanted.get((case.key, m.key), 0.1) for m in METRICS}
-        runs[case.key] = Run(case=case, time=t, signals=signals, metrics=metrics)
+        runs[case.key] = CaseRun(case=case, time=t, signals=signals, metrics=metrics)
     return runs
 
 

@@ -23,7 +23,7 @@ from analysis.report import (
     Report,
     Section,
     Table,
-    compare,
+    compare_contents,
     write_gallery,
     write_pdf,
     write_report,
@@ -63,7 +63,7 @@ def with_cell(row, place, value):
 
 def differences(tmp_path, first, second, rtol=0.0):
     one, two = write_report(first, tmp_path / "1"), write_report(second, tmp_path / "2")
-    return compare(one.parent, two.with_name("report.json"), rtol=rtol)
+    return compare_contents(one.parent, two.with_name("report.json"), rtol=rtol)
 
 
 def test_a_report_does_not_differ_from_itself_made_elsewhere(tmp_path):
@@ -119,14 +119,14 @@ def test_what_is_no_report_is_refused_by_name(tmp_path, content):
     """Damaged, or another file."""
     (tmp_path / "report.json").write_text(content)
     with pytest.raises(UsageError, match=r"report\.json' is no report"):
-        compare(tmp_path, tmp_path)
+        compare_contents(tmp_path, tmp_path)
 
 
 @each_row("rtol", [-1.0, float("nan"), float("inf")])
 def test_a_tolerance_is_finite_and_not_negative(rtol):
     """Otherwise everything would be equal, or nothing."""
     with pytest.raises(UsageError, match="rtol"):
-        compare("a", "b", rtol=rtol)
+        compare_contents("a", "b", rtol=rtol)
 
 
 def test_compare_prints_text_or_json(tmp_path, capsys):

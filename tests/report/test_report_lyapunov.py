@@ -26,7 +26,7 @@ from analysis.paper.reference_run import (
     agreed,
     continued,
     read_record,
-    thinned,
+    thinned_run,
     write_record,
 )
 from analysis.report import Figure, Paragraph, Report, Section, Table, render_html, render_json
@@ -84,7 +84,7 @@ def test_proved_checked_and_violated_lines_stand_in_tables_of_their_own(number):
     assert stands[text.PROVED] == {"proved", "computed"}
     assert stands[text.CHECKED] == {"checked"}
     assert stands[text.FAILING] == {"violated as printed"}
-    assert stands[text.OPEN] <= {"undecided", "not applicable"}
+    assert stands[text.LEFT_OPEN] <= {"undecided", "not applicable"}
     assert text.VIOLATED not in stands
 
 
@@ -118,17 +118,17 @@ def test_the_bound_of_34_is_half_the_square_of_C_0():  # noqa: N802
         assert shares == pytest.approx(one.conservatism.C_0**2 / 2, rel=1e-6)
 
 
-def test_the_creep_is_that_of_200_seconds_and_of_what_it_says():
+def test_the_slow_drift_is_that_of_200_seconds_and_of_what_it_says():
     """The table says what was computed; the text names the commands for what was not."""
     first = part()[0]
     assert LONG_RUN in [i.code for i in first.items if isinstance(i, Paragraph)]
     (table,) = tables([first])
     assert "after 200 s" in table.caption
     for row, one in zip(table.rows, found().values(), strict=True):
-        assert one.creep.time == 200.0
-        assert row[3] == one.creep.verdict
-    assert found()[2].creep.verdict == "creeps"
-    assert 7e3 < found()[2].creep.burst < 1.1e4  # within a quarter, a fiftieth of the way
+        assert one.slow_drift.time == 200.0
+        assert row[3] == one.slow_drift.verdict
+    assert found()[2].slow_drift.verdict == "creeps"
+    assert 7e3 < found()[2].slow_drift.burst < 1.1e4  # within a quarter, a fiftieth of the way
 
 
 def test_commands_in_the_text_are_python():
@@ -259,7 +259,7 @@ def test_a_long_run_foretells_from_its_beginning_alone():
     """From 200 s of a run of 210 s at one tolerance: the same as from 200 s at another."""
     run = long_run(nlctl.paper.example_2(), 210.0, rtol=1e-6)
     (told,) = run.predictions
-    wanted = found()[2].creep
+    wanted = found()[2].slow_drift
     assert told.time == 200.0
     assert told.verdict == "creeps"
     assert told.burst == pytest.approx(wanted.burst, rel=1e-3)
@@ -268,7 +268,7 @@ def test_a_long_run_foretells_from_its_beginning_alone():
 
 def test_the_burst_is_at_the_top_of_the_part():
     """First the sentence with its time, then the figure with the time and what was foretold."""
-    run = dataclasses.replace(burst(), predictions=(found()[2].creep,) * 2)
+    run = dataclasses.replace(burst(), predictions=(found()[2].slow_drift,) * 2)
     first = lyapunov_sections(found(), {"2": run})[0]
     words, figure, *_ = first.items
     assert isinstance(words, Paragraph)
@@ -283,7 +283,7 @@ def test_the_burst_is_at_the_top_of_the_part():
 def test_without_a_burst_none_is_claimed():
     """A run that ends calmly is told as such."""
     run = dataclasses.replace(
-        long_run(nlctl.paper.example_2(), 20.0), predictions=(found()[2].creep,)
+        long_run(nlctl.paper.example_2(), 20.0), predictions=(found()[2].slow_drift,)
     )
     first = lyapunov_sections(found(), {"2": run})[0]
     assert first.items[0].text.startswith("No burst within 20 s")
@@ -301,7 +301,7 @@ def test_the_envelope_is_the_largest_value_of_each_whole_window():
     """A spike counts in its own window only, and a part of a window is left out."""
     t = np.linspace(0, 10, 101)
     y = np.where(t == 4.5, 7.0, 1.0)
-    at, largest = figures.envelope(t, y, 3.0)
+    at, largest = figures.windowed_maximum(t, y, 3.0)
     np.testing.assert_allclose(at, [1.5, 4.5, 7.5])
     np.testing.assert_array_equal(largest, [1, 7, 1])
 
@@ -315,7 +315,7 @@ def test_a_thinned_run_has_the_same_burst_and_the_same_largest_error(tmp_path):
         loop="example_2", horizon=2000.0, rtol=1e-6, time=t, signals=signals, predictions=(),
         lobe=lobe_around(2.0), lost=1901.0,
     )  # fmt: skip
-    thin = thinned(run)
+    thin = thinned_run(run)
     assert thin.time.size < run.time.size / 100
     assert thin.burst == run.burst
     assert thin.calm == run.calm
@@ -350,8 +350,8 @@ def test_a_record_is_of_two_tolerances_that_agree():
     shifted = dataclasses.replace(late, rtol=1e-8, time=late.time + 0.9 * AGREE)
     made = agreed(late, shifted)
     assert made.again == (1e-8, pytest.approx(late.burst + 0.9 * AGREE))
-    assert f"it is {made.again[1]:.1f} s" in text.burst(
-        dataclasses.replace(made, predictions=(found()[2].creep,) * 2)
+    assert f"it is {made.again[1]:.1f} s" in text.burst_text(
+        dataclasses.replace(made, predictions=(found()[2].slow_drift,) * 2)
     )
     with pytest.raises(ValueError, match="at which these agree to 5 s"):
         agreed(late, dataclasses.replace(shifted, time=late.time + 1.1 * AGREE))

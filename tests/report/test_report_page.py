@@ -44,7 +44,7 @@ from analysis.report.outline import (
     light,
     meanings,
     numeric,
-    place,
+    place_anchors,
     sort_key,
     summary,
 )
@@ -216,7 +216,7 @@ def test_anchors_are_unique_and_harmless_whatever_the_keys(keys):
         for k in [*keys, "provenance", "claims"]
     ]
     empty = Report(title="", verdict="", claims=[], sections=sections, command="")
-    placed = place(empty)
+    placed = place_anchors(empty)
     anchors = [p.anchor for p in placed] + [a for p in placed for a, _, _ in p.items]
     assert len(set(anchors)) == len(anchors)
     assert all(re.fullmatch(r"[A-Za-z0-9_.-]+", a) for a in anchors)

@@ -29,7 +29,7 @@ FAILS = "print('first', file=sys.stderr)\nsys.exit('no such font')\n"
 @pytest.fixture
 def page(tmp_path, monkeypatch):
     """A page, a second of patience, and a function that puts a program in the browser's place."""
-    monkeypatch.setattr(browser, "PATIENCE", 1.0)
+    monkeypatch.setattr(browser, "BROWSER_TIMEOUT", 1.0)
     monkeypatch.setattr(browser, "BUSY", 0.02)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     (tmp_path / "index.html").write_text("<p>text", encoding="utf-8")

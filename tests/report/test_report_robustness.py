@@ -21,10 +21,10 @@ from studies_example import LOOP
 from analysis import figures as figures
 from analysis.cli.study_report import report_study
 from analysis.figures.labels import plain
-from analysis.figures.runs import envelope
+from analysis.figures.runs import upper_envelope
 from analysis.report import render_html, render_json
 from analysis.report.document import Figure, Paragraph, Section, Table
-from analysis.report.outline import claim_status, place
+from analysis.report.outline import claim_status, place_anchors
 from analysis.robustness import Space, Uncertain, confidence_sequence, independent, prepare
 from analysis.robustness.search.radius import size_of
 from analysis.robustness.stl.spec import FAILED
@@ -32,7 +32,7 @@ from analysis.studies import load_result, read_study, run
 from analysis.studies.kind import unanswered
 from analysis.studies.kinds import KINDS
 from analysis.studies.page.claims import claims, refusal, verdict
-from analysis.studies.page.deviations import deviations
+from analysis.studies.page.deviations import deviations_table
 from analysis.studies.page.histories import histories
 from analysis.studies.page.report import study_part, study_report, study_sections
 from analysis.studies.page.rows import margin_items, row_items
@@ -304,7 +304,7 @@ def test_planted_violations_make_the_page_red(result, report, page):
 
 def test_claims_point_to_sections(report):
     """Every claim links to its evidence."""
-    anchors = {part.anchor for part in place(report)}
+    anchors = {part.anchor for part in place_anchors(report)}
     assert {claim.evidence for claim in report.claims} <= anchors
 
 
@@ -453,7 +453,7 @@ def test_bands_are_drawn_at_least_as_wide_as_they_are(values, stretches):
     """Lines between few samples lie nowhere below the curve."""
     y = np.array(values)
     nodes = np.unique(np.linspace(0, y.size - 1, stretches + 1).astype(int))
-    drawn = envelope(y, nodes)
+    drawn = upper_envelope(y, nodes)
     assert drawn.shape == nodes.shape
     assert np.all(np.interp(np.arange(y.size), nodes, drawn) >= y - 1e-12)
 
@@ -512,7 +512,7 @@ def test_the_largest_deviation_is_the_size_of_the_row(values):
     about = {
         q.name: {"nominal": q.nominal, "low": q.box[0], "high": q.box[1]} for q in space.quantities
     }
-    found = deviations({"row": row}, pd.DataFrame.from_dict(about, orient="index"))["row"]
+    found = deviations_table({"row": row}, pd.DataFrame.from_dict(about, orient="index"))["row"]
     assert np.max(np.abs(found)) == pytest.approx(size_of(space, row))
     assert np.all(np.sign(found) == np.sign([row[q.name] - q.nominal for q in space.quantities]))
 
@@ -531,7 +531,7 @@ def bars(figure, colour):
 def test_nan_and_failed_runs_are_drawn_as_violations():
     """Histogram, search, sizes and map: no NaN looks calm."""
     margins = np.array([np.nan, -1.5 * FAILED, -0.1, 0.0, 0.2, 0.4, 0.4])
-    drawn = figures.margins(margins)
+    drawn = figures.margins_figure(margins)
     assert bars(drawn, "#D55E00") == 4
     assert bars(drawn, "#0072B2") == 3
     shown = figures.search(np.array([0.3, np.nan]), ["corners", "uniform"]).axes[0].lines[0]
@@ -539,7 +539,7 @@ def test_nan_and_failed_runs_are_drawn_as_violations():
     steps = pd.DataFrame({"size": [0.5, 1.0], "margin": [0.3, np.nan]})
     assert list(figures.radius_steps(steps, np.inf).axes[0].lines[1].get_xdata()) == [1.0]
     points = pd.DataFrame({"a": [0.0, 1, 0, 1], "b": [0.0, 0, 1, 1], "spec": [1, 1, np.nan, 1]})
-    made = figures.failure_map(points, np.array([[0, 1, 2], [1, 3, 2]]), ("a", "b"))
+    made = figures.failure_map_figure(points, np.array([[0, 1, 2], [1, 3, 2]]), ("a", "b"))
     assert made.axes[0].images[0].get_array()[-1, 0] == pytest.approx(-1)
 
 

@@ -13,8 +13,8 @@ from analysis import figures
 from analysis.report import Equation, Figure, Table, render_html
 from analysis.robustness import Requirement, always, eventually, in_band, prepare
 from analysis.studies import read_study, run
-from analysis.studies.page.histories import histories, limits
-from analysis.studies.page.loop import Loop, loop_of, loop_sections
+from analysis.studies.page.histories import histories, limits_of_requirements
+from analysis.studies.page.loop import StudyLoop, loop_of, loop_sections
 from analysis.studies.page.report import study_report
 
 
@@ -72,7 +72,7 @@ def test_a_loop_without_formulas_or_blocks_is_shown_as_far_as_it_goes(study):
         return np.frombuffer(x.tobytes()) * -1.0
 
     single = ct.nlsys(secret, None, states=["x"], outputs=["x"], name="single")
-    made = {s.key: s for s in loop_sections(Loop(diagram=single, maker="f"), result, "", 2)}
+    made = {s.key: s for s in loop_sections(StudyLoop(diagram=single, maker="f"), result, "", 2)}
     assert not [i for i in made["study_loop"].items if isinstance(i, Figure)]
     assert "no formulas of this loop" in made["study_equations"].items[0].text
     assert "study_source" not in made
@@ -127,7 +127,7 @@ BAND = in_band("y", upper=1.0)
 )
 def test_only_what_is_always_required_is_a_line(formula, wanted):
     """What may hold at some time, or instead of something else, limits no run at any time."""
-    found = limits([Requirement(key="r", formula=formula, until=9.0)])
+    found = limits_of_requirements([Requirement(key="r", formula=formula, until=9.0)])
     assert found.get("y") == wanted
 
 
@@ -153,7 +153,7 @@ def test_the_colours_of_a_map_fit_its_margins_with_0_in_the_middle(margins, shar
     """The colour bar ends where the margins end; white is 0 and nothing else; the box is drawn."""
     points = pd.DataFrame({"a": [0, 1, 0, 1], "b": [0, 0, 1, 1], "spec": margins}, dtype=float)
     triangles, box = np.array([[0, 1, 2], [1, 3, 2]]), ((0.25, 0.75), (0.25, 0.5))
-    made = figures.failure_map(points, triangles, ("a", "b"), box=box)
+    made = figures.failure_map_figure(points, triangles, ("a", "b"), box=box)
     ax, bar = made.axes
     norm = ax.images[0].norm
     assert norm(0.0) == pytest.approx(0.5)

@@ -10,7 +10,7 @@ from test_report_page import HOSTILE
 
 from analysis.paper.page.notation import formulas
 from analysis.report.mathml import inline, spoken
-from analysis.report.typography import FORMULA, NO_BREAK, in_print, pieces, plain
+from analysis.report.typography import FORMULA, NO_BREAK, in_print, pieces, plain_text
 
 
 @each_row(
@@ -109,7 +109,7 @@ def test_formulas_of_the_ledger_are_told_from_words(typed, told):
 def test_a_formula_can_be_read_aloud(latex, words):
     """In titles and descriptions of figures, where no MathML can stand."""
     assert spoken(latex) == words
-    assert plain(rf"see \({latex}\).") == f"see {words}."
+    assert plain_text(rf"see \({latex}\).") == f"see {words}."
 
 
 def test_a_comma_stays_on_the_line_of_its_formula():

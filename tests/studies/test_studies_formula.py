@@ -8,12 +8,12 @@ from rows import each_row
 
 from analysis.robustness.stl.formula import (
     And,
-    Signals,
+    SampledSignals,
     always,
     eventually,
     horizon,
     in_band,
-    trace,
+    margin_trace,
 )
 from analysis.robustness.stl.text import parse_formula
 from nlctl import ParameterError
@@ -67,8 +67,8 @@ def test_what_is_read_back_has_the_same_margin(formula, seed):
     until = horizon(formula) + 1.0
     t = np.linspace(0, until, 9)
     known = ["e", "u", "x1", "plant.x2", "y[0]", "W_norm", "s_1", "inner"]
-    signals = Signals(t, {name: rng.normal(size=t.size) * 20 for name in known}, until)
-    values = [trace(f, signals, 0.0, 0.0).y[0] for f in (formula, again)]
+    signals = SampledSignals(t, {name: rng.normal(size=t.size) * 20 for name in known}, until)
+    values = [margin_trace(f, signals, 0.0, 0.0).y[0] for f in (formula, again)]
     np.testing.assert_allclose(values[0], values[1], rtol=1e-12, atol=1e-12)
 
 

@@ -163,10 +163,10 @@ def test_loops_of_a_comparison_that_change_during_the_run_are_noticed(tmp_path):
 
 def test_other_versions_are_named(copied, tmp_path, monkeypatch):
     """Nothing is added to a run of another library; what is drawn from it says so."""
-    today = identity.versions()
+    today = identity.versions_of_numbers()
     path = write(tmp_path, *STUDIES["searches"])
     with monkeypatch.context() as patch:
-        patch.setattr(identity, "versions", lambda: today | {"numpy": "1.0"})
+        patch.setattr(identity, "versions_of_numbers", lambda: today | {"numpy": "1.0"})
         run(read_study(path), tmp_path / "out", threads=1)
     words = f"numpy 1.0 then, {today['numpy']} now"
     (tmp_path / "out" / "radius" / "finding.json").unlink()
@@ -174,7 +174,7 @@ def test_other_versions_are_named(copied, tmp_path, monkeypatch):
     assert (resumed.returncode, words in resumed.stderr) == (2, True)
     shutil.rmtree(tmp_path / "out")
     with monkeypatch.context() as patch:
-        patch.setattr(identity, "versions", lambda: today | {"numpy": "1.0"})
+        patch.setattr(identity, "versions_of_numbers", lambda: today | {"numpy": "1.0"})
         run(read_study(path), tmp_path / "out", threads=1)
     told = nlctl_here("report", "out", cwd=tmp_path)
     assert (told.returncode, words in told.stderr) == (0, True)

@@ -5,7 +5,7 @@ import numpy as np
 
 from nlctl.native.codegen.blocks import equations
 from nlctl.native.codegen.lower import lower
-from nlctl.native.codegen.program import corners, memory
+from nlctl.native.codegen.program import count_switching_functions, memory
 from nlctl.native.compiled import compile as compile_diagram
 from nlctl.native.machine.routine import plain_functions
 from nlctl.native.thirdparty.python_control import block_outputs, block_rates
@@ -59,7 +59,7 @@ def by_blocks(compiled, t, x, u):
         inputs = inputs_of(node)
         dx[states] = block_rates(node.system, t, x[states], inputs) if node.system.nstates else 0.0
         for count, name, target in (
-            (corners(node), "corners", found),
+            (count_switching_functions(node), "corners", found),
             (len(memory(node)), "commit", committed),
         ):
             if count:

@@ -29,8 +29,8 @@ from ...intervals.time_dependence import UNREAD, reads_time
 
 __all__ = ["Decomposable", "Decomposition", "DecompositionError", "clipped_split", "decompose"]
 
-UNTIMED, TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
-Edge = Callable[[Any, Any], Any]
+UNTIMED, _TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
+_Edge = Callable[[Any, Any], Any]
 TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared splits are tried
 
 
@@ -317,7 +317,7 @@ def _is_of_nlctl(actuator: Any) -> bool:
     return getattr(actuators, type(actuator).__name__, None) is type(actuator)
 
 
-def _refute_band(actuator: Any, edges: tuple[Edge, Edge], u_max: float) -> None:
+def _refute_band(actuator: Any, edges: tuple[_Edge, _Edge], u_max: float) -> None:
     """Look for an input and a memory at which an actuator leaves the band that it declares."""
     p, rng = equation_arguments(actuator), np.random.default_rng(0)
     for t in (0.0, *TIMES):
@@ -334,7 +334,7 @@ def _refute_band(actuator: Any, edges: tuple[Edge, Edge], u_max: float) -> None:
                 )
 
 
-def _edges(actuator: Any) -> tuple[Edge, Edge]:
+def _edges(actuator: Any) -> tuple[_Edge, _Edge]:
     """Return the least and the greatest output v that the actuator can have at input u, time t."""
     p, name = equation_arguments(actuator), type(actuator).__name__
     band: Any = getattr(actuator, "band", None)
@@ -358,12 +358,12 @@ def _edges(actuator: Any) -> tuple[Edge, Edge]:
 
 
 def _eps_range(
-    k: tuple[float, float], edges: tuple[Edge, Edge], u_max: float, tol: float
+    k: tuple[float, float], edges: tuple[_Edge, _Edge], u_max: float, tol: float
 ) -> tuple[Range, Range]:
     """Ranges of eps_u along both edges, for all t >= 0; it grows with v, so these are its ends."""
     part = clipped_split(*k)
 
-    def along(edge: Edge) -> Range:
+    def along(edge: _Edge) -> Range:
         def eps_u(point: tuple[Any, ...]) -> Any:
             u, t = (*point, UNREAD)[:2]
             v = edge(u, t)
@@ -371,7 +371,7 @@ def _eps_range(
             return rest if t is UNREAD else _sharpened(rest, edge, k, u, t)
 
         if reads_time(edge):
-            box, limit = Box.of(u=(-u_max, u_max), t=(0.0, np.inf)), TIMED
+            box, limit = Box.of(u=(-u_max, u_max), t=(0.0, np.inf)), _TIMED
         else:
             box, limit = Box.of(u=(-u_max, u_max)), UNTIMED
         return enclose(eps_u, box, tol=tol, max_boxes=limit)
@@ -380,7 +380,7 @@ def _eps_range(
     return low, low if edges[1] is edges[0] else along(edges[1])
 
 
-def _sharpened(rest: Any, edge: Edge, k: tuple[float, float], u: Any, t: Any) -> Any:
+def _sharpened(rest: Any, edge: _Edge, k: tuple[float, float], u: Any, t: Any) -> Any:
     """Return eps_u from the difference quotient q of v in u as well, v = q u + v(0, t).
 
     v - clip(v, k_1 u, k_2 u) grows with v, and no faster: it is u (q - clip(q, k_1, k_2)) and what

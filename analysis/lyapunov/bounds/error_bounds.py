@@ -22,7 +22,7 @@ from nlctl.references import SumOfSines
 
 __all__ = ["error_bounds", "filter_poles", "reference_bounds"]
 
-ROUNDING = 1e-12  # added to what double precision has summed up
+_ROUNDING = 1e-12  # added to what double precision has summed up
 
 
 def filter_poles(lambdas: Sequence[float]) -> tuple[arb, ...]:
@@ -126,7 +126,7 @@ def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[flo
     """
     a, w = np.abs(reference.amplitudes), np.array(reference.frequencies)
     n = reference.order
-    largest = [float(np.sum(a * w**k)) * (1 + ROUNDING) for k in range(n + 3)]
+    largest = [float(np.sum(a * w**k)) * (1 + _ROUNDING) for k in range(n + 3)]
     turning = [Fraction(f) for f in reference.frequencies if f > 0]  # exact
     if not turning:
         return tuple(largest[: n + 1])
@@ -140,7 +140,7 @@ def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[flo
     y = np.abs([reference.output(i * h, (), (), p) for i in range(samples * beats + 1)])
     between = np.max(y[:, :-1] + y[:, 1:] * h / 2, axis=0)
     return tuple(
-        min(float(between[k]) + largest[k + 2] * h * h / 8 + ROUNDING, largest[k])
+        min(float(between[k]) + largest[k + 2] * h * h / 8 + _ROUNDING, largest[k])
         for k in range(n + 1)
     )
 

@@ -37,7 +37,7 @@ from .plant_bounds import Demand, demand
 __all__ = ["Certificate", "bound_of_r", "certify"]
 
 OUTWARD = 1 + arb("1e-14")  # covers what the products of float gains round off
-LIMIT = 1e4  # a bound of |r| beyond which the iteration counts as without end
+_LIMIT = 1e4  # a bound of |r| beyond which the iteration counts as without end
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -256,7 +256,7 @@ def _refusal(
     loop: KnownSignLoop, split: Decomposition, need: Demand, iterations: list[float]
 ) -> str:
     """Say why the iteration must end without a bound; nothing if it need not."""
-    if not np.isfinite(iterations[-1]) or not iterations[-1] < LIMIT:
+    if not np.isfinite(iterations[-1]) or not iterations[-1] < _LIMIT:
         shown = ", ".join(f"{C:.4g}" for C in iterations)
         return f"the box does not close: C -> C_0(C) gives {shown} and so on without end"
     if not arb(loop.law.N_0) * split.k_1 * need.G_min >= 1:

@@ -20,14 +20,14 @@ from .certify import Certificate, bound_of_r, certify
 from .known_sign import KnownSignLoop, read_loop
 from .plant_bounds import Demand, demand
 
-__all__ = ["Design", "Trial", "design"]
+__all__ = ["GainCandidate", "GainDesign", "design"]
 
 SLACK = 1.002  # of N_0 over 1 / min k G
-BOUNDS = np.geomspace(0.02, 20, 40)  # of |r|, for which delta* is tabulated
+_BOUNDS = np.geomspace(0.02, 20, 40)  # of |r|, for which delta* is tabulated
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trial:
+class GainCandidate:
     """One set of gains that the search looked at.
 
     Attributes
@@ -46,7 +46,7 @@ class Trial:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Design:
+class GainDesign:
     """The gains that were found, and the proof for them.
 
     Attributes
@@ -68,12 +68,12 @@ class Design:
     u: float
     u_limit: float
     horizon: float
-    trials: tuple[Trial, ...]
+    trials: tuple[GainCandidate, ...]
 
     @property
-    def tradeoff(self) -> tuple[Trial, ...]:
+    def tradeoff(self) -> tuple[GainCandidate, ...]:
         """The trials than which no other has a smaller bound and a smaller max |u|, by max |u|."""
-        front: list[Trial] = []
+        front: list[GainCandidate] = []
         closed = [trial for trial in self.trials if np.isfinite(trial.C_0 + trial.u)]
         for trial in sorted(closed, key=lambda trial: (trial.u, trial.C_0)):
             if not front or trial.C_0 < front[-1].C_0:
@@ -101,7 +101,7 @@ def design(
     horizon: float = 20.0,
     evaluations: int = 150,
     max_steps: int = 100_000,
-) -> Design:
+) -> GainDesign:
     """Search the gains with the smallest proved bound of |r| whose run keeps |u| below a limit.
 
     Searched are gamma, tau, b, beta, and the shares of sigma_2 gamma and sigma_1 Gamma in 2 beta
@@ -143,7 +143,7 @@ def design(
     if read.nodes and not read.parts.gains.sigma_1 > 0:
         raise ParameterError("design needs sigma_1 > 0, otherwise alpha_1 = 0; got sigma_1 = 0")
     split = decompose(read.parts.actuator, k=k, u_max=u_max, tol=1e-3)
-    table = [demand(read, split, float(C), tol=1e-2) for C in BOUNDS]
+    table = [demand(read, split, float(C), tol=1e-2) for C in _BOUNDS]
     least_kG = split.k_1 * min(need.G_min for need in table)
     compiled, trials = compiled_loop(loop), []
 
@@ -151,7 +151,7 @@ def design(
         changed, gains = _with_gains(read, least_kG, point)
         C_0, excess = _bound(changed, table)
         u = _largest_input(compiled, gains, horizon, max_steps) if np.isfinite(C_0) else np.nan
-        trials.append(Trial(gains=gains, C_0=C_0, u=u))
+        trials.append(GainCandidate(gains=gains, C_0=C_0, u=u))
         if not np.isfinite(C_0):
             return 10 + excess
         over = np.log(u / u_limit)
@@ -220,14 +220,14 @@ def _largest_input(compiled: Any, gains: dict[str, float], horizon: float, max_s
 
 
 def _proved(
-    loop: Any, trials: list[Trial], u_limit: float, how: dict[str, Any], horizon: float
-) -> Design:
+    loop: Any, trials: list[GainCandidate], u_limit: float, how: dict[str, Any], horizon: float
+) -> GainDesign:
     """Prove the best trial that keeps the limit; if that fails, the next one."""
     allowed = [t for t in trials if np.isfinite(t.C_0) and t.u <= u_limit]
     for trial in sorted(allowed, key=lambda t: t.C_0)[:5]:
         certificate = certify(loop, params=trial.gains, **how)
         if certificate.holds:
-            return Design(
+            return GainDesign(
                 gains=trial.gains,
                 certificate=certificate,
                 u=trial.u,

@@ -14,7 +14,7 @@ import numpy as np
 from nlctl.diagrams import Place
 from nlctl.expressions.graph import Ambiguous, Graph, Untraceable
 from nlctl.expressions.trace import trace
-from nlctl.native.codegen.trace import arguments
+from nlctl.native.codegen.trace import traced_arguments
 from nlctl.native.parameters import slots_of
 from nlctl.plants import PureFeedback, integrator_chain
 
@@ -36,7 +36,7 @@ def update_is_declared(plant: Place) -> bool:
     system, graph = plant.system, Graph()
     declared = integrator_chain(*terms_with_parameters(system.current_spec))
 
-    given = functools.partial(arguments, graph, system, slots_of(system))
+    given = functools.partial(traced_arguments, graph, system, slots_of(system))
     try:
         with np.errstate(all="ignore"):
             one, other = (trace(graph, f, given) for f in (system.updfcn, declared))

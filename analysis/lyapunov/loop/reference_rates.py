@@ -23,9 +23,9 @@ from .signals import Margin, equality
 __all__ = ["reference_margin"]
 
 WEIGHTS = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])  # of differences at 1, ..., 4 steps
-STEPS = (1e-1, 1e-2, 1e-3, 1e-4)  # s
+_STEPS = (1e-1, 1e-2, 1e-3, 1e-4)  # s
 SAMPLES = 120
-TOLERANCE = 1e-6  # relative to the largest value of a derivative
+_TOLERANCE = 1e-6  # relative to the largest value of a derivative
 SHIFT = 0.381966  # of a sampling interval: corners of a function of time lie on the samples
 
 
@@ -77,7 +77,7 @@ def _slopes(block: Any, t: float, x: np.ndarray, rows: list[int]) -> np.ndarray:
     with np.errstate(all="ignore"):
         return np.array([
             sum(w * (along(j * h) - along(-j * h)) for j, w in enumerate(WEIGHTS, 1)) / h
-            for h in STEPS
+            for h in _STEPS
         ])  # fmt: skip
 
 
@@ -88,5 +88,5 @@ def _worst(t: np.ndarray, told: np.ndarray, found: np.ndarray) -> Margin:
     k = int(np.argmax(np.max(np.nan_to_num(np.abs(told - found), nan=np.inf) / size, axis=0)))
     return equality(
         "(yd)", "yd1, ..., ydn are the derivatives of yd", t, told[:, k], found[:, k],
-        float(size[k]), TOLERANCE,
+        float(size[k]), _TOLERANCE,
     )  # fmt: skip

@@ -9,13 +9,13 @@ import numpy as np
 from nlctl.diagrams import state_names
 from nlctl.errors import DiagramError, ParameterError
 
-from ..nussbaum.property import Function
+from ..nussbaum.property import GainFunction
 from .roles import read_parts
 
 __all__ = ["law_of_response", "own_parameters"]
 
-LOOKS = 12  # samples that are compared
-EQUAL = 1e-6  # relative, and absolute below 1
+_LOOKS = 12  # samples that are compared
+_EQUAL = 1e-6  # relative, and absolute below 1
 
 
 def own_parameters(loop: Any, response: Any) -> dict[str, Any]:
@@ -24,7 +24,7 @@ def own_parameters(loop: Any, response: Any) -> dict[str, Any]:
     return {k: v for k, v in given if "." in k and not np.array_equal(usual.get(k, np.nan), v)}
 
 
-def law_of_response(loop: Any, response: Any) -> Function:
+def law_of_response(loop: Any, response: Any) -> GainFunction:
     """Return the Nussbaum function of the loop that a response is of.
 
     At samples of the response zeta, r and u are compared with the diagram's own outputs at the same
@@ -55,10 +55,10 @@ def law_of_response(loop: Any, response: Any) -> Function:
     parts = read_parts(loop, params=params)
     if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
         raise DiagramError(
-            f"creep is about laws with a Nussbaum argument, got {type(parts.law).__name__}"
+            f"slow_drift is about laws with a Nussbaum argument, got {type(parts.law).__name__}"
         )
     place = state_names(loop).index(f"{parts.paths['law']}.zeta")
-    for i in np.unique(np.linspace(0, states.shape[1] - 1, LOOKS).astype(int)):
+    for i in np.unique(np.linspace(0, states.shape[1] - 1, _LOOKS).astype(int)):
         t, x = float(response.time[i]), states[:, i]
         zeta, r, u = _compared(loop, response, i, params)
         rate = float(np.asarray(loop.dynamics(t, x, np.zeros(0), params=params))[place])
@@ -86,5 +86,5 @@ def _compared(loop: Any, response: Any, i: int, params: dict[str, Any]) -> list[
 def _check_close(
     what: str, a: float, b: float, t: float, error: type[ValueError] = ParameterError
 ) -> None:
-    if not abs(a - b) <= EQUAL * max(1.0, abs(a), abs(b)):
+    if not abs(a - b) <= _EQUAL * max(1.0, abs(a), abs(b)):
         raise error(f"{what} differ at t = {t:g} s: {a:.9g} and {b:.9g}")

@@ -18,13 +18,13 @@ from nlctl.errors import DiagramError, UsageError
 
 __all__ = ["check_same", "points_around"]
 
-Point = tuple[float, np.ndarray]
-EQUAL = 1e-9  # relative, and absolute below 1: the same functions at the same arguments
-COUNT, SPREADS = 24, (0.03, 0.3, 1.0)  # points of each spread
+_Point = tuple[float, np.ndarray]
+_EQUAL = 1e-9  # relative, and absolute below 1: the same functions at the same arguments
+_COUNT, SPREADS = 24, (0.03, 0.3, 1.0)  # points of each spread
 LATEST = 1e4  # s
 
 
-def points_around(x: np.ndarray, *, seed: int = 0) -> list[Point]:
+def points_around(x: np.ndarray, *, seed: int = 0) -> list[_Point]:
     """Return times and states at which loops are compared: the start, and points around it.
 
     Parameters
@@ -35,7 +35,9 @@ def points_around(x: np.ndarray, *, seed: int = 0) -> list[Point]:
     rng = np.random.default_rng(seed)
     points = [(0.0, x)]
     for spread in SPREADS:
-        times = np.concatenate([rng.uniform(0, 20, COUNT // 2), rng.uniform(0, LATEST, COUNT // 2)])
+        times = np.concatenate(
+            [rng.uniform(0, 20, _COUNT // 2), rng.uniform(0, LATEST, _COUNT // 2)]
+        )
         points += [(float(t), x + spread * rng.standard_normal(x.size)) for t in times]
     return points
 
@@ -43,7 +45,7 @@ def points_around(x: np.ndarray, *, seed: int = 0) -> list[Point]:
 def check_same(
     given: ct.InterconnectedSystem,
     understood: ct.InterconnectedSystem,
-    points: Iterable[Point],
+    points: Iterable[_Point],
     params: Mapping[str, Any] | None = None,
     own: Mapping[str, Any] | None = None,
 ) -> None:
@@ -101,7 +103,7 @@ def _evaluated(
 
 def _compare(given: Any, t: float, what: list[str], a: np.ndarray, b: np.ndarray) -> None:
     size = np.maximum(1.0, np.maximum(np.abs(a), np.abs(b)))
-    same = (a == b) | (np.isnan(a) & np.isnan(b)) | (np.abs(a - b) <= EQUAL * size)
+    same = (a == b) | (np.isnan(a) & np.isnan(b)) | (np.abs(a - b) <= _EQUAL * size)
     if not same.all():
         i = int(np.argmin(same))
         raise DiagramError(

@@ -25,10 +25,10 @@ from .roles import Parts, read_parts
 from .same_loop import check_same, points_around
 from .signals import Margin, Signals, signals_of
 
-__all__ = ["Member", "Run", "members_of", "observe", "observed_loop"]
+__all__ = ["Member", "MemberRun", "members_of", "observe", "observed_loop"]
 
-LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
-AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
+_LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
+_AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class Member:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class MemberRun:
     """A member, and what became of it.
 
     Attributes
@@ -154,7 +154,7 @@ def observe(
     members: Sequence[Member],
     split: Decomposition,
     max_steps: int = 2_000_000,
-) -> Iterator[Run]:
+) -> Iterator[MemberRun]:
     """Run the members, observed; see `analysis.lyapunov.loop.instrumented`.
 
     Parameters
@@ -190,12 +190,12 @@ def observe(
             ignore_errors=True,
         )
         signals = signals_of(native.uninterrupted(response))
-        seen = _along(loop, response, LOOKS if place == 0 else 1)
+        seen = _along(loop, response, _LOOKS if place == 0 else 1)
         check_same(loop, compiled.system, seen, member.params, params)
         _check_reproduced(member, signals)
         lost = None if response.success else float(response.statistics.time)
         message = str(response.message or "")
-        yield Run(
+        yield MemberRun(
             member=member,
             parts=parts,
             signals=signals,
@@ -240,7 +240,7 @@ def _check_reproduced(member: Member, signals: Signals) -> None:
     told = dict(zip(member.expected.output_labels, member.expected.outputs, strict=True))
     r, again = np.asarray(told["r"]), signals["r"]
     far = np.abs(r[: again.size] - again)
-    if not np.all(far <= AGREE * np.max(np.abs(r))):
+    if not np.all(far <= _AGREE * np.max(np.abs(r))):
         at = float(signals.t[int(np.argmax(far))])
         raise ParameterError(
             f"the response is not one of this loop: at t = {at:g} s its r is off by "

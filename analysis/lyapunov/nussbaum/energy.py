@@ -25,7 +25,7 @@ from nlctl.arguments import number
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
-from .property import Function, antiderivative, lobes
+from .property import GainFunction, antiderivative, lobes
 
 __all__ = ["Drift", "DriftMargin", "SafeHorizon", "drift", "drift_margin", "safe_horizon"]
 
@@ -76,7 +76,7 @@ def signal(response: Any, name: str) -> np.ndarray:
     return values
 
 
-def drift(response: Any, N: Function = functions.nussbaum) -> Drift:
+def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
     """Read the energies of the Nussbaum term off a response.
 
     Parameters
@@ -205,7 +205,7 @@ def safe_horizon(
     l_min: float,
     l_max: float,
     zeta_0: float = 1.0,
-    N: Function = functions.nussbaum,
+    N: GainFunction = functions.nussbaum,
 ) -> SafeHorizon:
     """Return the time that zeta needs at least to cross the first lobe in which N < 0.
 

@@ -1,4 +1,4 @@
-"""When the creep of zeta will burst the loop, as a number of a run that ends long before."""
+"""When the slow drift of zeta will burst the loop, as a number of a run that ends long before."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from nlctl import functions
 from nlctl.errors import ParameterError
 
 from .property import lobe_around
-from .slow_drift import creep
+from .slow_drift import slow_drift
 
 __all__ = ["BurstForecast"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Samples:
-    """What `creep` reads of a response."""
+    """What `slow_drift` reads of a response."""
 
     time: np.ndarray
     outputs: np.ndarray
@@ -65,6 +65,6 @@ class BurstForecast:
             return float(t[beyond[0]])
         run: Any = _Samples(time=t, outputs=np.array([zeta, r, u]))
         try:
-            return float(creep(run, self.N, window=self.window).burst)
+            return float(slow_drift(run, self.N, window=self.window).burst)
         except ParameterError:
             return np.nan

@@ -14,7 +14,7 @@ from nlctl.response import input_output_response
 
 from ..loop.roles import read_parts
 from .property import Lobe, lobe_around
-from .slow_drift import Creep, creep
+from .slow_drift import SlowDrift, slow_drift
 
 __all__ = ["LOOKS", "LongRun", "long_run"]
 
@@ -24,10 +24,10 @@ LOOKS = {200.0: 4 * np.pi, 1000.0: 16 * np.pi}
 FINE, COARSE = (
     0.01,
     0.1,
-)  # s; sampling interval up to the last look, which `creep` needs, and beyond
-END, FINEST = 0.5, 1e-5  # s; how much of a burst is run again, and the sampling interval there
-STANDSTILL = 1e-5  # s; a burst has no end: a run that gets no further in 2000 steps is given up
-SIGNALS = ("zeta", "e", "r", "u")
+)  # s; sampling interval up to the last look, which `slow_drift` needs, and beyond
+END, _FINEST = 0.5, 1e-5  # s; how much of a burst is run again, and the sampling interval there
+_STANDSTILL = 1e-5  # s; a burst has no end: a run that gets no further in 2000 steps is given up
+LONG_RUN_SIGNALS = ("zeta", "e", "r", "u")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class LongRun:
         zeta, e, r and u over `time`.
     lobe : Lobe
         The lobe of the Nussbaum function that zeta starts in.
-    predictions : tuple of Creep
+    predictions : tuple of SlowDrift
         Each made from the beginning of the run alone.
     lost : float or None
         Time (s) at which the run was given up, because its steps shrank to nothing.
@@ -61,7 +61,7 @@ class LongRun:
     time: np.ndarray = field(repr=False)
     signals: Mapping[str, np.ndarray] = field(repr=False)
     lobe: Lobe
-    predictions: tuple[Creep, ...]
+    predictions: tuple[SlowDrift, ...]
     lost: float | None
     again: tuple[float, float] | None = None
 
@@ -148,18 +148,18 @@ def long_run(
     whole = _watched(compiled, times, start, progress, settings)
     time, signals = whole.time, _signals(whole)
     predictions = tuple(
-        creep(_Beginning(time, signals, look), N, window=window)
+        slow_drift(_Beginning(time, signals, look), N, window=window)
         for look, window in LOOKS.items()
         if look <= last
     )
     lost = None
     if not whole.success:
         i = max(int(np.searchsorted(time, whole.statistics.time - END)) - 1, 0)
-        again = np.arange(time[i], whole.statistics.time + END, FINEST)
+        again = np.arange(time[i], whole.statistics.time + END, _FINEST)
         end = _watched(compiled, again, whole.states[:, i], progress, settings)
         late = _signals(end)
         time = np.append(time[:i], end.time)
-        signals = {name: np.append(signals[name][:i], late[name]) for name in SIGNALS}
+        signals = {name: np.append(signals[name][:i], late[name]) for name in LONG_RUN_SIGNALS}
         lost = None if end.success else end.statistics.time
     return LongRun(
         loop=str(loop.name),
@@ -188,7 +188,7 @@ def _watched(
 
 def _signals(response: Any) -> dict[str, np.ndarray]:
     rows = dict(zip(response.output_labels, np.asarray(response.outputs), strict=True))
-    return {name: rows[name] for name in SIGNALS}
+    return {name: rows[name] for name in LONG_RUN_SIGNALS}
 
 
 @dataclass
@@ -202,16 +202,16 @@ class _Watch:
     def __call__(self, t: float) -> None:
         if self.progress is not None:
             self.progress(t)
-        self.stands_still = t - self.reached < STANDSTILL
+        self.stands_still = t - self.reached < _STANDSTILL
         if self.stands_still:
             raise KeyboardInterrupt
         self.reached = t
 
 
 class _Beginning:
-    """The beginning of a run, as `creep` reads a response."""
+    """The beginning of a run, as `slow_drift` reads a response."""
 
     def __init__(self, time: np.ndarray, signals: Mapping[str, np.ndarray], end: float) -> None:
         until = time <= end + 1e-9
-        self.time, self.output_labels = time[until], list(SIGNALS)
-        self.outputs: Any = np.array([signals[name][until] for name in SIGNALS])
+        self.time, self.output_labels = time[until], list(LONG_RUN_SIGNALS)
+        self.outputs: Any = np.array([signals[name][until] for name in LONG_RUN_SIGNALS])

@@ -32,7 +32,7 @@ __all__ = [
     "running_means",
 ]
 
-Function = Callable[[float], float]
+GainFunction = Callable[[float], float]
 Antiderivative = Callable[[np.ndarray], np.ndarray]
 DENSE = 4096
 RANGES = tuple(9.0 * 2**i for i in range(8))  # ends of ranges that are tried for four lobes
@@ -111,7 +111,7 @@ class NussbaumProperty:
         return "\n".join(lines)
 
 
-def antiderivative(N: Function) -> Antiderivative:
+def antiderivative(N: GainFunction) -> Antiderivative:
     """Return int_0^s N as a function of arrays.
 
     The closed form for the paper's function, otherwise adaptive quadrature (scipy.integrate.quad)
@@ -133,21 +133,21 @@ def antiderivative(N: Function) -> Antiderivative:
     return integral
 
 
-def _cumulated(N: Function, points: np.ndarray) -> np.ndarray:
+def _cumulated(N: GainFunction, points: np.ndarray) -> np.ndarray:
     """Return int_0^s N at increasing points, of which 0 is one."""
     pieces = [_quadrature(N, a, b) for a, b in itertools.pairwise(points)]
     total = np.concatenate([[0.0], np.cumsum(pieces)])
     return total - total[np.searchsorted(points, 0.0)]
 
 
-def _quadrature(N: Function, low: float, high: float) -> float:
+def _quadrature(N: GainFunction, low: float, high: float) -> float:
     # The default absolute tolerance would be the whole integral of a small lobe, and a relative
     # one alone cannot be met where positive and negative parts cancel.
     size = (high - low) * max(abs(N(low + share * (high - low))) for share in (0.0, 0.3, 0.5, 1.0))
     return quad(N, low, high, epsabs=1e-12 * size, epsrel=1e-10, limit=200)[0]
 
 
-def running_means(s: np.ndarray, N: Function = functions.nussbaum) -> np.ndarray:
+def running_means(s: np.ndarray, N: GainFunction = functions.nussbaum) -> np.ndarray:
     """Return (1/s) int_0^s N for an array of s != 0; the limit N(0) at s = 0."""
     s = np.asarray(s, dtype=float)
     whole = antiderivative(N)(s)
@@ -155,7 +155,7 @@ def running_means(s: np.ndarray, N: Function = functions.nussbaum) -> np.ndarray
 
 
 def lobes(
-    N: Function = functions.nussbaum, low: float = 0.0, high: float = 9.0, *, step: float = 0.01
+    N: GainFunction = functions.nussbaum, low: float = 0.0, high: float = 9.0, *, step: float = 0.01
 ) -> tuple[Lobe, ...]:
     """Return the lobes of N on [low, high], with their budgets and extrema.
 
@@ -194,13 +194,13 @@ def lobes(
     return tuple(_lobe(N, a, b) for a, b in itertools.pairwise(ends))
 
 
-def root(function: Function, low: float, high: float) -> float:
+def root(function: GainFunction, low: float, high: float) -> float:
     """Return the zero of a function between two points where its signs differ."""
     found: Any = brentq(function, low, high, xtol=1e-14)
     return float(found)
 
 
-def _lobe(N: Function, low: float, high: float) -> Lobe:
+def _lobe(N: GainFunction, low: float, high: float) -> Lobe:
     grid = np.linspace(low, high, 65)
     i = int(np.argmax([abs(N(z)) for z in grid]))
     around = grid[max(i - 1, 0)], grid[min(i + 1, 64)]
@@ -214,7 +214,7 @@ def _lobe(N: Function, low: float, high: float) -> Lobe:
     )
 
 
-def lobe_around(zeta: float, N: Function = functions.nussbaum, *, reach: float = 4.0) -> Lobe:
+def lobe_around(zeta: float, N: GainFunction = functions.nussbaum, *, reach: float = 4.0) -> Lobe:
     """Return the whole lobe that zeta lies in, searched within `reach` on both sides.
 
     At a zero of N it is the lobe above.
@@ -234,7 +234,7 @@ def lobe_around(zeta: float, N: Function = functions.nussbaum, *, reach: float =
 
 
 def nussbaum_property(
-    N: Function = functions.nussbaum, end: float | None = None
+    N: GainFunction = functions.nussbaum, end: float | None = None
 ) -> NussbaumProperty:
     """Check property (12) on [0, end].
 
@@ -280,7 +280,7 @@ def nussbaum_property(
     )
 
 
-def _lobes_until(N: Function, end: float) -> tuple[float, tuple[Lobe, ...], tuple[Lobe, ...]]:
+def _lobes_until(N: GainFunction, end: float) -> tuple[float, tuple[Lobe, ...], tuple[Lobe, ...]]:
     """Return the end, the lobes on [0, end], and those that it does not cut off."""
     found, whole = _whole_lobes(N, end)
     if len(whole) < 4:
@@ -291,7 +291,7 @@ def _lobes_until(N: Function, end: float) -> tuple[float, tuple[Lobe, ...], tupl
     return end, found, whole
 
 
-def _with_lobes(N: Function) -> tuple[float, tuple[Lobe, ...], tuple[Lobe, ...]]:
+def _with_lobes(N: GainFunction) -> tuple[float, tuple[Lobe, ...], tuple[Lobe, ...]]:
     """Return the same for a range that holds four lobes, or the longest on which N is finite."""
     end = RANGES[0]
     best = end, *_whole_lobes(N, _finite_until(N, end))
@@ -302,7 +302,7 @@ def _with_lobes(N: Function) -> tuple[float, tuple[Lobe, ...], tuple[Lobe, ...]]
     return best[1][-1].high, best[1], best[2]
 
 
-def _finite_until(N: Function, end: float) -> float:
+def _finite_until(N: GainFunction, end: float) -> float:
     """Return the largest of `end`, 0.99 end, ... at which N is finite."""
     for share in np.linspace(1.0, 0.01, 100):
         with np.errstate(all="ignore"):
@@ -311,7 +311,7 @@ def _finite_until(N: Function, end: float) -> float:
     raise ParameterError(f"the Nussbaum function is not finite at zeta = {0.01 * end:g}")
 
 
-def _whole_lobes(N: Function, end: float) -> tuple[tuple[Lobe, ...], tuple[Lobe, ...]]:
+def _whole_lobes(N: GainFunction, end: float) -> tuple[tuple[Lobe, ...], tuple[Lobe, ...]]:
     found = lobes(N, 0.0, end, step=max(0.01, end / 4000))
     last = abs(N(end)) <= 1e-9 * abs(found[-1].extremum)
     return found, found if last else found[:-1]

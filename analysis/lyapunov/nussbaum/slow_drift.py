@@ -1,4 +1,4 @@
-r"""The creep of the Nussbaum argument: where it leads, and when.
+r"""The slow drift of the Nussbaum argument: where it leads, and when.
 
 The law (23), (24) obeys N(zeta) zeta' = r u.  While zeta crosses a lobe in which N has the right
 sign (k G N < 0), the loop spends the lobe's budget :math:`\int |N| d\zeta`,
@@ -31,9 +31,9 @@ from nlctl.errors import ParameterError
 
 from ..loop.response_of_loop import law_of_response
 from .energy import Drift, drift
-from .property import Function, Lobe, antiderivative, lobe_around, root
+from .property import GainFunction, Lobe, antiderivative, lobe_around, root
 
-__all__ = ["Balance", "Creep", "burst_peak", "creep"]
+__all__ = ["Balance", "SlowDrift", "burst_peak", "slow_drift"]
 
 SAMPLED = 0.1  # mismatch beyond which the samples do not show that N is that of the law
 ERRORS, MODEL = 2.0, 0.05  # standard errors, and share of the time left, that the range allows
@@ -65,7 +65,7 @@ class Balance:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Creep:
+class SlowDrift:
     """Where zeta stands in its lobe at the end of a response, and where it drifts.
 
     Attributes
@@ -85,8 +85,8 @@ class Creep:
         turns round before; and the earliest and the latest time when mean rate and dependence on
         1/|N| are moved by two standard errors each, and the time that is left by 5 % more.  It
         is meant to hold the burst in nine of ten loops at least, and has done so in simulated ones
-        (tests/lyapunov/test_creep_forecast.py), as long as disturbance and reference go on as they
-        were.
+        (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference go on as
+        they were.
     balance : Balance
         The law fitted to all windows.
     rest, rest_range : float or None, tuple of float or None
@@ -176,16 +176,16 @@ def burst_peak(lobe: Lobe, kG: float) -> float:
     return float(np.sqrt(2 * kG * lobe.budget))
 
 
-def creep(
+def slow_drift(
     response: Any,
-    N: Function = functions.nussbaum,
+    N: GainFunction = functions.nussbaum,
     *,
     loop: Any = None,
     window: float = 16 * np.pi,
     skip: int = 1,
     kG: float = 1.0,
-) -> Creep:
-    """Tell from a response how the creep of zeta will go on.
+) -> SlowDrift:
+    """Tell from a response how the slow drift of zeta will go on.
 
     The prediction supposes that disturbance and reference stay as they were; a chirp does not.
 
@@ -209,7 +209,7 @@ def creep(
 
     Returns
     -------
-    Creep
+    SlowDrift
 
     Raises
     ------
@@ -221,8 +221,8 @@ def creep(
     """
     N = N if loop is None else law_of_response(loop, response)
     run = drift(response, N)
-    number("creep", "window", window, above=0)
-    whole_number("creep", "skip", skip, at_least=0)
+    number("slow_drift", "window", window, above=0)
+    whole_number("slow_drift", "skip", skip, at_least=0)
     lobe = lobe_around(float(run.zeta[-1]), N)
     rates, inverse = _windows(run, N, lobe, window, skip)
     balance = _fitted(rates, inverse)
@@ -233,7 +233,7 @@ def creep(
     lasts = _forecast(rates, inverse, N, lobe, float(run.zeta[-1]))
     if stops or not _recent(rates).mean() > 0:
         lasts = (np.inf, lasts[1], np.inf)
-    return Creep(
+    return SlowDrift(
         time=time,
         zeta=float(run.zeta[-1]),
         lobe=lobe,
@@ -256,7 +256,7 @@ def _recent(rates: np.ndarray) -> np.ndarray:
 
 
 def _windows(
-    run: Drift, N: Function, lobe: Lobe, window: float, skip: int
+    run: Drift, N: GainFunction, lobe: Lobe, window: float, skip: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean of A' and of 1/|N| over each window that zeta spends in the lobe."""
     start = run.time[0] + skip * window
@@ -272,7 +272,7 @@ def _windows(
             inverse.append(trapezoid(1 / values[a : b + 1], run.time[a : b + 1]) / length)
     if len(rates) < BLOCKS:
         raise ParameterError(
-            f"creep needs {BLOCKS} windows of {window:g} s within a lobe, got {len(rates)} in "
+            f"slow_drift needs {BLOCKS} windows of {window:g} s within a lobe, got {len(rates)} in "
             f"[{run.time[0]:g}, {run.time[-1]:g}] s: take a longer response or shorter windows"
         )
     return np.array(rates), np.array(inverse)
@@ -286,7 +286,7 @@ def _fitted(rates: np.ndarray, inverse: np.ndarray) -> Balance:
     return Balance(p=float(p), q=float(q), residual=float(np.sqrt(np.mean(left**2))))
 
 
-def _rest_of(balance: Balance, N: Function, lobe: Lobe) -> float | None:
+def _rest_of(balance: Balance, N: GainFunction, lobe: Lobe) -> float | None:
     """Return the zeta of the lobe, below its extremum, at which the balance stops the drift.
 
     Beyond the extremum |N| falls again, and the same |N| is passed on the way to the burst.
@@ -300,7 +300,7 @@ def _rest_of(balance: Balance, N: Function, lobe: Lobe) -> float | None:
 
 
 def _rest(
-    rates: np.ndarray, inverse: np.ndarray, N: Function, lobe: Lobe
+    rates: np.ndarray, inverse: np.ndarray, N: GainFunction, lobe: Lobe
 ) -> tuple[float | None, tuple[float, float] | None]:
     """Return the resting zeta, and its range over fits that leave a part of the windows out.
 
@@ -317,7 +317,7 @@ def _rest(
 
 
 def _forecast(
-    rates: np.ndarray, inverse: np.ndarray, N: Function, lobe: Lobe, zeta: float
+    rates: np.ndarray, inverse: np.ndarray, N: GainFunction, lobe: Lobe, zeta: float
 ) -> tuple[float, float, float]:
     """Return how long the budget lasts, and the shortest and the longest time that it may.
 
@@ -345,7 +345,7 @@ def _slope(rates: np.ndarray, inverse: np.ndarray) -> tuple[float, float, float]
     return fit.p, float(of_slope), fit.residual / float(np.sqrt(freedom))
 
 
-def _duration(balance: Balance, zeta: float, N: Function, lobe: Lobe) -> float:
+def _duration(balance: Balance, zeta: float, N: GainFunction, lobe: Lobe) -> float:
     """Time until the budget is spent by the balance: int |N| dzeta / A'."""
     if balance.rate(lobe.extremum) <= 0 and zeta < lobe.place:
         return np.inf

@@ -8,11 +8,11 @@ import numpy as np
 
 from ...lyapunov.nussbaum.long_run import LongRun
 from ...report.document import Claim
-from .. import HORIZON, TAIL, Check, Run
+from .. import HORIZON, TAIL, CaseRun, Check
 from ..evidence import Evidence
 
 
-def verdict(compared: Sequence[Check], far: Mapping[str, LongRun]) -> str:
+def paper_verdict(compared: Sequence[Check], far: Mapping[str, LongRun]) -> str:
     """Return the report's first sentence, and what became of the loops far beyond 20 s."""
     total = len(compared)
     missed = [c for c in compared if not c.passed]
@@ -39,7 +39,7 @@ def verdict(compared: Sequence[Check], far: Mapping[str, LongRun]) -> str:
     )
 
 
-def claims(runs: Mapping[str, Run], compared: Sequence[Check]) -> list[Claim]:
+def paper_claims(runs: Mapping[str, CaseRun], compared: Sequence[Check]) -> list[Claim]:
     """Return what the paper claims and these runs can show, with what was found."""
     found = [
         Claim(
@@ -87,7 +87,7 @@ def _limit(key: str, metric: str, compared: Sequence[Check]) -> str:
     return f"{expected.printed} ± {expected.tolerance:.0e}"
 
 
-def _error(run: Run, compared: Sequence[Check]) -> str:
+def _error(run: CaseRun, compared: Sequence[Check]) -> str:
     """Return the largest late error, to a digit beyond its tolerance."""
     tolerance = _of(run.case.key, "tail_max_e", compared).expectation.tolerance
     digits = 1 - int(np.floor(np.log10(tolerance)))

@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 
 from ...report.document import Paragraph, Section, Table
-from .. import HORIZON, METRICS, TAIL, Run
+from .. import HORIZON, METRICS, TAIL, CaseRun
 
 __all__ = ["closing_sections", "metric_table"]
 
-Runs = Mapping[str, Run]
+_Runs = Mapping[str, CaseRun]
 
 
-def closing_sections(runs: Runs, numerics: pd.DataFrame | None = None) -> list[Section]:
+def closing_sections(runs: _Runs, numerics: pd.DataFrame | None = None) -> list[Section]:
     """Return the last sections.
 
     Parameters
@@ -28,7 +28,7 @@ def closing_sections(runs: Runs, numerics: pd.DataFrame | None = None) -> list[S
     return [_choices(runs), _numerics(runs, numerics), _limits(runs)]
 
 
-def metric_table(caption: str, cases: Sequence[Run]) -> Table:
+def metric_table(caption: str, cases: Sequence[CaseRun]) -> Table:
     """Return the headline metrics of some runs, one row each."""
     keys = ("tail_max_e", "tail_rms_e", "max_u", "max_r", "zeta_end", "max_W", "max_delta_hat")
     by_key = {m.key: m for m in METRICS}
@@ -42,7 +42,7 @@ def metric_table(caption: str, cases: Sequence[Run]) -> Table:
     )
 
 
-def _choices(runs: Runs) -> Section:
+def _choices(runs: _Runs) -> Section:
     shown = [r for r in runs.values() if r.case.group in ("published", "choice")]
     return Section(
         key="choices",
@@ -62,13 +62,13 @@ def _choices(runs: Runs) -> Section:
     )
 
 
-def _same_verdict(shown: Sequence[Run]) -> bool:
+def _same_verdict(shown: Sequence[CaseRun]) -> bool:
     """Whether every reading tracks as well as the default, to a quarter of its error."""
     base = {r.case.example: r.metrics["tail_max_e"] for r in shown if r.case.group == "published"}
     return all(r.metrics["tail_max_e"] <= 1.25 * base[r.case.example] for r in shown)
 
 
-def _numerics(runs: Runs, found: pd.DataFrame | None) -> Section:
+def _numerics(runs: _Runs, found: pd.DataFrame | None) -> Section:
     return Section(
         key="numerics",
         title="Numerics",
@@ -102,7 +102,7 @@ def _apart(found: pd.DataFrame) -> Table:
     )
 
 
-def _limits(runs: Runs) -> Section:
+def _limits(runs: _Runs) -> Section:
     drift = {n: _drift(runs[str(n)]) for n in (1, 2)}
     return Section(
         key="limits",
@@ -123,9 +123,9 @@ def _limits(runs: Runs) -> Section:
     )
 
 
-def _reach(run: Run) -> float:
+def _reach(run: CaseRun) -> float:
     return float(np.max(np.abs(run.signals["yd"])))
 
 
-def _drift(run: Run) -> float:
+def _drift(run: CaseRun) -> float:
     return float(run.signals["zeta"][-1] - run.signals["zeta"][run.time >= TAIL][0])

@@ -13,24 +13,24 @@ from collections.abc import Iterator
 
 __all__ = ["formulas"]
 
-GREEK = {
+_GREEK = {
     "eps": r"\varepsilon", "delta": r"\delta", "alpha": r"\alpha", "sigma": r"\sigma",
     "Gamma": r"\Gamma", "gamma": r"\gamma", "beta": r"\beta", "tau": r"\tau", "zeta": r"\zeta",
     "kappa": r"\kappa", "psi": r"\psi", "Omega": r"\Omega", "inf": r"\infty", "mu": r"\mu",
     "lambda": r"\lambda", "eta": r"\eta", "phi": r"\varphi", "rho": r"\rho",
 }  # fmt: skip
-FUNCTIONS = ("arctan", "argmin", "cosh", "tanh", "sinh", "sqrt", "cos", "sin", "exp", "log", "max",
-             "min", "sup")  # fmt: skip
-SIGNS = {"<=": r"\le ", ">=": r"\ge ", "{": r"\{", "}": r"\}", "~": r"\approx "}
-RELATIONS = frozenset(["<=", ">=", "=", "<", ">"])
-OPENING, CLOSING = frozenset("([{"), frozenset(")]}")
+_FUNCTIONS = ("arctan", "argmin", "cosh", "tanh", "sinh", "sqrt", "cos", "sin", "exp", "log", "max",
+              "min", "sup")  # fmt: skip
+_SIGNS = {"<=": r"\le ", ">=": r"\ge ", "{": r"\{", "}": r"\}", "~": r"\approx "}
+_RELATIONS = frozenset(["<=", ">=", "=", "<", ">"])
+OPENING, _CLOSING = frozenset("([{"), frozenset(")]}")
 
 _NAME = (
-    rf"(?:d?(?:{'|'.join(GREEK)})|[A-Za-z])"  # also dzeta
+    rf"(?:d?(?:{'|'.join(_GREEK)})|[A-Za-z])"  # also dzeta
     r"(?:_(?:max|min|hat|\{[a-z0-9+-]+\}|[A-Za-z]|\d+))*\d*(?:~|(?<=[lE])[+-](?=[\s,=]|$))?\*?'*"
 )
-TOKEN = re.compile(
-    rf"(?P<integral>int(?:_0\^s)?(?![A-Za-z]))|(?P<function>(?:{'|'.join(FUNCTIONS)})(?![A-Za-z_]))"
+_TOKEN = re.compile(
+    rf"(?P<integral>int(?:_0\^s)?(?![A-Za-z]))|(?P<function>(?:{'|'.join(_FUNCTIONS)})(?![A-Za-z_]))"
     rf"|(?P<name>{_NAME}(?![A-Za-z_~'\d]))|(?P<word>[^\W\d_][\w'-]*(?:-[\w'-]+)*)"
     r"|(?P<label>(?<![\w~'*])\((?:\d+[a-z]?|[a-z])\))|(?P<number>\d+(?:\.\d+)?(?:e[+-]?\d+)?)"
     r"|(?P<sign><=|>=|[-+=/|(\[{}\])<>^])|(?P<space> +)|(?P<other>.)"
@@ -54,7 +54,7 @@ def formulas(words: str) -> str:
 def _tokens(words: str) -> Iterator[tuple[str, str]]:
     """Yield kind and text; an article and the unit of a number are words."""
     before: list[str] = ["", ""]
-    for found in TOKEN.finditer(words):
+    for found in _TOKEN.finditer(words):
         kind, token = str(found.lastgroup), found[0]
         alone = before[-1] in ("", "space", "other", "word")
         if kind == "name" and token in ARTICLES and alone and words[found.end() :][:1] == " ":
@@ -73,7 +73,7 @@ def _tokens(words: str) -> Iterator[tuple[str, str]]:
 def _depth(run: list[tuple[str, str]]) -> int:
     """Return how many brackets of a run are open."""
     signs = [token for kind, token in run if kind == "sign"]
-    return sum(s in OPENING for s in signs) - sum(s in CLOSING for s in signs)
+    return sum(s in OPENING for s in signs) - sum(s in _CLOSING for s in signs)
 
 
 def _segment(run: list[tuple[str, str]]) -> str:
@@ -96,7 +96,7 @@ def _unbalanced(run: list[tuple[str, str]]) -> bool:
     depth = 0
     for kind, token in run:
         if kind == "sign":
-            depth += (token in OPENING) - (token in CLOSING)
+            depth += (token in OPENING) - (token in _CLOSING)
         if depth < 0:
             return True
     return depth > 0
@@ -106,7 +106,7 @@ def _without_brackets(run: list[tuple[str, str]]) -> str:
     """Return a run whose brackets hold words as well: formulas between its brackets."""
     told, part = "", []
     for kind, token in run:
-        if kind == "sign" and token in OPENING | CLOSING:
+        if kind == "sign" and token in OPENING | _CLOSING:
             told, part = told + _segment(part) + token, []
         else:
             part.append((kind, token))
@@ -128,14 +128,14 @@ def _latex(run: list[tuple[str, str]]) -> str:
         elif kind == "integral":
             told += r"\int_0^s " if "_" in token else r"\int "
         else:
-            told += SIGNS.get(token, token)
+            told += _SIGNS.get(token, token)
     return _powers(told)
 
 
 def _is_factor(token: tuple[str, str], before: bool) -> bool:
     kind, text = token
     if kind == "sign":
-        return text in (CLOSING if before else OPENING) or text == "|"
+        return text in (_CLOSING if before else OPENING) or text == "|"
     return kind in ("name", "number", "label") or (kind in ("function", "integral") and not before)
 
 
@@ -157,8 +157,8 @@ def _name(token: str) -> str:
     token = token.rstrip("+-")
     base, *indices = token.split("_")
     base, number = re.fullmatch(r"(.*?)(\d*)", base).groups()  # type: ignore[union-attr]
-    differential, letter = ("d", base[1:]) if base[1:] in GREEK and base[0] == "d" else ("", base)
-    told = GREEK.get(letter, letter)
+    differential, letter = ("d", base[1:]) if base[1:] in _GREEK and base[0] == "d" else ("", base)
+    told = _GREEK.get(letter, letter)
     for accent in (*(["hat"] if "hat" in indices else []), *(["tilde"] if tilde else [])):
         told = rf"\{accent}{{{told}}}"
     if dots:

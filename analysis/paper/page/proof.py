@@ -10,19 +10,19 @@ from ... import figures
 from ...lyapunov.ledger import Line
 from ...lyapunov.nussbaum.long_run import LongRun
 from ...report.document import Figure, Item, Paragraph, Section, Table
-from ..evidence import FAR, LOOK, Evidence, evidence
+from ..evidence import FAR_HORIZONS, LOOK, Evidence, evidence
 from . import proof_text as text
 from .notation import formulas
 from .proof_text import LONG_RUN
 
 __all__ = ["LONG_RUN", "Evidence", "evidence", "lyapunov_sections"]
 
-GROUPS = (  # of the ledger's lines, each a table of its own
+_GROUPS = (  # of the ledger's lines, each a table of its own
     (("violated",), "corrected", text.VIOLATED),
     (("proved", "computed"), None, text.PROVED),
     (("checked",), None, text.CHECKED),
     (("violated",), "paper", text.FAILING),
-    (("undecided", "not applicable"), None, text.OPEN),
+    (("undecided", "not applicable"), None, text.LEFT_OPEN),
 )
 
 
@@ -54,7 +54,7 @@ def _finding(found: Mapping[int, Evidence], far: Mapping[str, LongRun]) -> Secti
         title="The proof, and what happens far beyond 20 s",
         items=[
             *_burst(far),
-            _creep_table(found),
+            _slow_drift_table(found),
             *(Paragraph(text=words, code=command) for words, command in text.COMMANDS),
         ],
     )
@@ -63,16 +63,16 @@ def _finding(found: Mapping[int, Evidence], far: Mapping[str, LongRun]) -> Secti
 def _burst(far: Mapping[str, LongRun]) -> Iterator[Item]:
     run = far.get("2")
     if run is not None and np.isfinite(run.burst):
-        yield Paragraph(text=text.burst(run))
+        yield Paragraph(text=text.burst_text(run))
         yield Figure(
             key="proof-burst",
             caption=text.BURST,
-            description=f"{text.burst(run)} {text.BURST}",
+            description=f"{text.burst_text(run)} {text.BURST}",
             figure=figures.burst(run),
         )
     else:
         yield Paragraph(text=text.NO_LONG_RUN if run is None else text.calm(run))
-    calm = {FAR[key][0]: r for key, r in far.items() if key != "2"}
+    calm = {FAR_HORIZONS[key][0]: r for key, r in far.items() if key != "2"}
     if calm:
         yield Figure(
             key="proof-calm",
@@ -89,16 +89,22 @@ def _far_table(far: Mapping[str, LongRun]) -> Table:
         caption=text.FAR_CAPTION,
         columns=("loop", "rtol", "runs until (s)", "max |e₁| before", "foretold", "happened"),
         rows=[
-            (FAR[key][0], f"{r.rtol:g}", f"{r.time[-1]:.0f}", r.calm, *text.told(r))
+            (
+                FAR_HORIZONS[key][0],
+                f"{r.rtol:g}",
+                f"{r.time[-1]:.0f}",
+                r.calm,
+                *text.prediction_text(r),
+            )
             for key, r in far.items()
         ],
     )
 
 
-def _creep_table(found: Mapping[int, Evidence]) -> Table:
+def _slow_drift_table(found: Mapping[int, Evidence]) -> Table:
     rows = []
     for number, one in found.items():
-        c = one.creep
+        c = one.slow_drift
         burst = f"{c.burst:.4g} s" if np.isfinite(c.burst) else "none"
         rest = "none" if c.rest is None else f"{c.rest:.4g}"
         if c.rest_range is not None:
@@ -106,7 +112,7 @@ def _creep_table(found: Mapping[int, Evidence]) -> Table:
         spent = f"{100 * c.share:.3g} %"
         rows.append((f"Example {number}", f"{c.zeta:.5g}", spent, c.verdict, rest, burst))
     return Table(
-        caption=f"The drift of ζ, judged after {LOOK:g} s. {text.CREEP}",
+        caption=f"The drift of ζ, judged after {LOOK:g} s. {text.SLOW_DRIFT}",
         columns=("loop", "ζ", "budget spent", "verdict", "ζ comes to rest at", "burst at"),
         rows=rows,
     )
@@ -129,7 +135,7 @@ def _example(number: int, one: Evidence) -> list[Section]:
             title=f"Example {number}: the proof line by line",
             level=3,
             folded=True,
-            items=[Paragraph(text=text.summary(one.ledger)), *_ledger_tables(one.ledger.lines)],
+            items=[Paragraph(text=text.ledger_text(one.ledger)), *_ledger_tables(one.ledger.lines)],
         ),
         Section(
             key=f"{key}-bound",
@@ -156,7 +162,7 @@ def _example(number: int, one: Evidence) -> list[Section]:
 
 
 def _ledger_tables(lines: Sequence[Line]) -> Iterator[Table]:
-    for statuses, reading, caption in GROUPS:
+    for statuses, reading, caption in _GROUPS:
         group = [x for x in lines if x.status in statuses and reading in (None, x.reading)]
         rows = [_row(line) for line in group]
         if rows:
@@ -185,7 +191,10 @@ def _bound(key: str, one: Evidence) -> Iterator[Item]:
         description=f"{text.V_CAPTION} C₀ is {c.C_0:.4g}, max |r| is {c.max_r:.4g}.",
         figure=figures.lyapunov_bound(one.t, one.curves),
     )
-    for caption, group in ((text.shares(c), c.shares), (text.delta_shares(c), c.delta_shares)):
+    for caption, group in (
+        (text.shares_caption(c), c.shares),
+        (text.delta_shares(c), c.delta_shares),
+    ):
         yield Table(
             caption=caption,
             columns=("term", "formula", "value", "share"),

@@ -41,7 +41,7 @@ FAR_CAPTION = (
     "continued from where today's run ends, unless the command at the end of this page has "
     "--far: then all of it was computed again."
 )
-CREEP = (
+SLOW_DRIFT = (
     "While ζ crosses an interval between two zeros of N, a lobe, it uses up the lobe's budget, the "
     "integral of |N|. Creeps: by the fitted balance of the drift it goes on until the budget is "
     "used up, and the gain changes its sign. Settles: by all fits the drift stops before. "
@@ -78,7 +78,7 @@ FAILING = (
     "False as the paper has it: statements as printed, or as the paper uses them. “Literal”: with "
     "q cos(w t) counted to g(x), which must not depend on t; the corrected line counts it to d."
 )
-OPEN = "Left open: what this run cannot decide, and what does not apply to it."
+LEFT_OPEN = "Left open: what this run cannot decide, and what does not apply to it."
 V_CAPTION = (
     r"\(V\) of (21) against its bounds: the level of (34), which is \(C_0^2/2\), the bound (32) "
     r"that depends on time, and the part \(r^2/2\) that the filtered error has in \(V\). \(I\) and "
@@ -108,7 +108,7 @@ EQUATIONS = (
 CONSTANTS = "Every constant of the proof, with how it was obtained. They hold over the box"
 
 
-def burst(run: LongRun) -> str:
+def burst_text(run: LongRun) -> str:
     """Return what a long run came to, in one paragraph."""
     early, *_ = run.predictions
     late = run.predictions[-1]
@@ -133,7 +133,7 @@ def calm(run: LongRun) -> str:
     return f"No burst within {run.time[-1]:.0f} s: ζ ends at {run.signals['zeta'][-1]:.3f}."
 
 
-def told(run: LongRun) -> tuple[str, str]:
+def prediction_text(run: LongRun) -> tuple[str, str]:
     """Return what was foretold of a long run, and what happened."""
     before = [
         f"at rest at ζ = {p.rest:.3f}"
@@ -149,7 +149,7 @@ def told(run: LongRun) -> tuple[str, str]:
     return "; ".join(before), happened
 
 
-def summary(found: Ledger) -> str:
+def ledger_text(found: Ledger) -> str:
     """Return the ledger in a paragraph: what is violated, and how many lines are what."""
     own = ", ".join(line.key for line in found.violated)
     paper = ", ".join(line.key for line in found.failing)
@@ -162,7 +162,7 @@ def summary(found: Ledger) -> str:
     )
 
 
-def shares(c: Conservatism) -> str:
+def shares_caption(c: Conservatism) -> str:
     """Return the caption of the terms of C_0, which says what makes it large."""
     most = max(c.shares, key=lambda share: share.share)
     return (

@@ -15,20 +15,20 @@ from ... import figures
 from ...lyapunov.nussbaum.long_run import LongRun
 from ...report.document import Figure, History, Item, Paragraph, Report, Section, Table, versions
 from ...report.equations import equations_of
-from .. import CASES, HORIZON, TAIL, Check, Run, checks
+from .. import CASES, HORIZON, TAIL, CaseRun, Check, checks
 from .. import figures as histories
 from . import text as text
-from .claims import claims, proof_claims, verdict
+from .claims import paper_claims, paper_verdict, proof_claims
 from .closing import closing_sections, metric_table
 from .proof import Evidence, lyapunov_sections
 
 __all__ = ["paper_report", "paper_sections"]
 
-Runs = Mapping[str, Run]
+_Runs = Mapping[str, CaseRun]
 
 
 def paper_report(
-    runs: Runs,
+    runs: _Runs,
     *,
     proofs: Mapping[int, Evidence] | None = None,
     far: Mapping[str, LongRun] | None = None,
@@ -63,20 +63,20 @@ def paper_report(
     return Report(
         title="Adaptive neural control with an uncertain actuator, reproduced",
         question=text.QUESTION,
-        verdict=verdict(compared, far or {}),
+        verdict=paper_verdict(compared, far or {}),
         lead=_lead(runs, (far or {}).get("2")),
-        claims=[*claims(runs, compared), *proof_claims(proofs or {}, far or {})],
+        claims=[*paper_claims(runs, compared), *proof_claims(proofs or {}, far or {})],
         sections=[*sections, *studies, *closing_sections(runs, numerics)],
         command="nlctl report",
         provenance=versions("python-flint", "cvxpy", "cma"),
         numbers={key: dict(run.metrics) for key, run in runs.items()},
-        methods=text.METHODS,
+        methods=text.METHODS_TEXT,
         references=text.REFERENCES,
     )
 
 
 def paper_sections(
-    runs: Runs,
+    runs: _Runs,
     *,
     proofs: Mapping[int, Evidence] | None = None,
     far: Mapping[str, LongRun] | None = None,
@@ -92,10 +92,10 @@ def paper_sections(
     ]
 
 
-def _lead(runs: Runs, long: LongRun | None) -> Figure:
+def _lead(runs: _Runs, long: LongRun | None) -> Figure:
     """Return the picture at the top: Example 2 follows its reference, and zeta creeps."""
     run = runs["2"]
-    told = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_CREEP}"
+    told = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_DRIFT}"
     if long is not None and np.isfinite(long.burst):
         told = f"{told} {text.LEAD_BURST.format(hours=long.burst / 3600)}"
     return Figure(
@@ -120,7 +120,7 @@ def _model() -> Section:
     )
 
 
-def _example(number: int, runs: Runs, compared: Sequence[Check]) -> list[Section]:
+def _example(number: int, runs: _Runs, compared: Sequence[Check]) -> list[Section]:
     run = runs[str(number)]
     diagram = run.case.diagram
     blocks = ", ".join(system.name for system in diagram.syslist)
@@ -157,7 +157,7 @@ def _count(number: int, compared: Sequence[Check]) -> int:
     return sum(check.expectation.case in own for check in compared)
 
 
-def _time_histories(key: str, run: Run) -> list[Figure]:
+def _time_histories(key: str, run: CaseRun) -> list[Figure]:
     m = run.metrics
     plots = (
         ("tracking", histories.tracking, r"Output \(y\) and reference \(y_d\)."),
@@ -200,7 +200,7 @@ def _time_histories(key: str, run: Run) -> list[Figure]:
     ]
 
 
-def _interactive(number: int, run: Run) -> History:
+def _interactive(number: int, run: CaseRun) -> History:
     names = ("y", "yd", "e", "u", "v", "zeta")
     return History(
         key=f"example-{number}-history",
@@ -252,7 +252,7 @@ def _check_table(number: int, compared: Sequence[Check]) -> Table:
     )
 
 
-def _exchange(runs: Runs) -> Section:
+def _exchange(runs: _Runs) -> Section:
     pairs = (("1", "1-backlash"), ("2", "2-dead-zone"))
     return Section(
         key="exchange",

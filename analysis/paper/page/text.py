@@ -19,7 +19,7 @@ QUESTION = (
     "do both examples do what the paper says, over 20 s and for all time, and does its proof hold?"
 )
 LEAD = "Example 2, top: the output follows its reference through backlash."
-LEAD_CREEP = (
+LEAD_DRIFT = (
     r"Bottom, the same loop over hours: the argument \(\zeta\) of the Nussbaum gain creeps upwards."
 )
 LEAD_BURST = (
@@ -27,7 +27,7 @@ LEAD_BURST = (
     "bursts."
 )
 
-METHODS = (
+METHODS_TEXT = (
     "Plant, actuator, reference and controller are blocks of python-control, joined by their "
     "signals; each equation is written once, as in the paper, and compiled to machine code. The "
     "numbers to reach are held against an independent computation, to the "

@@ -33,7 +33,7 @@ from .experiment import Prepared, columns_of, evaluate, typed
 
 __all__ = ["LostChunkError", "chunk_table", "computed_elsewhere", "computed_here"]
 
-LOOK = 0.5  # s between looks at Ctrl-C while workers are busy
+_LOOK = 0.5  # s between looks at Ctrl-C while workers are busy
 Chunk = tuple[range, pd.DataFrame]
 
 
@@ -116,7 +116,7 @@ def computed_elsewhere(
     UsageError
         At the end, if a row was refused.
     """
-    payload, todo = packed(prepared, design), iter(chunks)
+    payload, todo = _packed(prepared, design), iter(chunks)
     waiting: dict[Future, range] = {}
     failures: list[tuple[range, BaseException]] = []
     workers = _workers(executor)
@@ -139,7 +139,7 @@ def computed_elsewhere(
                         del waiting[future]
             if not waiting:
                 break
-            ready, _ = wait(waiting, timeout=LOOK, return_when=FIRST_COMPLETED)
+            ready, _ = wait(waiting, timeout=_LOOK, return_when=FIRST_COMPLETED)
             for future in ready:
                 numbers, error = waiting.pop(future), _failure(future)
                 if error is None:
@@ -153,7 +153,7 @@ def computed_elsewhere(
         _raise(*failures[0])
 
 
-def packed(prepared: Prepared, design: Design) -> bytes:
+def _packed(prepared: Prepared, design: Design) -> bytes:
     """Return what a worker needs, as bytes; functions made at run time travel by value.
 
     What builds diagrams stays at home, and the rows of a listed design go with their chunks.

@@ -21,7 +21,7 @@ from nlctl.native.integrate.driver import Settings
 from nlctl.params import as_numbers, checked_times
 from nlctl.responses.arguments import input_array
 
-from ...metrics import Metric, machine_code
+from ...metrics import Metric, in_machine_code
 from ..stl.piecewise import with_vertices
 from ..stl.spec import Requirement, Spec, unfinished_margin
 from ..uncertainty.binding import diagrams, resolved
@@ -33,10 +33,10 @@ __all__ = [
     "Prepared",
     "by_diagram",
     "columns_of",
-    "compile_ahead",
+    "compile_experiment_ahead",
     "evaluate",
     "prepare",
-    "simulate",
+    "simulate_rows",
     "typed",
 ]
 
@@ -225,7 +225,7 @@ def by_diagram(prepared: Prepared, table: pd.DataFrame) -> Iterator[tuple[Compil
             yield loop, rows
 
 
-def simulate(
+def simulate_rows(
     experiment: Experiment,
     loop: Compiled,
     rows: pd.DataFrame,
@@ -270,7 +270,9 @@ def _run(
 ) -> pd.DataFrame:
     requirements = experiment.spec.requirements
     metrics = (*map(_fast, experiment.metrics), *requirements)
-    made = simulate(experiment, loop, rows, metrics=metrics, threads=threads, progress=progress)
+    made = simulate_rows(
+        experiment, loop, rows, metrics=metrics, threads=threads, progress=progress
+    )
     found = made.table.reindex(columns=experiment.measured)
     found = found.set_axis(rows.index[found.index.to_numpy()])
     failed = found["status"] != Status.OK.name
@@ -282,7 +284,7 @@ def _run(
     return found
 
 
-def compile_ahead(prepared: Prepared) -> None:
+def compile_experiment_ahead(prepared: Prepared) -> None:
     """Compile diagrams, metrics and margins, which otherwise happens with the first row."""
     for _, loop in prepared.loops:
         native.compile_ahead(loop, ensemble=True)
@@ -296,7 +298,7 @@ def compile_ahead(prepared: Prepared) -> None:
 def _fast(metric: Metric) -> Metric:
     if not isinstance(metric, Metric):  # what is like a metric runs as it is
         return metric
-    return replace(metric, function=machine_code(metric.function))
+    return replace(metric, function=in_machine_code(metric.function))
 
 
 Columns = Mapping[str, str | Sequence[str]]

@@ -23,7 +23,13 @@ from ..uncertainty.space import Space
 from .experiment import Prepared
 from .loop_record import array_text, loop_facts, short_key
 
-__all__ = ["differences_of", "experiment_facts", "identity_of", "labels_text", "versions"]
+__all__ = [
+    "differences_of",
+    "experiment_facts",
+    "identity_of",
+    "labels_text",
+    "versions_of_numbers",
+]
 
 VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
 COMPUTING = {
@@ -89,7 +95,7 @@ def experiment_facts(prepared: Prepared, space: Space | None = None) -> dict[str
         "diagrams": {
             labels_text(labels): loop_facts(loop.system) for labels, loop in prepared.loops
         },
-        "versions": versions(),
+        "versions": versions_of_numbers(),
     }
 
 
@@ -99,7 +105,7 @@ def labels_text(labels: Mapping[str, str]) -> str:
 
 
 @functools.cache
-def versions() -> dict[str, str]:
+def versions_of_numbers() -> dict[str, str]:
     """Return the versions of all that computes numbers; nlctl's with a key of its source."""
     source = hashlib.sha256()
     for root, parts in COMPUTING.items():

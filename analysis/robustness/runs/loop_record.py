@@ -27,10 +27,10 @@ from nlctl.sampling.system import Sampled, happening
 
 __all__ = ["array_text", "loop_facts", "loop_values", "short_key", "values_differ"]
 
-T = TypeVar("T")
-EQUATIONS = ("update", "output", "corners", "commit")
+_T = TypeVar("_T")
+_EQUATIONS = ("update", "output", "corners", "commit")
 SHAPE = ("inputs", "outputs", "states", "feedthrough", "vector", "memory", "initial")
-POINTS = 6
+_POINTS = 6
 GOLDEN = (math.sqrt(5) - 1) / 2
 GIVEN = re.compile(r"sys\[\d+\]")  # by python-control
 RTOL, ATOL = 1e-6, 1e-9  # what processors and versions of libraries may differ by
@@ -61,7 +61,7 @@ def loop_facts(system: ct.InputOutputSystem) -> dict[str, dict[str, str]]:
     return {part: _steady(system, content) for part, content in found.items()}
 
 
-def _steady(system: ct.InputOutputSystem, content: Mapping[str, T]) -> dict[str, T]:
+def _steady(system: ct.InputOutputSystem, content: Mapping[str, _T]) -> dict[str, _T]:
     """Number the names that python-control gives, ``sys[7]``, by where they stand.
 
     It counts the systems of a process.
@@ -85,7 +85,7 @@ def _block(system: Any) -> str:
     if isinstance(system, Block):
         spec, known = system.spec, declared_params(system.spec)
         held = {k: v for k, v in getattr(spec, "__dict__", {}).items() if k not in known}
-        parts = [getattr(spec, name, None) for name in (*EQUATIONS, *SHAPE)]
+        parts = [getattr(spec, name, None) for name in (*_EQUATIONS, *SHAPE)]
         return short_key(type(spec), held, parts, timebase)
     if isinstance(system, ct.StateSpace):
         return short_key([system.A, system.B, system.C, system.D], timebase)
@@ -156,10 +156,10 @@ def loop_values(system: Any, end: float) -> dict[str, float | str]:
     everything = happening(frozenset(moments(clocks)))  # sampled blocks' next states as well
     with warnings.catch_warnings(), np.errstate(all="ignore"), everything:
         warnings.simplefilter("ignore")
-        for k in range(POINTS):
+        for k in range(_POINTS):
             spread = (GOLDEN * np.arange(1, start.size + width + 1) * (k + 1)) % 1 - 0.5
             x = start + reach * spread[: start.size] * (k > 0)
-            t, u = end * k / (POINTS - 1), spread[start.size :]
+            t, u = end * k / (_POINTS - 1), spread[start.size :]
             try:
                 rates += (1 + k % 3) * np.ravel(system.dynamics(t, x, u, params={}))
                 outputs += (1 + k % 3) * np.ravel(system.output(t, x, u, params={}))

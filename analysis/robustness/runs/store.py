@@ -35,7 +35,7 @@ from .identity import differences_of
 SEALS = b"nlctl.seals"  # a key of each column, in a chunk's file
 
 __all__ = [
-    "Store",
+    "ChunkStore",
     "StoreError",
     "claimed",
     "locked",
@@ -52,7 +52,7 @@ class StoreError(UsageError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Store:
+class ChunkStore:
     """A folder with chunks of one study.
 
     Attributes
@@ -124,7 +124,7 @@ def _text(path: Path) -> str:
 
 
 @contextmanager
-def claimed(store: Store, *, resume: bool = False) -> Iterator[None]:
+def claimed(store: ChunkStore, *, resume: bool = False) -> Iterator[None]:
     """Hold a folder for this process alone, with the study's identity in it.
 
     Raises
@@ -138,7 +138,7 @@ def claimed(store: Store, *, resume: bool = False) -> Iterator[None]:
         yield
 
 
-def _identify(store: Store, resume: bool) -> None:
+def _identify(store: ChunkStore, resume: bool) -> None:
     """Write who a folder belongs to, or compare."""
     begun = bool(_ranges(store))
     if begun and not resume:
@@ -159,7 +159,7 @@ def _identify(store: Store, resume: bool) -> None:
     _write(store, store.folder / "study.json", json.dumps(content, indent=1).encode())
 
 
-def opened(folder: str | os.PathLike[str]) -> Store:
+def opened(folder: str | os.PathLike[str]) -> ChunkStore:
     """Return the store that a folder holds.
 
     Raises
@@ -170,12 +170,14 @@ def opened(folder: str | os.PathLike[str]) -> Store:
     path = Path(folder) / "study.json"
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        return Store(folder=path.parent, identity=content["identity"], columns=content["columns"])
+        return ChunkStore(
+            folder=path.parent, identity=content["identity"], columns=content["columns"]
+        )
     except (OSError, ValueError, KeyError) as error:
         raise StoreError(f"'{path}' is no study of a sweep: {error}") from error
 
 
-def _write(store: Store, path: Path, content: bytes | memoryview) -> None:
+def _write(store: ChunkStore, path: Path, content: bytes | memoryview) -> None:
     """Write a file of a store in one step, and return when it is on the disk."""
 
     def write(file: Any) -> None:
@@ -193,7 +195,7 @@ def _write(store: Store, path: Path, content: bytes | memoryview) -> None:
         ) from error
 
 
-def put(store: Store, frame: pd.DataFrame) -> None:
+def put(store: ChunkStore, frame: pd.DataFrame) -> None:
     """Write consecutive rows as one chunk; floats keep their bits.
 
     Raises
@@ -233,7 +235,7 @@ def _check_seals(path: Path, frame: pd.DataFrame) -> None:
         raise ValueError(f"'{path.name}' is not as it was written: '{changed[0]}' was edited")
 
 
-def _ranges(store: Store) -> list[range]:
+def _ranges(store: ChunkStore) -> list[range]:
     """Return the rows of every chunk file, in order."""
     found = []
     for path in sorted(store.chunks.glob("*.parquet")):
@@ -243,16 +245,16 @@ def _ranges(store: Store) -> list[range]:
     return sorted(found, key=lambda numbers: numbers.start)
 
 
-def _path(store: Store, numbers: range) -> Path:
+def _path(store: ChunkStore, numbers: range) -> Path:
     return store.chunks / f"{numbers[0]:09d}-{numbers[-1]:09d}.parquet"
 
 
-def stored(store: Store) -> int:
+def stored(store: ChunkStore) -> int:
     """Return the number of rows in the folder."""
     return sum(map(len, _ranges(store)))
 
 
-def taken_up(store: Store) -> Iterator[tuple[range, np.ndarray | str]]:
+def taken_up(store: ChunkStore) -> Iterator[tuple[range, np.ndarray | str]]:
     """Go through the chunks that are there, and clear what a killed process has left.
 
     Yields
@@ -289,7 +291,7 @@ def taken_up(store: Store) -> Iterator[tuple[range, np.ndarray | str]]:
         yield numbers, margins
 
 
-def table_of(store: Store, columns: Sequence[str] | None = None) -> pd.DataFrame:
+def table_of(store: ChunkStore, columns: Sequence[str] | None = None) -> pd.DataFrame:
     """Read the rows that are there, in order; only some columns where asked.
 
     Raises
@@ -307,7 +309,7 @@ def table_of(store: Store, columns: Sequence[str] | None = None) -> pd.DataFrame
 
 
 def _read(
-    store: Store, paths: Sequence[Path], columns: Sequence[str] | None = None
+    store: ChunkStore, paths: Sequence[Path], columns: Sequence[str] | None = None
 ) -> pd.DataFrame:
     chosen = {name: store.columns[name] for name in columns or store.columns}
     if not paths:

@@ -25,13 +25,13 @@ from .executors import LostChunkError, chunk_table, computed_elsewhere, computed
 from .experiment import Prepared, columns_of
 from .identity import identity_of
 from .progress import Progress, Tally
-from .store import Store, claimed, opened, put, stored, table_of, taken_up
+from .store import ChunkStore, claimed, opened, put, stored, table_of, taken_up
 
 __all__ = ["Interrupt", "Sweep", "gentle_interrupt", "load", "sweep"]
 
-LARGEST = 1024  # rows of a chunk: some 200 kB on disk, and seconds of work
+_LARGEST = 1024  # rows of a chunk: some 200 kB on disk, and seconds of work
 FEWEST = 20  # chunks of a sweep, so that a kill costs little
-STEP = 64  # rows: a chunk keeps the SIMD lanes of several threads busy
+_STEP = 64  # rows: a chunk keeps the SIMD lanes of several threads busy
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -155,7 +155,7 @@ def sweep(
     with ExitStack() as stack:
         if folder is not None:
             facts = identity_of(prepared, design, identity)
-            store = Store(folder=Path(folder), identity=facts, columns=columns_of(prepared))
+            store = ChunkStore(folder=Path(folder), identity=facts, columns=columns_of(prepared))
             stack.enter_context(claimed(store, resume=resume))
             keep = partial(put, store)
             notes += _continued(store, tally) if resume else []
@@ -209,10 +209,10 @@ def _check_space(prepared: Prepared, design: Design) -> None:
 
 
 def _chunk_size(design: Design) -> int:
-    return min(LARGEST, STEP * math.ceil(design.size / (FEWEST * STEP)))
+    return min(_LARGEST, _STEP * math.ceil(design.size / (FEWEST * _STEP)))
 
 
-def _continued(store: Store, tally: Tally) -> list[str]:
+def _continued(store: ChunkStore, tally: Tally) -> list[str]:
     """Count the chunks that are there; return what is to be said of damaged ones."""
     notes = []
     for numbers, found in taken_up(store):

@@ -13,12 +13,12 @@ import numpy as np
 import pandas as pd
 
 from ..uncertainty.design import corners, numbered
-from ..uncertainty.space import Space, boxed, ends
+from ..uncertainty.space import Space, ends, from_unit_cube
 from .evaluation import Evaluate, evaluated, margins_of
 
-__all__ = ["Found", "corner_count", "search"]
+__all__ = ["Found", "corner_count", "search_worst"]
 
-SHARE = 4
+_SHARE = 4
 """Corners, and uniform draws, take one part in this many of the runs each."""
 BATCH = 64
 """Rows that run together."""
@@ -65,11 +65,11 @@ class Found:
         return margins
 
 
-def search(found: Found, rng: np.random.Generator) -> None:
+def search_worst(found: Found, rng: np.random.Generator) -> None:
     """Run rows until the budget is spent or the target met; see `worst_case.worst_case`."""
     space = found.space
     is_finite = not space.quantities or space.scale == 0  # the corners are everything
-    share = found.runs if is_finite else max(found.runs // SHARE, 1)
+    share = found.runs if is_finite else max(found.runs // _SHARE, 1)
     has_all = corner_count(space) <= share
     some = corners(space).table if has_all else _some_corners(space, share, rng)
     _in_batches(found, "corners", some)
@@ -93,11 +93,11 @@ def _some_corners(space: Space, count: int, rng: np.random.Generator) -> pd.Data
     unit = rng.random((count, len(space.names)))
     d = len(space.quantities)
     unit[:, :d] = np.rint(unit[:, :d])
-    return boxed(space, unit).drop_duplicates(ignore_index=True)
+    return from_unit_cube(space, unit).drop_duplicates(ignore_index=True)
 
 
 def _uniform(space: Space, count: int, rng: np.random.Generator) -> pd.DataFrame:
-    return boxed(space, rng.random((count, len(space.names))))
+    return from_unit_cube(space, rng.random((count, len(space.names))))
 
 
 def _in_batches(found: Found, searcher: str, table: pd.DataFrame) -> None:
@@ -116,13 +116,13 @@ def _evolve(found: Found, rng: np.random.Generator, size: int, *, is_first: bool
         asked = strategy.ask()
         unit = np.full((size, len(space.names)), 0.5)
         unit[:, :d] = np.clip(asked, 0.0, 1.0)[:, :d]
-        margins = found.run("CMA-ES", boxed(space, unit).assign(**labels))
+        margins = found.run("CMA-ES", from_unit_cube(space, unit).assign(**labels))
         with _quiet():
             strategy.tell(asked, list(np.clip(margins, -EXTREME, EXTREME)))
 
 
 def _places(space: Space, table: pd.DataFrame) -> np.ndarray:
-    """Return the places of rows in their boxes, the opposite of `boxed`."""
+    """Return the places of rows in their boxes, the opposite of `from_unit_cube`."""
     box = ends(space)
     low, high = box.to_numpy()
     return np.clip((table[box.columns].to_numpy(dtype=float) - low) / (high - low), 0.0, 1.0)

@@ -24,13 +24,13 @@ __all__ = ["TIGHTER", "Confirmation", "confirm"]
 
 TIGHTER = 100.0
 """Tolerances are divided by this."""
-OTHERS = ("tsit5", "rodas5p")
+_OTHERS = ("tsit5", "rodas5p")
 """The explicit integrator and the stiff one."""
-REFERENCE = "LSODA"
+_REFERENCE = "LSODA"
 """SciPy's, in python-control."""
-BURST = (Status.DIVERGED.name, Status.STEP_TOO_SMALL.name)
+_BURST = (Status.DIVERGED.name, Status.STEP_TOO_SMALL.name)
 """How a run may end where its states leave the finite numbers."""
-SAME = 0.01
+_SAME = 0.01
 """Bursts are the same if their times differ by at most this part of the later one."""
 
 
@@ -101,7 +101,7 @@ def confirm(
     tighter = replace(study, rtol=study.rtol / TIGHTER, atol=study.atol / TIGHTER)
     table = as_table(study.space, [row])
     replays = []
-    for experiment in (study, *(replace(tighter, method=method) for method in OTHERS)):
+    for experiment in (study, *(replace(tighter, method=method) for method in _OTHERS)):
         found = evaluate(replace(prepared, experiment=experiment), table).iloc[0]
         replays.append(_replay("native", experiment, found["status"], found["time"], found["spec"]))
     if python_control:
@@ -135,14 +135,14 @@ def _in_python_control(
     ((loop, _),) = by_diagram(prepared, table)
     given = arguments(experiment.space, table)
     end = float(experiment.timepts[-1])
-    told = partial(_replay, "python-control", experiment, method=REFERENCE)
+    told = partial(_replay, "python-control", experiment, method=_REFERENCE)
     try:
         response = input_output_response(
             loop.system,
             experiment.timepts,
             experiment.inputs,
             engine="python-control",
-            method=REFERENCE,
+            method=_REFERENCE,
             rtol=experiment.rtol,
             atol=experiment.atol,
             initial_state={name: values[0] for name, values in given["initial_state"].items()},
@@ -161,15 +161,15 @@ def _reason(replays: pd.DataFrame) -> str:
     runs = replays.to_dict("records")
     for run in runs:
         how = f"with {run['engine']}, method {run['method']}, rtol = {run['rtol']:.1g}"
-        if run["status"] not in (Status.OK.name, *BURST):
+        if run["status"] not in (Status.OK.name, *_BURST):
             return f"the run {how} ended with {run['status']} at {run['time']:.4g} s"
-        if (run["status"] in BURST) != (runs[0]["status"] in BURST):
+        if (run["status"] in _BURST) != (runs[0]["status"] in _BURST):
             return f"the run {how} ended with {run['status']}, the study's with {runs[0]['status']}"
         if np.isnan(run["margin"]):
             return f"the run {how} has no margin"
         if run["margin"] > 0:
             return f"the run {how} holds, margin {run['margin']:.4g}"
     times = replays["time"].to_numpy(dtype=float)
-    if np.ptp(times) > SAME * np.max(times):
+    if np.ptp(times) > _SAME * np.max(times):
         return f"the runs end at different times, from {np.min(times):.4g} to {np.max(times):.4g} s"
     return ""

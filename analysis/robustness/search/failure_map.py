@@ -15,18 +15,18 @@ from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
 from ..uncertainty.design import affordable, numbered
-from ..uncertainty.space import Space, boxed, ends, nominal
+from ..uncertainty.space import Space, ends, from_unit_cube, nominal
 from .evaluation import Evaluate, evaluated, margins_of
 
 __all__ = ["FailureMap", "boundary", "failure_map"]
 
-Cell = tuple[int, int, int]
+_Cell = tuple[int, int, int]
 """Lower left corner and side, in steps of the finest grid."""
 CLOSE = 0.5
 """A cell is near the boundary if its least |margin| is below this part of their range in it."""
-FINEST = 30
+_FINEST = 30
 """Divisions beyond which the finest cells are no wider than rounding."""
-WORK = 40
+_WORK = 40
 """What a point of the first grid takes beside its row, in numbers."""
 NEW = 5
 """Points that the refinement of a cell adds at most."""
@@ -111,9 +111,9 @@ def failure_map(
     cells = whole_number(who, "cells", cells, at_least=1)
     levels = whole_number(who, "levels", levels, at_least=0)
     most = whole_number(who, "most", most, at_least=0)
-    if levels > FINEST:
-        raise ParameterError(f"{who} needs levels <= {FINEST}, got {levels}")
-    affordable("the first grid of a failure map", (cells + 1) ** 2, len(space.names) + WORK)
+    if levels > _FINEST:
+        raise ParameterError(f"{who} needs levels <= {_FINEST}, got {levels}")
+    affordable("the first grid of a failure map", (cells + 1) ** 2, len(space.names) + _WORK)
     plane = _Plane(evaluate, space, (x, y), given, cells << levels)
     side = 1 << levels
     leaves = {(i * side, j * side, side) for i in range(cells) for j in range(cells)}
@@ -174,19 +174,19 @@ class _Plane:
         """All points in the order in which they were added."""
         return pd.concat(self.tables, ignore_index=True)
 
-    def add(self, cells: Iterable[Cell]) -> None:
+    def add(self, cells: Iterable[_Cell]) -> None:
         """Run the corners of cells that were not run before."""
         new = sorted({point for cell in cells for point in _corners(cell)} - self.margins.keys())
         unit = np.full((len(new), len(self.space.names)), 0.5)
         for name, coordinates in zip(self.axes, np.transpose(new), strict=True):
             unit[:, self.space.names.index(name)] = coordinates / self.steps
         others = {k: v for k, v in self.given.items() if k not in self.axes}
-        rows = numbered(boxed(self.space, unit).assign(**others), len(self.margins))
+        rows = numbered(from_unit_cube(self.space, unit).assign(**others), len(self.margins))
         results = evaluated(self.evaluate, rows)
         self.margins |= zip(new, margins_of(results), strict=True)
         self.tables.append(rows.assign(spec=results["spec"].to_numpy(), round=len(self.tables)))
 
-    def near_boundary(self, cells: Iterable[Cell]) -> list[Cell]:
+    def near_boundary(self, cells: Iterable[_Cell]) -> list[_Cell]:
         """Return the cells to be divided, those with the least |margin| first."""
         chosen = []
         for cell in cells:
@@ -200,19 +200,19 @@ class _Plane:
         return [cell for _, cell in sorted(chosen)]
 
 
-def _corners(cell: Cell) -> tuple[tuple[int, int], ...]:
+def _corners(cell: _Cell) -> tuple[tuple[int, int], ...]:
     i, j, side = cell
     return (i, j), (i + side, j), (i, j + side), (i + side, j + side)
 
 
-def _edges(cell: Cell) -> tuple[tuple[int, int], ...]:
+def _edges(cell: _Cell) -> tuple[tuple[int, int], ...]:
     """Middles of the edges: there are margins where a neighbour is finer."""
     i, j, side = cell
     half = side // 2
     return (i + half, j), (i, j + half), (i + side, j + half), (i + half, j + side)
 
 
-def _quarters(cell: Cell) -> tuple[Cell, ...]:
+def _quarters(cell: _Cell) -> tuple[_Cell, ...]:
     i, j, side = cell
     half = side // 2
     return tuple((i + k * half, j + m * half, half) for k in range(2) for m in range(2))

@@ -22,7 +22,7 @@ __all__ = ["Radius", "robustness_radius", "size_of"]
 
 START = 1 / 16
 """Smallest size that is searched first, as a part of the largest; then twice that, and so on."""
-SMALLEST = 1e-3
+_SMALLEST = 1e-3
 """Smaller sizes are not searched, as a part of the largest."""
 RAY = 12
 """Bisections along the ray to a witness."""
@@ -181,7 +181,7 @@ def robustness_radius(
     while search.upper == np.inf and search.searched < largest:
         search.at(min(size, largest))
         size *= 2
-    while max(SMALLEST * largest, search.low / (1 - tolerance)) < search.upper < np.inf:
+    while max(_SMALLEST * largest, search.low / (1 - tolerance)) < search.upper < np.inf:
         search.at((search.low + search.upper) / 2)
     statement, missing = _drawn(search, draws, confidence)
     return Radius(

@@ -18,7 +18,7 @@ from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, tow
 
 __all__ = ["Shrunk", "shrink"]
 
-Row = dict[str, Any]
+_Row = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,20 +130,20 @@ class _Task:
         self.evaluate, self.space, self.middle = evaluate, space, nominal(space)
         self.runs = 0
 
-    def margins(self, rows: Sequence[Row]) -> np.ndarray:
+    def margins(self, rows: Sequence[_Row]) -> np.ndarray:
         if not rows:
             return np.empty(0)
         self.runs += len(rows)
         return margins_of(evaluated(self.evaluate, as_table(self.space, rows)))
 
-    def deviating(self, row: Row) -> list[str]:
+    def deviating(self, row: _Row) -> list[str]:
         return [name for name in self.space.names if row[name] != self.middle[name]]
 
-    def without(self, row: Row, names: Collection[str]) -> Row:
+    def without(self, row: _Row, names: Collection[str]) -> _Row:
         return row | {name: self.middle[name] for name in names}
 
 
-def _deleted(task: _Task, row: Row) -> Row:
+def _deleted(task: _Task, row: _Row) -> _Row:
     """Set back one deviation after the other while the spec stays violated."""
     while names := task.deviating(row):
         rows = [task.without(row, [name]) for name in names]
@@ -155,7 +155,7 @@ def _deleted(task: _Task, row: Row) -> Row:
     return row
 
 
-def _fewest(task: _Task, row: Row, size: int, most: int) -> tuple[Row | None, bool]:
+def _fewest(task: _Task, row: _Row, size: int, most: int) -> tuple[_Row | None, bool]:
     """Try all sets of less than `size` deviations; return a violation, and whether it tried."""
     names = task.deviating(row)
     if sum(math.comb(len(names), count) for count in range(size)) > most:
@@ -170,7 +170,7 @@ def _fewest(task: _Task, row: Row, size: int, most: int) -> tuple[Row | None, bo
     return None, True
 
 
-def _scaled(task: _Task, row: Row, steps: int) -> Row:
+def _scaled(task: _Task, row: _Row, steps: int) -> _Row:
     """Move one number after the other towards nominal by bisection."""
     for name in [q.name for q in task.space.quantities if q.name in task.deviating(row)]:
         full, low, high = row, 0.0, 1.0

@@ -12,7 +12,7 @@ from nlctl.arguments import number, of_type, whole_number
 
 from ..uncertainty.design import Design, checked_entropy, listed
 from ..uncertainty.space import Space
-from .candidates import Found, corner_count, search
+from .candidates import Found, corner_count, search_worst
 from .evaluation import Evaluate, margins_of, row_text
 
 __all__ = ["WorstCase", "worst_case"]
@@ -138,7 +138,7 @@ def worst_case(
     found = Found(evaluate, space, runs, target)
     is_finished = True
     try:
-        search(found, np.random.default_rng(entropy))
+        search_worst(found, np.random.default_rng(entropy))
     except KeyboardInterrupt:
         if not found.tables:
             raise

@@ -22,7 +22,7 @@ from .paired import Better, differences, mcnemar, wins
 
 __all__ = ["Comparison", "compare", "crossed"]
 
-Columns = dict[str, np.ndarray]
+_Columns = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -160,7 +160,7 @@ def compare(
 
 def _paired(
     design: Design, choice: Choice, table: pd.DataFrame, columns: tuple[str, ...]
-) -> dict[str, Columns]:
+) -> dict[str, _Columns]:
     """Return each column by option, in the order of the samples."""
     wanted = crossed(design, choice)
     for name in (*wanted.columns, *columns):
@@ -203,7 +203,7 @@ def _check_rows(wanted: pd.DataFrame, table: pd.DataFrame, choice: str) -> None:
 
 
 def _ranking(
-    paired: Mapping[str, Columns], spec: str, metrics: Mapping[str, Better], confidence: float
+    paired: Mapping[str, _Columns], spec: str, metrics: Mapping[str, Better], confidence: float
 ) -> pd.DataFrame:
     rows = {}
     for label, margins in paired[spec].items():

@@ -21,10 +21,10 @@ __all__ = [
     "NoGuaranteeError",
     "Side",
     "Violation",
-    "assumptions",
     "check_iid",
     "checked_confidence",
     "clopper_pearson",
+    "design_assumptions",
     "least_count",
     "rounded_down",
     "rounded_up",
@@ -292,7 +292,7 @@ def violation_probability(
         side=side,
         singly=(lower, upper) if side == "both" else single,
         method=f"Clopper-Pearson, {'two-sided' if side == 'both' else 'one-sided'}",
-        assumptions=(*assumptions(design), fixed),
+        assumptions=(*design_assumptions(design), fixed),
     )
 
 
@@ -365,7 +365,7 @@ def check_iid(design: Design) -> None:
     )
 
 
-def assumptions(design: Design) -> tuple[str, ...]:
+def design_assumptions(design: Design) -> tuple[str, ...]:
     """Return what every statement from this design rests on."""
     laws = ", ".join(f"{name} ~ {law}" for name, law in design.space.laws.items())
     drawn = "as the user says, " if design.kind == "user's table" else ""

@@ -14,7 +14,7 @@ from nlctl.errors import ParameterError
 
 from ..stl.spec import FAILED
 from ..uncertainty.design import Design, affordable, checked_entropy, listed, sobol_points
-from ..uncertainty.space import Space, boxed, sampled
+from ..uncertainty.space import Space, from_unit_cube, sampled
 from .guarantee import Margins, checked_confidence, series_of
 from .paired import holm
 
@@ -92,7 +92,7 @@ def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None
     turn = rng.permuted(np.tile(np.arange(d), (r, 1)), axis=1)[:, None, :]
     changed = np.arange(d + 1)[None, :, None] > turn  # row k has made the first k changes
     unit = np.minimum(low + step * (changed == upwards), 1.0)  # rounding
-    points = boxed(space, unit.reshape(-1, d))
+    points = from_unit_cube(space, unit.reshape(-1, d))
     return listed(space, "Morris", points, entropy, {"trajectories": r})
 
 

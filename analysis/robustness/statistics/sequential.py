@@ -15,9 +15,9 @@ from ..uncertainty.design import Design
 from .guarantee import (
     Margins,
     Violation,
-    assumptions,
     checked_confidence,
     checked_counts,
+    design_assumptions,
     violations_of,
 )
 
@@ -157,7 +157,7 @@ def _statement(design: Design, k: int, n: int, confidence: float) -> Violation:
         side="both",
         singly=(lower, upper),
         method="beta-binomial confidence sequence, valid at every number of runs",
-        assumptions=(*assumptions(design), "rows are counted in the order of the design"),
+        assumptions=(*design_assumptions(design), "rows are counted in the order of the design"),
     )
 
 

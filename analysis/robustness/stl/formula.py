@@ -23,7 +23,7 @@ from nlctl.arguments import number, of_type, text
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
-from .piecewise import Trace, extremes, joined, largest, with_vertices
+from .piecewise import Trace, extremes, largest, pointwise_maximum, with_vertices
 
 __all__ = [
     "Always",
@@ -32,13 +32,13 @@ __all__ = [
     "Eventually",
     "Formula",
     "Not",
-    "Signals",
+    "SampledSignals",
     "always",
     "eventually",
     "horizon",
     "in_band",
-    "signals_of",
-    "trace",
+    "margin_trace",
+    "signals_named",
 ]
 
 
@@ -208,7 +208,7 @@ def parts_of(formula: Formula) -> Iterator[Formula]:
 
 
 @cache
-def signals_of(formula: Formula) -> tuple[str, ...]:
+def signals_named(formula: Formula) -> tuple[str, ...]:
     """Return the names of the signals that a formula looks at, in alphabetical order."""
     return tuple(sorted({part.signal for part in parts_of(formula) if isinstance(part, Band)}))
 
@@ -224,7 +224,7 @@ def horizon(formula: Formula) -> float:
 
 
 @dataclass(frozen=True)
-class Signals:
+class SampledSignals:
     """Samples by name, all finite.
 
     Attributes
@@ -242,7 +242,7 @@ class Signals:
     until: float
 
 
-def trace(formula: Formula, signals: Signals, low: float, high: float) -> Trace:
+def margin_trace(formula: Formula, signals: SampledSignals, low: float, high: float) -> Trace:
     """Return the margin of a formula as a function of time in [low, high].
 
     Parameters
@@ -261,12 +261,14 @@ def trace(formula: Formula, signals: Signals, low: float, high: float) -> Trace:
         case Band():
             return _band(formula, signals, low, high)
         case Not():
-            return -trace(formula.part, signals, low, high)
+            return -margin_trace(formula.part, signals, low, high)
         case And():
-            return -joined([-trace(part, signals, low, high) for part in formula.parts])
+            return -pointwise_maximum(
+                [-margin_trace(part, signals, low, high) for part in formula.parts]
+            )
         case Always():
             opposite = Eventually(part=~formula.part, start=formula.start, end=formula.end)
-            return -trace(opposite, signals, low, high)
+            return -margin_trace(opposite, signals, low, high)
         case Eventually():
             start, end = formula.start, formula.end
             last = max(min(high + end, signals.until - horizon(formula.part)), low + start)
@@ -274,12 +276,14 @@ def trace(formula: Formula, signals: Signals, low: float, high: float) -> Trace:
             if low == high and isinstance(formula.part, Not) and isinstance(band, Band):
                 worst = _worst(band, signals, low + start, last)
                 return Trace(np.array([low]), np.array([worst]))
-            inner = trace(formula.part, signals, low + start, last)
+            inner = margin_trace(formula.part, signals, low + start, last)
             return largest(inner, low, high, start, end)
     raise TypeError(f"no formula: {formula!r}")
 
 
-def _near(band: Band, signals: Signals, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+def _near(
+    band: Band, signals: SampledSignals, low: float, high: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return times and samples of the band's signal in [low, high], with a few more around."""
     if band.signal not in signals.samples:
         raise unknown("signal", band.signal, signals.samples)
@@ -294,12 +298,12 @@ def _beyond(band: Band, y: np.ndarray) -> list[np.ndarray]:
     return sides if np.isinf(band.lower) else [*sides, (band.lower - y) / band.scale]
 
 
-def _band(band: Band, signals: Signals, low: float, high: float) -> Trace:
+def _band(band: Band, signals: SampledSignals, low: float, high: float) -> Trace:
     y = with_vertices(*_near(band, signals, low, high)).between(low, high)
-    return -joined([Trace(y.t, beyond) for beyond in _beyond(band, y.y)])
+    return -pointwise_maximum([Trace(y.t, beyond) for beyond in _beyond(band, y.y)])
 
 
-def _worst(band: Band, signals: Signals, low: float, high: float) -> float:
+def _worst(band: Band, signals: SampledSignals, low: float, high: float) -> float:
     """Return the largest violation in [low, high]: an extreme value has it."""
     values = np.array(extremes(*_near(band, signals, low, high), low, high))
     return float(np.max(_beyond(band, values)))

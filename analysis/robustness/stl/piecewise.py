@@ -12,9 +12,9 @@ import numpy as np
 
 from nlctl.native.machine.machine_code import kept
 
-from ...metrics import differences, vertex
+from ...metrics import consecutive_differences, vertex
 
-__all__ = ["Trace", "extremes", "higher", "joined", "largest", "with_vertices"]
+__all__ = ["Trace", "extremes", "higher", "largest", "pointwise_maximum", "with_vertices"]
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def with_vertices(t: np.ndarray, y: np.ndarray) -> Trace:
 @kept(nogil=True, error_model="numpy")
 def _vertices(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the vertices between samples: before which sample each is, when, and its value."""
-    d = differences(y)
+    d = consecutive_differences(y)
     i = np.nonzero(d[:-1] * d[1:] < 0)[0] + 1
     if i.size == 0:
         return i, t[:0], y[:0]
@@ -156,7 +156,7 @@ def _inner_largest(part: Trace, low: np.ndarray, high: np.ndarray) -> np.ndarray
     return np.where(j > i, np.maximum.reduceat(padded, pairs)[::2], -np.inf)
 
 
-def joined(traces: list[Trace]) -> Trace:
+def pointwise_maximum(traces: list[Trace]) -> Trace:
     """Return the largest of several functions over the same interval."""
     result = traces[0]
     for trace in traces[1:]:

@@ -14,7 +14,7 @@ from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.params import as_numbers
 
-from .formula import HOW, Formula, Signals, horizon, signals_of, trace
+from .formula import HOW, Formula, SampledSignals, horizon, margin_trace, signals_named
 
 __all__ = [
     "FAILED",
@@ -72,7 +72,7 @@ class Requirement:
     @property
     def signals(self) -> tuple[str, ...]:
         """Names of the signals that it looks at."""
-        return signals_of(self.formula)
+        return signals_named(self.formula)
 
     def function(self, t: np.ndarray, *samples: np.ndarray) -> float:
         """Return the margin, with the samples in the order of `signals`."""
@@ -155,9 +155,9 @@ def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.nda
         )
     if t.size == 0 or t[-1] < until * (1 - 1e-12):
         return unfinished_margin(t[-1] if t.size else 0.0, until)
-    finite = Signals(t, dict(zip(requirement.signals, samples, strict=True)), until)
+    finite = SampledSignals(t, dict(zip(requirement.signals, samples, strict=True)), until)
     with np.errstate(over="ignore", invalid="ignore"):  # samples near the largest number
-        value = trace(requirement.formula, finite, 0.0, 0.0).y[0]
+        value = margin_trace(requirement.formula, finite, 0.0, 0.0).y[0]
     return float(np.fmax(value, -FAILED))  # NaN becomes -FAILED
 
 

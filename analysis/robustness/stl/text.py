@@ -20,10 +20,12 @@ from nlctl.errors import ParameterError
 
 __all__ = ["parse_formula"]
 
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-NAME = r"[A-Za-z_][\w.]*(?:\[\d+\])?"
-TOKEN = re.compile(rf"\s*(?:(?P<number>{NUMBER})|(?P<name>{NAME})|(?P<sign><=|>=|[|()\[\],])|(\S))")
-WORDS = ("always", "and", "eventually", "from", "in", "not", "on", "or", "s")
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_NAME = r"[A-Za-z_][\w.]*(?:\[\d+\])?"
+_TOKEN = re.compile(
+    rf"\s*(?:(?P<number>{_NUMBER})|(?P<name>{_NAME})|(?P<sign><=|>=|[|()\[\],])|(\S))"
+)
+_WORDS = ("always", "and", "eventually", "from", "in", "not", "on", "or", "s")
 DEPTH = 50
 EXAMPLE = "always from 10 s on |e| <= 0.15"
 
@@ -53,7 +55,7 @@ class _Reader:
         self.text = text
         self.words: list[tuple[str, str, int]] = []  # (kind, word, column)
         self.next = 0
-        for match in TOKEN.finditer(text.rstrip()):
+        for match in _TOKEN.finditer(text.rstrip()):
             kind = match.lastgroup or "other"
             word = match[match.lastgroup or 4]
             self.words.append((kind, word, match.end() - len(word)))
@@ -65,7 +67,7 @@ class _Reader:
     @property
     def kind(self) -> str:
         kind = self.words[self.next][0] if self.next < len(self.words) else ""
-        return "word" if kind == "name" and self.here in WORDS else kind
+        return "word" if kind == "name" and self.here in _WORDS else kind
 
     def took(self, word: str) -> bool:
         """Step over `word` if it stands here."""

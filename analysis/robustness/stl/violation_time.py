@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .formula import Always, And, Formula, Signals, horizon, trace
+from .formula import Always, And, Formula, SampledSignals, horizon, margin_trace
 from .spec import Requirement, margin
 
 __all__ = ["ViolationTime", "violation_time"]
@@ -75,7 +75,7 @@ def violation_time(
     found = dict(zip(requirement.signals, samples, strict=True))
     until = min(requirement.until, float(t[-1]))
     is_short = until < requirement.until * (1 - 1e-12)
-    first = _first(requirement.formula, Signals(t, found, until))
+    first = _first(requirement.formula, SampledSignals(t, found, until))
     if is_short:
         return min(first, until)
     if margin(requirement, t, found) > 0:
@@ -83,7 +83,7 @@ def violation_time(
     return min(first, until)
 
 
-def _first(formula: Formula, signals: Signals) -> float:
+def _first(formula: Formula, signals: SampledSignals) -> float:
     """Return when something that should always hold does not, inf where nothing says so."""
     if isinstance(formula, And):
         return min(_first(part, signals) for part in formula.parts)
@@ -92,7 +92,7 @@ def _first(formula: Formula, signals: Signals) -> float:
     last = min(formula.end, signals.until - horizon(formula.part))
     if last < formula.start:
         return np.inf
-    inner = trace(formula.part, signals, formula.start, last)
+    inner = margin_trace(formula.part, signals, formula.start, last)
     bad = np.flatnonzero(~(inner.y > 0))
     if not bad.size:
         return np.inf

@@ -90,7 +90,7 @@ def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Place, str] | Non
 
     Returns
     -------
-    (place, ``"lambdas[0]"``), or None for a parameter of a foreign block
+    (place, ``"lambdas[0]"``), or None for a parameter of a third-party block
     """
     path = base_name(name).rpartition(".")[0]
     for leaf in leaves(system):

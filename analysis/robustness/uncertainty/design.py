@@ -16,11 +16,11 @@ from nlctl.arguments import flag, of_type, whole_number
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
-from .space import Space, boxed, nominal, sampled
+from .space import Space, from_unit_cube, nominal, sampled
 
 __all__ = [
     "Design",
-    "Kind",
+    "_Kind",
     "affordable",
     "checked_entropy",
     "corners",
@@ -38,12 +38,12 @@ __all__ = [
     "sobol_points",
 ]
 
-MOST_ROWS = 10**9
+_MOST_ROWS = 10**9
 """Rows of a design at most: what is drawn row by row."""
 MOST_HELD = 10**8
 """Numbers that a design holds in memory at most, 800 MB: rows times columns."""
 
-Kind = Literal[
+_Kind = Literal[
     "i.i.d.", "Sobol'", "Latin hypercube", "grid", "corners", "one at a time", "Saltelli",
     "Morris", "user's table", "adaptive",
 ]  # fmt: skip
@@ -72,7 +72,7 @@ class Design:
     """
 
     space: Space
-    kind: Kind
+    kind: _Kind
     size: int
     is_iid: bool
     entropy: int
@@ -148,8 +148,8 @@ def independent(space: Space, size: int, entropy: int | None = None) -> Design:
     """
     of_type("a design", "space", space, Space)
     size = whole_number("a design", "size", size, at_least=1)
-    if size > MOST_ROWS:
-        raise ParameterError(f"a design needs size <= {MOST_ROWS:.0e}, got {size}")
+    if size > _MOST_ROWS:
+        raise ParameterError(f"a design needs size <= {_MOST_ROWS:.0e}, got {size}")
     return Design(
         space=space, kind="i.i.d.", size=size, is_iid=True, entropy=checked_entropy(entropy)
     )  # fmt: skip
@@ -228,7 +228,7 @@ def from_table(
 
 def listed(
     space: Space,
-    kind: Kind,
+    kind: _Kind,
     points: pd.DataFrame,
     entropy: int,
     details: Mapping[str, Any] | None = None,
@@ -339,7 +339,7 @@ def _crossed(space: Space, axes: Sequence[np.ndarray]) -> pd.DataFrame:
     impossible = [c.name for c in space.choices if min(c.weights) == 0]
     if impossible:
         raise ParameterError(f"options with weight 0 in {impossible}: leave them out of the space")
-    return boxed(space, np.array(list(itertools.product(*axes, *options))))
+    return from_unit_cube(space, np.array(list(itertools.product(*axes, *options))))
 
 
 def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> Design:
@@ -368,7 +368,7 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
     middle = nominal(space)
     made, varied = [middle], [""]
     unit = np.tile(np.linspace(0, 1, levels)[:, None], len(space.names))
-    values = boxed(space, unit)
+    values = from_unit_cube(space, unit)
     for quantity in space.quantities:
         made += [{**middle, quantity.name: value} for value in values[quantity.name]]
         varied += [quantity.name] * levels

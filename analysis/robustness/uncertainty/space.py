@@ -19,11 +19,11 @@ from .quantity import Choice, SpaceError, Uncertain
 __all__ = [
     "Space",
     "arguments",
-    "boxed",
     "checked_row",
     "checked_rows",
     "combinations",
     "ends",
+    "from_unit_cube",
     "moved",
     "nominal",
     "sampled",
@@ -139,7 +139,7 @@ def sampled(space: Space, unit: np.ndarray) -> pd.DataFrame:
     return _table(space, inner, drawn)
 
 
-def boxed(space: Space, unit: np.ndarray) -> pd.DataFrame:
+def from_unit_cube(space: Space, unit: np.ndarray) -> pd.DataFrame:
     """Turn points of the unit cube into values, linearly between the ends of each box.
 
     Arguments and errors as in `sampled`; whole numbers are rounded.
@@ -154,7 +154,7 @@ def boxed(space: Space, unit: np.ndarray) -> pd.DataFrame:
 
 def ends(space: Space) -> pd.DataFrame:
     """Return the ends of the box of every quantity: a table of two rows, low and high."""
-    corners = boxed(space, np.repeat([[0.0], [1.0]], len(space.names), axis=1))
+    corners = from_unit_cube(space, np.repeat([[0.0], [1.0]], len(space.names), axis=1))
     return corners.filter([quantity.name for quantity in space.quantities])
 
 

@@ -15,7 +15,7 @@ from nlctl.names import unknown
 from .toml import statements
 
 __all__ = [
-    "Place",
+    "KeyPath",
     "Problem",
     "StudyError",
     "line_numbers",
@@ -24,10 +24,10 @@ __all__ = [
     "schema_problems",
 ]
 
-Place = tuple[str | int, ...]
-LONGEST = 600  # characters of a mistake
+KeyPath = tuple[str | int, ...]
+_LONGEST = 600  # characters of a mistake
 OWN_KIND = "a kind of your own is 'path/to/file.py:name' or 'module:name'"
-LARGEST = 10**40  # integers beyond are not printed
+_LARGEST = 10**40  # integers beyond are not printed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class Problem:
         Of the command line, ``key=value``, that are mistaken or have a part in it.
     """
 
-    place: Place
+    place: KeyPath
     message: str
     line: int | None = None
     settings: tuple[str, ...] = ()
@@ -69,7 +69,9 @@ class Problem:
 
 def _short(text: str) -> str:
     """Leave out the middle of a text that quotes too much of a file."""
-    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
+    return (
+        text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"
+    )
 
 
 class StudyError(UsageError):
@@ -86,7 +88,7 @@ class StudyError(UsageError):
         self.problems = tuple(problems)
 
 
-def place_text(place: Place) -> str:
+def place_text(place: KeyPath) -> str:
     """Return a place as it is written in TOML: ``space."actuator.b_r".uniform``."""
     text = ""
     for part in place:
@@ -99,11 +101,11 @@ def place_text(place: Place) -> str:
     return text or "the file"
 
 
-def line_numbers(text: str) -> dict[Place, int]:
+def line_numbers(text: str) -> dict[KeyPath, int]:
     """Return the line of every key that a statement of a TOML file begins with."""
-    found: dict[Place, int] = {}
-    counts: dict[Place, int] = {}
-    table: Place = ()
+    found: dict[KeyPath, int] = {}
+    counts: dict[KeyPath, int] = {}
+    table: KeyPath = ()
     for line, statement in statements(text):
         path = _path(_parsed(statement))
         if statement.startswith("["):
@@ -117,7 +119,7 @@ def line_numbers(text: str) -> dict[Place, int]:
     return found
 
 
-def _indexed(path: Place, counts: Mapping[Place, int]) -> Place:
+def _indexed(path: KeyPath, counts: Mapping[KeyPath, int]) -> KeyPath:
     """Put in the index of the list entry that a header belongs to."""
     place: list[str | int] = []
     for depth, part in enumerate(path, 1):
@@ -134,7 +136,7 @@ def _parsed(statement: str) -> dict[str, Any]:
         return {}
 
 
-def _path(statement: Any) -> Place:
+def _path(statement: Any) -> KeyPath:
     """Return the dotted key of a statement; a value that is a table ends it as well."""
     path: list[str | int] = []
     while isinstance(statement, dict | list) and len(statement) == 1:
@@ -175,12 +177,12 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
 
 def _text(value: Any) -> str:
     """Return a value as it stands in the file; not an integer of thousands of digits."""
-    if isinstance(value, int) and abs(value) > LARGEST:
+    if isinstance(value, int) and abs(value) > _LARGEST:
         return f"an integer of {value.bit_length()} bits"
     return repr(value)
 
 
-def _in_file(loc: Place, data: Any, absent: bool) -> Place:
+def _in_file(loc: KeyPath, data: Any, absent: bool) -> KeyPath:
     """Drop the names of union members that pydantic puts between keys and behind them.
 
     Only if `absent` may the last part be a key that is not there.
@@ -196,7 +198,7 @@ def _in_file(loc: Place, data: Any, absent: bool) -> Place:
     return tuple(place)
 
 
-def _keys_at(annotation: Any, loc: Place) -> list[str]:
+def _keys_at(annotation: Any, loc: KeyPath) -> list[str]:
     """Return the fields of the model that a place of pydantic's leads to."""
     models = list(_models(annotation))
     for part in loc:
@@ -221,7 +223,9 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
         yield from _models(part)
 
 
-def located(problem: Problem, lines: Mapping[Place, int], settings: Mapping[Place, str]) -> Problem:
+def located(
+    problem: Problem, lines: Mapping[KeyPath, int], settings: Mapping[KeyPath, str]
+) -> Problem:
     """Return a mistake with its line, or with the settings of the command line that made it.
 
     Parameters
@@ -240,7 +244,7 @@ def located(problem: Problem, lines: Mapping[Place, int], settings: Mapping[Plac
     return replace(problem, line=nearest_line(lines, place), settings=inside if place else ())
 
 
-def nearest_line(lines: Mapping[Place, int], place: Place) -> int | None:
+def nearest_line(lines: Mapping[KeyPath, int], place: KeyPath) -> int | None:
     """Return the line of a place, or of the innermost table around it that has one."""
     for depth in range(len(place), 0, -1):
         if place[:depth] in lines:

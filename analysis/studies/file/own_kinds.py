@@ -13,7 +13,7 @@ from nlctl.errors import ParameterError, UsageError
 from ..finding import Finding
 from ..kind import Asked, Ground, Kind
 from ..kinds import KINDS
-from .errors import Place, Problem
+from .errors import KeyPath, Problem
 from .resolve import named_kind
 from .schema import Study, study_model
 from .trust import untrusted_names
@@ -56,7 +56,7 @@ def own_kinds(
     return found, problems
 
 
-def _named(data: Mapping[str, Any]) -> Iterator[tuple[Place, str]]:
+def _named(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
     """Yield the places of kinds in a file that may be of any shape."""
     listed = data.get("analysis")
     for i, entry in enumerate(listed if isinstance(listed, list) else ()):

@@ -15,16 +15,16 @@ from pydantic import ValidationError
 from analysis.robustness import Experiment
 from nlctl.errors import ParameterError
 
-from .errors import Place, Problem, StudyError, line_numbers, located, place_text, schema_problems
+from .errors import KeyPath, Problem, StudyError, line_numbers, located, place_text, schema_problems
 from .own_kinds import model_of, own_kinds
 from .schema import Study
 from .toml import check_depth, read_toml
 from .trust import untrusted
-from .validate import bound
+from .validate import checked_experiment
 
 __all__ = ["StudyFile", "read_study"]
 
-ROUNDS = 5  # mistakes may stand behind mistakes
+_ROUNDS = 5  # mistakes may stand behind mistakes
 NAMELESS = {"title": "a study", "seed": 0}  # while the rest of a mistaken file is looked at
 
 
@@ -99,7 +99,7 @@ def read_study(
     if study is not None:
         more = [] if trust else untrusted(study, folder)
         if not more:
-            experiment, more = bound(study, folder)
+            experiment, more = checked_experiment(study, folder)
         more = [replace(p, place=_original(p.place, entries)) for p in more]
         problems += [p for p in more if not follows(p, problems)]
     if problems or study is None or experiment is None:
@@ -122,7 +122,7 @@ def _validated(
     for problem in mistaken:
         _remove(rest, problem.place)
     entries: list[int] = []
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         whole, listed = rest, rest.get("analysis")
         if isinstance(listed, list):
             entries = [i for i, entry in enumerate(listed) if entry is not None]
@@ -147,14 +147,14 @@ def follows(problem: Problem, told: Sequence[Problem]) -> bool:
     return any(place and one.place[: len(place)] == place for one in told)
 
 
-def _original(place: Place, entries: Sequence[int]) -> Place:
+def _original(place: KeyPath, entries: Sequence[int]) -> KeyPath:
     """Return a place with the index that an analysis has in the file."""
     if len(place) > 1 and place[0] == "analysis" and isinstance(place[1], int):
         return ("analysis", entries[place[1]], *place[2:])
     return place
 
 
-def _remove(data: dict[str, Any], place: Place) -> None:
+def _remove(data: dict[str, Any], place: KeyPath) -> None:
     """Take out the innermost key or analysis that a mistake belongs to."""
     target: Any = data
     steps: list[tuple[Any, str | int]] = []
@@ -177,7 +177,7 @@ def _remove(data: dict[str, Any], place: Place) -> None:
         del holder[last]
 
 
-def _set(data: dict[str, Any], setting: str) -> Place:
+def _set(data: dict[str, Any], setting: str) -> KeyPath:
     """Put one setting into the data; return its place."""
     name, equals, value = setting.partition("=")
     try:

@@ -21,7 +21,7 @@ __all__ = [
     "Measured",
     "Rows",
     "Rule",
-    "Solver",
+    "SolverTable",
     "Study",
     "Times",
     "keyed",
@@ -102,7 +102,7 @@ class Measured(Strict):
     )
 
 
-class Solver(Strict):
+class SolverTable(Strict):
     """How runs are integrated."""
 
     rtol: Number = Field(1e-6, gt=0, description="Relative tolerance.")
@@ -158,7 +158,7 @@ class Study(Strict):
     )
     time: Times
     metrics: Measured | None = Field(None, description="Without it only margins are taken.")
-    solver: Solver = Solver()  # type: ignore[call-arg]
+    solver: SolverTable = SolverTable()  # type: ignore[call-arg]
     runs: Rows | None = Field(None, description="The main table.")
     analysis: tuple[SerializeAsAny[Asked], ...] = Field((), description="What is asked.")
 

@@ -9,10 +9,10 @@ from typing import Any
 
 __all__ = ["check_depth", "read_toml", "statements"]
 
-LARGEST = 200_000  # characters of a file
-LONGEST = 8_000  # characters of a line; a key takes the square of its dots to be read
+_LARGEST = 200_000  # characters of a file
+_LONGEST = 8_000  # characters of a line; a key takes the square of its dots to be read
 DEEPEST = 20  # tables and lists inside of each other
-TOKEN = re.compile(
+_TOKEN = re.compile(
     r'"""(?:[^\\]|\\.)*?"""|\'\'\'.*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*|[\[\]{}\n]',
     re.DOTALL,
 )
@@ -26,14 +26,14 @@ def read_toml(text: str) -> dict[str, Any]:
     ValueError
         If it is no TOML, or larger or deeper than any study; the message is one sentence.
     """
-    if len(text) > LARGEST:
-        raise ValueError(f"has {len(text):,} characters, a study at most {LARGEST:,}")
+    if len(text) > _LARGEST:
+        raise ValueError(f"has {len(text):,} characters, a study at most {_LARGEST:,}")
     lines = text.split("\n")
     longest = max(range(len(lines)), key=lambda i: len(lines[i]))
-    if len(lines[longest]) > LONGEST:
+    if len(lines[longest]) > _LONGEST:
         raise ValueError(
             f"has {len(lines[longest]):,} characters in line {longest + 1}, a study at most "
-            f"{LONGEST:,}"
+            f"{_LONGEST:,}"
         )
     try:
         data = tomllib.loads(text)
@@ -79,7 +79,7 @@ def statements(text: str) -> Iterator[tuple[int, str]]:
         The number of its first line, from 0.
     """
     start, first, line, depth = 0, 0, 0, 0
-    for token in TOKEN.finditer(text):
+    for token in _TOKEN.finditer(text):
         word = token[0]
         depth += (word in "[{") - (word in "]}")
         if word == "\n" and depth <= 0:

@@ -27,7 +27,7 @@ import control as ct
 from nlctl import errors
 from nlctl.errors import ParameterError
 
-from .errors import Place, Problem
+from .errors import KeyPath, Problem
 from .schema import Study
 
 __all__ = [
@@ -38,11 +38,11 @@ __all__ = [
     "untrusted_names",
 ]
 
-OWN = (Path(errors.__file__).parent, Path(__file__).parents[2])  # nlctl, analysis
+_OWN = (Path(errors.__file__).parent, Path(__file__).parents[2])  # nlctl, analysis
 MAKERS = ("control", "nlctl")  # whoever makes a diagram calls one of these
 NO_DIAGRAMS = {"None", "bool", "int", "float", "complex", "str", "bytes", "list", "tuple", "dict"}
 SITES = ("site-packages", "dist-packages")
-LONGEST = 500  # characters of a function's name
+_LONGEST = 500  # characters of a function's name
 NO_DIAGRAMS |= {"set", "Path", "ndarray", "DataFrame", "NoReturn", "Never"}
 DIAGRAMS = {
     name
@@ -59,7 +59,7 @@ def untrusted(study: Study, folder: Path) -> list[Problem]:
     return untrusted_names(_named(study), folder)
 
 
-def untrusted_names(named: Iterable[tuple[Place, str]], folder: Path) -> list[Problem]:
+def untrusted_names(named: Iterable[tuple[KeyPath, str]], folder: Path) -> list[Problem]:
     """Return which of these functions and kinds, each with its place in the file, need trust."""
     return [
         Problem(place=place, message=f"{reason}: reading this study would run it. Trust it with "
@@ -69,7 +69,7 @@ def untrusted_names(named: Iterable[tuple[Place, str]], folder: Path) -> list[Pr
     ]  # fmt: skip
 
 
-def _named(study: Study) -> Iterator[tuple[Place, str]]:
+def _named(study: Study) -> Iterator[tuple[KeyPath, str]]:
     """Yield every function that a study names, with its place."""
     if ":" in study.loop:
         yield ("loop",), study.loop
@@ -82,7 +82,7 @@ def _named(study: Study) -> Iterator[tuple[Place, str]]:
         yield from _inside(asked.model_dump(), ("analysis", i))
 
 
-def _inside(value: Any, place: Place) -> Iterator[tuple[Place, str]]:
+def _inside(value: Any, place: KeyPath) -> Iterator[tuple[KeyPath, str]]:
     if isinstance(value, Mapping):
         if isinstance(value.get("function"), str):
             yield place, value["function"]
@@ -105,7 +105,7 @@ def _reason(name: str, folder: Path) -> str:
         places = _module_places(source)
     except (ParameterError, OSError):  # there is none such: said when it is looked for
         return ""
-    homes = [*OWN, *_installed(source.partition(".")[0]), folder.resolve()]
+    homes = [*_OWN, *_installed(source.partition(".")[0]), folder.resolve()]
     outside = [p for p in places if not any(p.resolve().is_relative_to(home) for home in homes)]
     return f"'{source}' is '{outside[0]}', and no installed package" if outside else ""
 
@@ -125,8 +125,10 @@ def check_place(name: str) -> None:
         )
     if not name.isprintable():
         raise ParameterError(f"a function's name has characters that can be printed, got {name!r}")
-    if len(name) > LONGEST:
-        raise ParameterError(f"a function's name has at most {LONGEST} characters, got {len(name)}")
+    if len(name) > _LONGEST:
+        raise ParameterError(
+            f"a function's name has at most {_LONGEST} characters, got {len(name)}"
+        )
     if source.endswith(".py"):
         return
     if not all(part.isidentifier() for part in source.split(".")):

@@ -34,14 +34,14 @@ from ..build import (
     times,
 )
 from ..kind import Asked, Setup
-from .errors import Place, Problem
+from .errors import KeyPath, Problem
 from .resolve import loop_function, option, uncertain
 from .schema import RESERVED, Faulty, Study
 
-__all__ = ["bound"]
+__all__ = ["checked_experiment"]
 
-T = TypeVar("T")
-MOST_ROWS = 10_000_000  # of a design or a search
+_T = TypeVar("_T")
+_MOST_ROWS = 10_000_000  # of a design or a search
 MOST_DIAGRAMS = 1000
 
 
@@ -51,10 +51,10 @@ class _Notes:
     def __init__(self) -> None:
         self.problems: list[Problem] = []
 
-    def add(self, place: Place, message: str) -> None:
+    def add(self, place: KeyPath, message: str) -> None:
         self.problems.append(Problem(place=place, message=message))
 
-    def attempt(self, place: Place, make: Callable[..., T], *arguments: Any) -> T | None:
+    def attempt(self, place: KeyPath, make: Callable[..., _T], *arguments: Any) -> _T | None:
         """Return what `make` returns; a mistake that it names is noted instead."""
         try:
             return make(*arguments)
@@ -63,7 +63,7 @@ class _Notes:
             return None
 
 
-def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]:
+def checked_experiment(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]:
     """Return the experiment of a study, and all mistakes; None if there are any.
 
     Errors of another kind than `UsageError` come from the user's own functions and pass.
@@ -257,10 +257,10 @@ def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Note
                 notes.add(("analysis", i, key), str(unknown("quantity", name, study.space)))
 
 
-def _too_large(study: Study, notes: _Notes) -> set[Place]:
+def _too_large(study: Study, notes: _Notes) -> set[KeyPath]:
     """Refuse numbers of runs that no machine can make; return where they are asked for."""
     wide, options = len(study.space), math.prod(len(c.options) for c in study.choices.values())
-    counts: dict[Place, int] = {
+    counts: dict[KeyPath, int] = {
         ("analysis", i): asked.definition.largest(asked, wide)
         for i, asked in enumerate(study.analysis)
         if asked.definition.largest is not None
@@ -269,10 +269,10 @@ def _too_large(study: Study, notes: _Notes) -> set[Place]:
         counts["runs",] = study.runs.size or 1
         if study.runs.design in ("grid", "corners"):
             counts["runs",] = (study.runs.levels or 2) ** wide * options
-    large = {place: count for place, count in counts.items() if count > MOST_ROWS}
+    large = {place: count for place, count in counts.items() if count > _MOST_ROWS}
     for place, count in large.items():
         what = "rows can be run" if place == ("runs",) else "runs can be made"
-        notes.add(place, f"at most {MOST_ROWS:,} {what}, got {_count(count)}")
+        notes.add(place, f"at most {_MOST_ROWS:,} {what}, got {_count(count)}")
     return set(large)
 
 
@@ -280,7 +280,7 @@ def _count(rows: int) -> str:
     return f"{rows:,}" if rows < 10**15 else f"about 10^{math.log10(rows):.0f}"
 
 
-def _check_designs(study: Study, space: Space, large: set[Place], notes: _Notes) -> None:
+def _check_designs(study: Study, space: Space, large: set[KeyPath], notes: _Notes) -> None:
     """Make designs that are known in advance, unless too large; hold the analyses against them."""
     if study.runs is not None and ("runs",) not in large:
         notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)

@@ -35,7 +35,7 @@ from ..file.schema import Choices
 from ..finding import Finding
 from ..kind import Asked, Ground, Kind, Setup, made
 from ..page import text as text
-from ..page.tables import result_table, told
+from ..page.tables import column_in_words, result_table
 from .context import CLOPPER, HOLM
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ MCNEMAR = (
     "McNemar's test by pair: runs in which only one of the two violates the spec. Holm: p adjusted "
     "for the number of pairs."
 )
-DIFFERENCES = (
+_DIFFERENCES = (
     "Paired differences a − b with intervals, confidence {confidence:g} % each: of the median, "
     "exact, and of the mean, by bootstrap (NaN where a run did not end). p: sign test; Holm: "
     "adjusted for the pairs of a metric."
@@ -280,7 +280,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield Figure(
         key=f"{key}-rates",
         caption=caption,
-        description=f"{caption} {told(ranking['rate'])}.",
+        description=f"{caption} {column_in_words(ranking['rate'])}.",
         figure=figures.violation_rates(ranking),
     )
     titles = {"rate": "share", "rate_low": "from", "rate_high": "to", "failed": "did not end"}
@@ -289,7 +289,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield from _medians(t["differences"], result.metrics["unit"].to_dict(), key)
     columns = {c: c.replace("_", " ") for c in t["differences"].columns} | {"p_holm": "p (Holm)"}
     pairs, only = _with_first(t["differences"], f"{finding.key}/differences.parquet")
-    yield result_table(pairs, DIFFERENCES.format(confidence=confidence) + only, columns)
+    yield result_table(pairs, _DIFFERENCES.format(confidence=confidence) + only, columns)
     columns = {c: c.replace("_", " ") for c in t["violations"].columns} | {"p_holm": "p (Holm)"}
     pairs, only = _with_first(t["violations"], f"{finding.key}/violations.parquet")
     yield result_table(pairs, MCNEMAR + only, columns)

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from analysis.robustness import bound_verdict, independent
 from analysis.robustness.search.degradation import degradation_curve
-from analysis.robustness.statistics.guarantee import assumptions, rounded_down, rounded_up
+from analysis.robustness.statistics.guarantee import design_assumptions, rounded_down, rounded_up
 
 from ... import figures as figures
 from ...report.document import Figure, Table
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 __all__ = ["DEGRADATION"]
 
-CAPTION = (
+_CAPTION = (
     "Share of violations with all deviations from nominal scaled by a factor; bars: intervals with "
     "confidence {confidence:g} %, {together}."
 )
 
 
-class Degradation(Varied):
+class AskedDegradation(Varied):
     """The probability of a violation against the size of the uncertainty."""
 
     factors: tuple[Size, ...] = Field(min_length=1, description="Sizes, as factors of the box.")
@@ -43,7 +43,7 @@ class Degradation(Varied):
     limit: Confidence | None = Field(None, description="Claim: the upper bound at that size.")
 
     @model_validator(mode="after")
-    def _at_is_looked_at(self) -> Degradation:
+    def _at_is_looked_at(self) -> AskedDegradation:
         if self.limit is not None and self.at not in self.factors:
             raise ValueError(f"the claim is about size {self.at:g}, which is not among the factors")
         return self
@@ -55,7 +55,7 @@ class Degradation(Varied):
         return f"a violation has at most probability {self.limit:g} at the size {self.at:g}"
 
 
-def _run(asked: Degradation, ground: Ground) -> Finding:
+def _run(asked: AskedDegradation, ground: Ground) -> Finding:
     """Bound the probability of a violation at every size."""
     space = ground.space(asked.quantities)
     found = degradation_curve(
@@ -74,13 +74,14 @@ def _run(asked: Degradation, ground: Ground) -> Finding:
         for factor, one in bounds.items()
     )
     together = "together" if asked.simultaneous else "each by itself"
+    assumed = "; ".join(design_assumptions(independent(space, asked.runs, ground.seed)))
     limit = asked.limit
     verdict = {} if limit is None else vars(bound_verdict(bounds[asked.at], limit))
     return made(
         asked,
         f"Violations with all deviations scaled: {told}. The bounds hold with confidence "
         f"{100 * asked.confidence:g} %, {together}. Assumed: "
-        f"at each size {'; '.join(assumptions(independent(space, asked.runs, ground.seed)))}.",
+        f"at each size {assumed}.",
         **verdict,
         runs=sum(one.runs for one in found.statements),
         numbers={"confidence": asked.confidence, "simultaneous": asked.simultaneous},
@@ -88,11 +89,11 @@ def _run(asked: Degradation, ground: Ground) -> Finding:
     )
 
 
-def _runs(asked: Degradation, setup: Setup) -> int:
+def _runs(asked: AskedDegradation, setup: Setup) -> int:
     return len(asked.factors) * asked.runs
 
 
-def _largest(asked: Degradation, quantities: int) -> int:
+def _largest(asked: AskedDegradation, quantities: int) -> int:
     return asked.runs * len(asked.factors)
 
 
@@ -111,7 +112,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     """Yield the probability of a violation against the size of the uncertainty."""
     n, curve = finding.numbers, finding.tables["curve"]
     together = "all together" if n["simultaneous"] else "each by itself"
-    caption = CAPTION.format(confidence=100 * n["confidence"], together=together)
+    caption = _CAPTION.format(confidence=100 * n["confidence"], together=together)
     yield Figure(
         key=f"{key}-curve",
         caption=caption,
@@ -138,7 +139,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
 
 DEGRADATION = Kind(
     name="degradation",
-    schema=Degradation,
+    schema=AskedDegradation,
     run=_run,
     title="Degradation with the size of the uncertainty",
     answers="probability of a violation against the size of the box",

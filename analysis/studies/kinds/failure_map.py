@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 __all__ = ["FAILURE_MAP"]
 
-CAPTION = (
+_CAPTION = (
     "Margin over the plane, the other quantities nominal; between the points that were run, the "
     "dots, it is interpolated."
 )
-VIOLATED = " Orange: violated."
+_VIOLATED = " Orange: violated."
 BOUNDARY = " Line: margin 0."
 STAR = " Star: nominal."
 BOX = " Dashed: the box of the study."
@@ -107,14 +107,14 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     nominal = tuple(map(float, about["nominal"]))
     labels = tuple(f"{name} ({unit or '1'})" for name, unit in known(about, "unit"))
     edge, is_nominal = finding.tables["boundary"], bool(np.all(np.isfinite(nominal)))
-    caption = CAPTION + VIOLATED * bool(np.any(violates(points["spec"])))
+    caption = _CAPTION + _VIOLATED * bool(np.any(violates(points["spec"])))
     caption += BOUNDARY * bool(len(edge)) + STAR * is_nominal + BOX
     box = tuple((float(row["low"]), float(row["high"])) for _, row in about.iterrows())
     yield Figure(
         key=f"{key}-map",
         caption=caption,
         description=f"{caption} {finding.sentence}",
-        figure=figures.failure_map(
+        figure=figures.failure_map_figure(
             points,
             finding.tables["triangles"].to_numpy(),
             names,

@@ -15,7 +15,7 @@ import pandas as pd
 from pydantic import Field
 
 from analysis.robustness import Experiment, Prepared, Uncertain, from_table, nominal, prepare
-from analysis.robustness.runs.experiment import by_diagram, simulate
+from analysis.robustness.runs.experiment import by_diagram, simulate_rows
 from analysis.robustness.stl.spec import violates
 from analysis.robustness.stl.violation_time import ViolationTime, violation_time
 from nlctl.errors import ParameterError
@@ -173,7 +173,7 @@ def _times(prepared: Prepared, table: pd.DataFrame) -> pd.DataFrame:
         chosen = unfinished[start : start + TOGETHER]
         part = table.iloc[chosen].filter(prepared.experiment.space.names)
         for loop, rows in by_diagram(prepared, part):
-            again = simulate(prepared.experiment, loop, rows, keep=signals)
+            again = simulate_rows(prepared.experiment, loop, rows, keep=signals)
             for i, row in enumerate(chosen):
                 samples = {s: again.signals[s][i] for s in signals}
                 for r in requirements:

@@ -15,7 +15,7 @@ from ..file.field_types import Whole
 from ..finding import Finding
 from ..kind import Asked, Ground, Kind, made
 from ..page import text as text
-from ..page.tables import result_table, told
+from ..page.tables import column_in_words, result_table
 from .context import response
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield Figure(
         key=f"{key}-effects",
         caption=caption,
-        description=f"{caption} μ*: {told(table['mu_star'])}.",
+        description=f"{caption} μ*: {column_in_words(table['mu_star'])}.",
         figure=figures.screening(table),
     )
     yield result_table(

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 __all__ = ["RADIUS"]
 
 SIZES = 12  # that the search looks at, roughly
-CAPTION = "Sizes that were looked at, as factors of the box, with the lowest margin found there."
-SMALLEST = " Dashed: the smallest size with a violation."
+_CAPTION = "Sizes that were looked at, as factors of the box, with the lowest margin found there."
+_SMALLEST = " Dashed: the smallest size with a violation."
 
 
-class Radius(Varied):
+class AskedRadius(Varied):
     """The smallest size of the uncertainty at which a violation is found."""
 
     largest: Size = Field(4.0, gt=0, description="Largest size, as a factor of the box.")
@@ -47,7 +47,7 @@ class Radius(Varied):
         return "" if self.limit is None else f"no violation is found below size {self.limit:g}"
 
 
-def _run(asked: Radius, ground: Ground) -> Finding:
+def _run(asked: AskedRadius, ground: Ground) -> Finding:
     """Search for the smallest size with a violation."""
     space = ground.space(asked.quantities)
     largest, why = largest_scale(ground.prepared, asked.largest, space.names)
@@ -88,11 +88,11 @@ def _no_small_violation(limit: float | None, upper: float, largest: float) -> di
     return {"answer": "not shown yet", "needs": needs}
 
 
-def _runs(asked: Radius, setup: Setup) -> int:
+def _runs(asked: AskedRadius, setup: Setup) -> int:
     return SIZES * asked.runs + asked.draws
 
 
-def _largest(asked: Radius, quantities: int) -> int:
+def _largest(asked: AskedRadius, quantities: int) -> int:
     return max(asked.runs, asked.draws)
 
 
@@ -120,7 +120,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
         f"{step['size']:.4g}: {margin_text(float(step['margin']))}"
         for step in steps.to_dict("records")
     )
-    caption = CAPTION + SMALLEST * bool(np.isfinite(n["upper"])) + text.clipped(steps["margin"])
+    caption = _CAPTION + _SMALLEST * bool(np.isfinite(n["upper"])) + text.clipped(steps["margin"])
     yield Figure(
         key=f"{key}-sizes",
         caption=caption,
@@ -133,7 +133,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
 
 RADIUS = Kind(
     name="radius",
-    schema=Radius,
+    schema=AskedRadius,
     run=_run,
     title="Robustness radius",
     answers="the smallest factor of the box at which a violation is found",

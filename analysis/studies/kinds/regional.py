@@ -14,7 +14,7 @@ from ...report.document import Figure
 from ..finding import Finding
 from ..kind import Asked, Ground, Kind, made
 from ..page import text as text
-from ..page.tables import result_table, told
+from ..page.tables import column_in_words, result_table
 from .context import HOLM
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["REGIONAL"]
 
-CAPTION = (
+_CAPTION = (
     "Distance between the distributions in failing and in passing runs; for choices Cramér's V. 0: "
     "alike, 1: apart. p: of the test that they are alike; Holm: adjusted for the number of lines."
 )
@@ -64,8 +64,8 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     table = finding.tables["differences"]
     yield Figure(
         key=f"{key}-distances",
-        caption=CAPTION,
-        description=f"{CAPTION} {told(table['statistic'])}.",
+        caption=_CAPTION,
+        description=f"{_CAPTION} {column_in_words(table['statistic'])}.",
         figure=figures.set_apart(table),
     )
     columns = {"statistic": "distance"}

@@ -15,7 +15,7 @@ from ..file.field_types import Confidence, Whole
 from ..finding import Finding
 from ..kind import Asked, Ground, Kind, made
 from ..page import text as text
-from ..page.tables import result_table, told
+from ..page.tables import column_in_words, result_table
 from .context import response
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield Figure(
         key=f"{key}-shares",
         caption=caption,
-        description=f"{caption} S_T: {told(table['ST'])}.",
+        description=f"{caption} S_T: {column_in_words(table['ST'])}.",
         figure=figures.shares(table),
     )
     columns = {"S1": "S₁", "S1_low": "from", "S1_high": "to"}

@@ -40,7 +40,7 @@ ZELLER = (
 )
 
 
-class WorstCase(Varied):
+class AskedWorstCase(Varied):
     """The row with the lowest margin that a search finds; a violation is confirmed and shrunk."""
 
     runs: Whole = Field(1000, ge=1, description="The search runs at most so many rows.")
@@ -53,7 +53,7 @@ class WorstCase(Varied):
         return "" if self.limit is None else f"no margin of {self.limit:g} or lower is found"
 
 
-def _run(asked: WorstCase, ground: Ground) -> Finding:
+def _run(asked: AskedWorstCase, ground: Ground) -> Finding:
     """Search for the lowest margin; confirm and shrink a violation."""
     space = ground.space(asked.quantities)
     found = worst_case(ground.simulate, space, asked.runs, entropy=ground.seed)
@@ -98,11 +98,11 @@ def _no_low_margin(limit: float | None, margin: float, is_confirmed: bool) -> di
     return {"answer": "not shown yet", "needs": needs}
 
 
-def _runs(asked: WorstCase, setup: Setup) -> int:
+def _runs(asked: AskedWorstCase, setup: Setup) -> int:
     return asked.runs
 
 
-def _largest(asked: WorstCase, quantities: int) -> int:
+def _largest(asked: AskedWorstCase, quantities: int) -> int:
     return asked.runs
 
 
@@ -170,7 +170,7 @@ def _replays(replays: pd.DataFrame, is_confirmed: bool) -> Table:
 
 WORST_CASE = Kind(
     name="worst case",
-    schema=WorstCase,
+    schema=AskedWorstCase,
     run=_run,
     title="Worst case",
     answers="the lowest margin in the box; a violation is confirmed and shrunk",

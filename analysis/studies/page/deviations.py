@@ -12,20 +12,20 @@ from ... import figures as figures
 from ...report.document import Figure, Item, Table
 from .rows import known
 
-__all__ = ["deviations", "found_rows"]
+__all__ = ["deviations_table", "found_rows"]
 
 DEVIATIONS = "How far each quantity lies from nominal: ±1 is the end of its box on that side."
-Row = Mapping[str, Any]
+_Row = Mapping[str, Any]
 
 
-def found_rows(rows: Mapping[str, Row], quantities: pd.DataFrame, key: str) -> Iterator[Item]:
+def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> Iterator[Item]:
     """Yield some rows beside the nominal one, and how far their numbers deviate.
 
     What a row leaves out is nominal.
     """
     middle = dict(known(quantities, "nominal"))
     rows = {label: middle | dict(row) for label, row in rows.items()}
-    table = deviations(rows, quantities)
+    table = deviations_table(rows, quantities)
     yield Table(
         caption="Its values beside the nominal ones; * deviates from nominal.",
         columns=("quantity", "unit", "nominal", *rows),
@@ -52,7 +52,7 @@ def _marked(value: Any, middle: Any) -> str:
     return shown if value == middle else f"{shown} *"
 
 
-def deviations(rows: Mapping[str, Row], quantities: pd.DataFrame) -> pd.DataFrame:
+def deviations_table(rows: Mapping[str, _Row], quantities: pd.DataFrame) -> pd.DataFrame:
     """Return how far the numbers of some rows lie from nominal, in sides of their boxes.
 
     1 is the upper end of the box, -1 the lower one; one line per quantity, one column per row.

@@ -13,14 +13,14 @@ from nlctl.native import Status
 
 from ... import metrics
 from ...figures import Limit
-from ...robustness.runs.experiment import Prepared, by_diagram, simulate
+from ...robustness.runs.experiment import Prepared, by_diagram, simulate_rows
 from ...robustness.search.evaluation import as_table, margins_of
 from ...robustness.stl.formula import Always, And, Band, Formula
 from ...robustness.uncertainty.space import nominal
 
-__all__ = ["Histories", "histories", "limits"]
+__all__ = ["Histories", "histories", "limits_of_requirements"]
 
-MOST = 4  # signals
+_MOST = 4  # signals
 IN_UNIT = (  # metrics whose unit is that of their signal
     *(metrics.peak, metrics.rms, metrics.highest, metrics.spread, metrics.ultimate_bound),
     metrics.total_variation,
@@ -107,13 +107,13 @@ def histories(
         worst={name: samples[1] for name, samples in signals.items()},
         margin=margin,
         ended=int(np.sum(status[2:] != Status.OK.name)),
-        limits=limits(prepared.experiment.spec.requirements),
+        limits=limits_of_requirements(prepared.experiment.spec.requirements),
         units={m.signals[0]: m.unit for m in prepared.experiment.metrics if m.function in IN_UNIT},
         groups=_groups(table.iloc[:count], [choice.name for choice in space.choices]),
     )
 
 
-def limits(requirements: Sequence[Any]) -> dict[str, list[Limit]]:
+def limits_of_requirements(requirements: Sequence[Any]) -> dict[str, list[Limit]]:
     """Return what requirements always ask of each signal; what they ask else is no line."""
     found: dict[str, list[Limit]] = {}
 
@@ -150,7 +150,7 @@ def _kept(
     kept = {name: np.full((len(rows), len(study.timepts)), np.nan) for name in names}
     status = np.full(len(rows), "", dtype=object)
     for loop, same in by_diagram(prepared, rows):
-        found = simulate(study, loop, same, keep=names, threads=threads)
+        found = simulate_rows(study, loop, same, keep=names, threads=threads)
         status[same.index] = found.table["status"].to_numpy()
         for name in names:
             kept[name][same.index] = found.signals[name]
@@ -159,4 +159,4 @@ def _kept(
 
 def _signals(requirements: Sequence[Any]) -> list[str]:
     """Return the signals that the spec looks at, each once."""
-    return list(dict.fromkeys(s for r in requirements for s in r.signals))[:MOST]
+    return list(dict.fromkeys(s for r in requirements for s in r.signals))[:_MOST]

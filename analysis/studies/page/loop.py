@@ -27,14 +27,14 @@ from . import text as text
 if TYPE_CHECKING:
     from analysis.studies.result import Result
 
-__all__ = ["Loop", "Published", "loop_of", "loop_sections"]
+__all__ = ["Published", "StudyLoop", "loop_of", "loop_sections"]
 
-OWN = ("nlctl", "analysis")  # packages whose source comes with nlctl and is not printed
-LONGEST = 60  # characters of a value
+_OWN = ("nlctl", "analysis")  # packages whose source comes with nlctl and is not printed
+_LONGEST = 60  # characters of a value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Loop:
+class StudyLoop:
     """The loop of a study, with nominal values.
 
     Attributes
@@ -76,7 +76,7 @@ class Published:
     items: tuple[Item, ...] = ()
 
 
-def loop_of(prepared: Prepared) -> Loop:
+def loop_of(prepared: Prepared) -> StudyLoop:
     """Return the loop of an experiment; with choices, that of the nominal ones."""
     nominal = {choice.name: choice.nominal for choice in prepared.experiment.space.choices}
     compiled = next(
@@ -87,22 +87,22 @@ def loop_of(prepared: Prepared) -> Loop:
         build = build.func
     build = inspect.unwrap(build)
     module = str(getattr(build, "__module__", ""))
-    found = Loop(diagram=compiled.system, maker=str(getattr(build, "__qualname__", build)))
+    found = StudyLoop(diagram=compiled.system, maker=str(getattr(build, "__qualname__", build)))
     try:
         path = Path(inspect.getsourcefile(build) or "")
         content = path.read_bytes()
     except (OSError, TypeError):  # a callable object, or made where there is no file
         return found
-    return Loop(
+    return StudyLoop(
         diagram=found.diagram,
         maker=found.maker,
         file=path.name,
-        source="" if module.partition(".")[0] in OWN else content.decode(errors="replace"),
+        source="" if module.partition(".")[0] in _OWN else content.decode(errors="replace"),
         sha256=hashlib.sha256(content).hexdigest(),
     )
 
 
-def loop_sections(loop: Loop, result: Result, prefix: str, level: int) -> Iterator[Section]:
+def loop_sections(loop: StudyLoop, result: Result, prefix: str, level: int) -> Iterator[Section]:
     """Yield the loop as it was run, its parameters with what was varied, and its source."""
     from_file = f" in {loop.file} (SHA-256 {loop.sha256})" if loop.file else ""
     made = Paragraph(text=f"The loop is made by {loop.maker}{from_file}.")
@@ -129,7 +129,7 @@ def loop_sections(loop: Loop, result: Result, prefix: str, level: int) -> Iterat
         )
 
 
-def _picture(loop: Loop, prefix: str) -> Iterator[Figure]:
+def _picture(loop: StudyLoop, prefix: str) -> Iterator[Figure]:
     """Yield the diagram; a single system is none."""
     if isinstance(loop.diagram, ct.InterconnectedSystem):
         blocks = ", ".join(str(system.name) for system in loop.diagram.syslist)
@@ -141,7 +141,7 @@ def _picture(loop: Loop, prefix: str) -> Iterator[Figure]:
         )
 
 
-def _parameters(loop: Loop, result: Result) -> Iterator[Item]:
+def _parameters(loop: StudyLoop, result: Result) -> Iterator[Item]:
     """Yield all parameters of the loop, and how each was varied."""
     laws: dict[Any, str] = result.quantities["law"].to_dict()
     table: pd.DataFrame = parameters(loop.diagram)
@@ -159,14 +159,14 @@ def _parameters(loop: Loop, result: Result) -> Iterator[Item]:
     )  # fmt: skip
 
 
-def _equations(loop: Loop) -> Iterator[Item]:
+def _equations(loop: StudyLoop) -> Iterator[Item]:
     """Yield the equations of every block, read from the functions that are run."""
     try:
         blocks = typeset(loop.diagram)
     except UsageError as refused:  # it was run all the same, by calling a function as it stands
         yield Paragraph(text=f"There are no formulas of this loop: {refused}")
         return
-    yield Paragraph(text=text.EQUATIONS)
+    yield Paragraph(text=text.EQUATIONS_CAPTION)
     for block in blocks:
         yield Paragraph(text=f"Block {block.block}:")
         yield from block_items(block)
@@ -177,4 +177,4 @@ def _value(value: Any) -> Any:
     if isinstance(value, bool | int | float | str):
         return value
     told = str(value)
-    return told if len(told) <= LONGEST else f"{'×'.join(map(str, np.shape(value)))} numbers"
+    return told if len(told) <= _LONGEST else f"{'×'.join(map(str, np.shape(value)))} numbers"

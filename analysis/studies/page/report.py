@@ -17,7 +17,7 @@ from . import methods as how
 from . import text as text
 from .claims import claims, verdict
 from .histories import Histories
-from .loop import Loop, Published, loop_sections
+from .loop import Published, StudyLoop, loop_sections
 from .rows import fan_items, margin_items, row_items, setup_items
 from .running import running
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["study_part", "study_report", "study_sections"]
 
-LISTED = 400  # lines of a table that report.json holds as well; longer ones are files beside it
+_LISTED = 400  # lines of a table that report.json holds as well; longer ones are files beside it
 OUTCOMES = {  # by the light
     "pass": "shown",
     "caution": "not shown yet",
@@ -39,7 +39,7 @@ def study_report(
     result: Result,
     kept: Histories | None = None,
     command: str = "nlctl report RUN",
-    loop: Loop | None = None,
+    loop: StudyLoop | None = None,
     published: Published | None = None,
 ) -> Report:
     """Compose the report of a study.
@@ -87,7 +87,7 @@ def _provenance(result: Result) -> dict[str, str]:
 def study_sections(
     result: Result,
     kept: Histories | None = None,
-    loop: Loop | None = None,
+    loop: StudyLoop | None = None,
     published: Published | None = None,
     *,
     prefix: str = "",
@@ -292,7 +292,7 @@ def numbers(result: Result) -> dict[str, Any]:
         finding.key: {
             name: table.reset_index().to_dict("records")
             for name, table in sorted(finding.tables.items())
-            if len(table) <= LISTED
+            if len(table) <= _LISTED
         }
         for finding in result.findings
     }

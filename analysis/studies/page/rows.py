@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 WORST = 10  # rows that are listed
-PARTS = {0.5: "median", 0.95: "95 %", 1.0: "largest"}  # quantiles of the metrics
+_PARTS = {0.5: "median", 0.95: "95 %", 1.0: "largest"}  # quantiles of the metrics
 
 
 def setup_items(result: Result, published: Published | None = None) -> Iterator[Item]:
@@ -103,13 +103,13 @@ def margin_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item
     yield _requirements(result, table)
     margins = table["spec"].to_numpy(dtype=float)
     violated = int(np.sum(violates(margins)))
-    caption = text.MARGINS + text.VIOLATIONS * bool(violated) + text.clipped(margins)
+    caption = text.MARGINS_CAPTION + text.VIOLATIONS * bool(violated) + text.clipped(margins)
     yield Figure(
         key=f"{key}-margins",
         caption=caption,
         description=f"{caption} {text.violate(violated, margins.size)}; the median margin is "
         f"{margin_text(float(figures.quantile(margins, 0.5, -np.inf)))}.",
-        figure=figures.margins(margins),
+        figure=figures.margins_figure(margins),
     )
 
 
@@ -171,12 +171,12 @@ def _metrics(result: Result, table: pd.DataFrame) -> Table:
     for key, about in result.metrics.iterrows():
         values = table[key].to_numpy(dtype=float)
         there = values[~np.isnan(values)]
-        ends = [float(figures.quantile(there, q, np.inf)) if there.size else np.nan for q in PARTS]
+        ends = [float(figures.quantile(there, q, np.inf)) if there.size else np.nan for q in _PARTS]
         missing = values.size - there.size
         rows.append((key, about["meaning"], about["unit"], *ends, missing))
     return Table(
-        caption=text.METRICS,
-        columns=("metric", "meaning", "unit", *PARTS.values(), "missing"),
+        caption=text.METRICS_CAPTION,
+        columns=("metric", "meaning", "unit", *_PARTS.values(), "missing"),
         rows=rows,
         folded=True,
     )

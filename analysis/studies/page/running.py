@@ -18,8 +18,8 @@ from ..result import Result
 
 __all__ = ["running", "running_items"]
 
-POINTS = 150  # of the estimate
-RUNNING = (
+_POINTS = 150  # of the estimate
+_RUNNING = (
     "Line: share of violations after n runs, in their order. Band: bounds that hold at all n at "
     "once with confidence {confidence:g} % (a confidence sequence)."
 )
@@ -50,7 +50,7 @@ def running_items(
     confidence = float(finding.numbers["confidence"])
     curve = running(margins[: int(finding.numbers["runs"])], confidence)
     last = curve.iloc[-1]
-    caption = RUNNING.format(confidence=100 * confidence) + decides
+    caption = _RUNNING.format(confidence=100 * confidence) + decides
     ends = f", exact bounds {rounded_down(fixed[0])} and {rounded_up(fixed[1])}" if fixed else ""
     yield Figure(
         key=f"{key}-running",
@@ -67,7 +67,7 @@ def running(margins: np.ndarray, confidence: float) -> pd.DataFrame:
     Columns violations, rate, low, high; NaN is a violation.
     """
     counts = np.cumsum(violates(margins))
-    numbers = np.unique(np.geomspace(1, counts.size, POINTS).round().astype(int))
+    numbers = np.unique(np.geomspace(1, counts.size, _POINTS).round().astype(int))
     rows = []
     for n in map(int, numbers):
         k = int(counts[n - 1])

@@ -10,10 +10,10 @@ import pandas as pd
 from ...report.document import Table
 from . import text as text
 
-__all__ = ["result_table", "told"]
+__all__ = ["column_in_words", "result_table"]
 
 
-def told(column: Any) -> str:
+def column_in_words(column: Any) -> str:
     """Return a column of numbers in words, for the description of a figure."""
     return "; ".join(f"{name}: {value:.4g}" for name, value in column.items())
 

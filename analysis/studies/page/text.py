@@ -23,11 +23,13 @@ SPACE = (
 )
 STATUS = "How the runs ended. A run that did not reach its end violates the spec."
 REQUIREMENTS = "Margins by requirement; the spec is the least of them."
-METRICS = (
+METRICS_CAPTION = (
     "Metrics of the runs. Missing: runs that did not reach their end; they are not in the other "
     "columns."
 )
-MARGINS = "Left: number of runs by margin. Right: share of the runs with at most that margin."
+MARGINS_CAPTION = (
+    "Left: number of runs by margin. Right: share of the runs with at most that margin."
+)
 VIOLATIONS = " Orange: violations."
 CLIPPED = (
     f" Margins below −{CLIP:g}, and runs that did not reach their end, are drawn at −{CLIP:g}."
@@ -42,7 +44,7 @@ DIAGRAM = "The loop as simulated, with nominal values, and the inside of its nes
 PARAMETERS = (
     "All parameters of the loop, with their values; varied: by which law the study changed them."
 )
-EQUATIONS = (
+EQUATIONS_CAPTION = (
     "Read from the functions that are run, block by block; letters are the names of signals, "
     "parameters and local variables."
 )

@@ -12,20 +12,28 @@ import control as ct
 import numpy as np
 
 from ...errors import CompileError
-from ...expressions.arrays import Tracer, boxed, concatenated, full, number, traced, vector
+from ...expressions.arrays import Tracer, as_array, concatenated, full, leaf_vector, scalar, traced
 from ...expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable, needed
 from ...expressions.operators import elementwise
 from ...expressions.trace import trace
 from ...sampling.system import Happening
 from ..diagram.feedthrough import feedthrough
-from ..diagram.schedule import Combination, Loop, Node, Schedule, Signal, during, signal_name
+from ..diagram.schedule import (
+    AlgebraicLoop,
+    Combination,
+    Node,
+    Schedule,
+    Signal,
+    during,
+    signal_name,
+)
 from ..machine.called import call_of
 from ..parameters import length
 from .calls import Call
 from .newton import inside, solver
-from .program import corners, memory
+from .program import count_switching_functions, memory
 from .solver import Solver
-from .trace import parameters, time
+from .trace import time, traced_parameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,14 +127,14 @@ def _results(graph: Graph, op: str, name: str, given: Sequence[Tracer], count: i
         return traced(graph, 0.0).reshape(1)[:0]
     node = graph.node(op, *args, data=(name, sizes), size=count, varies=True)
     if count > SMALL:
-        return Tracer(graph, boxed(node), 0, count)
-    items = [number(graph, graph.item(node, k)).reshape(1) for k in range(count)]
+        return Tracer(graph, as_array(node), 0, count)
+    items = [scalar(graph, graph.item(node, k)).reshape(1) for k in range(count)]
     return concatenated(graph, items)
 
 
 def _events(reader: Reader) -> list[tuple[int, Tracer]]:
     """Return switching functions of all blocks, then what memories are committed to."""
-    counts = [(corners(node), len(memory(node))) for node in reader.blocks]
+    counts = [(count_switching_functions(node), len(memory(node))) for node in reader.blocks]
     at, behind, found = 0, sum(count for count, _ in counts), []
     for i, (own, committed) in enumerate(counts):
         if own or committed:
@@ -198,11 +206,11 @@ class Reader:
             i = schedule.order[place]
             self.signals[i] = self.outputs(i, schedule.unknown[place])
 
-    def solve(self, schedule: Schedule, loop: Loop) -> None:
+    def solve(self, schedule: Schedule, loop: AlgebraicLoop) -> None:
         """Read the blocks of a loop: with guesses, and then with what these are solved for."""
         name, places = f"loop{len(self.solvers)}", range(loop.start, loop.stop)
         leaves = [self.graph.leaf(name, k, None) for k in range(len(loop.torn))]
-        self._guessed(schedule, places, loop.torn, [number(self.graph, leaf) for leaf in leaves])
+        self._guessed(schedule, places, loop.torn, [scalar(self.graph, leaf) for leaf in leaves])
         found = [self.taken(signal, 1).reshape(-1)[0].only for signal in loop.torn]
         try:
             made, given = solver(name, leaves, found)
@@ -213,8 +221,8 @@ class Reader:
                 f"the algebraic loop through {names} cannot be solved: {why}; put a state into it"
             ) from error
         self.solvers[name] = made
-        pieces = [Tracer(self.graph, boxed(e), 0, e.size) if e.size else
-                  number(self.graph, e).reshape(1) for e in given]  # fmt: skip
+        pieces = [Tracer(self.graph, as_array(e), 0, e.size) if e.size else
+                  scalar(self.graph, e).reshape(1) for e in given]  # fmt: skip
         results = _results(self.graph, "solve", name, pieces, made.count)
         self.solved.append(results)
         self._guessed(schedule, places, loop.torn, [results[k] for k in range(made.count)])
@@ -298,7 +306,7 @@ class Reader:
     def _divided(self, node: Node) -> tuple[Tracer, Tracer, Tracer]:
         """Return a sampled block's own states, waiting outputs and held outputs."""
         sampled: Any = node.sampled
-        return sampled.parts(vector(self.graph, "x", node.state_offset, (node.size,)))
+        return sampled.parts(leaf_vector(self.graph, "x", node.state_offset, (node.size,)))
 
     def _rounded(self, quantum: float, values: Tracer) -> Tracer:
         if not quantum or not values.size:
@@ -319,7 +327,7 @@ class Reader:
 
     def events(self, i: int) -> Tracer:
         node, spec = self.blocks[i], self.blocks[i].system.spec
-        used = [("corners", corners(node)), ("commit", len(memory(node)))]
+        used = [("corners", count_switching_functions(node)), ("commit", len(memory(node)))]
         functions = [getattr(spec, name) for name, count in used if count]
         inputs = self.wired(node.inputs)
         return self._function(i, "events", functions, inputs, sum(count for _, count in used))
@@ -341,7 +349,7 @@ class Reader:
         total = full(self.graph, count, 0.0)
         for signal, gain in combination.items():
             if signal.block is None:
-                part = vector(self.graph, "u", signal.index, (count,))
+                part = leaf_vector(self.graph, "u", signal.index, (count,))
             else:
                 part = self.taken(signal, count)
             if gain != -1.0:
@@ -363,7 +371,7 @@ class Reader:
         return concatenated(self.graph, rows) if rows else x[:0]
 
     def _states(self, node: Node) -> Tracer:
-        return vector(self.graph, "x", node.state_offset, (node.system.nstates or 0,))
+        return leaf_vector(self.graph, "x", node.state_offset, (node.system.nstates or 0,))
 
     def _function(
         self, i: int, kind: str, functions: list[Any], inputs: Tracer, count: int
@@ -372,7 +380,7 @@ class Reader:
         node = self.blocks[i]
 
         def arguments() -> tuple[Any, ...]:
-            given = parameters(self.graph, node.system, self.layout[i], self.p)
+            given = traced_parameters(self.graph, node.system, self.layout[i], self.p)
             return time(self.graph), self._states(node), inputs.copy(), given
 
         try:
@@ -403,7 +411,7 @@ class Reader:
             time(self.graph).reshape(1),
             self._states(node),
             inputs,
-            vector(self.graph, "p", start, (size,)),
+            leaf_vector(self.graph, "p", start, (size,)),
         ]
         return _results(self.graph, "call", name, given, count)
 

@@ -26,10 +26,10 @@ from ..machine.fingerprint import module_key
 from ..machine.machine_code import Wanted, address_of, machine_code_if_taken
 from ..machine.module import loaded
 
-ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)
+_ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)
 CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
 OPTIONS = {"error_model": "numpy", "nogil": True, "no_cpython_wrapper": True}
-FAILED = 1.0
+CALL_FAILED = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +155,7 @@ def native_calls(calls: Mapping[str, Call], lanes: int) -> Native:
     for name, call in calls.items():
         code = _by_numba(call, lanes)
         if code is not None:
-            symbols[name] = address_of(code, ADDRESS)
+            symbols[name] = address_of(code, _ADDRESS)
         else:
             code = CALLBACK(_back(call, lanes, raised))
             symbols[name] = ctypes.cast(code, ctypes.c_void_p).value or 0
@@ -179,13 +179,13 @@ def _back(call: Call, lanes: int, raised: dict[Any, BaseException]) -> Callable[
         column = np.ctypeslib.as_array(memory.from_address(place)).reshape(shape)[:, lane]
         results = slice(call.given, call.failed)
         try:
-            if column[call.failed] == FAILED:
+            if column[call.failed] == CALL_FAILED:
                 column[results] = np.nan
             else:
                 call.of_column(column)
         except BaseException as error:  # Ctrl-C too
             column[results] = np.nan
-            column[call.failed] = FAILED
+            column[call.failed] = CALL_FAILED
             raised[place, lane] = error
 
     return at
@@ -205,7 +205,9 @@ def _by_numba(call: Call, lanes: int) -> Any:
         taught=known.taught,
     )
     module = loaded(own, {})
-    wanted = Wanted(function=getattr(module, f"at_{call.name}"), signature=ADDRESS, options=OPTIONS)
+    wanted = Wanted(
+        function=getattr(module, f"at_{call.name}"), signature=_ADDRESS, options=OPTIONS
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaWarning)  # of what the user need not know
         return machine_code_if_taken(f"{module.__name__} {module_key(*known.taught)}", wanted)
@@ -218,7 +220,7 @@ def _of_member(call: Call, lanes: int) -> list[str]:
 def at_{call.name}(c, at, lane):
     table = carray(c, (at + {call.rows}, {lanes}))
     given, y = np.empty({given}), np.empty({count})
-    if table[at + {failed}, lane] == {FAILED}:
+    if table[at + {failed}, lane] == {CALL_FAILED}:
         for i in range({count}):
             table[at + {given} + i, lane] = np.nan
         return
@@ -228,7 +230,7 @@ def at_{call.name}(c, at, lane):
         {call.name}(given, y)
     except Exception:
         y[:] = np.nan
-        table[at + {failed}, lane] = {FAILED}
+        table[at + {failed}, lane] = {CALL_FAILED}
         for i in range({given}):
             table[at + {failed + 1} + i, lane] = given[i]
     for i in range({count}):

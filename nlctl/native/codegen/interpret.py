@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 
 from ...expressions.graph import Expr, numpy_function
-from .plan import CALLS, Function, LoopOfLevel, Plan
+from .plan import CALLS, Function, FunctionPlan, LoopOfLevel
 
-Opaque = Callable[[np.ndarray, int, int], None]  # of c, a row of it, and the member
+_Opaque = Callable[[np.ndarray, int, int], None]  # of c, a row of it, and the member
 
 
-def interpreted(function: Function, lanes: int, calls: Mapping[str, Opaque]) -> Callable[..., None]:
+def interpreted_function(
+    function: Function, lanes: int, calls: Mapping[str, _Opaque]
+) -> Callable[..., None]:
     """Return one function of a program.
 
     Parameters
@@ -45,7 +47,11 @@ class _Run:
     """One evaluation: `values` are what has been computed so far."""
 
     def __init__(
-        self, plan: Plan, memory: dict[str, np.ndarray], lanes: int, calls: Mapping[str, Opaque]
+        self,
+        plan: FunctionPlan,
+        memory: dict[str, np.ndarray],
+        lanes: int,
+        calls: Mapping[str, _Opaque],
     ) -> None:
         self.plan, self.memory, self.lanes, self.calls = plan, memory, lanes, calls
         self.values: dict[Expr, Any] = {}

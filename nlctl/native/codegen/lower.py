@@ -21,7 +21,7 @@ from ..parameters import length
 from .blocks import Equations, equations
 from .calls import Call
 from .ir.program import program_text
-from .plan import Function, Store, plan, split
+from .plan import Function, Store, plan_function, split
 from .program import Program
 from .rewrite import rewritten
 from .solver import Solver
@@ -192,7 +192,7 @@ def _planned(
     functions, size = {}, parameters + sum(store.size for store in prepared)
     for name, given in {**PREPARE, **arguments}.items():
         first = name in PREPARE
-        planned = plan(prepared if first else stores[name], {} if first else known, size)
+        planned = plan_function(prepared if first else stores[name], {} if first else known, size)
         size = planned.rows
         copied = parameters if first else 0
         functions[name] = Function(arguments=given, plan=planned, copied=copied)

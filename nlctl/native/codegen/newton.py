@@ -16,20 +16,20 @@ from typing import Any
 
 import numpy as np
 
-from ...expressions.arrays import Tracer, number
+from ...expressions.arrays import Tracer, scalar
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from ...expressions.stage import Stage
-from .plan import Function, Store, plan
+from .plan import Function, Store, plan_function
 from .rewrite import rewritten
 from .solver import DONE, GUESS, PASS, Solver
 
-BASE, TRIAL = 0.0, 1.0  # phases of a search besides DONE
+BASE, _TRIAL = 0.0, 1.0  # phases of a search besides DONE
 STARTS = (0.0, 1.0, -1.0)
 MOST = 16  # signals of one loop; elimination is written out, and grows with their third power
-STEPS = 60.0  # trials from one start, halvings included
+_STEPS = 60.0  # trials from one start, halvings included
 SMALL_STEP = 1e-9  # relative; the next one, of about its square, would not be seen
-ROUNDING = 4 * 2.0**-52
+_ROUNDING = 4 * 2.0**-52
 SINGULAR = 1e-7  # relative to the largest entry: a solution would have lost half of its digits
 
 
@@ -120,14 +120,14 @@ def _pass(
         for g in guesses
     ]
     zero = graph.const(0.0)
-    jacobian = [[number(graph, columns[j][i] or zero) for j in range(n)] for i in range(n)]
-    state = [number(graph, graph.leaf("s", i, None)) for i in range(GUESS + 2 * n)]
-    values = [number(graph, graph.number(e)) for e in found]
+    jacobian = [[scalar(graph, columns[j][i] or zero) for j in range(n)] for i in range(n)]
+    state = [scalar(graph, graph.leaf("s", i, None)) for i in range(GUESS + 2 * n)]
+    values = [scalar(graph, graph.number(e)) for e in found]
     following = Stage(graph).copied(improved)(n, state, values, jacobian)
     exprs = [e.only if isinstance(e, Tracer) else graph.const(float(e)) for e in following]
     stores = [Store(array="n", row=i, expr=e, size=1) for i, e in enumerate(exprs)]
     written, exact = rewritten(graph, {"n": stores})
-    return Function(arguments=PASS, plan=plan(written["n"], {}, 0)), exact
+    return Function(arguments=PASS, plan=plan_function(written["n"], {}, 0)), exact
 
 
 def improved(
@@ -151,7 +151,7 @@ def improved(
     guess, base = state[4 : 4 + n], state[4 + n : 4 + 2 * n]
     apart = _largest([found[i] - guess[i] for i in range(n)])
     count = count + 1.0
-    solved = np.logical_and(phase == TRIAL, apart <= ROUNDING * _largest(found))
+    solved = np.logical_and(phase == _TRIAL, apart <= _ROUNDING * _largest(found))
     better = apart < best  # NaN is not; the first one is infinite
     step, is_regular = newton_step(
         [[jacobian[i][j] - (1.0 if i == j else 0.0) for j in range(n)] for i in range(n)],
@@ -160,12 +160,12 @@ def improved(
     moved = [guess[i] + step[i] for i in range(n)]
     is_short = _largest(step) <= SMALL_STEP * _largest(moved)
     again = np.where(
-        better, np.logical_not(is_regular), np.logical_or(phase == BASE, count > STEPS)
+        better, np.logical_not(is_regular), np.logical_or(phase == BASE, count > _STEPS)
     )
     again = np.logical_and(np.logical_not(solved), again)
     is_last = start >= len(STARTS) - 1.0
     fresh = np.where(is_last, np.nan, np.where(start < 1.0, STARTS[1], STARTS[2]))
-    further = np.where(np.logical_and(better, is_short), DONE, TRIAL)
+    further = np.where(np.logical_and(better, is_short), DONE, _TRIAL)
     phase = np.where(again, np.where(is_last, DONE, BASE), np.where(solved, DONE, further))
     new_guess, new_base = [], []
     for i in range(n):

@@ -14,7 +14,7 @@ from functools import cached_property
 
 from ...expressions.graph import Expr, needed
 
-Loop = tuple[int, int]  # level and length
+_Loop = tuple[int, int]  # level and length
 CALLS = ("call", "solve")  # their arguments lie in memory, in front of their results
 STORED = ("concat", *CALLS)  # vectors that are made in memory
 READ = (*STORED, "leaf", "table", "item", "slice")  # what a loop reads and does not compute
@@ -31,7 +31,7 @@ class Store:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class FunctionPlan:
     """What is computed when.
 
     Attributes
@@ -56,14 +56,14 @@ class Plan:
     nodes: tuple[Expr, ...]
     level: dict[Expr, int]
     stored: dict[Expr, tuple[str, int]]
-    loops: dict[Loop, list[Expr]]
+    loops: dict[_Loop, list[Expr]]
     stores: tuple[Store, ...]
     rows: int
 
     @cached_property
     def levels(self) -> tuple[Level, ...]:
         """The levels, in order."""
-        inner: dict[Loop, list[Store]] = {}
+        inner: dict[_Loop, list[Store]] = {}
         for store in self.stores:
             if store.size > 1:
                 inner.setdefault((self.level[store.expr], store.size), []).append(store)
@@ -148,7 +148,7 @@ class Function:
     """
 
     arguments: tuple[str, ...]
-    plan: Plan
+    plan: FunctionPlan
     copied: int = 0
 
 
@@ -163,7 +163,9 @@ def split(store: Store, known: Collection[Expr] = ()) -> list[Store]:
     return parts
 
 
-def plan(wanted: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int) -> Plan:
+def plan_function(
+    wanted: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int
+) -> FunctionPlan:
     """Plan a function.
 
     Parameters
@@ -198,14 +200,14 @@ def plan(wanted: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int)
     users = _loops(
         nodes, level, stored, known, written
     )  # again: what lies in memory is computed once
-    loops: dict[Loop, list[Expr]] = {}
+    loops: dict[_Loop, list[Expr]] = {}
     for node in nodes:
         for loop in users.get(node, ()):
             loops.setdefault(loop, []).append(node)
     for store in written:
         if store.size > 1:
             loops.setdefault((level[store.expr], store.size), [])
-    return Plan(
+    return FunctionPlan(
         known=known,
         nodes=nodes,
         level=level,
@@ -281,9 +283,9 @@ def _loops(
     stored: dict[Expr, tuple[str, int]],
     known: Collection[Expr],
     written: Sequence[Store],
-) -> dict[Expr, set[Loop]]:
+) -> dict[Expr, set[_Loop]]:
     """Return in which loops each vector and sum is computed."""
-    found: dict[Expr, set[Loop]] = {}
+    found: dict[Expr, set[_Loop]] = {}
     for store in written:
         if store.expr.size:
             found.setdefault(store.expr, set()).add((level[store.expr], store.size))

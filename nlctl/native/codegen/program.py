@@ -89,7 +89,7 @@ def program(schedule: Schedule) -> Program:
     return Program(
         layout=layout,
         fixed={i: values for i, values in fixed.items() if values},
-        corners=sum(corners(node) for node in schedule.nodes),
+        corners=sum(count_switching_functions(node) for node in schedule.nodes),
         memory=tuple(i for node in schedule.nodes for i in memory(node)),
         sampled=tuple(
             node.state_offset + i
@@ -100,7 +100,7 @@ def program(schedule: Schedule) -> Program:
     )
 
 
-def corners(node: Node) -> int:
+def count_switching_functions(node: Node) -> int:
     """Return the number of switching functions that a block declares."""
     return event_count(node.system) if isinstance(node.system, Block) and not node.sampled else 0
 

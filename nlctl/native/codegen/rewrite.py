@@ -13,10 +13,10 @@ from collections.abc import Mapping, Sequence
 from ...expressions.graph import COMPARISONS, Expr, Graph, needed
 from .plan import Store
 
-JUMPS = (*COMPARISONS, "floor", "ceil", "trunc", "rint", "sign", "remainder", "fmod", "copysign")
+_JUMPS = (*COMPARISONS, "floor", "ceil", "trunc", "rint", "sign", "remainder", "fmod", "copysign")
 ALGEBRAIC = ("add", "sub", "mul", "div", "neg", "select", "absolute", "minimum", "maximum")
-PARTS = ("item", "slice", "concat")  # they compute nothing
-LOG2_E = 1.4426950408889634
+_PARTS = ("item", "slice", "concat")  # they compute nothing
+_LOG2_E = 1.4426950408889634
 
 
 def rewritten(
@@ -58,8 +58,8 @@ def _decisive(nodes: Sequence[Expr]) -> set[Expr]:
     """Return what reaches a jump by arithmetic alone."""
     found: set[Expr] = set()
     for node in reversed(nodes):
-        passes = node in found and node.op in (*ALGEBRAIC, *PARTS)
-        if node.op in JUMPS or passes:
+        passes = node in found and node.op in (*ALGEBRAIC, *_PARTS)
+        if node.op in _JUMPS or passes:
             found.update(node.args)
         elif node.op == "select":
             found.add(node.args[0])
@@ -76,7 +76,7 @@ def _reworded(graph: Graph, node: Expr, args: tuple[Expr, ...]) -> Expr | None:
         if other.varies:
             factor, other = other, factor
         if not other.varies:  # the power of e is one of 2
-            power = graph.op("mul", factor, graph.op("mul", other, graph.const(LOG2_E)))
+            power = graph.op("mul", factor, graph.op("mul", other, graph.const(_LOG2_E)))
             return graph.node("exp2", power, size=node.size)
     return None
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...expressions.graph import Expr
-from .interpret import interpreted
+from .interpret import interpreted_function
 from .ir.text import float_text
 from .plan import Function
 
@@ -50,7 +50,7 @@ class Solver:
 
 def plain_solver(solver: Solver) -> Callable[[np.ndarray, int, int], None]:
     """Return a search as plain Python, called with c, a row and a member."""
-    step = interpreted(solver.function, 1, {})
+    step = interpreted_function(solver.function, 1, {})
 
     def at(c: np.ndarray, row: int, lane: int) -> None:
         given = c[row : row + solver.given, [lane]]

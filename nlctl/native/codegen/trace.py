@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...blocks import Block
-from ...expressions.arrays import Tracer, number, vector
+from ...expressions.arrays import Tracer, leaf_vector, scalar
 from ...expressions.graph import Expr, Graph, Untraceable
 from ...expressions.operators import elementwise
 from ...expressions.trace import trace
@@ -17,10 +17,10 @@ from ..parameters import Slot, current_values
 
 def time(graph: Graph) -> Tracer:
     """Return the time."""
-    return number(graph, graph.leaf("t", 0, None))
+    return scalar(graph, graph.leaf("t", 0, None))
 
 
-def parameters(
+def traced_parameters(
     graph: Graph, system: Any, slots: Mapping[str, Slot], p: np.ndarray | None = None
 ) -> Any:
     """Return the record or dict that a block's functions take, with arrays for the numbers.
@@ -34,19 +34,19 @@ def parameters(
     return type(system._current_params)(**values) if isinstance(system, Block) else values
 
 
-def arguments(graph: Graph, system: Any, slots: Mapping[str, Slot]) -> tuple[Any, ...]:
+def traced_arguments(graph: Graph, system: Any, slots: Mapping[str, Slot]) -> tuple[Any, ...]:
     """Return what a block's functions take: its time, states, inputs and parameters."""
-    x = vector(graph, "x", 0, (system.nstates or 0,))
-    u = vector(graph, "u", 0, (system.ninputs or 0,))
-    return time(graph), x, u, parameters(graph, system, slots)
+    x = leaf_vector(graph, "x", 0, (system.nstates or 0,))
+    u = leaf_vector(graph, "u", 0, (system.ninputs or 0,))
+    return time(graph), x, u, traced_parameters(graph, system, slots)
 
 
 def _parameter(graph: Graph, slot: Slot, value: Any, p: np.ndarray | None) -> Tracer:
     if slot.kind in "ib" and not slot.shape:  # Python's True is an integer, too
         now = int(value if p is None else p[slot.offset])
         leaf = graph.leaf("p", slot.offset, None, kind="i", value=now)
-        return number(graph, leaf)
-    whole = vector(graph, "p", slot.offset, slot.shape)
+        return scalar(graph, leaf)
+    whole = leaf_vector(graph, "p", slot.offset, slot.shape)
     return elementwise(graph, "ne", whole, 0.0) if slot.kind == "b" else whole
 
 
@@ -64,7 +64,7 @@ def dependence(system: Any, function: Callable[..., Any], slots: Mapping[str, Sl
 
     try:
         with np.errstate(all="ignore"):
-            result = trace(graph, function, lambda: arguments(graph, system, slots))
+            result = trace(graph, function, lambda: traced_arguments(graph, system, slots))
     except Untraceable:
         return found
     if result.size != system.noutputs or graph.assumptions:

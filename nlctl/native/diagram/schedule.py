@@ -25,7 +25,15 @@ from .feedthrough import closer_feedthrough, feedthrough
 from .tearing import first_loop, tear
 from .wiring import AlgebraicLoopError, Combination, Signal, Wiring
 
-__all__ = ["AlgebraicLoopError", "Combination", "Loop", "Node", "Schedule", "Signal", "schedule"]
+__all__ = [
+    "AlgebraicLoop",
+    "AlgebraicLoopError",
+    "Combination",
+    "Node",
+    "Schedule",
+    "Signal",
+    "schedule",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +72,7 @@ class Node:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loop:
+class AlgebraicLoop:
     """Signals that depend on each other at the same instant and are solved for together.
 
     Attributes
@@ -108,7 +116,7 @@ class Schedule:
     order: tuple[int, ...]
     unknown: tuple[frozenset[int], ...]
     outputs: tuple[Combination, ...]
-    loops: tuple[Loop, ...]
+    loops: tuple[AlgebraicLoop, ...]
     captured: tuple[Captured, ...]
 
     @property
@@ -231,7 +239,7 @@ class _Ordering:
     known: set[Signal] = field(default_factory=set)
     order: list[int] = field(default_factory=list)
     unknown: list[frozenset[int]] = field(default_factory=list)
-    loops: list[Loop] = field(default_factory=list)
+    loops: list[AlgebraicLoop] = field(default_factory=list)
 
     def run(self, solve_loops: bool) -> None:
         every = {Signal(i, k) for i, node in enumerate(self.nodes) for k in range(len(node.direct))}
@@ -240,13 +248,13 @@ class _Ordering:
             before = _signals_before(self.nodes, every - self.known)
             if not solve_loops:
                 raise AlgebraicLoopError(
-                    f"algebraic loop: {_ring_text(self.nodes, before)} has no state in it; put one "
+                    f"algebraic loop: {_loop_text(self.nodes, before)} has no state in it; put one "
                     "in, or compile with algebraic_loops='solve'"
                 )
             loop = first_loop(before)
             torn, start = tear({s: before[s] & loop for s in before if s in loop}), len(self.order)
             self._evaluate(loop, torn)
-            self.loops.append(Loop(start=start, stop=len(self.order), torn=torn))
+            self.loops.append(AlgebraicLoop(start=start, stop=len(self.order), torn=torn))
             self._evaluate(every, ())
 
     def _evaluate(self, wanted: set[Signal], guessed: Iterable[Signal]) -> None:
@@ -293,11 +301,11 @@ def signal_name(nodes: Sequence[Node], signal: Signal) -> str:
     return f"{node.path}.{node.system.output_labels[signal.index]}"
 
 
-def _ring_text(nodes: tuple[Node, ...], before: Mapping[Signal, set[Signal]]) -> str:
-    """Print a ring of signals in the order in which they act on each other."""
+def _loop_text(nodes: tuple[Node, ...], before: Mapping[Signal, set[Signal]]) -> str:
+    """Print an algebraic loop in the order in which its signals act on each other."""
     try:
         TopologicalSorter(before).prepare()
     except CycleError as error:
-        ring = error.args[1]
-        return " -> ".join(signal_name(nodes, s) for s in ring)
-    raise AssertionError("signals that cannot be ordered form a ring")
+        loop = error.args[1]
+        return " -> ".join(signal_name(nodes, s) for s in loop)
+    raise AssertionError("signals that cannot be ordered form a loop")

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-Item = TypeVar("Item", bound=Hashable)
+_Item = TypeVar("_Item", bound=Hashable)
 
 
-def first_loop(before: Mapping[Item, set[Item]]) -> set[Item]:
+def first_loop(before: Mapping[_Item, set[_Item]]) -> set[_Item]:
     """Return the items of one loop that depends on no other loop.
 
     Parameters
@@ -37,7 +37,7 @@ def first_loop(before: Mapping[Item, set[Item]]) -> set[Item]:
     return {item for item, label in zip(items, labels, strict=True) if label == chosen}
 
 
-def tear(before: Mapping[Item, set[Item]]) -> tuple[Item, ...]:
+def tear(before: Mapping[_Item, set[_Item]]) -> tuple[_Item, ...]:
     """Choose few items of a loop without which there is no loop.
 
     The item with the most connections first; then what is in no loop any more drops out.  The

@@ -15,7 +15,7 @@ Combination = Mapping["Signal", float]
 
 
 class AlgebraicLoopError(UsageError):
-    """Signals that depend on each other at the same instant; the message prints the ring."""
+    """Signals that depend on each other at the same instant; the message prints the loop."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from ..codegen.along import derivatives
 from ..compiled import Compiled
 from ..integrate.discrete import compile_discrete
-from .evaluations import WIDTH, machine
+from .evaluations import ENSEMBLE_WIDTH, machine
 
 
 def compile_ahead(compiled: Compiled, *, ensemble: bool = False) -> None:
@@ -27,7 +27,7 @@ def compile_ahead(compiled: Compiled, *, ensemble: bool = False) -> None:
     CompileError
         If a block's function cannot be machine code.
     """
-    width = WIDTH if ensemble else 1
+    width = ENSEMBLE_WIDTH if ensemble else 1
     compile_for(compiled, np.repeat(compiled.parameter_vector()[:, None], width, axis=1), width)
 
 

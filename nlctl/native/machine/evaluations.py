@@ -10,12 +10,12 @@ import numpy as np
 
 from ..codegen.blocks import equations
 from ..codegen.lower import Lowered, lower
-from .routine import called_back, check, entry, lowered_code
+from .routine import called_back, entry, lowered_code, raise_failures
 
 if TYPE_CHECKING:
     from ..compiled import Compiled
 
-WIDTH = 8  # members side by side in ensembles: one AVX-512 register
+ENSEMBLE_WIDTH = 8  # members side by side in ensembles: one AVX-512 register
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +66,7 @@ class Machine:
 
     def check(self, c: np.ndarray) -> None:
         """Raise what an opaque function has raised, with `c` as the parameters."""
-        check((self.rhs, self.out, *self.samples), c)
+        raise_failures((self.rhs, self.out, *self.samples), c)
 
 
 def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:

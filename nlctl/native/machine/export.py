@@ -9,9 +9,9 @@ Relied on in numba, and held by a test each:
 - `CPUCodeLibrary.add_ir_module` is given each function's own IR, and ``_linking_libraries`` are
   the libraries that it calls;
 - ``fndesc.llvm_func_name`` takes pointers for the result and for an exception, then the arguments,
-  and returns `RETURNED` or `NONE`, or the number of an exception;
+  and returns `_RETURNED` or `NONE`, or the number of an exception;
 - memory of arrays is asked for by ``NRT_MemInfo_alloc_aligned`` and given back by
-  ``NRT_MemInfo_call_dtor``; `MEMORY` has both in terms of the C library, with numba's layout.
+  ``NRT_MemInfo_call_dtor``; `_MEMORY` has both in terms of the C library, with numba's layout.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from .machine_code import Wanted
 
-RETURNED, NONE = 0, -2
-LONG = 80  # lines of IR from which on a function is not inlined: twice the compile time, no gain
-MEMORY = """
+_RETURNED, NONE = 0, -2
+_LONG = 80  # lines of IR from which on a function is not inlined: twice the compile time, no gain
+_MEMORY = """
 declare ptr @malloc(i64)
 declare void @free(ptr)
 
@@ -84,7 +84,7 @@ def exported(wanted: Sequence[Wanted]) -> bytes:
     found: dict[int, Any] = {}
     for library in libraries:
         _reach(library, found)
-    linked = llvm.parse_assembly(MEMORY)
+    linked = llvm.parse_assembly(_MEMORY)
     for key, library in found.items():
         for text in texts.get(key) or [library.get_llvm_str()]:  # what was compiled before has none
             linked.link_in(llvm.parse_assembly(text))
@@ -164,7 +164,7 @@ def _apart(module: Any, entries: Iterable[str]) -> Any:
     """
     text = str(module)
     for function in module.functions:
-        short = str(function).count("\n") < LONG
+        short = str(function).count("\n") < _LONG
         if not (function.is_declaration or short or function.name in entries):
             place = rf'(\ndefine [^\n]*@"?{re.escape(function.name)}"?\([^\n]*\)[^\n{{]*)\{{'
             text, count = re.subn(place, r"\1noinline {", text)

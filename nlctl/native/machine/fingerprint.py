@@ -22,10 +22,10 @@ from typing import Any, Protocol
 import numba
 import numpy as np
 
-LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"}  # their versions stand for them
+_LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"}  # their versions stand for them
 MODULE = "\1of "  # begins a text that names a module and nothing of its content
 HEAP_TYPE = 1 << 9  # Py_TPFLAGS_HEAPTYPE: made by a class statement
-CONSTANTS = (int, float, complex, str, bytes, tuple, list, dict, np.ndarray, np.generic)
+_CONSTANTS = (int, float, complex, str, bytes, tuple, list, dict, np.ndarray, np.generic)
 STANDARD = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
 
 
@@ -152,7 +152,7 @@ def _of_class(kind: type, seen: set[int]) -> Iterator[str]:
         if isinstance(_plain(function), types.FunctionType):
             yield name
             yield from _fingerprint(function, seen)
-        elif not name.startswith("__") and isinstance(part, CONSTANTS):
+        elif not name.startswith("__") and isinstance(part, _CONSTANTS):
             yield name
             yield from _fingerprint(part, seen)
     for base in kind.__bases__:
@@ -231,7 +231,7 @@ def _is_library(name: str | None) -> bool:
     """Whether a module is Python's own or numba's: a version stands for its content."""
     top = (name or "").partition(".")[0]
     if top not in sys.stdlib_module_names:
-        return top in LIBRARIES
+        return top in _LIBRARIES
     file = getattr(sys.modules.get(top), "__file__", None)  # a user's file may have that name
     return file is None or any(Path(file).is_relative_to(f) for f in STANDARD)
 

@@ -25,12 +25,12 @@ from ..integrate.workspace import TASK, WORK
 from . import address, store
 from .fingerprint import function_key, module_key
 from .finish import finished
-from .machine_code import Wanted, full_key
+from .machine_code import Wanted, store_key
 
 HERE = Path(__file__).parents[1]
 SHIPPED = HERE / "integrators.bitcode"
-RETURNED = (0, -2)  # what numba's functions return, unless they raise an exception
-ADDRESS = numba.intp
+_RETURNED = (0, -2)  # what numba's functions return, unless they raise an exception
+_ADDRESS = numba.intp
 WANTED = [
     Wanted(
         function=function,
@@ -38,9 +38,9 @@ WANTED = [
         options={"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True},
     )
     for function, *arguments in (
-        (restart.start, ADDRESS, TASK, WORK),
-        (advance.advance, ADDRESS, ADDRESS, TASK, WORK, numba.intp),
-        (workspace.outputs, ADDRESS, ADDRESS, TASK, WORK),
+        (restart.start, _ADDRESS, TASK, WORK),
+        (advance.advance, _ADDRESS, _ADDRESS, TASK, WORK, numba.intp),
+        (workspace.outputs, _ADDRESS, _ADDRESS, TASK, WORK),
     )
 ]
 _ONCE = threading.Lock()  # of several threads that begin at the same time one compiles
@@ -57,7 +57,7 @@ def _integrators() -> dict[str, Callable[..., None]]:
     functions = {each.function.__name__: each for each in WANTED}
     if getattr(config, "DISABLE_JIT", False):
         return {name: each.function for name, each in functions.items()}
-    loaded = finished(shipped() or _made_anew(), functions)
+    loaded = finished(shipped_bitcode() or _made_anew(), functions)
     return {
         name: _callable(loaded.addresses[name], each.signature.args, loaded)
         for name, each in functions.items()
@@ -73,14 +73,14 @@ def _callable(address: int, arguments: Any, owner: Any) -> Callable[..., None]:
     def function(*given: Any) -> None:
         values = (g if isinstance(g, int) else g.table.ctypes.data for g in given)
         status = call(nothing, ctypes.byref(nothing, 8), *values)
-        if status not in RETURNED:
+        if status not in _RETURNED:
             raise MemoryError(f"the integrators have failed for want of memory (status {status})")
 
     function.owner = owner  # type: ignore[attr-defined]
     return function
 
 
-def shipped() -> bytes | None:
+def shipped_bitcode() -> bytes | None:
     """Return the bitcode that is shipped, if it is that of the sources and can be read here."""
     try:
         first, _, code = SHIPPED.read_bytes().partition(b"\n")
@@ -113,7 +113,7 @@ def _made_anew() -> bytes:
     """Return what numba makes of the sources, from the cache if it is there."""
     from .export import exported
 
-    key = full_key(integrator_key(), "bitcode")
+    key = store_key(integrator_key(), "bitcode")
     code = store.read(key)
     if code is None:
         code = exported(WANTED)

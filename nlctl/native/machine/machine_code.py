@@ -80,7 +80,7 @@ def machine_code(key: str, wanted: Sequence[Wanted]) -> list[Any]:
     """
     if getattr(config, "DISABLE_JIT", False):
         return [each.function for each in wanted]
-    key = full_key(key, *((str(each.signature), each.options) for each in wanted))
+    key = store_key(key, *((str(each.signature), each.options) for each in wanted))
     with global_compiler_lock:  # types are made, as by a compilation
         known = _read(key)
     caches = [_Given(data) for data in known or [None] * len(wanted)]
@@ -99,7 +99,7 @@ def machine_code_if_taken(key: str, wanted: Wanted) -> Any:
         As in `machine_code`.
     wanted : Wanted
     """
-    refused = full_key(key, "refused", str(wanted.signature), wanted.options)
+    refused = store_key(key, "refused", str(wanted.signature), wanted.options)
     if store.read(refused) is not None:
         return None
     try:
@@ -156,15 +156,15 @@ class _ByArguments(NullCache):
         return function_key(self.code)
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        known = _read(full_key(self.key, str(sig)))
+        known = _read(store_key(self.key, str(sig)))
         return None if known is None else _rebuilt(known[0], target_context)
 
     def save_overload(self, sig: Any, cres: CompileResult) -> None:
         if _may_be_kept(cres):
-            _write(full_key(self.key, str(sig)), [cres._reduce()])
+            _write(store_key(self.key, str(sig)), [cres._reduce()])
 
 
-def full_key(key: str, *more: Any) -> str:
+def store_key(key: str, *more: Any) -> str:
     """Return the key of what was compiled by this numba, for this processor, with its settings."""
     python = sys.implementation.cache_tag, platform.python_version()
     versions = numba.__version__, llvmlite.__version__, np.__version__

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numba.core import config
 
-from ..codegen.calls import FAILED, Call, Native, native_calls, plain_calls
-from ..codegen.interpret import interpreted
+from ..codegen.calls import CALL_FAILED, Call, Native, native_calls, plain_calls
+from ..codegen.interpret import interpreted_function
 from ..codegen.lower import Lowered
 from ..codegen.solver import plain_solver
 from .finish import Loaded, finished
@@ -37,7 +37,7 @@ class Opaque:
     def check(self, c: np.ndarray) -> None:
         """Raise what the function has raised for one of the members, if it has."""
         at = self.row + self.call.failed
-        for lane in np.flatnonzero(c[at] == FAILED)[:1]:
+        for lane in np.flatnonzero(c[at] == CALL_FAILED)[:1]:
             raise self.native.error(self.call, c, self.row, int(lane))
 
 
@@ -93,7 +93,7 @@ def plain_functions(lowered: Lowered) -> tuple[Runnable, ...]:
     """Return the functions of a program as plain Python, in their order."""
     calls = plain_calls(lowered.calls)
     calls |= {name: plain_solver(solver) for name, solver in lowered.solvers.items()}
-    return tuple(interpreted(f, lowered.lanes, calls) for f in lowered.functions.values())
+    return tuple(interpreted_function(f, lowered.lanes, calls) for f in lowered.functions.values())
 
 
 def lowered_code(lowered: Lowered) -> tuple[Runnable, ...]:
@@ -133,7 +133,7 @@ def entry(function: Any) -> Any:
     return function.address if isinstance(function, Routine) else function
 
 
-def check(functions: Sequence[Any], c: np.ndarray) -> None:
+def raise_failures(functions: Sequence[Any], c: np.ndarray) -> None:
     """Raise what an opaque function has raised within these, whose parameters were `c`."""
     for function in functions:
         if isinstance(function, Routine):

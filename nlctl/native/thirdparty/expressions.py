@@ -18,19 +18,19 @@ from .values import (
     FRESH,
     OUTSIDE,
     SLICE,
-    UNKNOWN,
+    UNKNOWN_VALUE,
     Impure,
+    KnownValue,
     Local,
     OneOf,
     Unknown,
-    Value,
     captured,
     element,
     forgotten,
+    function_choice,
     holder,
-    joined,
+    least_upper_bound,
     library,
-    one_of,
 )
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ CHANGES = "work on a copy, as in x.copy()"
 class Frame:
     """The names of one call."""
 
-    names: dict[str, Value]
+    names: dict[str, KnownValue]
     function: Any  # the plain function that is called, or around it
     parent: Frame | None = None
     shared: dict[str, str] = field(default_factory=dict)  # declared global or nonlocal
@@ -71,7 +71,7 @@ class Expressions(ast.NodeVisitor):
 
     # names
 
-    def lookup(self, name: str) -> Value:
+    def lookup(self, name: str) -> KnownValue:
         frame: Frame | None = self.frame
         while frame is not None:
             if name in frame.names:
@@ -91,7 +91,7 @@ class Expressions(ast.NodeVisitor):
             return self.walk.captured(function.__globals__, name, function.__globals__[name])
         return captured(builtin[name]) if name in builtin else OUTSIDE
 
-    def assign(self, name: str, value: Value) -> None:
+    def assign(self, name: str, value: KnownValue) -> None:
         kind = self.frame.shared.get(name)
         if kind == "global":
             raise Impure(f"writes the global '{name}'", MEMORY)
@@ -104,9 +104,9 @@ class Expressions(ast.NodeVisitor):
             frame = frame.parent
         if frame is None:
             raise Impure(f"writes '{name}', a variable of the function around it", MEMORY)
-        frame.names[name] = joined([frame.names[name], value])
+        frame.names[name] = least_upper_bound([frame.names[name], value])
 
-    def bind(self, target: ast.expr, value: Value) -> None:
+    def bind(self, target: ast.expr, value: KnownValue) -> None:
         """Assign to a name, an item, an attribute, or several of these."""
         if isinstance(target, ast.Name):
             self.assign(target.id, value)
@@ -121,7 +121,7 @@ class Expressions(ast.NodeVisitor):
         else:
             self.generic_visit(target)
 
-    def write(self, target: ast.Subscript | ast.Attribute, value: Value) -> None:
+    def write(self, target: ast.Subscript | ast.Attribute, value: KnownValue) -> None:
         base = self.visit(target.value)
         if isinstance(target, ast.Subscript):
             self.visit(target.slice)
@@ -130,7 +130,7 @@ class Expressions(ast.NodeVisitor):
             raise Impure(f"writes into '{text}', which it did not make", f"{MEMORY}, or {CHANGES}")
         self.kept(base, [value])
 
-    def kept(self, base: Value, values: Sequence[Value]) -> None:
+    def kept(self, base: KnownValue, values: Sequence[KnownValue]) -> None:
         """Note that a list or dict keeps what the call has not made: any other may be the same."""
         if base.holds and not all(v.own and v.inside for v in values):
             names = self.frame.names
@@ -138,29 +138,29 @@ class Expressions(ast.NodeVisitor):
 
     # expressions
 
-    def visit_Lambda(self, node: ast.Lambda) -> Value:
-        return Value(True, True, known=Local(node, self.frame))
+    def visit_Lambda(self, node: ast.Lambda) -> KnownValue:
+        return KnownValue(True, True, known=Local(node, self.frame))
 
-    def visit_Constant(self, node: ast.Constant) -> Value:
+    def visit_Constant(self, node: ast.Constant) -> KnownValue:
         return captured(node.value) if node.value is not ... else SLICE
 
-    def visit_Name(self, node: ast.Name) -> Value:
+    def visit_Name(self, node: ast.Name) -> KnownValue:
         return self.lookup(node.id)
 
-    def visit_NamedExpr(self, node: ast.NamedExpr) -> Value:
+    def visit_NamedExpr(self, node: ast.NamedExpr) -> KnownValue:
         value = self.visit(node.value)
         self.assign(node.target.id, value)
         return value
 
-    def visit_BinOp(self, node: ast.BinOp) -> Value:
+    def visit_BinOp(self, node: ast.BinOp) -> KnownValue:
         self.operands([self.visit(node.left), self.visit(node.right)])
         return FRESH
 
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> Value:
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> KnownValue:
         self.operands([self.visit(node.operand)])
         return FRESH
 
-    def operands(self, values: Sequence[Value]) -> None:
+    def operands(self, values: Sequence[KnownValue]) -> None:
         """Check that operators are those of numbers, arrays and containers."""
         for value in values:
             known_calls.check_object(value, "computes with")
@@ -168,7 +168,7 @@ class Expressions(ast.NodeVisitor):
     def condition(self, node: ast.expr) -> None:
         self.operands([self.visit(node)])
 
-    def visit_Compare(self, node: ast.Compare) -> Value:
+    def visit_Compare(self, node: ast.Compare) -> KnownValue:
         self.operands([self.visit(part) for part in (node.left, *node.comparators)])
         for test, part in zip(node.ops, node.comparators, strict=True):
             is_none = isinstance(part, ast.Constant) and part.value is None
@@ -176,44 +176,44 @@ class Expressions(ast.NodeVisitor):
                 raise Impure("tests identity with 'is'", "write == or !=")
         return FRESH
 
-    def visit_BoolOp(self, node: ast.BoolOp) -> Value:
+    def visit_BoolOp(self, node: ast.BoolOp) -> KnownValue:
         values = [self.visit(part) for part in node.values]
         self.operands(values)
-        return joined(values)
+        return least_upper_bound(values)
 
-    def visit_IfExp(self, node: ast.IfExp) -> Value:
+    def visit_IfExp(self, node: ast.IfExp) -> KnownValue:
         self.condition(node.test)
-        return joined([self.visit(node.body), self.visit(node.orelse)])
+        return least_upper_bound([self.visit(node.body), self.visit(node.orelse)])
 
-    def visit_Tuple(self, node: ast.Tuple | ast.List | ast.Set) -> Value:
+    def visit_Tuple(self, node: ast.Tuple | ast.List | ast.Set) -> KnownValue:
         return holder([self.visit(part) for part in node.elts])
 
     visit_List = visit_Set = visit_Tuple
 
-    def visit_Dict(self, node: ast.Dict) -> Value:
+    def visit_Dict(self, node: ast.Dict) -> KnownValue:
         for part in node.keys:
             if part is not None:
                 self.visit(part)
         return holder([self.visit(part) for part in node.values])
 
-    def visit_Starred(self, node: ast.Starred) -> Value:
+    def visit_Starred(self, node: ast.Starred) -> KnownValue:
         value = self.visit(node.value)
         self.iterated(value)
         return element(value)
 
-    def visit_Slice(self, node: ast.Slice) -> Value:
+    def visit_Slice(self, node: ast.Slice) -> KnownValue:
         for part in (node.lower, node.upper, node.step):
             if part is not None:
                 self.visit(part)
         return SLICE
 
-    def visit_JoinedStr(self, node: ast.JoinedStr) -> Value:
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> KnownValue:
         for part in ast.walk(node):
             if isinstance(part, ast.FormattedValue):
                 self.visit(part.value)
         return FRESH
 
-    def visit_Subscript(self, node: ast.Subscript) -> Value:
+    def visit_Subscript(self, node: ast.Subscript) -> KnownValue:
         base = self.visit(node.value)
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         values = [self.visit(index) for index in indices]
@@ -222,7 +222,7 @@ class Expressions(ast.NodeVisitor):
             return base
         if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
             parts = base.known.values() if isinstance(base.known, dict) else base.known
-            return replace(element(base), known=one_of(map(captured, parts)))
+            return replace(element(base), known=function_choice(map(captured, parts)))
         if isinstance(base.known, dict | list | tuple):
             try:
                 key: Any = keys[0] if len(keys) == 1 else tuple(keys)
@@ -237,10 +237,10 @@ class Expressions(ast.NodeVisitor):
         whole = isinstance(base.known, np.ndarray) and len(keys) == base.known.ndim
         return FRESH if whole else element(base)
 
-    def visit_Attribute(self, node: ast.Attribute) -> Value:
+    def visit_Attribute(self, node: ast.Attribute) -> KnownValue:
         return self.attribute(self.visit(node.value), node.attr)
 
-    def attribute(self, base: Value, name: str) -> Value:
+    def attribute(self, base: KnownValue, name: str) -> KnownValue:
         """Return what is known of an attribute; a property is walked."""
         thing = base.known
         if isinstance(thing, Unknown):
@@ -253,7 +253,7 @@ class Expressions(ast.NodeVisitor):
             result = self.walk.call(captured(getter), [base], {})
             return result if not result.own else FRESH
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
-            value = getattr(thing, name, UNKNOWN)
+            value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):
                 return OUTSIDE
             if isinstance(value, MethodType) or isinstance(thing, super):
@@ -261,7 +261,7 @@ class Expressions(ast.NodeVisitor):
             return self.walk.captured(thing, name, value)
         raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
 
-    def visit_Call(self, node: ast.Call) -> Value:
+    def visit_Call(self, node: ast.Call) -> KnownValue:
         given = [self.visit(part) for part in node.args]
         named = {k.arg or "**": self.visit(k.value) for k in node.keywords}
         if "out" in named and not named["out"].own:
@@ -282,22 +282,24 @@ class Expressions(ast.NodeVisitor):
             self.kept(value, [*given, *named.values()])
         return result
 
-    def parent_class(self) -> Value:
+    def parent_class(self) -> KnownValue:
         """Return what ``super()`` stands for."""
         own, cls = next(iter(self.frame.names.values()), OUTSIDE), self.lookup("__class__")
         if isinstance(own.known, Unknown) or not isinstance(cls.known, type):
             raise Impure("calls super() of what is only known when it runs", "name the class")
         return captured(super(cls.known, own.known))
 
-    def visit_ListComp(self, node: ast.ListComp | ast.SetComp | ast.GeneratorExp) -> Value:
+    def visit_ListComp(self, node: ast.ListComp | ast.SetComp | ast.GeneratorExp) -> KnownValue:
         return self.comprehended(node.generators, [node.elt])
 
     visit_SetComp = visit_GeneratorExp = visit_ListComp
 
-    def visit_DictComp(self, node: ast.DictComp) -> Value:
+    def visit_DictComp(self, node: ast.DictComp) -> KnownValue:
         return self.comprehended(node.generators, [node.key, node.value])
 
-    def comprehended(self, loops: Sequence[ast.comprehension], parts: Sequence[ast.expr]) -> Value:
+    def comprehended(
+        self, loops: Sequence[ast.comprehension], parts: Sequence[ast.expr]
+    ) -> KnownValue:
         before = dict(self.frame.names)
         for loop in loops:
             over = self.visit(loop.iter)
@@ -309,7 +311,7 @@ class Expressions(ast.NodeVisitor):
         self.frame.names = before
         return made
 
-    def iterated(self, value: Value) -> None:
+    def iterated(self, value: KnownValue) -> None:
         known_calls.check_object(value, "goes through")
 
 

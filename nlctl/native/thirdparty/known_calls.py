@@ -14,14 +14,14 @@ from .values import (
     OUTSIDE,
     SLICE,
     Impure,
+    KnownValue,
     Local,
     OneOf,
     Unknown,
-    Value,
     captured,
     element,
     forgotten,
-    joined,
+    least_upper_bound,
     library,
     python_function,
 )
@@ -43,13 +43,13 @@ WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis
 IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
             "ipow", "imatmul", "iand", "ior", "ixor", "iconcat", "ilshift", "irshift"}  # fmt: skip
 # functions that draw random numbers inside, read or write files, or change settings for everybody
-OTHERS = {"differential_evolution": DRAW, "basinhopping": DRAW, "dual_annealing": DRAW,
-          "eigs": DRAW, "eigsh": DRAW, "svds": DRAW, "lobpcg": DRAW, "kmeans": DRAW,
-          "kmeans2": DRAW, "estimate_rank": DRAW, "interp_decomp": DRAW}  # fmt: skip
-OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoptions"), MEMORY)
-OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt", "loads",
-                         "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
-                        "read files before the run, and write them after it")  # fmt: skip
+_OTHERS = {"differential_evolution": DRAW, "basinhopping": DRAW, "dual_annealing": DRAW,
+           "eigs": DRAW, "eigsh": DRAW, "svds": DRAW, "lobpcg": DRAW, "kmeans": DRAW,
+           "kmeans2": DRAW, "estimate_rank": DRAW, "interp_decomp": DRAW}  # fmt: skip
+_OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoptions"), MEMORY)
+_OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt",
+                          "loads", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
+                         "read files before the run, and write them after it")  # fmt: skip
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
@@ -80,12 +80,14 @@ CONTAINERS = (
     | range
 )
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
-PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float", "format",
-         "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord", "pow", "range",
-         "repr", "round", "slice", "str", "sum", "bytes", "object", "bin", "hex"}  # fmt: skip
+_PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float", "format",
+          "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord", "pow", "range",
+          "repr", "round", "slice", "str", "sum", "bytes", "object", "bin", "hex"}  # fmt: skip
 
 
-def call(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]) -> Value:
+def call(
+    walk: Walk, thing: Any, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue:
     """Return what is known of the result of calling an object.
 
     Raises
@@ -105,7 +107,7 @@ def call(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]) ->
         return _library(walk, thing, module, given, named)
     if isinstance(thing, type):
         if issubclass(thing, tuple) and hasattr(thing, "_fields"):
-            return Value(True, all(v.own and v.inside for v in given), True)
+            return KnownValue(True, all(v.own and v.inside for v in given), True)
         raise Impure(f"makes an object of {thing.__name__}", "use numbers and arrays")
     function = python_function(thing)
     if type(owner).__module__.startswith(VARYING):
@@ -121,8 +123,8 @@ def call(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]) ->
 
 
 def method(
-    walk: Walk, base: Value, name: str, given: list[Value], named: dict[str, Value]
-) -> Value | None:
+    walk: Walk, base: KnownValue, name: str, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue | None:
     """Return what is known of the result of a method of a container; None if it is another's.
 
     Raises
@@ -156,18 +158,18 @@ def method(
     raise Impure(f"calls a method '{name}()' that is not known", "use NumPy's functions")
 
 
-def _read(base: Value, name: str, given: list[Value]) -> Value:
+def _read(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
     """Return what is known of the result of a method that changes nothing."""
     if name == "get" and given:
         key = given[0].known
         if isinstance(base.known, dict) and isinstance(key, str) and key in base.known:
             return captured(base.known[key])
-        return joined([element(base), *given[1:]])
+        return least_upper_bound([element(base), *given[1:]])
     kept = base.holds and name in ("items", "keys", "values", "copy", "_asdict", "_replace")
-    return Value(True, base.inside, True) if kept else FRESH
+    return KnownValue(True, base.inside, True) if kept else FRESH
 
 
-def _written(base: Value, what: str) -> None:
+def _written(base: KnownValue, what: str) -> None:
     if not base.own:
         raise Impure(f"changes with {what} what it did not make", MEMORY)
 
@@ -177,7 +179,7 @@ def _walkable(function: FunctionType) -> bool:
     return (library(function) or "control").partition(".")[0] == "control"
 
 
-def check_object(value: Value, what: str) -> None:
+def check_object(value: KnownValue, what: str) -> None:
     """Check that what a value does by itself is known: no iterator, no class of somebody.
 
     Raises
@@ -198,7 +200,9 @@ def _is_builtin(thing: Any) -> bool:
     return getattr(builtins, name, None) is thing if isinstance(name, str) else False
 
 
-def _builtin(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]) -> Value:
+def _builtin(
+    walk: Walk, thing: Any, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue:
     name = thing.__name__
     for value in given if name not in ("isinstance", "issubclass", "callable", "type") else ():
         check_object(value, f"calls {name}() of")
@@ -209,27 +213,29 @@ def _builtin(walk: Walk, thing: Any, given: list[Value], named: dict[str, Value]
         return OUTSIDE if isinstance(known, Unknown) else captured(type(known))
     if name in ("min", "max"):
         _call_functions(walk, named.values())
-        return joined([element(given[0])] if len(given) == 1 else [forgotten(v) for v in given])
+        return least_upper_bound(
+            [element(given[0])] if len(given) == 1 else [forgotten(v) for v in given]
+        )
     if thing in MAKING:
         _call_functions(walk, [*given, *named.values()])
-        return Value(True, all(v.inside for v in given), True)
+        return KnownValue(True, all(v.inside for v in given), True)
     if name == "next":
         _written(given[0], "next()")
         return element(given[0])
-    if name in PLAIN:
+    if name in _PLAIN:
         return FRESH
     advice = OUTPUT if name in ("print", "input", "open") else "do without it"
     raise Impure(f"calls {name}()", advice)
 
 
 def _library(
-    walk: Walk, thing: Any, module: str, given: list[Value], named: dict[str, Value]
-) -> Value:
+    walk: Walk, thing: Any, module: str, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue:
     name = getattr(thing, "__name__", "")
     if module.startswith(VARYING):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
-    if name in OTHERS:
-        raise Impure(f"calls {module}.{name}, which is more than its result", OTHERS[name])
+    if name in _OTHERS:
+        raise Impure(f"calls {module}.{name}, which is more than its result", _OTHERS[name])
     _call_functions(walk, [*given, *named.values()])
     for value in (*given, *named.values()):
         if not callable(value.known):

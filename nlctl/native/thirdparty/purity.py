@@ -19,10 +19,20 @@ from . import known_calls
 from .captured import Captured, noted
 from .expressions import Frame
 from .source import Definition, Unreadable, definition
-from .statements import Body
-from .values import OUTSIDE, Impure, Local, OneOf, Unknown, Value, captured, holder, joined
+from .statements import CallWalker
+from .values import (
+    OUTSIDE,
+    Impure,
+    KnownValue,
+    Local,
+    OneOf,
+    Unknown,
+    captured,
+    holder,
+    least_upper_bound,
+)
 
-BUDGET = 400  # bodies that are walked for one function, before it is too much to follow
+_BUDGET = 400  # bodies that are walked for one function, before it is too much to follow
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +52,7 @@ class Reading:
     unbound: tuple[str, ...]
 
 
-def check_pure(function: Any, arguments: Sequence[Value]) -> Reading:
+def check_pure(function: Any, arguments: Sequence[KnownValue]) -> Reading:
     """Check that a function depends on its arguments alone and changes nothing.
 
     Parameters
@@ -69,25 +79,27 @@ class Walk:
     """Walks a function and all that it calls."""
 
     def __init__(self) -> None:
-        self.done: dict[Any, Value] = {}
+        self.done: dict[Any, KnownValue] = {}
         self.walked: set[ast.AST] = set()  # functions inside others, while they are walked
         self.read: dict[tuple[int, str], Captured] = {}
         self.unbound: list[str] = []
         self.bodies = 0
 
-    def captured(self, holder: Any, name: str, value: Any) -> Value:
+    def captured(self, holder: Any, name: str, value: Any) -> KnownValue:
         """Return what is known of a value that is read from around a function, and note it."""
         if (id(holder), name) not in self.read:
             self.read[id(holder), name] = noted(holder, name, value)
         return captured(value)
 
-    def call(self, function: Value, given: list[Value], named: dict[str, Value]) -> Value:
+    def call(
+        self, function: KnownValue, given: list[KnownValue], named: dict[str, KnownValue]
+    ) -> KnownValue:
         """Return what is known of the result of a call."""
         thing = function.known
         if isinstance(thing, Unknown):
             raise Impure("calls what is only known when it runs", "call a function by its name")
         if isinstance(thing, OneOf):
-            return joined([self.call(choice, given, named) for choice in thing.choices])
+            return least_upper_bound([self.call(choice, given, named) for choice in thing.choices])
         if isinstance(thing, Local):
             return self.body(thing.node, thing.frame.function, thing.frame, given, named)
         if isinstance(thing, functools.partial):
@@ -96,7 +108,9 @@ class Walk:
             return self.call(captured(thing.func), first + given, more | named)
         return known_calls.call(self, thing, given, named)
 
-    def function(self, thing: FunctionType, given: list[Value], named: dict[str, Value]) -> Value:
+    def function(
+        self, thing: FunctionType, given: list[KnownValue], named: dict[str, KnownValue]
+    ) -> KnownValue:
         """Return what is known of the result of somebody's Python function."""
         try:
             return self.body(definition(thing), thing, None, given, named)
@@ -108,24 +122,24 @@ class Walk:
         node: Definition,
         function: FunctionType,
         parent: Frame | None,
-        given: list[Value],
-        named: dict[str, Value],
-    ) -> Value:
+        given: list[KnownValue],
+        named: dict[str, KnownValue],
+    ) -> KnownValue:
         frame = Frame(_bound(node.args, function, parent, given, named), function, parent)
         self.bodies += 1
-        if self.bodies > BUDGET:
+        if self.bodies > _BUDGET:
             raise Impure("calls too many functions to be followed", "make it simpler")
         if parent is not None:  # what it finds in the names around it may have changed
             if node in self.walked:
                 return OUTSIDE  # it calls itself
             self.walked.add(node)
-            result = Body(self, frame).result(node)
+            result = CallWalker(self, frame).result(node)
             self.walked.discard(node)
             return result
         key = (node, function, *frame.names.items())
         if key not in self.done:
             self.done[key] = OUTSIDE  # while it is being walked: it may call itself
-            self.done[key] = Body(self, frame).result(node)
+            self.done[key] = CallWalker(self, frame).result(node)
         return self.done[key]
 
 
@@ -133,9 +147,9 @@ def _bound(
     arguments: ast.arguments,
     function: FunctionType,
     parent: Frame | None,
-    given: list[Value],
-    named: dict[str, Value],
-) -> dict[str, Value]:
+    given: list[KnownValue],
+    named: dict[str, KnownValue],
+) -> dict[str, KnownValue]:
     """Return the names of a call's arguments with their values."""
     places = [a.arg for a in arguments.posonlyargs + arguments.args]
     names = [*places, *(a.arg for a in arguments.kwonlyargs)]

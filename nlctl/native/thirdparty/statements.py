@@ -15,14 +15,14 @@ from .source import Definition
 from .values import (
     FRESH,
     OUTSIDE,
-    UNKNOWN,
+    UNKNOWN_VALUE,
     Impure,
+    KnownValue,
     Local,
-    Value,
     captured,
     element,
     forgotten,
-    joined,
+    least_upper_bound,
 )
 
 if TYPE_CHECKING:
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
 _SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.MatMult: "@"}
 
 
-class Body(Expressions):
+class CallWalker(Expressions):
     """Walks the body of one call."""
 
     def __init__(self, walk: Walk, frame: Frame) -> None:
         super().__init__(walk, frame)
-        self.returned: list[Value] = []
+        self.returned: list[KnownValue] = []
 
-    def result(self, node: Definition) -> Value:
+    def result(self, node: Definition) -> KnownValue:
         if isinstance(node, ast.Lambda):
             return self.visit(node.body)
         self.statements(node.body)
-        return joined(self.returned)
+        return least_upper_bound(self.returned)
 
     def statements(self, body: Sequence[ast.stmt]) -> None:
         for statement in body:
@@ -146,7 +146,7 @@ class Body(Expressions):
             for part in ast.walk(case.pattern):
                 name = getattr(part, "name", None) or getattr(part, "rest", None)
                 if name:
-                    self.assign(name, Value(subject.own and subject.inside, subject.inside))
+                    self.assign(name, KnownValue(subject.own and subject.inside, subject.inside))
                 if isinstance(part, ast.MatchClass):
                     self.generic_visit(part)
             if case.guard is not None:
@@ -168,7 +168,7 @@ class Body(Expressions):
     def visit_With(self, node: ast.With) -> None:
         for item in node.items:
             call = item.context_expr
-            made = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN
+            made = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN_VALUE
             if made is not np.errstate or item.optional_vars is not None:
                 raise Impure("has a with statement", "do without it")
         self.statements(node.body)
@@ -188,7 +188,7 @@ class Body(Expressions):
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         if node.decorator_list:
             raise Impure("decorates a function inside", "define it outside")
-        self.assign(node.name, Value(True, True, known=Local(node, self.frame)))
+        self.assign(node.name, KnownValue(True, True, known=Local(node, self.frame)))
 
 
 def _pairs(target: ast.expr, value: ast.expr) -> list[tuple[ast.expr, ast.expr]]:
@@ -199,7 +199,7 @@ def _pairs(target: ast.expr, value: ast.expr) -> list[tuple[ast.expr, ast.expr]]
     return list(zip(target.elts, value.elts, strict=True)) if fits else []
 
 
-def merged(ends: Sequence[dict[str, Value]]) -> dict[str, Value]:
+def merged(ends: Sequence[dict[str, KnownValue]]) -> dict[str, KnownValue]:
     """Return what is known after one of several ways."""
     names = {name for end in ends for name in end}
-    return {name: joined([end[name] for end in ends if name in end]) for name in names}
+    return {name: least_upper_bound([end[name] for end in ends if name in end]) for name in names}

@@ -16,11 +16,11 @@ class Unknown:
     """Stands for an object that is only known when the function runs."""
 
 
-UNKNOWN = Unknown()
+UNKNOWN_VALUE = Unknown()
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
-LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
-             "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
-             "statistics")  # fmt: skip
+_LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
+              "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
+              "statistics")  # fmt: skip
 
 
 class Impure(Exception):  # noqa: N818 (it is what a walk finds)
@@ -51,11 +51,11 @@ class Local:
 class OneOf:
     """One of several functions, and which is only known when the function runs."""
 
-    choices: tuple[Value, ...]
+    choices: tuple[KnownValue, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Value:
+class KnownValue:
     """What is known of a value.
 
     Attributes
@@ -73,10 +73,10 @@ class Value:
     own: bool
     inside: bool
     holds: bool = False
-    known: Any = UNKNOWN
+    known: Any = UNKNOWN_VALUE
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Value) and self.marks == other.marks
+        return isinstance(other, KnownValue) and self.marks == other.marks
 
     def __hash__(self) -> int:
         return hash(self.marks)
@@ -87,56 +87,56 @@ class Value:
         return self.own, self.inside, self.holds, id(self.known)
 
 
-FRESH = Value(True, True)
-VECTOR = Value(False, True)  # numbers that belong to the caller
-OUTSIDE = Value(False, False, True)
-SLICE = Value(True, True, known=slice(None))
+FRESH = KnownValue(True, True)
+VECTOR = KnownValue(False, True)  # numbers that belong to the caller
+OUTSIDE = KnownValue(False, False, True)
+SLICE = KnownValue(True, True, known=slice(None))
 
 
-def captured(thing: Any) -> Value:
+def captured(thing: Any) -> KnownValue:
     """Return what is known of an object that was there before the call."""
     if isinstance(thing, PLAIN):
-        return Value(True, True, known=thing)
+        return KnownValue(True, True, known=thing)
     if isinstance(thing, np.ndarray):
-        return Value(False, thing.ndim <= 1, known=thing)
+        return KnownValue(False, thing.ndim <= 1, known=thing)
     numbers = isinstance(thing, tuple) and all(isinstance(v, PLAIN) for v in thing)
-    return Value(False, numbers, True, known=thing)
+    return KnownValue(False, numbers, True, known=thing)
 
 
-def joined(values: Iterable[Value]) -> Value:
+def least_upper_bound(values: Iterable[KnownValue]) -> KnownValue:
     """Return what holds for each of several values."""
     values = list(values) or [FRESH]
     first = values[0]
-    return Value(
+    return KnownValue(
         own=all(v.own for v in values),
         inside=all(v.inside for v in values),
         holds=any(v.holds for v in values),
-        known=first.known if all(v.known is first.known for v in values) else UNKNOWN,
+        known=first.known if all(v.known is first.known for v in values) else UNKNOWN_VALUE,
     )
 
 
-def element(value: Value) -> Value:
+def element(value: KnownValue) -> KnownValue:
     """Return what is known of an element, whichever it is."""
-    return Value(value.inside, value.inside, value.holds)
+    return KnownValue(value.inside, value.inside, value.holds)
 
 
-def holder(values: Iterable[Value]) -> Value:
+def holder(values: Iterable[KnownValue]) -> KnownValue:
     """Return what is known of a list or tuple of these."""
     values = list(values)
-    known = one_of(values)
-    return Value(True, all(v.own and v.inside for v in values), True, known)
+    known = function_choice(values)
+    return KnownValue(True, all(v.own and v.inside for v in values), True, known)
 
 
-def one_of(values: Iterable[Value]) -> Any:
+def function_choice(values: Iterable[KnownValue]) -> Any:
     """Return the choice between functions; UNKNOWN where not all values are functions."""
     values = tuple(values)
     functions = all(callable(v.known) or isinstance(v.known, Local) for v in values)
-    return OneOf(values) if values and functions else UNKNOWN
+    return OneOf(values) if values and functions else UNKNOWN_VALUE
 
 
-def forgotten(value: Value) -> Value:
+def forgotten(value: KnownValue) -> KnownValue:
     """Return the same without the object: a part of it, or another view."""
-    return replace(value, known=UNKNOWN)
+    return replace(value, known=UNKNOWN_VALUE)
 
 
 def library(thing: Any) -> str | None:
@@ -149,7 +149,7 @@ def library(thing: Any) -> str | None:
         module = "numpy"
     elif owner is not None and not isinstance(owner, type):
         return None  # a method of some object
-    return module if module.partition(".")[0] in LIBRARIES else None
+    return module if module.partition(".")[0] in _LIBRARIES else None
 
 
 def python_function(thing: Any) -> FunctionType | None:

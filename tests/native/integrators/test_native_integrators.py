@@ -18,7 +18,7 @@ import nlctl
 from nlctl import paper
 from nlctl.native.integrate import driver
 from nlctl.native.machine import integrators
-from nlctl.native.machine.integrators import SHIPPED, WANTED, shipped, sources_key
+from nlctl.native.machine.integrators import SHIPPED, WANTED, shipped_bitcode, sources_key
 from nlctl.native.ship import source_files
 
 pytestmark = pytest.mark.skipif(
@@ -35,7 +35,7 @@ def test_what_is_shipped_is_of_these_sources():
     assert header()["files"] == source_files(), REMEDY
     assert header()["sources"] == sources_key(source_files()), REMEDY
     if header()["llvm"] <= list(llvm.llvm_version_info):
-        assert shipped() is not None
+        assert shipped_bitcode() is not None
 
 
 def test_all_that_is_compiled_belongs_to_these_sources():
@@ -70,22 +70,22 @@ def test_what_does_not_fit_is_not_used(name, tmp_path, monkeypatch):
     path = tmp_path / "integrators.bitcode"
     path.write_bytes(UNFIT[name])
     monkeypatch.setattr(integrators, "SHIPPED", path)
-    assert shipped() is None
+    assert shipped_bitcode() is None
 
 
 def test_without_the_file_there_is_none(tmp_path, monkeypatch):
     monkeypatch.setattr(integrators, "SHIPPED", tmp_path / "none")
-    assert shipped() is None
+    assert shipped_bitcode() is None
 
 
 def test_with_checked_indices_numba_makes_its_own(monkeypatch):
     monkeypatch.setattr(config, "BOUNDSCHECK", 1)
-    assert shipped() is None
+    assert shipped_bitcode() is None
 
 
 def test_the_first_run_compiles_nothing_by_numba(tmp_path, monkeypatch):
     """With an empty cache; numba's compiler alone would take ten times as long as all the rest."""
-    if shipped() is None:
+    if shipped_bitcode() is None:
         pytest.skip("another LLVM")
     monkeypatch.setenv("NLCTL_CACHE_DIR", str(tmp_path))
     made = integrators._integrators.__wrapped__()
@@ -140,9 +140,9 @@ LIBERTIES = {"fast", "reassoc", "contract", "nnan", "ninf", "nsz", "arcp", "afn"
 
 def test_no_compiler_may_take_liberties_with_the_arithmetic():
     """Sums in another order, or rounded once less, would have other bits with other passes."""
-    if shipped() is None:
+    if shipped_bitcode() is None:
         pytest.skip("another LLVM")
-    text = str(llvm.parse_bitcode(lzma.decompress(shipped())))
+    text = str(llvm.parse_bitcode(lzma.decompress(shipped_bitcode())))
     operations = re.findall(r" = (?:tail )?(f(?:add|sub|mul|div|cmp|neg)|call) ([a-z ]*)", text)
     assert {"fadd", "fsub", "fmul", "fdiv"} <= {name for name, _ in operations}
     taken = {f"{name} {flags}" for name, flags in operations if LIBERTIES & set(flags.split())}

@@ -17,7 +17,7 @@ from places import SUPPORT
 from sweep_examples import experiment, loop, same
 
 from analysis.robustness import Requirement, Spec, always, in_band, independent, prepare, scaled
-from analysis.robustness.runs.store import Store, StoreError, claimed, put, table_of
+from analysis.robustness.runs.store import ChunkStore, StoreError, claimed, put, table_of
 from analysis.robustness.runs.sweep import load, sweep
 
 ROWS, CHUNK, ENTROPY = 96, 12, 3
@@ -74,7 +74,7 @@ def test_floats_keep_their_bits(tmp_path):
     values = np.array([0.0, -0.0, 5e-324, -2.2e-308, nan, np.inf, -np.inf, 1.8e308, 0.1])
     frame = pd.DataFrame({"x": values}, index=pd.RangeIndex(9, name="row"))
     facts = {"design": {"size": 9}}
-    store = Store(folder=tmp_path, identity=facts, columns={"x": "float64"})
+    store = ChunkStore(folder=tmp_path, identity=facts, columns={"x": "float64"})
     with claimed(store):
         put(store, frame)
     found = table_of(store)["x"].to_numpy()

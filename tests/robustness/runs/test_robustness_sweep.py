@@ -17,7 +17,7 @@ from sweep_examples import experiment, loop, same
 
 import nlctl
 from analysis.cli.sweep_progress import sweep_bar
-from analysis.metrics import machine_code
+from analysis.metrics import in_machine_code
 from analysis.robustness import (
     Choice,
     NoGuaranteeError,
@@ -282,10 +282,10 @@ def test_machine_code_of_the_usual_metrics_agrees_with_python():
     t = np.linspace(0, 20, 1001)
     y = np.exp(-t / 5) * np.sin(3 * t) + 0.01 * np.cos(40 * t)
     for metric in tracking_metrics(start=10, band=0.05):
-        fast = machine_code(metric.function)
+        fast = in_machine_code(metric.function)
         assert fast is not metric.function
         np.testing.assert_allclose(fast(t, y), metric.function(t, y), rtol=1e-13)
-    assert machine_code(len) is len
+    assert in_machine_code(len) is len
 
 
 def test_the_bar_shows_rows_rate_and_bounds():

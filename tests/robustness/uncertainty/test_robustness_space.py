@@ -14,9 +14,9 @@ from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncerta
 from analysis.robustness.uncertainty.space import (
     Space,
     arguments,
-    boxed,
     combinations,
     ends,
+    from_unit_cube,
     nominal,
     sampled,
     scaled,
@@ -128,7 +128,7 @@ def test_scaling_multiplies_the_distance_to_the_nominal_value(factor, u):
         quantities=(Uncertain(name="b_r", bounds=(0.3, 0.9), nominal=0.5),), choices=(ACTUATOR,)
     )
     points = np.array([[u, 0.7]])
-    for mapping in (sampled, boxed):
+    for mapping in (sampled, from_unit_cube):
         full, part = mapping(space, points), mapping(scaled(space, factor), points)
         assert part.b_r[0] - 0.5 == pytest.approx(factor * (full.b_r[0] - 0.5), abs=1e-12)
         assert part.actuator[0] == full.actuator[0] == "backlash"
@@ -154,7 +154,7 @@ def test_ends_are_those_of_the_scaled_boxes():
 def test_arguments_split_parameters_from_initial_states():
     """The ensemble's two dictionaries, without the choices."""
     space = Space(quantities=(B_R, X1), choices=(ACTUATOR,))
-    split = arguments(space, boxed(space, np.zeros((3, 3))))
+    split = arguments(space, from_unit_cube(space, np.zeros((3, 3))))
     assert list(split["params"]) == ["actuator.b_r"]
     assert list(split["initial_state"]) == ["plant.x1"]
     np.testing.assert_array_equal(split["params"]["actuator.b_r"], [0.3] * 3)
@@ -190,7 +190,7 @@ def test_every_combination_of_choices_is_built_and_checked():
         (lambda: scaled(Space(quantities=(B_R,)), 2), "has no nominal value: give one"),
         (lambda: nominal(Space(quantities=(B_R,))), "has no nominal value"),
         (lambda: sampled(Space(quantities=(B_R,)), np.zeros((2, 2))), r"shape \(n, 1\), got"),
-        (lambda: boxed(Space(quantities=(B_R,)), np.array([[np.nan]])), r"in \[0, 1\]"),
+        (lambda: from_unit_cube(Space(quantities=(B_R,)), np.array([[np.nan]])), r"in \[0, 1\]"),
     ],
 )
 def test_contradictions_are_refused_by_name(make, message):

@@ -9,13 +9,13 @@ from rows import each_row
 import nlctl
 from analysis.metrics import peak
 from analysis.robustness.stl.formula import (
-    Signals,
+    SampledSignals,
     always,
     eventually,
     horizon,
     in_band,
-    signals_of,
-    trace,
+    margin_trace,
+    signals_named,
 )
 from analysis.robustness.stl.piecewise import Trace, higher, largest, with_vertices
 from analysis.robustness.stl.spec import (
@@ -233,7 +233,7 @@ def test_formulas_read_as_sentences():
     assert str(both) == (
         "(always from 10 s on |e| <= 0.15 and not eventually in [1, 2] s (u >= 3 or 0 <= z <= 1))"
     )
-    assert signals_of(both) == ("e", "u", "z")
+    assert signals_named(both) == ("e", "u", "z")
     assert str(always(in_band("u", upper=1))) == "always u <= 1"
 
 
@@ -241,7 +241,7 @@ def test_a_trace_is_the_margin_at_every_time():
     """Shifting the response by t is the trace at t."""
     e = np.sin(T) * np.exp(-T / 5)
     formula = always(SMALL, 0, 2)
-    got = trace(formula, Signals(T, {"e": e}, 10.0), 0.0, 8.0)
+    got = margin_trace(formula, SampledSignals(T, {"e": e}, 10.0), 0.0, 8.0)
     for k in (0, 137, 500):
         assert got.at(T[k]) == pytest.approx(value(formula, t=T[k:] - T[k], e=e[k:]), abs=1e-4)
 

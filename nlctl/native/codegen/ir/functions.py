@@ -14,9 +14,9 @@ import math
 from collections.abc import Callable, Sequence
 
 from ....expressions.functions import FUNCTIONS
-from .text import RARELY, Body, Value, type_of
+from .text import RARELY, Body, Value, llvm_type
 
-LOG2_E, LN2 = 1.4426950408889634, (0.6931471805599453, 2.3190468138462996e-17)
+_LOG2_E, LN2 = 1.4426950408889634, (0.6931471805599453, 2.3190468138462996e-17)
 TWO_OVER_PI, HALF_PI = 0.6366197723675814, (
     1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33
 )  # fmt: skip
@@ -49,7 +49,7 @@ SIN_WIDE = (
 )  # fmt: skip
 LARGEST_ANGLE = 1e6  # beyond it three parts of pi are too few
 ROUND = 1.5 * 2.0**52  # added, it leaves the nearest integer, which the last bits are
-SMALLEST, STEP = -707.0, 64  # below e^-707 powers of two are made in two steps
+_SMALLEST, _STEP = -707.0, 64  # below e^-707 powers of two are made in two steps
 
 
 def applied(b: Body, name: str, *args: Value) -> Value:
@@ -91,7 +91,7 @@ def _call(b: Body, name: str, make: Callable[..., Results], *args: Value) -> Res
     """Call a function of this module; it is written when it is first needed."""
     values = b.same(*args)
     width, count = values[0].width, 2 if make is _sin_and_cos else 1
-    kind = type_of(width)
+    kind = llvm_type(width)
     kind = f"{{{kind}, {kind}}}" if count == 2 else kind
     full = f"@nlctl.{name}.{width or 1}"
     if full not in b.module.functions:
@@ -143,7 +143,7 @@ def _clamped(b: Body, x: Value, low: float, high: float) -> Value:
 
 def _reduced(b: Body, x: Value, shift: float) -> tuple[Value, Value]:
     """Return r and m with e^x = 2^n e^r, where n + shift is in the last bits of m."""
-    m = b.fma(x, LOG2_E, ROUND + shift)
+    m = b.fma(x, _LOG2_E, ROUND + shift)
     n = b.sub(m, ROUND + shift, exact=True)
     return b.fma(n, -LN2[1], b.fma(n, -LN2[0], x)), m
 
@@ -154,10 +154,12 @@ def _scaled(b: Body, y: Value, m: Value, small: Value) -> Value:
     Where the result may be small it is made in two steps, so that it underflows gradually.
     """
     bits = b.bits(m)
-    more = b.integer("and", b.new(f"sext {small} to {type_of(y.width, 'i')}", y.width, "i"), STEP)
+    more = b.integer(
+        "and", b.new(f"sext {small} to {llvm_type(y.width, 'i')}", y.width, "i"), _STEP
+    )
     bits = b.new(f"add {bits}, {more.text}", y.width, "i")
     y = b.mul(y, b.real(b.integer("shl", bits, 52)), exact=True)
-    return b.mul(y, b.select(small, 2.0**-STEP, 1.0), exact=True)
+    return b.mul(y, b.select(small, 2.0**-_STEP, 1.0), exact=True)
 
 
 def _exp(b: Body, x: Value) -> Results:
@@ -166,7 +168,7 @@ def _exp(b: Body, x: Value) -> Results:
     r, m = _reduced(b, x, 1022)
     tail = _polynomial(b, [2 * c for c in EXP], r)
     y = b.muladd(tail, b.mul(r, r), b.muladd(r, 2.0, 2.0))
-    return (_scaled(b, y, m, b.compare("olt", x, SMALLEST)),)
+    return (_scaled(b, y, m, b.compare("olt", x, _SMALLEST)),)
 
 
 def _exp2(b: Body, x: Value) -> Results:
@@ -174,7 +176,7 @@ def _exp2(b: Body, x: Value) -> Results:
     m = b.add(x, ROUND + 1022, exact=True)
     r = b.sub(x, b.sub(m, ROUND + 1022, exact=True), exact=True)
     y = b.muladd(_polynomial(b, [2 * c for c in EXP2], r), r, 2.0)
-    return (_scaled(b, y, m, b.compare("olt", x, SMALLEST * LOG2_E)),)
+    return (_scaled(b, y, m, b.compare("olt", x, _SMALLEST * _LOG2_E)),)
 
 
 def _tanh(b: Body, x: Value) -> Results:
@@ -257,7 +259,7 @@ def _exact_if_far(b: Body, x: Value, near: dict[str, Value]) -> Results:
 
 def _far(b: Body, name: str, x: Value, y: Value) -> Value:
     """Call a function that is seldom called: it leaves all registers as they were."""
-    full, kind = f"@nlctl.far.{name}.{x.width or 1}", type_of(x.width)
+    full, kind = f"@nlctl.far.{name}.{x.width or 1}", llvm_type(x.width)
     if full not in b.module.functions:
         inner, (given, known) = Body(b.module), (Value("%x", x.width), Value("%y", x.width))
         is_far = inner.compare("ogt", inner.intrinsic("fabs", given), LARGEST_ANGLE)

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from ....expressions.graph import Expr
 from ..plan import LoopOfLevel
-from .memory import load, place, store
-from .numbers import Writer, shown
+from .memory import entry_address, load_value, store
+from .numbers import Writer, one_line
 from .text import Value, constant, float_text
 
-WIDE = 4  # elements of one member side by side
+_WIDE = 4  # elements of one member side by side
 PER_ROUND = 3  # elements of several members in a round
-STRAIGHT = 16  # turns of one member up to which they are written one after the other
+_STRAIGHT = 16  # turns of one member up to which they are written one after the other
 
 
 def written(w: Writer, loop: LoopOfLevel) -> None:
@@ -28,17 +28,17 @@ class _Loop:
 
     def __init__(self, w: Writer, loop: LoopOfLevel) -> None:
         self.w, self.b, self.loop, self.lanes = w, w.b, loop, w.lanes
-        self.step = 1 if self.lanes > 1 else next(k for k in (WIDE, 2, 1) if k <= loop.size)
+        self.step = 1 if self.lanes > 1 else next(k for k in (_WIDE, 2, 1) if k <= loop.size)
         self.chunk = w.width or self.step
         self.sums = [node for node in loop.nodes if node.op == "sum"]
 
     def write(self) -> None:
         names, size = self.w.names, self.loop.size
-        self.b.note(f"{size} elements: {', '.join(map(shown, self.loop.nodes))}")
+        self.b.note(f"{size} elements: {', '.join(map(one_line, self.loop.nodes))}")
         for node in self.sums:
             names[node] = constant(0.0, self.chunk)
         turns = size // self.step
-        done = self._rounds(turns) if turns > (STRAIGHT if self.lanes == 1 else 1) else 0
+        done = self._rounds(turns) if turns > (_STRAIGHT if self.lanes == 1 else 1) else 0
         for k in range(done, turns):
             self._turn(None, k * self.step)
         if size > turns * self.step:
@@ -103,7 +103,7 @@ class _Loop:
         for each in self.loop.stores:
             self._reads((each.expr,), index, at)
             array, row, step = each.array, each.row, self.lanes
-            where = place(self.b, array, (row + at) * step, index, step)
+            where = entry_address(self.b, array, (row + at) * step, index, step)
             store(self.b, self.b.wide(w.names[each.expr], self.chunk), where)
         w.names, w.pairs = outer, pairs
 
@@ -127,11 +127,13 @@ class _Loop:
         array, row, step = self.w.plan.elements(vector)
         if self.lanes > 1:
             first = (row + step * at) * self.lanes
-            return load(b, place(b, array, first, index, step * self.lanes), self.chunk)
+            return load_value(
+                b, entry_address(b, array, first, index, step * self.lanes), self.chunk
+            )
         if step == 1:
-            return load(b, place(b, array, row + at, index), self.chunk)
+            return load_value(b, entry_address(b, array, row + at, index), self.chunk)
         parts = [
-            load(b, place(b, array, row + step * (at + k), index, step), 0)
+            load_value(b, entry_address(b, array, row + step * (at + k), index, step), 0)
             for k in range(self.chunk)
         ]
         return b.gathered(parts, self.chunk)
@@ -146,5 +148,5 @@ class _Loop:
         moved = b.new(f"add i64 {index}, {at}").text
         where = b.new(f"getelementptr double, ptr {b.module.table(vector.data)}, i64 {moved}").text
         if self.lanes > 1:
-            return b.wide(load(b, where, 0), self.chunk)
-        return load(b, where, self.chunk)
+            return b.wide(load_value(b, where, 0), self.chunk)
+        return load_value(b, where, self.chunk)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from .text import Body, Value, type_of
+from .text import Body, Value, llvm_type
 
 
-def place(b: Body, array: str, at: int, index: str | None = None, step: int = 1) -> str:
+def entry_address(b: Body, array: str, at: int, index: str | None = None, step: int = 1) -> str:
     """Return the address of entry `at` of an array, or of ``index * step + at``."""
     if index is None:
         return b.new(f"getelementptr double, ptr %{array}, i64 {at}").text if at else f"%{array}"
@@ -14,9 +14,9 @@ def place(b: Body, array: str, at: int, index: str | None = None, step: int = 1)
     return b.new(f"getelementptr double, ptr %{array}, i64 {moved}").text
 
 
-def load(b: Body, where: str, width: int) -> Value:
+def load_value(b: Body, where: str, width: int) -> Value:
     """Return the number, or as many as a vector has, at an address."""
-    return b.new(f"load {type_of(width)}, ptr {where}, align 8", width)
+    return b.new(f"load {llvm_type(width)}, ptr {where}, align 8", width)
 
 
 def store(b: Body, value: Value, where: str) -> None:

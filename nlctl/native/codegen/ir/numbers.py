@@ -6,12 +6,12 @@ from collections import Counter
 from typing import Any
 
 from ....expressions.graph import COMPARISONS, LOGIC, Expr
-from ..plan import CALLS, Plan
+from ..plan import CALLS, FunctionPlan
 from .functions import CALLED, applied, sin_cos
-from .memory import load, place, store
+from .memory import entry_address, load_value, store
 from .text import Body, Value, constant
 
-COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
+_COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 PACKED = 4  # numbers of one member whose sines, powers, ... are computed side by side
 
@@ -33,7 +33,7 @@ class Writer:
         Sines and cosines of those that have been computed, by the angle's name.
     """
 
-    def __init__(self, b: Body, plan: Plan, lanes: int, exact: Any) -> None:
+    def __init__(self, b: Body, plan: FunctionPlan, lanes: int, exact: Any) -> None:
         self.b, self.plan, self.lanes, self.exact = b, plan, lanes, exact
         self.width = 0 if lanes == 1 else lanes
         self.names: dict[Expr, Value] = {}
@@ -51,18 +51,20 @@ class Writer:
         if node not in self.names:
             where = self.plan.place(node)
             if where is None:
-                self.b.note(shown(node))
+                self.b.note(one_line(node))
                 self.names[node] = self.operation(node)
             else:
                 array, row = where
-                self.names[node] = load(self.b, place(self.b, array, row * self.lanes), self.width)
+                self.names[node] = load_value(
+                    self.b, entry_address(self.b, array, row * self.lanes), self.width
+                )
         self.stored(node)
 
     def stored(self, node: Expr) -> None:
         """Write a number where it is to lie."""
         for array, row in self.plan.places.get(node, ()):
             value = self.b.wide(self.names[node], self.width) if self.width else self.names[node]
-            store(self.b, value, place(self.b, array, row * self.lanes))
+            store(self.b, value, entry_address(self.b, array, row * self.lanes))
 
     def _call(self, node: Expr) -> None:
         """Call a function member by member; arguments and results are in memory."""
@@ -81,7 +83,7 @@ class Writer:
         if node.op in ARITHMETIC:
             return b.op(ARITHMETIC[node.op], *args, exact=node in self.exact)
         if node.op in COMPARISONS:
-            return b.compare(COMPARE[node.op], *args)
+            return b.compare(_COMPARE[node.op], *args)
         if node.op == "not":
             return b.logic("xor", args[0], constant(True, args[0].width, "b"))
         if node.op in LOGIC:
@@ -140,7 +142,7 @@ class Writer:
         """Compute functions of up to four numbers as functions of one vector."""
         b = self.b
         for node in nodes:
-            b.note(shown(node))
+            b.note(one_line(node))
         x = b.gathered([self.names[a] for a in angles], 2 if len(angles) == 2 else PACKED)
         kinds = {node.op for node in nodes}
         if kinds <= {"sin", "cos"}:
@@ -159,12 +161,14 @@ def _depths(nodes: tuple[Expr, ...], is_packable: Any) -> dict[Expr, int]:
     return found
 
 
-def shown(node: Expr) -> str:
+def one_line(node: Expr) -> str:
     """Return an expression in a line."""
     if node.op == "const":
         return f"{node.data:g}"
     if node.op == "leaf":
         array, start, step = node.data
         return f"{array}[{start}]" if node.size is None else f"{array}[{start}::{step}]"
-    inside = ", ".join(shown(a) if a.op in ("const", "leaf") else f"e{a.index}" for a in node.args)
+    inside = ", ".join(
+        one_line(a) if a.op in ("const", "leaf") else f"e{a.index}" for a in node.args
+    )
     return f"e{node.index} = {node.op}({inside})"

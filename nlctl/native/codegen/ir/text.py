@@ -11,7 +11,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-KINDS = {"f": "double", "b": "i1", "i": "i64"}
+_KINDS = {"f": "double", "b": "i1", "i": "i64"}
 RARELY = "!prof !0"  # the first way of a branch is all but never taken
 
 
@@ -36,15 +36,15 @@ class Value:
     @property
     def type(self) -> str:
         """LLVM's name of its type."""
-        return type_of(self.width, self.kind)
+        return llvm_type(self.width, self.kind)
 
     def __str__(self) -> str:
         return f"{self.type} {self.text}"
 
 
-def type_of(width: int, kind: str = "f") -> str:
+def llvm_type(width: int, kind: str = "f") -> str:
     """Return LLVM's name of a type."""
-    return f"<{width} x {KINDS[kind]}>" if width else KINDS[kind]
+    return f"<{width} x {_KINDS[kind]}>" if width else _KINDS[kind]
 
 
 def float_text(x: float) -> str:
@@ -136,7 +136,7 @@ class Body:
             return constant(v, width)
         if v.width == width:
             return v
-        one, whole = type_of(width, v.kind), f"<{width} x i32> zeroinitializer"
+        one, whole = llvm_type(width, v.kind), f"<{width} x i32> zeroinitializer"
         first = self.new(f"insertelement {one} poison, {v}, i64 0")
         return self.new(f"shufflevector {one} {first.text}, {one} poison, {whole}", width, v.kind)
 
@@ -234,10 +234,10 @@ class Body:
         return self.new(f"{name} {a}, {constant(b, a.width, 'i').text}", a.width, "i")
 
     def bits(self, a: Value) -> Value:
-        return self.new(f"bitcast {a} to {type_of(a.width, 'i')}", a.width, "i")
+        return self.new(f"bitcast {a} to {llvm_type(a.width, 'i')}", a.width, "i")
 
     def real(self, a: Value) -> Value:
-        return self.new(f"bitcast {a} to {type_of(a.width)}", a.width)
+        return self.new(f"bitcast {a} to {llvm_type(a.width)}", a.width)
 
     def any(self, c: Value) -> Value:
         """Return whether a condition holds for any element."""

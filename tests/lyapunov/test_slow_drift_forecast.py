@@ -1,4 +1,4 @@
-"""The range that `creep` gives for a burst: how often the burst lies in it."""
+"""The range that `slow_drift` gives for a burst: how often the burst lies in it."""
 
 import functools
 from types import SimpleNamespace
@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nlctl
-from analysis.lyapunov.nussbaum.slow_drift import creep
+from analysis.lyapunov.nussbaum.slow_drift import slow_drift
 from nlctl import DiagramError, ParameterError
 
 NAMES = ("zeta", "r", "u")
@@ -21,7 +21,7 @@ def covered(time, signals, burst, N, window):
     seen = SimpleNamespace(
         time=time[keep], outputs=signals[:, keep], output_labels=list(NAMES), params={}
     )
-    found = creep(seen, N, window=window)
+    found = slow_drift(seen, N, window=window)
     assert found.time < found.burst_range[0] <= found.burst <= found.burst_range[1]
     return found.burst_range[0] <= burst <= found.burst_range[1]
 
@@ -115,7 +115,9 @@ class TestOfWhichLoop:
     def test_the_loop_gives_its_function(self):
         """With the loop, N is that of its law, and the samples are compared with it."""
         loop, response = example_2()
-        assert creep(response, loop=loop, window=4 * np.pi) == creep(response, window=4 * np.pi)
+        assert slow_drift(response, loop=loop, window=4 * np.pi) == slow_drift(
+            response, window=4 * np.pi
+        )
 
     def test_a_response_of_another_loop_is_refused(self):
         """Of the same blocks with another Nussbaum function, and of another number of states."""
@@ -124,9 +126,9 @@ class TestOfWhichLoop:
         law = nlctl.NussbaumLaw(beta=5.0, N=lambda zeta: -np.exp(zeta))
         other = nlctl.paper.example_2(controller=nlctl.controllers.replaced(controller, law=law))
         with pytest.raises(ParameterError, match="u of the response and of 'example_2' differ"):
-            creep(response, loop=other)
+            slow_drift(response, loop=other)
         with pytest.raises(ParameterError, match="states"):
-            creep(response, loop=nlctl.paper.example_1())
+            slow_drift(response, loop=nlctl.paper.example_1())
 
     def test_another_wiring_is_refused(self):
         """A minus at the plant's input."""
@@ -135,10 +137,10 @@ class TestOfWhichLoop:
         signs[other.input_offset[[s.name for s in other.syslist].index("plant")]] = -1
         other.set_connect_map(other.connect_map * signs)
         with pytest.raises(DiagramError, match=r"'v' of block 'plant' is -'v'"):
-            creep(example_2()[1], loop=other)
+            slow_drift(example_2()[1], loop=other)
 
     def test_one_time_is_printed_and_no_double_minus(self):
         """What the README shows."""
-        text = str(creep(example_2()[1], window=4 * np.pi))
+        text = str(slow_drift(example_2()[1], window=4 * np.pi))
         assert "- -" not in text
         assert text.count("the budget lasts until") <= 1

@@ -1,4 +1,4 @@
-"""The creep of zeta: energies, the balance, the time and the peak of a burst."""
+"""The slow drift of zeta: energies, the balance, the time and the peak of a burst."""
 
 from types import SimpleNamespace
 
@@ -10,7 +10,7 @@ from scipy.integrate import quad, solve_ivp
 import nlctl
 from analysis.lyapunov.nussbaum.energy import drift, drift_margin, safe_horizon
 from analysis.lyapunov.nussbaum.property import Lobe, lobe_around, lobes
-from analysis.lyapunov.nussbaum.slow_drift import burst_peak, creep
+from analysis.lyapunov.nussbaum.slow_drift import burst_peak, slow_drift
 from nlctl import ParameterError, UnknownNameError
 from nlctl.functions import nussbaum, nussbaum_integral
 
@@ -102,10 +102,10 @@ class TestEnergies:
             drift(labels)
 
 
-class TestCreep:
+class TestSlowDrift:
     def test_the_balance_of_a_constant_disturbance(self, crossing):
         """u ~ -d and r ~ -d / (beta N): A' = d^2 / (beta |N|), so p = d^2 / beta and q = 0."""
-        found = creep(part(crossing, 80.0), tame, window=4.0)
+        found = slow_drift(part(crossing, 80.0), tame, window=4.0)
         assert found.balance.p == pytest.approx(D**2 / BETA, rel=0.02)
         assert abs(found.balance.q) < 0.03 * found.balance.rate(found.lobe.extremum)
         assert found.verdict == "creeps"
@@ -117,7 +117,7 @@ class TestCreep:
         burst = float(np.interp(3.0, zeta, crossing.time))
         exact = quad(lambda z: BETA / D**2 * tame(z) ** 2, 1, 3)[0]
         assert burst == pytest.approx(exact, rel=0.02)
-        found = creep(part(crossing, burst / 3), tame, window=4.0)
+        found = slow_drift(part(crossing, burst / 3), tame, window=4.0)
         assert 0.1 < found.share < 0.5
         assert found.burst == pytest.approx(burst, rel=0.03)
         assert found.time < found.burst_range[0] <= found.burst <= found.burst_range[1]
@@ -127,7 +127,7 @@ class TestCreep:
         """eta = beta r + Y_d: A' = (d^2/|N| - |Y_d d|)/beta is zero where |N| = |d / Y_d|."""
         Y_d = -0.1
         run = scalar_loop(tame, -1.0, np.linspace(0, 60, 6001), reference=Y_d)
-        found = creep(run, tame, window=2.0)
+        found = slow_drift(run, tame, window=2.0)
         assert abs(tame(found.rest)) == pytest.approx(1 / abs(Y_d), rel=0.02)
         assert found.verdict == "settles"
         assert found.burst == np.inf
@@ -137,15 +137,15 @@ class TestCreep:
     def test_a_drift_back_has_turned_round(self):
         """From beyond the resting place zeta falls, and no burst is announced."""
         run = scalar_loop(tame, -1.0, np.linspace(0, 60, 6001), reference=-0.1, zeta=1.6)
-        found = creep(run, tame, window=2.0)
+        found = slow_drift(run, tame, window=2.0)
         assert np.all(np.array(found.rates[2:]) < 0)
         assert found.verdict == "turned round"
         assert found.burst == np.inf
 
     def test_too_few_windows_are_refused(self, crossing):
         """Five windows in the lobe at least."""
-        with pytest.raises(ParameterError, match="creep needs 5 windows of 30 s"):
-            creep(part(crossing, 100.0), tame, window=30.0)
+        with pytest.raises(ParameterError, match="slow_drift needs 5 windows of 30 s"):
+            slow_drift(part(crossing, 100.0), tame, window=30.0)
 
 
 class TestBurst:
@@ -246,7 +246,7 @@ def test_the_papers_loop():
     """
     loop = nlctl.paper.example_1(phase="integral")
     run = nlctl.input_output_response(nlctl.compile(loop), np.linspace(0, 200, 20_001))
-    found = creep(run, nussbaum, window=4 * np.pi)
+    found = slow_drift(run, nussbaum, window=4 * np.pi)
     assert found.mismatch < 1e-3
     assert isinstance(found.lobe, Lobe)
     assert found.verdict == "settles"
