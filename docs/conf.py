@@ -71,5 +71,6 @@ sphinx_gallery_conf = {
     "matplotlib_animations": False,
     "image_srcset": ["2x"],
     "nested_sections": False,
+    "reset_modules": ("matplotlib", "strict.warnings_are_errors"),
 }
 warnings.filterwarnings("ignore", message=".*non-interactive.*", category=UserWarning)
