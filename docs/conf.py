@@ -37,6 +37,8 @@ exclude_patterns += ["how-to/GALLERY_HEADER.rst"]
 autodoc_typehints = "none"  # types stand in the docstrings
 autosummary_generate = False
 numpydoc_show_class_members = False
+# numpydoc refers to each attribute of a docstring, and those are not pages of their own
+nitpick_ignore_regex = [("py:obj", r"\w+")]
 myst_heading_anchors = 3
 myst_enable_extensions = ["deflist", "dollarmath"]
 suppress_warnings = ["config.cache"]  # functions among sphinx-gallery's settings
@@ -71,5 +73,6 @@ sphinx_gallery_conf = {
     "matplotlib_animations": False,
     "image_srcset": ["2x"],
     "nested_sections": False,
+    "reset_modules": ("matplotlib", "strict.warnings_are_errors"),
 }
 warnings.filterwarnings("ignore", message=".*non-interactive.*", category=UserWarning)

@@ -32,6 +32,8 @@ def _is_told(thing, key, value):
     if key.startswith("_") or key in thing.__dict__.get("__dataclass_fields__", {}):
         return False
     plain = getattr(value, "__func__", value)  # of class and static methods
+    if getattr(plain, "__module__", thing.__module__) != thing.__module__:
+        return False
     return bool(getattr(plain, "__doc__", "")) and (
         inspect.isfunction(plain) or isinstance(value, property)
     )
