@@ -285,6 +285,8 @@ def _check_timebase(spec: Any, name: str, dt: Any) -> None:
 def default_state(system: ct.InputOutputSystem) -> np.ndarray:
     """Return the initial state of one block: what its record declares, otherwise 0."""
     x = np.zeros(system.nstates or 0)
+    if within(system) is not system:
+        return system.default_state()  # type: ignore[attr-defined]
     if isinstance(system, Block):
         states = list(system.spec.states)  # python-control may have renamed the block's own labels
         for name, value in getattr(system.spec, "initial", {}).items():
@@ -292,6 +294,11 @@ def default_state(system: ct.InputOutputSystem) -> np.ndarray:
                 raise unknown("state", name, states, f"in initial of '{system.name}'")
             x[states.index(name)] = value
     return x
+
+
+def within(system: Any) -> Any:
+    """Return the block that has a block's equations: the one that it samples, or itself."""
+    return getattr(system, "inner", system)
 
 
 def memory_states(spec: Any) -> tuple[str, ...]:

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
-from .blocks import Block, ParameterRow, block, default_state, parameter_rows, record_rows
+from .blocks import (
+    Block,
+    ParameterRow,
+    block,
+    default_state,
+    parameter_rows,
+    record_rows,
+    within,
+)
 from .errors import DiagramError, ParameterError
 from .names import Parameters, find_name, unknown
 from .params import as_numbers, declared_params
@@ -224,7 +232,7 @@ def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str,
     """A controller that is made for plants of one order must not drive one of a higher order."""
     for system in systems:
         for leaf in leaves(system):
-            order = getattr(getattr(leaf.system, "spec", None), "plant_order", None)
+            order = getattr(getattr(within(leaf.system), "spec", None), "plant_order", None)
             if not isinstance(order, int):
                 continue
             above = f"x{order + 1}"
@@ -314,8 +322,8 @@ def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
         system._update_params(None)
     rows: list[ParameterRow] = []
     for leaf in leaves(system):
-        if isinstance(leaf.system, Block):
-            rows += parameter_rows(leaf.system, f"{leaf.parameter_path}.")
+        if isinstance(within(leaf.system), Block):
+            rows += parameter_rows(within(leaf.system), f"{leaf.parameter_path}.")
     return rows
 
 

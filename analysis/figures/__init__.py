@@ -1,5 +1,6 @@
 """Results -> matplotlib figures.  Nothing here writes a file or shows a window."""
 
+from .faults import fault_margins, fault_pairs
 from .proof import (
     bounds,
     burst,
@@ -26,6 +27,8 @@ __all__ = [
     "equality_residuals",
     "failure_map",
     "fans",
+    "fault_margins",
+    "fault_pairs",
     "inequality_margins",
     "long_zeta",
     "lyapunov_bound",

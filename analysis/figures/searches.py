@@ -138,7 +138,7 @@ def failure_map(
     plane = np.meshgrid(np.linspace(*span[:2], 240), np.linspace(*span[2:], 180))
     field = LinearTriInterpolator(net, margin)(*plane)
     image = ax.imshow(
-        field, extent=span, origin="lower", aspect="auto", cmap=COLOURS, norm=_centred(margin)
+        field, extent=span, origin="lower", aspect="auto", cmap=COLOURS, norm=centred(margin)
     )
     ax.plot(x, y, ".", color=INK, markersize=1.5, alpha=0.5, rasterized=True)
     if margin.min() <= 0 < margin.max():
@@ -160,7 +160,7 @@ def failure_map(
     return figure
 
 
-def _centred(margin: np.ndarray) -> Normalize:
+def centred(margin: np.ndarray) -> Normalize:
     """Return the scale of colours that fits margins: 0 in the middle, their ends at its ends."""
     low, high = float(margin.min()), float(margin.max())
     least = 0.05  # a map that is all alike is not made to look as if it were not

@@ -13,11 +13,12 @@ import control as ct
 
 from nlctl import paper
 from nlctl.actuators import Backlash, DeadZone, Gain, Saturation, cascade
+from nlctl.diagrams import interconnect
 from nlctl.names import unknown
 
 from .controllers import contenders, sensor
 
-__all__ = ["example_1", "example_2"]
+__all__ = ["example_1", "example_2", "true_error"]
 
 WIDE = 1e6  # a saturation beyond every |u| of a run that is worth keeping
 
@@ -71,6 +72,27 @@ def example_2(
     """Example 2 with another controller, gain, saturation or noise; see `example_1`."""
     body = Backlash() if actuator is None else actuator
     return _loop("example_2", body, controller, gain, limit, noise)
+
+
+def true_error(example: str = "example_1") -> ct.InterconnectedSystem:
+    """An example with the output ``error``, y - yd of the plant itself.
+
+    The output e is what the controller makes of its measurements: with a fault on one of them it
+    is no error of the plant.
+
+    Parameters
+    ----------
+    example : {"example_1", "example_2"}, optional
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such example.
+    """
+    if example not in paper.EXAMPLES:
+        raise unknown("example", example, paper.EXAMPLES)
+    difference = ct.summing_junction(["y", "-yd"], "error", name="difference")
+    return interconnect([paper.EXAMPLES[example](), difference])
 
 
 def _loop(

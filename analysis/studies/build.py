@@ -29,15 +29,17 @@ from analysis.robustness import (
     tracking_metrics,
 )
 from nlctl.errors import ParameterError
+from nlctl.faults import Fault
 from nlctl.names import unknown
 
 from ..robustness.stl.text import parse_formula
 from .file.resolve import DEFAULT, loop_function, option, uncertain
-from .file.schema import Choices, Rows, Study
+from .file.schema import Choices, Faulty, Rows, Study
 
 __all__ = [
     "choice",
     "experiment",
+    "faults_of",
     "inputs_of",
     "labels",
     "loop",
@@ -233,6 +235,23 @@ def experiment(
         metrics=metrics_of(study, folder, signals),
         **study.solver.model_dump(),
     )
+
+
+def faults_of(signal: str, faulty: Faulty) -> dict[str, Fault]:
+    """Return the faults that a table under ``[faults]`` describes, by name, all from 0 s on.
+
+    Raises
+    ------
+    UsageError
+        If a magnitude is refused.
+    """
+    found = {}
+    for kind, size in faulty.model_dump(exclude_none=True).items():
+        lasts = size if kind == "dropout" else None
+        value = None if size is True or lasts else size
+        block = "fault_" + "".join(c if c.isalnum() else "_" for c in f"{signal}_{kind}")
+        found[f"{signal} {kind}"] = Fault(signal, kind, value, at=0.0, until=lasts, name=block)
+    return found
 
 
 def main_design(rows: Rows, space: Space, seed: int) -> Design:

@@ -1,11 +1,43 @@
-"""Actuators with uncertain nonlinearity, v = k(u, t) u + eps_u (2): dead zone and backlash.
+"""Actuators: nonlinearities of (2), v = k(u, t) u + eps_u, and others that it does not describe.
 
-Saturation does not obey (2), and a gain of the wrong sign breaks Assumption 1: both are here to
-see what a controller makes of them.
+Each record says whether it obeys (2), as `analysis.lyapunov.decompose` finds it: with bounds
+(k_1, k_2) of k, its ``gains``, and the least and greatest output at an input, its ``band``; or
+with the reason why not, its ``no_split``.  What breaks an assumption is here to see what a
+controller makes of it.  Friction is here as a force law, from velocity to force.
 """
 
 from .backlash import Backlash
 from .cascade import cascade
-from .static import DeadZone, Gain, Saturation
+from .dynamic import Lag, RateLimiter, SecondOrderLag
+from .friction import BoucWen, Coulomb, Dahl, LuGre, Stribeck
+from .inverses import DeadZoneInverse, PrandtlIshlinskiiInverse
+from .prandtl_ishlinskii import OneSidedDeadZones, PrandtlIshlinskii, Stop
+from .quantiser import Quantiser
+from .relay import Preisach, Relay, relay_grid
+from .static import AsymmetricSaturation, DeadZone, Gain, Saturation
 
-__all__ = ["Backlash", "DeadZone", "Gain", "Saturation", "cascade"]
+__all__ = [
+    "AsymmetricSaturation",
+    "Backlash",
+    "BoucWen",
+    "Coulomb",
+    "Dahl",
+    "DeadZone",
+    "DeadZoneInverse",
+    "Gain",
+    "Lag",
+    "LuGre",
+    "OneSidedDeadZones",
+    "PrandtlIshlinskii",
+    "PrandtlIshlinskiiInverse",
+    "Preisach",
+    "Quantiser",
+    "RateLimiter",
+    "Relay",
+    "Saturation",
+    "SecondOrderLag",
+    "Stop",
+    "Stribeck",
+    "cascade",
+    "relay_grid",
+]

@@ -81,6 +81,11 @@ class Backlash:
         if not self.c_l < self.c_r:
             raise ParameterError(f"Backlash needs c_l < c_r, got {self.c_l:g} and {self.c_r:g}")
 
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Bounds (k_1, k_2) of k in (2): the slopes."""
+        return min(self.m_r, self.m_l), max(self.m_r, self.m_l)
+
     @staticmethod
     @equation
     def update(t, x, u, p):
@@ -107,3 +112,9 @@ class Backlash:
         (u1,) = u
         low, high = play_band(u1, p)
         return memory - low, memory - high
+
+    @staticmethod
+    @equation
+    def band(t, u, p):
+        """Least and greatest output at input u."""
+        return play_band(u, p)

@@ -9,7 +9,9 @@ from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
 
-__all__ = ["DeadZone", "Gain", "Saturation"]
+__all__ = ["AsymmetricSaturation", "DeadZone", "Gain", "Saturation"]
+
+BOUNDED_OUTPUT = "its output is bounded for all u, so that no k >= k_1 > 0 keeps eps_u bounded"
 
 
 @record
@@ -68,7 +70,8 @@ class Gain:
 
     v = k u
 
-    With k = -1 behind another actuator the sign of the input gain is turned round.
+    It obeys (2) where k > 0.  With k = -1 behind another actuator the sign of the input gain is
+    reversed.
     """
 
     k: float = param(1.0, unit="1", meaning="gain")
@@ -77,6 +80,11 @@ class Gain:
     outputs = ("v",)
     states = ()
     feedthrough = True
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Bounds (k_1, k_2) of k in (2): the gain."""
+        return self.k, self.k
 
     @staticmethod
     @equation
@@ -98,6 +106,7 @@ class Saturation:
     outputs = ("v",)
     states = ()
     feedthrough = True
+    no_split = BOUNDED_OUTPUT
 
     @staticmethod
     @equation
@@ -110,3 +119,38 @@ class Saturation:
     def corners(t, x, u, p):
         """Where it begins to saturate."""
         return u[0] + p.limit, u[0] - p.limit
+
+
+@record
+class AsymmetricSaturation:
+    """Saturation with other slopes and limits on either side.
+
+        v = min(slope_r u, limit_r)    u >= 0
+            max(slope_l u, limit_l)    u < 0
+
+    With equal slopes of 1 and equal limits it is `Saturation`.  It does not obey (2) either.
+    """
+
+    slope_r: float = param(1.0, unit="1", meaning="slope on the right", above=0)
+    slope_l: float = param(1.2, unit="1", meaning="slope on the left", above=0)
+    limit_r: float = param(10.0, unit="1", meaning="greatest v", above=0)
+    limit_l: float = param(-6.0, unit="1", meaning="least v", below=0)
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ()
+    feedthrough = True
+    no_split = BOUNDED_OUTPUT
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The characteristic v(u)."""
+        slope = np.where(u[0] < 0, p.slope_l, p.slope_r)
+        return (clip(slope * u[0], p.limit_l, p.limit_r),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where the slope changes, and where it begins to saturate."""
+        return u[0], p.slope_l * u[0] - p.limit_l, p.slope_r * u[0] - p.limit_r

@@ -23,13 +23,16 @@ class Function:
     name : str
         NumPy's name.
     code : str
-        Its machine code: ``"own"`` for what the generator writes out, an intrinsic of LLVM
+        Its machine code: ``"own"`` for what `nlctl.native.codegen.ir.functions` writes out, in
+        its table ``INLINE`` or ``CALLED``, an intrinsic of LLVM
         (``"llvm.fabs"``), or the name in the C library (``"log"``).
     derivative : tuple of callable
         Partial derivatives with respect to each argument, as functions of all of them.  Where a
         function has a jump or a kink: that of one side, the one that its value belongs to.
     enclosure : callable or None
-        The same function of python-flint's ``arb``; None where operators of the reader do it.
+        The same function of python-flint's ``arb``, for functions of one argument.  Without it
+        balls know only what `analysis.intervals` has operators for (absolute, minimum, maximum,
+        power), and refuse the rest.
     latex : str
         Format string with ``{0}`` and ``{1}`` for the arguments.
     math : tuple of str
@@ -55,6 +58,14 @@ def _zero(*x: Any) -> Any:
 
 def _log_of(base: float, x: Any) -> Any:
     return np.log(base + 0.0 * x)  # as exact as x: a ball encloses it
+
+
+def _cube_root(x: Any) -> Any:
+    if not x.is_finite():
+        return x if x.is_nan() else type(x)(0, "inf")
+    ends = x.lower(), x.upper()  # it rises: what it does with the ends is all
+    low, high = (-(-e).root(3) if e < 0 else e.root(3) if e > 0 else e for e in ends)
+    return low.union(high)
 
 
 def _row(
@@ -119,7 +130,8 @@ _ROWS = (
          ball=lambda x: x.ceil(), math="-"),
     _row("trunc", "llvm.trunc", r"\operatorname{{trunc}} {0}", _zero, math="-"),
     _row("rint", "llvm.rint", r"\operatorname{{round}} {0}", _zero, math="-"),
-    _row("cbrt", "cbrt", r"\sqrt[3]{{{0}}}", lambda x: 1.0 / (3.0 * np.cbrt(x) ** 2)),
+    _row("cbrt", "cbrt", r"\sqrt[3]{{{0}}}", lambda x: 1.0 / (3.0 * np.cbrt(x) ** 2),
+         ball=_cube_root),
     _row("arctan2", "atan2", r"\operatorname{{atan2}}\left({0}, {1}\right)",
          lambda y, x: x / (x * x + y * y), lambda y, x: -y / (x * x + y * y), math="atan2"),
     _row("hypot", "hypot", r"\sqrt{{{0}^2 + {1}^2}}",
@@ -127,6 +139,9 @@ _ROWS = (
     _row("power", "pow", r"{0}^{{{1}}}",
          lambda x, y: y * np.power(x, y - 1.0), lambda x, y: np.log(x) * np.power(x, y),
          math="pow"),
+    _row("logaddexp", "own", r"\ln\left(e^{{{0}}} + e^{{{1}}}\right)",
+         lambda x, y: np.exp(x - np.logaddexp(x, y)), lambda x, y: np.exp(y - np.logaddexp(x, y)),
+         math="-"),
     _row("remainder", "own", r"{0} \bmod {1}",
          lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.floor(x / y), math="-"),
     _row("fmod", "fmod", r"\operatorname{{fmod}}\left({0}, {1}\right)",

@@ -17,6 +17,7 @@ import control as ct
 import numpy as np
 
 from ..errors import ParameterError, UsageError
+from ..sampling.system import happening
 from .codegen.blocks import equations
 from .codegen.lower import lower
 from .compiled import Compiled
@@ -31,7 +32,7 @@ SHAKEN = 1e-13  # relative change of states and inputs that shows what rounding 
 _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
 
 Audit = bool | Literal["every run"]
-Values = tuple[np.ndarray, np.ndarray]  # derivatives (or next states), outputs
+Values = tuple[np.ndarray, ...]  # derivatives (or next states), outputs, states after samples
 Evaluated = Callable[[float, np.ndarray, np.ndarray], Values]
 
 
@@ -106,13 +107,19 @@ def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
 def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
     """Return what machine code computes at a point."""
     system, events = compiled.system, compiled.program.events
+    rows = np.array(compiled.program.sampled, dtype=int)
 
     def several(t: float, x: np.ndarray, u: np.ndarray) -> Values:
         tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), code.width, axis=1) for v in (t, x, u))
         dx, y = np.empty_like(xx), np.empty((system.noutputs or 0, code.width))
         code.rhs(tt[0].copy(), xx, uu, c, dx, np.empty((events, code.width)))
         code.out(tt[0].copy(), xx, uu, c, y)
-        return dx[:, -1], y[:, -1]
+        found = [dx[:, -1], y[:, -1]]
+        for sample in code.samples:
+            s = np.zeros((rows.size, code.width))  # 0 as python-control has it where nothing is due
+            sample(tt[0].copy(), xx, uu, c, s)
+            found.append(s[:, -1])
+        return tuple(found)
 
     return several
 
@@ -124,10 +131,10 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
     if not all(np.isfinite(values).all() for values in ours):
         return  # the run says that it diverged
     try:
-        theirs = _by_python_control(system, point, trial.params)
-        again = _by_python_control(system, point, trial.params)
+        theirs = _by_python_control(compiled, point, trial.params)
+        again = _by_python_control(compiled, point, trial.params)
     except RuntimeError as error:
-        if "lgebraic loop" not in str(error):
+        if "lgebraic loop" not in str(error) or compiled.program.sampled:
             raise
         _compare_blocks(compiled, trial, ours, point)
         return
@@ -144,12 +151,14 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
             )
     if all(np.all(_close(a, b)) for a, b in zip(ours, theirs, strict=True)):
         return
-    shaken = _shaken(compiled.system, point, trial, theirs)
-    for what, a, b, moved in zip(("state", "output"), ours, theirs, shaken, strict=True):
+    shaken = _shaken(compiled, point, trial, theirs)
+    after = [system.state_labels[i] for i in compiled.program.sampled]
+    names = [system.state_labels, system.output_labels, *[after] * (len(ours) - 2)]
+    for labels, a, b, moved in zip(names, ours, theirs, shaken, strict=True):
         wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
         if wrong.size:
-            _compare_blocks(compiled, trial, ours, point)  # it names the block, if it finds one
-            labels = system.state_labels if what == "state" else system.output_labels
+            if not compiled.program.sampled:
+                _compare_blocks(compiled, trial, ours, point)  # it names the block, if it can
             raise _difference(labels[wrong[0]], system.name, (a[wrong[0]], b[wrong[0]]), point[0])
 
 
@@ -158,12 +167,16 @@ def _close(a: np.ndarray, b: np.ndarray, relative: float = ROUNDING, absolute: A
     return (a == b) | (np.abs(a - b) <= relative * np.maximum(np.abs(a), np.abs(b)) + absolute)
 
 
-def _by_python_control(system: Any, point: Any, params: Any) -> Values:
-    given = {"params": dict(params)} if params else {}
-    rates = system.dynamics(*point, **given) if system.nstates else np.empty(0)
-    outputs = system.output(*point, **given) if system.noutputs else np.empty(0)
-    rates, outputs = (np.asarray(v, dtype=float).reshape(-1) for v in (rates, outputs))
-    return rates, outputs
+def _by_python_control(compiled: Compiled, point: Any, params: Any) -> Values:
+    system, given = compiled.system, {"params": dict(params)} if params else {}
+    with happening():
+        rates = system.dynamics(*point, **given) if system.nstates else np.empty(0)
+        outputs = system.output(*point, **given) if system.noutputs else np.empty(0)
+    after, rows = [], list(compiled.program.sampled)
+    for what in compiled.program.meetings:
+        with happening(what):
+            after.append(system.dynamics(*point, **given)[rows])
+    return tuple(np.asarray(v, dtype=float).reshape(-1) for v in (rates, outputs, *after))
 
 
 def _rounded(t: float, trial: Trial) -> float:
@@ -186,14 +199,14 @@ def _near(point: Any, trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndar
         yield t + _rounded(t, trial), x * factors[: x.size], u * factors[x.size :]
 
 
-def _shaken(system: Any, point: Any, trial: Trial, base: Values) -> Values:
+def _shaken(compiled: Compiled, point: Any, trial: Trial, base: Values) -> Values:
     """Return how far python-control's values move from `base` when all is rounded."""
     moved = [np.zeros_like(values) for values in base]
     for near in _near(point, trial):
-        found = _by_python_control(system, near, trial.params)
+        found = _by_python_control(compiled, near, trial.params)
         for total, a, b in zip(moved, base, found, strict=True):
             np.maximum(total, np.abs(a - b), out=total)
-    return moved[0], moved[1]
+    return tuple(moved)
 
 
 def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) -> None:

@@ -89,7 +89,7 @@ class Compiled:
     @cached_property
     def equations(self) -> Equations:
         """What the blocks' functions compute as expressions."""
-        return equations(self.schedule, self.program.layout)
+        return equations(self.schedule, self.program.layout, meetings=self.program.meetings)
 
     @cached_property
     def native(self) -> tuple[Rhs, Rhs]:
@@ -275,7 +275,7 @@ def compile(  # noqa: A001 (what it does)
         raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
     read = schedule(system, solve_loops=algebraic_loops == "solve")
     arrays = program(read)
-    check_sizes(system, [node.system for node in read.nodes])
+    check_sizes(system, [node.sampled or node.system for node in read.nodes])
     made = Compiled(schedule=read, program=arrays)
     _ = made.equations  # what expressions would understand otherwise is refused now
     return made

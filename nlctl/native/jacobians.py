@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
+from scipy.linalg import expm
 
 from ..errors import CompileError, ParameterError, UsageError
 from ..expressions.derivatives import tangents
@@ -16,6 +17,7 @@ from ..expressions.evaluate import evaluate
 from ..expressions.graph import Expr, Untraceable, needed
 from ..names import unknown
 from ..responses.arguments import state_array
+from ..sampling.clock import common_period, instants
 from .codegen.blocks import Equations
 from .parameters import length
 
@@ -33,7 +35,8 @@ class Tangent:
     Attributes
     ----------
     rows : mapping
-        For ``"dx"`` and ``"y"`` pairs of an expression, None where it is 0, and its length.
+        For ``"dx"`` and ``"y"``, and for ``"sample0"`` and so on of sampled blocks' next states,
+        pairs of an expression, None where it is 0, and its length.
     assumed : mapping
         Integer parameters for whose values this holds: place in the parameter vector, and value.
     """
@@ -63,7 +66,9 @@ def tangent(compiled: Compiled) -> Tangent:
     CompileError
         If a function is opaque, or there are algebraic loops.
     """
-    why, found = inexact(compiled, ("dx", "y")), compiled.equations
+    found = compiled.equations
+    names = ("dx", "y", *(name for name in found.results if name.startswith("sample")))
+    why = inexact(compiled, names)
     if why is not None:
         raise CompileError(
             f"'{compiled.system.name}' has no exact derivatives, since {why}: use "
@@ -71,7 +76,7 @@ def tangent(compiled: Compiled) -> Tangent:
         )
     n, m = compiled.system.nstates or 0, compiled.system.ninputs or 0
     starts = {"x": 0, "u": n, "p": n + m}
-    rows = {name: along(found, name, starts) for name in ("dx", "y")}
+    rows = {name: along(found, name, starts) for name in names}
     return Tangent(rows=rows, assumed=dict(found.graph.assumptions))
 
 
@@ -128,7 +133,8 @@ def jacobian(
     Returns
     -------
     dict
-        ``"dx"`` of shape (nstates, k) and ``"y"`` of shape (noutputs, k).
+        ``"dx"`` of shape (nstates, k) and ``"y"`` of shape (noutputs, k), and of next states of
+        sampled blocks ``"sample0"`` and so on.
     """
     system, made = compiled.system, compiled.tangent
     p = compiled.parameter_vector(params)
@@ -171,12 +177,56 @@ def linearize(
     n, m = system.nstates or 0, system.ninputs or 0
     directions = np.eye(n + m + length(compiled.program.layout), n + m)
     found = jacobian(compiled, x0, u0, t, params, directions)
+    rates, outputs, dt = found["dx"], found["y"], system.dt
+    if compiled.program.sampled:
+        rates, outputs, dt = over_a_period(compiled, found)
     names = {"states": system.state_labels, "inputs": system.input_labels}
     return ct.StateSpace(
-        found["dx"][:, :n], found["dx"][:, n:], found["y"][:, :n], found["y"][:, n:], system.dt,
+        rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:], dt,
         outputs=system.output_labels, name=f"{system.name}$linearized",
         remove_useless_states=False, **names,
     )  # fmt: skip
+
+
+def over_a_period(compiled: Compiled, found: Mapping[str, np.ndarray]) -> tuple[Any, Any, float]:
+    """Return the map of a diagram with sampled blocks from period to period, exactly.
+
+    States are taken before what happens at the beginning of a period, outputs after it; inputs
+    are constant over it.  Between instants the map is a matrix exponential.
+
+    Returns
+    -------
+    states, outputs : ndarray of shape (nstates, nstates + ninputs), (noutputs, ...)
+    period : float
+        Common period of the clocks (s).
+    """
+    n, width = found["dx"].shape
+    clocks, meetings = compiled.program.clocks, compiled.program.meetings
+    begin, end, period = common_period(clocks)
+    due = instants(clocks, begin, end, meetings)
+    flow = np.zeros((width, width))
+    flow[:n] = found["dx"]
+    total, shown = np.eye(width), found["y"]
+    gaps = np.diff(np.r_[begin, due.times, end])
+    total = expm(flow * gaps[0]) @ total
+    for k, (which, gap) in enumerate(zip(due.which, gaps[1:], strict=True)):
+        step = _sampled_map(compiled, found, int(which), width)
+        if k == 0 and gaps[0] == 0.0:
+            shown = shown @ step
+        total = expm(flow * gap) @ step @ total
+    return total[:n], shown, period
+
+
+def _sampled_map(
+    compiled: Compiled, found: Mapping[str, np.ndarray], which: int, width: int
+) -> np.ndarray:
+    """Return what an instant does to states and inputs."""
+    step, at = np.eye(width), 0
+    for row, array in compiled.equations.results[f"sample{which}"]:
+        places = list(compiled.program.sampled[row : row + array.size])
+        step[places] = found[f"sample{which}"][at : at + array.size]
+        at += array.size
+    return step
 
 
 def parameter_jacobian(

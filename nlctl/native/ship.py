@@ -48,8 +48,9 @@ def _imported(path: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level:
             folder = path.parents[node.level - 1]
-            modules = [node.module] if node.module else [each.name for each in node.names]
-            files = [folder / f"{module.replace('.', '/')}.py" for module in modules]
+            inner = folder / (node.module or "").replace(".", "/")
+            files = [inner / f"{each.name}.py" for each in node.names]
+            files += [inner.with_suffix(".py")] if node.module else []
             yield from (
                 file.relative_to(HERE).as_posix()
                 for file in files

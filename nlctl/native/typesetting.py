@@ -103,7 +103,7 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     every = {} if values else slots_of(system, node.path)
     slots = {name: slot for name, slot in every.items() if slot.kind == "f"}  # others steer
     inputs = tuple({Signal(None, j): 1.0} for j in range(len(node.inputs)))
-    alone = replace(node, state_offset=0, inputs=inputs)
+    alone = replace(node, state_offset=0, inputs=inputs, sampled=None)
     reader = Reader(graph=Graph(), layout={0: slots}, blocks=[alone])
     with np.errstate(all="ignore"), _local_names() as names:
         found = {"x": reader.derivatives(0), "y": reader.outputs(0, ())}

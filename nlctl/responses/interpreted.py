@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import control as ct
 import numpy as np
 
+from ..diagrams import leaves
 from ..errors import DivergedError, ParameterError
 from ..names import unknown
+from ..sampling.system import Sampled
 from .arguments import Run, evaluation_array, input_array, state_array
+from .sampled import from_sample_to_sample
 from .time_response import as_response
 
 METHODS = ("LSODA", "RK23", "RK45", "DOP853", "Radau", "BDF")  # of scipy.integrate.solve_ivp
@@ -39,6 +43,8 @@ def interpreted(run: Run) -> ct.TimeResponseData:
         if wanted.size == 1 and system.isdtime(strict=True):
             raise ParameterError("evaluation_times of a sampled system needs two times, got one")
     simulate: Any = ct.input_output_response  # its types are those of the defaults
+    if any(isinstance(leaf.system, Sampled) for leaf in leaves(system)):
+        simulate = partial(from_sample_to_sample, simulate)
     watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
     method = solver["method"] or solver["solve_ivp_method"] or "LSODA"
     if isinstance(method, str) and method not in METHODS:

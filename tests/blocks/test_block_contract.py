@@ -55,7 +55,7 @@ def points(spec, seed=1, count=8):
     for i in range(count):
         yield TIMES[i % 3], rng.normal(size=n), 2 * rng.normal(size=m)
     scalars = [v for k in declared_params(spec) if np.ndim(v := getattr(spec, k)) == 0]
-    for corner in (0.0, *scalars):
+    for corner in 2 * (0.0, *scalars):  # with one state and another: memories count there
         yield 0.7, rng.normal(size=n), np.full(m, float(corner))
 
 

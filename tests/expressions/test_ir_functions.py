@@ -216,6 +216,17 @@ def test_every_function_of_two_arguments_is_numpys(name):
             np.testing.assert_array_equal(np.signbit(found)[:7], np.signbit(expected)[:7])
 
 
+def test_logaddexp_neither_overflows_nor_loses_small_numbers():
+    """ln(e^x + e^y): far apart the larger one, equal ones ln 2 more, infinities as NumPy's."""
+    x = np.array([1e300, -1e300, 800.0, -800.0, np.inf, -np.inf, np.nan, 0.0])
+    np.testing.assert_array_equal(values("logaddexp", x, -np.inf), x)
+    np.testing.assert_array_equal(values("logaddexp", x[:6], np.inf), np.inf)
+    for z in (-800.0, 0.0, 800.0):
+        np.testing.assert_allclose(values("logaddexp", [z], z), z + np.log(2.0), rtol=1e-15)
+    small = np.array([-30.0, -100.0, -700.0])
+    np.testing.assert_allclose(values("logaddexp", small, 0.0), np.exp(small), rtol=1e-12)
+
+
 @given(st.lists(st.floats(allow_nan=False), min_size=8, max_size=8), st.integers(0, 7))
 def test_an_element_does_not_depend_on_the_others(x, place):
     """Bit for bit, wherever it stands."""

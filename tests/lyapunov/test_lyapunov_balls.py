@@ -223,6 +223,17 @@ def test_every_function_of_the_table_is_enclosed_with_its_derivative(name, data)
         assert (ball.gradient[0] + arb(0, 1e-11)).contains(arb(float(quotient)))
 
 
+@given(ends=st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=2))
+def test_the_cube_root_of_a_ball_undoes_the_cube(ends):
+    """It rises, also through 0: it holds the roots, and is wider by roundings of radii alone."""
+    a, b = sorted(ends)
+    ball = interval(a, b)
+    root, room = np.cbrt(ball).value, 1e-7 * (max(abs(a), abs(b)) + 1e-9)
+    assert holds(root, np.cbrt(0.5 * (a + b)))
+    assert abs(float(root.lower()) ** 3 - float(ball.value.lower())) <= room
+    assert abs(float(root.upper()) ** 3 - float(ball.value.upper())) <= room
+
+
 def test_numbers_of_numpy_on_the_left_of_a_ball():
     """np.float64 and arrays compute with balls as plain numbers do."""
     ball = Ball(arb(2), (arb(1),))

@@ -13,7 +13,7 @@ from numba.core import config
 import nlctl
 from analysis.paper import CASES, checks, measured, sample_times
 from nlctl.native import Status
-from nlctl.native.integrate.tsit5 import A, B, C, E
+from nlctl.native.integrate.methods.tsit5 import A, B, C, E
 from nlctl.native.machine.store import cache_folder
 
 OSCILLATOR = ct.ss([[0.0, 1.0], [-1.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]], name="osc")

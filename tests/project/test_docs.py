@@ -81,3 +81,15 @@ def test_the_glossary_explains_every_status(word):
     """What a ledger or a claim may say."""
     glossary = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
     assert re.search(rf"^\| {word} \| \S", glossary, flags=re.MULTILINE)
+
+
+def test_the_guide_to_sampling_runs():
+    """Its loop is as good as the continuous one."""
+    code = re.findall(
+        r"```python\n(.*?)```", (ROOT / "docs" / "sampling.md").read_text(), re.DOTALL
+    )
+    names = {}
+    exec(code[0], names)
+    loop, response = names["loop"], names["response"]
+    e = response.outputs[loop.output_index["e"], 1000:]
+    assert abs(e).max() < 0.13

@@ -10,8 +10,9 @@ from places import ROOT
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
     ["nlctl._version", "nlctl.host"],
     ["nlctl.errors", "nlctl.names", "nlctl.arguments", "nlctl.params", "nlctl.equations"],
-    ["nlctl.blocks", "nlctl.diagrams", "nlctl.functions", "nlctl.drawing", "nlctl.responses"],
-    ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers"],
+    ["nlctl.blocks", "nlctl.diagrams", "nlctl.functions", "nlctl.drawing", "nlctl.responses"]
+    + ["nlctl.sampling"],
+    ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers", "nlctl.faults"],
     ["nlctl.paper"],
     ["nlctl.expressions"],
     ["nlctl.native"],

@@ -14,8 +14,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from flint import arb
 
+from nlctl import actuators
 from nlctl.actuators import Backlash, DeadZone
-from nlctl.actuators.backlash import play_band
 from nlctl.arguments import number, vector
 from nlctl.errors import ParameterError, UsageError
 from nlctl.functions import clip
@@ -142,12 +142,12 @@ def decompose(
     ----------
     actuator : record
         A `nlctl.DeadZone` (by default split as in textbooks: k is the slope factor, and 1 inside
-        the dead zone), a `nlctl.Backlash` (k is the slope), a memoryless actuator with one input
-        and one output (`k` must be given), or a record with a method ``decomposition(u_max)``,
-        see `Decomposable`.
+        the dead zone), a memoryless actuator with one input and one output, an actuator with
+        memory and an equation ``band(t, u, p)`` of the least and greatest output that it can have
+        at input u, or a record with a method ``decomposition(u_max)``, see `Decomposable`.
     k : (k_1, k_2), optional
-        Bounds that k shall have.  The split is then `clipped_split`, and eps_u is bounded by
-        branch and bound.
+        Bounds that k shall have, by default the ``gains`` of the record where it has them.  The
+        split is then `clipped_split`, and eps_u is bounded by branch and bound.
     u_max : float, optional
         Largest |u| of the branch and bound.
     tol : float, optional
@@ -165,28 +165,47 @@ def decompose(
     Raises
     ------
     DecompositionError
-        If eps_u is not bounded for all u, as with saturation, no split is known, or the record's
-        own one is refuted by a sample of its output.
+        If eps_u is not bounded for all u, as with saturation, no split is known (a record may say
+        why, as ``no_split``), or the record's own one is refuted by a sample of its output.
     ParameterError
         If `k` is no pair with 0 < k_1 <= k_2, or `u_max` or `tol` is not positive.
     """
     u_max = number("decompose", "u_max", u_max, above=0)
     tol = number("decompose", "tol", tol, above=0)
     check_gain("decompose", k)
+    _refuse_by_itself(actuator)
     if k is None and hasattr(actuator, "decomposition"):
         return _declared_split(actuator, u_max, tol)
     if k is None and type(actuator) is DeadZone:
         return _textbook_dead_zone(actuator)
-    if k is None and type(actuator) is Backlash:
-        if actuator.m_r == actuator.m_l:
-            return _play(actuator)
-        k = (min(actuator.m_r, actuator.m_l), max(actuator.m_r, actuator.m_l))
+    if k is None and type(actuator) is Backlash and actuator.m_r == actuator.m_l:
+        return _play(actuator)
+    k = _own_gains(actuator) if k is None else k
+    return _proved_split(actuator, k, u_max, tol)
+
+
+def _refuse_by_itself(actuator: Any) -> None:
+    """Refuse an actuator whose record says why it has no split."""
+    why = getattr(actuator, "no_split", None)
+    if why is not None:
+        name = type(actuator).__name__
+        raise DecompositionError(f"{name} is not of the form (2): {why}; replace the actuator")
+
+
+def _own_gains(actuator: Any) -> tuple[float, float]:
+    """Return the bounds of k that a record knows."""
+    name = type(actuator).__name__
+    k = getattr(actuator, "gains", None)
     if k is None:
         raise DecompositionError(
-            f"{type(actuator).__name__} has no known split (2): give the bounds k=(k_1, k_2), or "
-            "the record a method decomposition(u_max)"
+            f"{name} has no known split (2): give the bounds k=(k_1, k_2), or the record a method "
+            "decomposition(u_max)"
         )
-    return _proved_split(actuator, k, u_max, tol)
+    if not k[0] > 0:
+        raise DecompositionError(
+            f"{name} breaks Assumption 1: its gain is {k[0]:g}, and k >= k_1 > 0 is wanted"
+        )
+    return k
 
 
 def _declared_split(actuator: Any, u_max: float, tol: float) -> Decomposition:
@@ -277,35 +296,63 @@ def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: floa
             f"{undecided} boxes are undecided"
         )
     _refuse_growth(actuator, k, u_max, (_eps_range(k, edges, u_max, tol), wide))
+    declared = hasattr(actuator, "band") and not _is_of_nlctl(actuator)
+    if declared:
+        _refute_band(actuator, edges, u_max)
     return Decomposition(
         k_1=k[0],
         k_2=k[1],
         eps_low=wide[0].low,
         eps_high=wide[1].high,
         part=clipped_split(*k),
-        provenance="proved",
-        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in wide)} boxes",
+        provenance="given" if declared else "proved",
+        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in wide)} boxes"
+        + (", within the band that the record declares" if declared else ""),
         over=f"|u| <= {2 * u_max:g}, all t",
     )
 
 
+def _is_of_nlctl(actuator: Any) -> bool:
+    """Whether it is one of nlctl's own records, whose bands its tests hold to."""
+    return getattr(actuators, type(actuator).__name__, None) is type(actuator)
+
+
+def _refute_band(actuator: Any, edges: tuple[Edge, Edge], u_max: float) -> None:
+    """Look for an input and a memory at which an actuator leaves the band that it declares."""
+    p, rng = equation_arguments(actuator), np.random.default_rng(0)
+    for t in (0.0, *TIMES):
+        for u in np.linspace(-u_max, u_max, 101):
+            x = 0.5 * u_max * rng.standard_normal(len(actuator.states))
+            v = float(np.asarray(actuator.output(t, x, np.array([u]), p)).reshape(-1)[0])
+            low, high = (float(edge(u, t)) for edge in edges)
+            room = 1e-9 * (1 + abs(v))
+            if not low - room <= v <= high + room:
+                raise DecompositionError(
+                    f"{type(actuator).__name__} declares the band [{low:g}, {high:g}] at u = {u:g},"
+                    f" t = {t:g} s, but its output is {v:g} there with the states {x.tolist()}: "
+                    "correct its band"
+                )
+
+
 def _edges(actuator: Any) -> tuple[Edge, Edge]:
     """Return the least and the greatest output v that the actuator can have at input u, time t."""
-    p = equation_arguments(actuator)
-    if type(actuator) is Backlash:
-        return (lambda u, t: play_band(u, p)[0]), (lambda u, t: play_band(u, p)[1])
-    if len(actuator.states) or len(actuator.inputs) != 1 or len(actuator.outputs) != 1:
+    p, name = equation_arguments(actuator), type(actuator).__name__
+    band: Any = getattr(actuator, "band", None)
+    if len(actuator.inputs) != 1 or len(actuator.outputs) != 1 or (actuator.states and not band):
         raise DecompositionError(
-            f"{type(actuator).__name__} has memory or several signals: give the record a method "
-            "decomposition(u_max)"
+            f"{name} has memory or several signals: give the record a method decomposition(u_max), "
+            "or an equation band(t, u, p) of its least and greatest output at input u"
         )
 
     def refusal(why: str) -> DecompositionError:
         return DecompositionError(
-            f"the output of {type(actuator).__name__} cannot be evaluated on intervals of u "
+            f"the output of {name} cannot be evaluated on intervals of u "
             f"and t ({why}): write it with arithmetic and NumPy functions of numbers"
         )
 
+    if band is not None:
+        low, high = (on_balls(lambda u, t, i=i: band(t, u, p)[i], refusal) for i in (0, 1))
+        return low, high
     output = on_balls(lambda u, t: actuator.output(t, (), (u,), p)[0], refusal)
     return output, output
 

@@ -18,10 +18,12 @@ from typing import Any, TypeVar
 import control as ct
 import numpy as np
 
-from nlctl.blocks import Block
+from nlctl.blocks import Block, within
 from nlctl.diagrams import all_parameter_rows, initial_state, leaves, places, state_names
 from nlctl.native.machine.fingerprint import content_key
 from nlctl.params import declared_params
+from nlctl.sampling.clock import moments
+from nlctl.sampling.system import Sampled, happening
 
 __all__ = ["array_text", "loop_facts", "loop_values", "short_key", "values_differ"]
 
@@ -77,6 +79,9 @@ def short_key(*things: Any) -> str:
 def _block(system: Any) -> str:
     """Return a key of a block's equations; its parameters' values are told by themselves."""
     timebase = repr(system.dt)
+    if isinstance(system, Sampled):
+        quanta = (system.input_quantum, system.output_quantum)
+        return short_key(_block(system.inner), repr(system.clock), repr(quanta))
     if isinstance(system, Block):
         spec, known = system.spec, declared_params(system.spec)
         held = {k: v for k, v in getattr(spec, "__dict__", {}).items() if k not in known}
@@ -107,7 +112,7 @@ def _parameters(system: Any) -> dict[str, str]:
     found = {
         f"{place.path or place.system.name}.{name}": value
         for place in leaves(system)
-        if not isinstance(place.system, Block)
+        if not isinstance(within(place.system), Block)
         for name, value in dict(place.system.params or {}).items()
     }
     found |= dict(system.params or {})
@@ -147,7 +152,9 @@ def loop_values(system: Any, end: float) -> dict[str, float | str]:
     start, width = initial_state(system), system.ninputs or 0
     reach = np.maximum(1.0, abs(start)) / 4
     rates, outputs = np.zeros(start.size), np.zeros(system.noutputs or 0)
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
+    clocks = [p.system.clock for p in leaves(system) if isinstance(p.system, Sampled)]
+    everything = happening(frozenset(moments(clocks)))  # sampled blocks' next states as well
+    with warnings.catch_warnings(), np.errstate(all="ignore"), everything:
         warnings.simplefilter("ignore")
         for k in range(POINTS):
             spread = (GOLDEN * np.arange(1, start.size + width + 1) * (k + 1)) % 1 - 0.5

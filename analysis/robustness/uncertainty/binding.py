@@ -13,7 +13,7 @@ import control as ct
 import numpy as np
 
 from nlctl.arguments import a_function, of_type
-from nlctl.blocks import Block
+from nlctl.blocks import Block, within
 from nlctl.diagrams import Place, all_parameter_rows, initial_state, leaves, state_names
 from nlctl.errors import ParameterError, UsageError
 from nlctl.names import Parameters, base_name, find_name, unknown
@@ -67,7 +67,7 @@ def _parameter(quantity: Uncertain, system: Any) -> Uncertain:
     if owner is not None:
         leaf, key = owner
         for end in map(np.rint, quantity.box) if quantity.is_whole else quantity.box:
-            with_overrides(leaf.system.current_spec, {key: end}, leaf.path)
+            with_overrides(within(leaf.system).current_spec, {key: end}, leaf.path)
         _check_whole(quantity, full in rows and isinstance(value, int))
     if suffix:
         value = np.asarray(value)[tuple(int(k) for k in re.findall(r"\d+", suffix))]
@@ -94,7 +94,7 @@ def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Place, str] | Non
     """
     path = base_name(name).rpartition(".")[0]
     for leaf in leaves(system):
-        if isinstance(leaf.system, Block) and leaf.parameter_path == path:
+        if isinstance(within(leaf.system), Block) and leaf.parameter_path == path:
             return leaf, name.removeprefix(f"{path}.")
     return None
 

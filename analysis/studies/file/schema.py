@@ -11,11 +11,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, SerializeAsAny, create_model
 
 from ..kind import Asked, Kind, tagged
-from .field_types import Number, Pair, Strict, Whole
+from .field_types import Number, Pair, Size, Strict, Whole
 
 __all__ = [
     "About",
     "Choices",
+    "Faulty",
     "Law",
     "Measured",
     "Rows",
@@ -122,6 +123,20 @@ class Rows(Strict):
     levels: Whole | None = Field(None, ge=1, description="Values per quantity of a grid.")
 
 
+class Faulty(Strict):
+    """What may happen to a signal: the kind of a fault, and how large it is."""
+
+    stuck: Number | Literal[True] | None = Field(
+        None, description="Stuck at this value; true: at the one of the onset."
+    )
+    bias: Number | None = Field(None, description="Offset.")
+    drift: Number | None = Field(None, description="Rate of an offset, per s.")
+    gain: Number | None = Field(None, description="Factor, a loss of effectiveness.")
+    noise: Size | None = Field(None, description="RMS of band-limited noise.")
+    dropout: Number | None = Field(None, gt=0, description="0 for so long (s).")
+    disconnection: Literal[True] | None = Field(None, description="true: 0 for ever.")
+
+
 class Study(Strict):
     """A study file; `study_model` adds what its analyses look like."""
 
@@ -135,6 +150,9 @@ class Study(Strict):
         {}, description="Input of the loop from outside -> its value, the same all the time."
     )
     choices: dict[str, Choices] = Field({}, description="Keyword of the loop -> its options.")
+    faults: dict[str, Faulty] = Field(
+        {}, description="Signal of the loop -> kinds of faults, for the analysis 'faults'."
+    )
     spec: dict[str, Annotated[Rule, BeforeValidator(_rule)]] = Field(
         min_length=1, description="Name -> requirement."
     )

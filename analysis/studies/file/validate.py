@@ -18,12 +18,14 @@ from analysis.robustness.statistics.guarantee import check_iid
 from analysis.robustness.uncertainty.binding import check_keyword
 from analysis.robustness.uncertainty.space import combinations
 from nlctl.errors import ParameterError, UsageError
+from nlctl.faults import with_faults
 from nlctl.names import unknown
 
 from ..build import (
     SIGNALS,
     choice,
     experiment,
+    faults_of,
     inputs_of,
     loop,
     main_design,
@@ -34,7 +36,7 @@ from ..build import (
 from ..kind import Asked, Setup
 from .errors import Place, Problem
 from .resolve import loop_function, option, uncertain
-from .schema import RESERVED, Study
+from .schema import RESERVED, Faulty, Study
 
 __all__ = ["bound"]
 
@@ -81,6 +83,9 @@ def bound(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]
     signals = frozenset.intersection(*(frozenset(d.output_labels) for d in diagrams or [_Empty]))
     for diagram in diagrams:
         _check_names(study, diagram, quantities, requirements, notes)
+    for diagram in diagrams:
+        for signal, faulty in study.faults.items():
+            notes.attempt(("faults", signal), _check_faults, diagram, signal, faulty)
     large = _too_large(study, notes)
     metrics = notes.attempt(("metrics",), metrics_of, study, folder, signals) if diagrams else None
     inputs = notes.attempt(("inputs",), inputs_of, study, diagrams) if diagrams else None
@@ -222,6 +227,15 @@ def _check_names(
         signal = getattr(study.metrics, key, None)
         if signal and signal not in diagram.output_labels:
             notes.add(("metrics", key), str(unknown("signal", signal, diagram.output_labels)))
+
+
+def _check_faults(diagram: ct.InputOutputSystem, signal: str, faulty: Faulty) -> None:
+    """Refuse faults on a signal that the loop lacks, and magnitudes that are none."""
+    made = faults_of(signal, faulty)
+    if not made:
+        kinds = ", ".join(Faulty.model_fields)
+        raise ParameterError(f"faults on '{signal}' need at least one kind of: {kinds}")
+    with_faults(diagram, *made.values())
 
 
 def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Notes) -> None:

@@ -3,6 +3,7 @@
 from .compare import COMPARE
 from .degradation import DEGRADATION
 from .failure_map import FAILURE_MAP
+from .faults import FAULTS
 from .morris import MORRIS
 from .probability import PROBABILITY
 from .radius import RADIUS
@@ -23,5 +24,6 @@ KINDS = (  # in the order of the report
     SOBOL,
     REGIONAL,
     FAILURE_MAP,
+    FAULTS,
     COMPARE,
 )

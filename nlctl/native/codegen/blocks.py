@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
 
@@ -16,7 +16,9 @@ from ...expressions.arrays import Tracer, boxed, concatenated, full, number, tra
 from ...expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable, needed
 from ...expressions.operators import elementwise
 from ...expressions.trace import trace
-from ..diagram.schedule import Combination, Loop, Node, Schedule, Signal, signal_name
+from ...sampling.system import Happening
+from ..diagram.feedthrough import feedthrough
+from ..diagram.schedule import Combination, Loop, Node, Schedule, Signal, during, signal_name
 from ..machine.called import call_of
 from ..parameters import length
 from .calls import Call
@@ -35,6 +37,7 @@ class Equations:
     graph : Graph
     results : dict
         For ``"dx"``, ``"g"`` and ``"y"`` pairs of a row and the array that is to be written there.
+        For ``"sample0"`` and so on those of sampled blocks' next states, at each meeting.
     calls : dict
         Opaque functions by name.
     solvers : dict
@@ -47,7 +50,12 @@ class Equations:
     solvers: dict[str, Solver]
 
 
-def equations(schedule: Schedule, layout: Any, p: np.ndarray | None = None) -> Equations:
+def equations(
+    schedule: Schedule,
+    layout: Any,
+    p: np.ndarray | None = None,
+    meetings: Sequence[Happening] = (),
+) -> Equations:
     """Write a schedule as expressions.
 
     Parameters
@@ -58,6 +66,8 @@ def equations(schedule: Schedule, layout: Any, p: np.ndarray | None = None) -> E
     p : ndarray, optional
         The parameter vector whose integers steer what is computed; by default those that the
         blocks have now.
+    meetings : sequence of frozenset, optional
+        What happens to sampled blocks, as in `Program.meetings`.
 
     Returns
     -------
@@ -73,22 +83,32 @@ def equations(schedule: Schedule, layout: Any, p: np.ndarray | None = None) -> E
     sizes = {"t": 1, "x": system.nstates or 0, "u": system.ninputs or 0, "p": length(layout)}
     reader = Reader(graph=Graph(sizes), layout=layout, blocks=schedule.nodes, p=p)
     with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
-        at = 0
-        for loop in schedule.loops:
-            reader.evaluate(schedule, range(at, loop.start))
-            reader.solve(schedule, loop)
-            at = loop.stop
-        reader.evaluate(schedule, range(at, len(schedule.order)))
+        reader.read(schedule)
         results = {
             "dx": [(n.state_offset, reader.derivatives(i)) for i, n in enumerate(schedule.nodes)],
             "g": _events(reader),
             "y": [(0, reader.wired(schedule.outputs))],
         }
-    if reader.solved:
-        results = {k: [(row, reader.known(a)) for row, a in v] for k, v in results.items()}
+        results = reader.all_known(results)
+        for k, what in enumerate(meetings):
+            at_instant = during(schedule, what)
+            then = replace(reader, blocks=at_instant.nodes, what=what, signals={}, solved=[])
+            then.read(at_instant)
+            results |= then.all_known({f"sample{k}": _next(then)})
     return Equations(
         graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers
     )
+
+
+def _next(reader: Reader) -> list[tuple[int, Tracer]]:
+    """Return the next states of sampled blocks to which something happens, with their rows."""
+    found, row = [], 0
+    for i, node in enumerate(reader.blocks):
+        if node.sampled:
+            if node.sampled.acts(reader.what):
+                found.append((row, reader.next_states(i)))
+            row += node.size
+    return found
 
 
 def _results(graph: Graph, op: str, name: str, given: Sequence[Tracer], count: int) -> Tracer:
@@ -142,6 +162,8 @@ class Reader:
         Signals that have been.
     calls, solvers : dict
         By name.
+    what : frozenset of Moment
+        What happens to sampled blocks.
     """
 
     graph: Graph
@@ -153,6 +175,22 @@ class Reader:
     solved: list[Tracer] = field(default_factory=list)
     calls: dict[str, Call] = field(default_factory=dict)
     solvers: dict[str, Solver] = field(default_factory=dict)
+    what: Happening = frozenset()
+
+    def read(self, schedule: Schedule) -> None:
+        """Read all blocks in their order, and solve the loops."""
+        at = 0
+        for loop in schedule.loops:
+            self.evaluate(schedule, range(at, loop.start))
+            self.solve(schedule, loop)
+            at = loop.stop
+        self.evaluate(schedule, range(at, len(schedule.order)))
+
+    def all_known(self, results: dict[str, Any]) -> dict[str, Any]:
+        """Return results that are NaN where a loop was not solved."""
+        if not self.solved:
+            return results
+        return {k: [(row, self.known(a)) for row, a in v] for k, v in results.items()}
 
     def evaluate(self, schedule: Schedule, places: range) -> None:
         """Read the outputs of blocks at some places of the order."""
@@ -207,6 +245,15 @@ class Reader:
 
     def outputs(self, i: int, unknown: Collection[int]) -> Tracer:
         """Return a block's outputs; those that depend on unknown inputs are asked for again."""
+        node = self.blocks[i]
+        if node.sampled:
+            if not node.sampled.answers(self.what):
+                _, waiting, held = self._divided(node)
+                return waiting[-held.size :] if node.sampled.releases(self.what) else held
+            return self._rounded(node.sampled.output_quantum, self._own_outputs(i, unknown))
+        return self._own_outputs(i, unknown)
+
+    def _own_outputs(self, i: int, unknown: Collection[int]) -> Tracer:
         node, system = self.blocks[i], self.blocks[i].system
         linear = isinstance(system, ct.StateSpace)
         if not linear and (system.outfcn is None or not system.noutputs):
@@ -219,15 +266,53 @@ class Reader:
                 for j, combination in enumerate(node.inputs)
             ]
         )
+        if node.sampled:
+            inputs = self._rounded(node.sampled.input_quantum, inputs)
         if linear:
             return self._linear(node, system.C, system.D, inputs)
         return self._function(i, "output", [system.outfcn], inputs, system.noutputs)
 
     def derivatives(self, i: int) -> Tracer:
+        """Return the derivatives of a block's states; those of sampled ones stand still."""
+        if self.blocks[i].sampled:
+            return full(self.graph, self.blocks[i].size, 0.0)
+        return self._own_states(i)
+
+    def next_states(self, i: int) -> Tracer:
+        """Return the states of a sampled block after what happens."""
+        sampled: Any = self.blocks[i].sampled
+        own, waiting, held = self._divided(self.blocks[i])
+        if sampled.releases(self.what):
+            held = waiting[-held.size :]
+        if sampled.clock.sampling in self.what:
+            direct = replace(self.blocks[i], direct=feedthrough(self.blocks[i].system))
+            reader = replace(self, blocks=[*self.blocks[:i], direct, *self.blocks[i + 1 :]])
+            y = self._rounded(sampled.output_quantum, reader._own_outputs(i, ()))
+            own = self._own_states(i)
+            if waiting.size:
+                waiting = concatenated(self.graph, [y, waiting[: -y.size]]) if y.size else waiting
+            else:
+                held = y
+        return concatenated(self.graph, [own, waiting, held])
+
+    def _divided(self, node: Node) -> tuple[Tracer, Tracer, Tracer]:
+        """Return a sampled block's own states, waiting outputs and held outputs."""
+        sampled: Any = node.sampled
+        return sampled.parts(vector(self.graph, "x", node.state_offset, (node.size,)))
+
+    def _rounded(self, quantum: float, values: Tracer) -> Tracer:
+        if not quantum or not values.size:
+            return values
+        steps = elementwise(self.graph, "rint", elementwise(self.graph, "div", values, quantum))
+        return elementwise(self.graph, "mul", quantum, steps)
+
+    def _own_states(self, i: int) -> Tracer:
         node, system = self.blocks[i], self.blocks[i].system
         if not system.nstates:
             return self._states(node)
         inputs = self.wired(node.inputs)
+        if node.sampled:
+            inputs = self._rounded(node.sampled.input_quantum, inputs)
         if isinstance(system, ct.StateSpace):
             return self._linear(node, system.A, system.B, inputs)
         return self._function(i, "update", [system.updfcn], inputs, system.nstates)

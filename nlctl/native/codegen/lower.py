@@ -28,6 +28,7 @@ from .solver import Solver
 
 PREPARE = {"prepare": ("p", "c")}
 EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g"), "out": ("t", "x", "u", "c", "y")}
+SAMPLE = ("t", "x", "u", "c", "s")  # of those of sampled blocks
 ALONG = {"along": ("t", "x", "u", "c", "v", "dx")}
 
 
@@ -38,9 +39,10 @@ class Lowered:
     Attributes
     ----------
     functions : mapping
-        Plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g)`` and
-        ``out(t, x, u, c, y)``, or ``along(t, x, u, c, v, dx)``.  All arrays have a row per number
-        and a column per member, `t` is one row.  `prepare` fills `c` with all that depends on the
+        Plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g)``,
+        ``out(t, x, u, c, y)`` and a ``sample(t, x, u, c, s)`` for each meeting of the clocks of
+        sampled blocks, or ``along(t, x, u, c, v, dx)``.  All arrays have a row per number and a
+        column per member, `t` is one row.  `prepare` fills `c` with all that depends on the
         parameters `p` alone; the rest of `c` is room that the others write to, so members that
         run at the same time need a `c` each.
     exact : frozenset of Expr
@@ -110,13 +112,15 @@ def lower(
     Lowered
     """
     if found is None:
-        found = equations(schedule, program.layout)
+        found = equations(schedule, program.layout, meetings=program.meetings)
     stores = {
-        name: [part for row, array in rows for part in _stores(name, row, array)]
+        name: [part for row, array in rows for part in _stores(_array(name), row, array)]
         for name, rows in found.results.items()
     }
     wanted = {"rhs": [*stores["dx"], *stores["g"]], "out": stores["y"]}
-    return _lowered(schedule, program, found, EVALUATE, wanted, lanes)
+    samples = {name: SAMPLE for name in stores if name.startswith("sample")}
+    wanted |= {name: stores[name] for name in samples}
+    return _lowered(schedule, program, found, EVALUATE | samples, wanted, lanes)
 
 
 def lower_along(
@@ -167,7 +171,7 @@ def _lowered(
     n, m = schedule.system.nstates or 0, schedule.system.ninputs or 0
     rows = {
         "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n, "g": program.events,
-        "y": len(schedule.outputs), "v": n + m + 1,
+        "y": len(schedule.outputs), "v": n + m + 1, "s": len(program.sampled),
     }  # fmt: skip
     return Lowered(
         functions=functions, exact=exact, calls=found.calls, solvers=found.solvers, rows=rows,
@@ -193,6 +197,11 @@ def _planned(
         copied = parameters if first else 0
         functions[name] = Function(arguments=given, plan=planned, copied=copied)
     return functions, size
+
+
+def _array(results: str) -> str:
+    """Return the array that results are written to."""
+    return "s" if results.startswith("sample") else results
 
 
 def _stores(name: str, row: int, array: Tracer) -> list[Store]:

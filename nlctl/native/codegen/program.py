@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import control as ct
 
 from ...blocks import Block, event_count, memory_states
 from ...errors import CompileError
+from ...sampling.clock import Clock, meetings
+from ...sampling.system import Happening
 from ..diagram.schedule import Node, Schedule
 from ..parameters import Slot, current_values, slots
+
+MOST = 40  # ways in which clocks meet
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,12 +33,35 @@ class Program:
         Number of switching functions.
     memory : tuple of int
         Indices of the memory states.
+    sampled : tuple of int
+        Indices of the states of sampled blocks.
+    clocks : tuple of Clock
+        Of these blocks.
     """
 
     layout: Mapping[int, Mapping[str, Slot]]
     fixed: Mapping[int, Mapping[str, Any]]
     corners: int
     memory: tuple[int, ...]
+    sampled: tuple[int, ...] = ()
+    clocks: tuple[Clock, ...] = ()
+
+    @cached_property
+    def meetings(self) -> tuple[Happening, ...]:
+        """What may happen at one instant: there is a function of the program for each.
+
+        Raises
+        ------
+        CompileError
+            If there is too much.
+        """
+        found = tuple(meetings(self.clocks))
+        if len(found) > MOST:
+            raise CompileError(
+                f"{len(self.clocks)} clocks of sampled blocks may meet in {len(found)} ways, at "
+                f"most {MOST} can be compiled: give blocks of one rate the same offset and delay"
+            )
+        return found
 
     @property
     def events(self) -> int:
@@ -63,17 +91,23 @@ def program(schedule: Schedule) -> Program:
         fixed={i: values for i, values in fixed.items() if values},
         corners=sum(corners(node) for node in schedule.nodes),
         memory=tuple(i for node in schedule.nodes for i in memory(node)),
+        sampled=tuple(
+            node.state_offset + i
+            for node in schedule.nodes
+            for i in range(node.size if node.sampled else 0)
+        ),
+        clocks=tuple(dict.fromkeys(n.sampled.clock for n in schedule.nodes if n.sampled)),
     )
 
 
 def corners(node: Node) -> int:
     """Return the number of switching functions that a block declares."""
-    return event_count(node.system) if isinstance(node.system, Block) else 0
+    return event_count(node.system) if isinstance(node.system, Block) and not node.sampled else 0
 
 
 def memory(node: Node) -> list[int]:
     """Return the indices of a block's memory states in the diagram's state."""
-    if not isinstance(node.system, Block):
+    if not isinstance(node.system, Block) or node.sampled:
         return []
     spec = node.system.spec
     return [node.state_offset + list(spec.states).index(m) for m in memory_states(spec)]

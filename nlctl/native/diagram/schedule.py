@@ -16,7 +16,9 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ...blocks import within
 from ...diagrams import places
+from ...sampling.system import Happening, Sampled
 from ..thirdparty.captured import Captured, noted
 from ..thirdparty.checks import check_functions
 from .feedthrough import closer_feedthrough, feedthrough
@@ -43,6 +45,8 @@ class Node:
         Which outputs depend on which inputs at the same instant.
     unbound : tuple of str
         Names in its functions that have no value on one of the ways: only traced are these right.
+    sampled : Sampled or None
+        What samples the block, whose states are the first ones of this.
     """
 
     path: str
@@ -51,6 +55,12 @@ class Node:
     inputs: tuple[Combination, ...]
     direct: np.ndarray
     unbound: tuple[str, ...] = ()
+    sampled: Sampled | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of its states."""
+        return (self.sampled or self.system).nstates or 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,39 +139,71 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
         If a block's function does not depend on its arguments alone.
     """
     wiring = Wiring(system)
+    blocks = [within(place.system) for place in wiring.blocks]
     read = [note for place in places(system) for note in _equations_of(place.system)]
-    readings = [check_functions(b.path, b.system) for b in wiring.blocks]  # before any is called
+    read += [note for one in blocks for note in _equations_of(one)]
+    readings = [  # before any is called
+        check_functions(place.path, one) for place, one in zip(wiring.blocks, blocks, strict=True)
+    ]
     read += [note for reading in readings for note in reading.captured]
     nodes = tuple(
         Node(
             path=place.path,
-            system=place.system,
+            system=one,
             state_offset=place.state_offset,
             inputs=tuple(wiring.inputs(place)),
-            direct=feedthrough(place.system),
+            direct=feedthrough(one) & (one is place.system),
             unbound=reading.unbound,
+            sampled=None if one is place.system else place.system,
         )
-        for place, reading in zip(wiring.blocks, readings, strict=True)
+        for place, one, reading in zip(wiring.blocks, blocks, readings, strict=True)
     )
     outputs = tuple(wiring.output(wiring.top, i) for i in range(system.noutputs or 0))
+    return _ordered(
+        Schedule(
+            system=system, nodes=nodes, order=(), unknown=(), outputs=outputs, loops=(),
+            captured=tuple(read),
+        ),
+        solve_loops,
+    )  # fmt: skip
+
+
+def _ordered(read: Schedule, solve_loops: bool) -> Schedule:
+    """Return a schedule with the order of evaluation that its nodes need."""
+    nodes = read.nodes
     try:
         order = tuple(TopologicalSorter(_blocks_before(nodes)).static_order())
-        unknown, loops = (frozenset(),) * len(order), ()
+        return replace(read, order=order, unknown=(frozenset(),) * len(order), loops=())
     except CycleError:  # look closer: which output depends on which input
         nodes = tuple(replace(n, direct=closer_feedthrough(n.system, n.direct)) for n in nodes)
         ordering = _Ordering(nodes=nodes)
         ordering.run(solve_loops)
         order, unknown = tuple(ordering.order), tuple(ordering.unknown)
         loops = tuple(ordering.loops)
-    return Schedule(
-        system=system,
-        nodes=nodes,
-        order=order,
-        unknown=unknown,
-        outputs=outputs,
-        loops=loops,
-        captured=tuple(read),
+        return replace(read, nodes=nodes, order=order, unknown=unknown, loops=loops)
+
+
+def during(read: Schedule, what: Happening) -> Schedule:
+    """Return the schedule at an instant: outputs of what samples then depend on its inputs.
+
+    Raises
+    ------
+    AlgebraicLoopError
+        If blocks that sample then depend on each other's new outputs in a circle.
+    """
+    nodes = tuple(
+        replace(node, direct=feedthrough(node.system))
+        if node.sampled and node.sampled.answers(what)
+        else node
+        for node in read.nodes
     )
+    try:
+        return _ordered(replace(read, nodes=nodes), bool(read.loops))
+    except AlgebraicLoopError as error:
+        raise AlgebraicLoopError(
+            f"{error} (all these sample at one instant: a delay or an offset of one of them would "
+            "also do)"
+        ) from None
 
 
 def _equations_of(system: Any) -> Iterator[Captured]:

@@ -12,12 +12,13 @@ import numba
 import numpy as np
 
 from ..machine.address import call_rhs
-from . import rodas5p, tsit5
 from .control import choose_method, choose_step, memory_error, next_step, rejected
 from .events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
+from .methods import rodas5p, tsit5
+from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
+from .samples import next_stop, take_samples
 from .state import DERIVATIVES, INNER, RUNNING
-from .stiff import stiff_attempt
 from .workspace import AUTO, UNKNOWN, evaluate, inputs_at
 
 # of what memories would become by the two solutions: by so much of the difference they are as
@@ -106,12 +107,6 @@ def _sample(lane, j, times, t_new, x, x_new, k, U, states):
 
 
 @numba.njit(**INNER)
-def _stop(times, lane, u):
-    """Return where a step must end: with inputs at the next corner, otherwise at the last time."""
-    return times[lane.segment + 1] if u.shape[0] and lane.segment < times.size - 1 else times[-1]
-
-
-@numba.njit(**INNER)
 def _judge(task, lanes, w, done, passed):
     """Accept or reject the step just tried in every lane, and propose the next.
 
@@ -137,7 +132,7 @@ def _judge(task, lanes, w, done, passed):
         if found == AGAIN:
             lane.rejected += 1
             continue
-        t_new = _stop(task.times, lane, w.u) if lane.ends else lane.t + lane.step
+        t_new = next_stop(task, lane, w.u) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
             _sample(lane, j, task.times, t_new, w.x, w.x_new, w.k, w.U, w.samples)
         step_accepted(lane, found == EVENT)
@@ -194,12 +189,13 @@ def advance(rhs, along, task, w, rounds):
     """
     lanes = w.lanes
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
+    sampled = np.zeros(lanes.size, np.bool_)
     for _ in range(rounds):
         running = 0
         for j in range(lanes.size):
             if lanes[j].status == RUNNING:
                 over = lanes[j].segment == task.times.size - 1
-                choose_step(lanes[j], _stop(task.times, lanes[j], w.u), over, task.max_steps)
+                choose_step(lanes[j], next_stop(task, lanes[j], w.u), over, task.max_steps)
                 running += lanes[j].status == RUNNING
         if not running:
             return
@@ -219,5 +215,9 @@ def advance(rhs, along, task, w, rounds):
                 w.e[i, j] = w.g[i, j]
         any_passed = _judge(task, lanes, w, done, passed)
         _take(task, w, done)
-        if task.memory.size and any_passed:
+        if task.ticks.size and take_samples(task, lanes, w, sampled):
+            for j in range(lanes.size):
+                passed[j] = sampled[j] or (passed[j] and task.memory.size > 0)
+            restart(rhs, task, lanes, w, passed)
+        elif task.memory.size and any_passed:
             restart(rhs, task, lanes, w, passed)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from . import tsit5
+from .methods import tsit5
 from .state import DIVERGED, FIRST_PATIENCE, INNER, OK, RUNNING, STEP_LIMIT, STEP_TOO_SMALL, STIFF
 
 SMALLEST = 4e-16  # of the time: no shorter step can be told from none

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...errors import ParameterError
 from ...names import unknown
+from ...sampling.clock import instants
 from ..codegen.along import Along, derivatives
 from ..compiled import Compiled
 from ..machine.evaluations import Machine, machine
@@ -235,13 +236,29 @@ def prepared(
         max_steps=int(settings.max_steps),
         method=METHODS[settings.method],
         alone=int(count == 1),
+        **_instants(compiled, code, times),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
     )
     signals = compiled.system.noutputs or 0
-    work = new_work(x0, times, inputs.shape[0], program.events, signals)
+    work = new_work(x0, times, inputs.shape[0], program.events, signals, len(program.sampled))
     work.lanes["stiff"] = settings.method == "rodas5p"
     return Run(machine=code, task=task, work=work)
+
+
+def _instants(compiled: Compiled, code: Machine, times: np.ndarray) -> dict[str, np.ndarray]:
+    """Return when something happens to sampled blocks, and what."""
+    program = compiled.program
+    due = instants(program.clocks, float(times[0]), float(times[-1]), program.meetings)
+    written = np.zeros((max(len(due.patterns), 1), len(program.sampled)), dtype=np.int64)
+    for k in range(len(code.samples)):
+        for store in code.lowered.functions[f"sample{k}"].plan.stores:
+            if store.array == "s":
+                written[k, store.row : store.row + store.size] = 1
+    return {
+        "ticks": due.times, "which": due.which, "samples": code.sample_entries, "due": written,
+        "sampled": np.array(program.sampled, dtype=np.int64),
+    }  # fmt: skip
 
 
 def made(run: Run, outputs: np.ndarray, j: int) -> Trajectory:

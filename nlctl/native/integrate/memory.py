@@ -69,7 +69,8 @@ def with_table(record: Any, like: Any = None, **values: Any) -> Any:
     """
     for name, wanted in like.formats.items() if like else ():
         found = np.asarray(values[name])
-        if (found.dtype, found.ndim) != wanted:
+        plain = found.dtype == object  # functions in the place of addresses, without JIT
+        if (found.dtype, found.ndim) != wanted and not plain:
             raise TypeError(
                 f"'{name}' of {record.__name__} needs {wanted[1]} dimensions of {wanted[0]}, got "
                 f"{found.ndim} of {found.dtype}"

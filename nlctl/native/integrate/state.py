@@ -42,6 +42,7 @@ _FIELDS = [
     ("judged_at", "f8"),  # time at which the methods were last compared
     ("judged_after", "i8"),  # and the steps tried until then
     ("segment", "i8"),  # interval of the time grid in which t lies
+    ("tick", "i8"),  # what happens next to sampled blocks
     ("status", "i8"),
     ("accepted", "i8"),
     ("rejected", "i8"),

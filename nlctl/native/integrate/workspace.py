@@ -13,8 +13,8 @@ import numba
 import numpy as np
 
 from ..machine.address import call_out, call_rhs
-from . import rodas5p, tsit5
 from .memory import type_of, with_table
+from .methods import rodas5p, tsit5
 from .state import INNER, new_lanes
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
@@ -36,6 +36,11 @@ class Task(NamedTuple):
     max_steps: int
     method: int
     alone: int  # whether this is a single run
+    ticks: np.ndarray  # times at which something happens to sampled blocks
+    which: np.ndarray  # which of the functions then
+    samples: np.ndarray  # these functions
+    due: np.ndarray  # (functions, sampled states): whether it makes the next state
+    sampled: np.ndarray  # indices of these states
     derivatives: int  # UNKNOWN until the stiff method asks for them
     c_along: np.ndarray  # what exact ones read besides their arguments
     table: np.ndarray
@@ -70,6 +75,7 @@ class Work(NamedTuple):
     error: np.ndarray  # of the step over its tolerance
     rate: np.ndarray  # estimate of the largest eigenvalue's magnitude (1/s)
     t_end: np.ndarray
+    s: np.ndarray  # next states of sampled blocks
     x_flat: np.ndarray  # the same memory as x, x_new, x_stage, x_ahead, k
     x_new_flat: np.ndarray
     x_stage_flat: np.ndarray
@@ -92,7 +98,9 @@ class Work(NamedTuple):
 _STATES = ("x", "x_new", "x_stage", "x_ahead", "dx_ahead")
 
 
-def new_work(x0: np.ndarray, times: np.ndarray, inputs: int, events: int, outputs: int) -> Work:
+def new_work(
+    x0: np.ndarray, times: np.ndarray, inputs: int, events: int, outputs: int, sampled: int = 0
+) -> Work:
     """Return the arrays for integrating members from `x0` (states, lanes) on."""
     n, lanes = x0.shape
     stiff = n if lanes == 1 else 0  # the stiff method is for single runs
@@ -104,6 +112,7 @@ def new_work(x0: np.ndarray, times: np.ndarray, inputs: int, events: int, output
         "hh": (n * lanes,),
         "k": (tsit5.STAGES, n, lanes),
         "u": (inputs, lanes),
+        "s": (sampled, lanes),
         **dict.fromkeys(("jacobian", "columns"), (stiff, stiff)),
         "f_t": (stiff,),
         "U": (rodas5p.STAGES, stiff),
@@ -127,7 +136,8 @@ _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
 TASK = type_of(  # only the types of these matter
     with_table(
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
-        fixed=0.0, max_steps=0, method=0, alone=0, derivatives=0, c_along=_GRID,
+        fixed=0.0, max_steps=0, method=0, alone=0, ticks=_LINE, which=_NONE, samples=_NONE,
+        due=np.zeros((1, 1), dtype=np.int64), sampled=_NONE, derivatives=0, c_along=_GRID,
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))

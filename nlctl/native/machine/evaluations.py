@@ -31,6 +31,8 @@ class Machine:
         ``prepare(p, c)`` fills these from the program's parameter vectors.
     rhs, out : callable
         ``rhs(t, x, u, c, dx, g)`` and ``out(t, x, u, c, y)``.
+    samples : tuple of callable
+        ``sample(t, x, u, c, s)`` for each meeting: the next states of sampled blocks.
     """
 
     width: int
@@ -38,6 +40,7 @@ class Machine:
     prepare: Callable[[np.ndarray, np.ndarray], None]
     rhs: Any
     out: Any
+    samples: tuple[Any, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -47,16 +50,23 @@ class Machine:
     @property
     def called_back(self) -> tuple[str, ...]:
         """Names of functions that call back into Python."""
-        return called_back((self.rhs, self.out))
+        return called_back((self.rhs, self.out, *self.samples))
 
     @property
     def entries(self) -> tuple[Any, Any]:
         """What integrators take of `rhs` and `out`."""
         return entry(self.rhs), entry(self.out)
 
+    @property
+    def sample_entries(self) -> np.ndarray:
+        """What integrators take of `samples`."""
+        found = [entry(function) for function in self.samples]
+        plain = any(callable(each) for each in found)
+        return np.array(found, dtype=object if plain else np.int64)
+
     def check(self, c: np.ndarray) -> None:
         """Raise what an opaque function has raised, with `c` as the parameters."""
-        check((self.rhs, self.out), c)
+        check((self.rhs, self.out, *self.samples), c)
 
 
 def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:
@@ -71,12 +81,16 @@ def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:
             return made
     found, schedule, program = compiled.equations, compiled.schedule, compiled.program
     if not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
-        found = equations(schedule, program.layout, p[:, 0])
+        found = equations(schedule, program.layout, p[:, 0], program.meetings)
     lowered = lower(schedule, program, width, found)
     if not lowered.holds_for(p):
         raise ValueError("members whose integers differ have no machine code in common")
-    prepare, rhs, out = lowered_code(lowered)
-    known.append(Machine(width=width, lowered=lowered, prepare=prepare, rhs=rhs, out=out))
+    prepare, rhs, out, *samples = lowered_code(lowered)
+    known.append(
+        Machine(
+            width=width, lowered=lowered, prepare=prepare, rhs=rhs, out=out, samples=tuple(samples)
+        )
+    )
     return known[-1]
 
 

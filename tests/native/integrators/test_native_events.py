@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 import nlctl
 from nlctl.native import Status
-from nlctl.native.integrate.tsit5 import A, C
+from nlctl.native.integrate.methods.tsit5 import A, C
 
 run: Any = nlctl.input_output_response
 needs_jit = pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="thousands of steps")

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from stiff_problems import hires, robertson, van_der_pol
 
 import nlctl
-from nlctl.native.integrate.rodas5p import GAMMA, NODES, A, C, D, H
+from nlctl.native.integrate.methods.rodas5p import GAMMA, NODES, A, C, D, H
 
 run: Any = nlctl.input_output_response
 needs_jit = pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="thousands of steps")

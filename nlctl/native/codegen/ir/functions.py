@@ -297,10 +297,20 @@ def _remainder(b: Body, x: Value, y: Value) -> Value:
     return b.select(b.compare("oeq", rest, 0.0), b.intrinsic("copysign", 0.0, y), rest)
 
 
+def _logaddexp(b: Body, x: Value, y: Value) -> Value:
+    """max(x, y) + ln(1 + e^-|x - y|), which neither overflows nor asks for inf - inf."""
+    x, y = b.same(x, y)
+    larger, apart = _extreme("ogt")(b, x, y), b.sub(x, y, exact=True)
+    small = _call(b, "exp", _exp, b.sub(0.0, b.intrinsic("fabs", apart), exact=True))[0]
+    rest = b.select(b.compare("oeq", x, y), math.log(2.0), b.each("log1p", small))
+    return b.add(larger, rest, exact=True)
+
+
 CALLED = {"exp": _exp, "exp2": _exp2, "tanh": _tanh, "sin": _sin, "cos": _cos}
 INLINE = {
     "minimum": _extreme("olt"),
     "maximum": _extreme("ogt"),
+    "logaddexp": _logaddexp,
     "sign": _sign,
     "remainder": _remainder,
 }

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..machine.address import call_along
+from ...machine.address import call_along
+from ..control import TRIAL, memory_error
+from ..state import INNER
+from ..workspace import DIFFERENCES, evaluate, inputs_at
 from . import rodas5p
-from .control import TRIAL, memory_error
-from .state import INNER
-from .workspace import DIFFERENCES, evaluate, inputs_at
 
 RELATIVE = 1.5e-8  # square root of the machine precision
 FLOOR = 1e-4  # a state smaller than this is varied as if it were so large

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .state import INNER
+from ..state import INNER
 
 STAGES = 8
 GAMMA = 0.21193756319429014

@@ -1,0 +1,365 @@
+"""What faults on the signals of the loop do, one at a time and in pairs."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import control as ct
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from analysis.robustness import Experiment, Prepared, Uncertain, from_table, nominal, prepare
+from analysis.robustness.runs.experiment import by_diagram, simulate
+from analysis.robustness.stl.spec import violates
+from analysis.robustness.stl.violation_time import ViolationTime, violation_time
+from nlctl.errors import ParameterError
+from nlctl.faults import NEVER, Fault, with_faults
+from nlctl.names import unknown
+from nlctl.native import Status
+
+from ... import figures as figures
+from ...report.document import Figure, Paragraph, Table
+from ..build import faults_of
+from ..file.field_types import Flag, Names, Size
+from ..finding import Finding
+from ..kind import Asked, Ground, Kind, Setup, made
+from ..page import text as text
+from ..page.text import margin_text
+
+if TYPE_CHECKING:
+    from ...report.document import Item
+    from ..result import Result
+
+__all__ = ["FAULTS"]
+
+TOGETHER = 256  # unfinished runs that are simulated again side by side
+MOST = 40  # rows of the table of pairs
+MARGINS = "Least margin that each fault leaves, worst first, drawn between −1 and 1."
+PAIRS = (
+    "Least margin under each pair of faults, on the diagonal under one alone, drawn between −1 and "
+    "1. Cross: violated."
+)
+EFFECTS = (
+    "Each fault by itself, worst first: the least margin, and the time from the onset to the "
+    "violation of each requirement; –: not violated."
+)
+
+
+class Faults(Asked):
+    """What the faults under [faults] do to the nominal loop, one at a time and in pairs."""
+
+    onset: Size | tuple[Size, ...] = Field(description="When a fault begins (s); several: each.")
+    pairs: Flag = Field(True, description="Whether every two faults are also tried together.")
+    tolerates: Names = Field(
+        (), description="Claim: under each of these, 'SIGNAL KIND', the spec holds."
+    )
+
+    @property
+    def onsets(self) -> tuple[float, ...]:
+        """The onsets, also where there is only one."""
+        return self.onset if isinstance(self.onset, tuple) else (self.onset,)
+
+    @property
+    def claim(self) -> str:
+        told = ", ".join(self.tolerates)
+        return f"the spec holds under each of: {told}" if told else ""
+
+
+def _faults(setup: Setup) -> dict[str, Fault]:
+    """Return the faults of a study by name."""
+    every = (faults_of(signal, faulty) for signal, faulty in setup.study.faults.items())
+    return {name: fault for found in every for name, fault in found.items()}
+
+
+def _faulty(
+    build: Any, options: Mapping[str, Any], faults: Sequence[Fault]
+) -> ct.InterconnectedSystem:
+    """Return the loop with all faults in it; which of them begin is said by parameters."""
+    return with_faults(build(**options), *faults)
+
+
+def _experiment(asked: Faults, setup: Setup) -> Experiment:
+    """Return what the rows are run with: the loop of nominal options, its faults' onsets varied."""
+    own, faults = setup.experiment, _faults(setup)
+    options = {c.name: c.options[c.nominal] for c in own.space.choices}
+    onsets = tuple(
+        Uncertain(name=_onset(fault), bounds=(0.0, NEVER), nominal=NEVER, unit="s")
+        for fault in faults.values()
+    )
+    space = replace(own.space, quantities=(*own.space.quantities, *onsets), choices=())
+    times = tuple(ViolationTime(requirement=r) for r in own.spec.requirements)
+    return replace(
+        own,
+        space=space,
+        build=partial(_faulty, own.build, options, tuple(faults.values())),
+        metrics=(*own.metrics, *times),  # type: ignore[arg-type]
+    )
+
+
+def _onset(fault: Fault) -> str:
+    return f"{fault.name}.onset"
+
+
+def _check(asked: Faults, setup: Setup) -> None:
+    """Refuse an analysis without faults, an onset that comes too late, unknown names."""
+    faults = _faults(setup)
+    if not faults:
+        raise ParameterError("'faults' needs signals and kinds of faults under [faults], got none")
+    end = float(setup.experiment.timepts[-1])
+    for onset in asked.onsets:
+        if not onset < end:
+            raise ParameterError(f"'faults' needs onset < {end:g} s, the end, got {onset:g}")
+    for name in asked.tolerates:
+        if name not in faults:
+            raise unknown("fault", name, faults)
+    _experiment(asked, setup).build()
+
+
+def _cases(asked: Faults, setup: Setup) -> list[tuple[tuple[str, ...], float]]:
+    """Return which faults begin in each row, and when; none in the first."""
+    names = list(_faults(setup))
+    single = [(name,) for name in names]
+    chosen = [*single, *(combinations(names, 2) if asked.pairs else ())]
+    return [((), NEVER), *((which, onset) for onset in asked.onsets for which in chosen)]
+
+
+def _runs(asked: Faults, setup: Setup) -> int:
+    return len(_cases(asked, setup))
+
+
+def _run(asked: Faults, ground: Ground) -> Finding | None:
+    """Run the loop without a fault, with each, and with every two."""
+    setup, faults = ground.setup, _faults(ground.setup)
+    if not faults:
+        raise ParameterError("no faults under [faults]")
+    prepared, cases = prepare(_experiment(asked, setup)), _cases(asked, setup)
+    space = prepared.experiment.space
+    onsets = dict(zip(faults, space.names[-len(faults) :], strict=True))
+    rows = pd.DataFrame([nominal(space)] * len(cases))
+    for i, (which, onset) in enumerate(cases):
+        for name in which:
+            rows.loc[i, onsets[name]] = onset
+    done = ground.run_design(from_table(space, rows, entropy=ground.seed), prepared)
+    if not done.complete:
+        return None
+    table = done.table
+    effects = pd.DataFrame(
+        {
+            "first": [which[0] if which else "" for which, _ in cases],
+            "second": [which[1] if len(which) > 1 else "" for which, _ in cases],
+            "onset": [onset if which else np.inf for which, onset in cases],
+            "margin": table["spec"].to_numpy(),
+            "status": table["status"].astype(str).to_numpy(),
+        }
+    )
+    effects = effects.join(_times(prepared, table)).rename_axis("row")
+    return _found(asked, effects)
+
+
+def _times(prepared: Prepared, table: pd.DataFrame) -> pd.DataFrame:
+    """Return when each requirement is violated, also where the run did not reach its end."""
+    requirements = prepared.experiment.spec.requirements
+    keys = {r.key: ViolationTime(requirement=r).key for r in requirements}
+    times = {key: table[key].to_numpy(dtype=float).copy() for key in keys.values()}
+    signals = sorted({s for r in requirements for s in r.signals})
+    unfinished = np.flatnonzero(table["status"].astype(str).to_numpy() != Status.OK.name)
+    for start in range(0, unfinished.size, TOGETHER):
+        chosen = unfinished[start : start + TOGETHER]
+        part = table.iloc[chosen].filter(prepared.experiment.space.names)
+        for loop, rows in by_diagram(prepared, part):
+            again = simulate(prepared.experiment, loop, rows, keep=signals)
+            for i, row in enumerate(chosen):
+                samples = {s: again.signals[s][i] for s in signals}
+                for r in requirements:
+                    times[keys[r.key]][row] = violation_time(r, again.time, samples)
+    return pd.DataFrame(times)
+
+
+def _single(effects: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows with one fault."""
+    alone = (effects["first"] != "").to_numpy() & (effects["second"] == "").to_numpy()
+    return effects.loc[alone]
+
+
+def _pairs(effects: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows with two."""
+    return effects.loc[(effects["second"] != "").to_numpy()]
+
+
+def _violating(effects: pd.DataFrame) -> pd.DataFrame:
+    return effects.loc[violates(effects["margin"])]
+
+
+def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
+    """Return what the effects say, in a sentence, and the answer to the claim."""
+    single, pairs = _single(effects), _pairs(effects)
+    bad, bad_pairs = _violating(single), _violating(pairs)
+    alone = float(effects["margin"].iloc[0])
+    singly = {(row["first"], row["onset"]) for row in bad.to_dict("records")}
+    only = [
+        number
+        for number, row in bad_pairs.to_dict("index").items()
+        if not {(row["first"], row["onset"]), (row["second"], row["onset"])} & singly
+    ]
+    worst = single.sort_values("margin", kind="stable").to_dict("records")[0]
+    words = (
+        f"The loop without a fault {'meets' if alone > 0 else 'already violates'} the spec (margin "
+        f"{margin_text(alone)}). {len(bad)} of {len(single)} single faults violate it; the worst "
+        f"is {worst['first']} at {worst['onset']:g} s (margin {margin_text(worst['margin'])})."
+    )
+    if asked.pairs:
+        words += (
+            f" So do {len(bad_pairs)} of {len(pairs)} pairs, {len(only)} of them although neither "
+            "fault does alone."
+        )
+    numbers = {
+        "nominal_margin": alone,
+        "singles": len(single),
+        "singles_violating": len(bad),
+        "pairs": len(pairs),
+        "pairs_violating": len(bad_pairs),
+        "only_together": only,
+    }
+    return made(
+        asked,
+        f"{words} Nominal values, one run each: nothing is said of other onsets or magnitudes.",
+        **_answer(asked, bad),
+        runs=len(effects),
+        numbers=numbers,
+        tables={"effects": effects},
+    )
+
+
+def _answer(asked: Faults, violating: pd.DataFrame) -> dict[str, str]:
+    """Return the answer to the claim that faults are tolerated."""
+    if not asked.tolerates:
+        return {}
+    return {"answer": "refuted" if set(asked.tolerates) & set(violating["first"]) else "shown"}
+
+
+def _largest(asked: Faults, quantities: int) -> int:
+    return len(asked.onsets)
+
+
+def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+    """Return the least margin under the faults that are claimed to be tolerated."""
+    effects = finding.tables["effects"]
+    every = _single(effects).sort_values("margin", kind="stable").to_dict("records")
+    least = next(row for row in every if row["first"] in asked.tolerates)
+    margin = margin_text(least["margin"])
+    measured = f"least margin {margin} (1), {least['first']}"
+    return {"measured": measured, "limit": "> 0", "margin": margin}
+
+
+def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+    """Yield the margins under each fault and each pair, and when what is violated."""
+    effects = finding.tables["effects"].sort_values("margin", kind="stable")
+    several = len(asked.onsets) > 1
+    single = _single(effects)
+    names = [_label(row, several) for row in single.to_dict("records")]
+    margin = pd.Series(single["margin"].to_numpy(), index=names)
+    yield Figure(
+        key=f"{key}-margins",
+        caption=MARGINS,
+        description=f"{MARGINS} "
+        + "; ".join(f"{n}: {margin_text(m)}" for n, m in zip(names, margin, strict=True)),
+        figure=figures.fault_margins(margin),
+    )
+    yield _effects(single, EFFECTS, result, finding.key)
+    pairs = _pairs(effects)
+    if not len(pairs):
+        return
+    for i, onset in enumerate(asked.onsets, 1):
+        at = f" Onset {onset:g} s." if several else ""
+        yield Figure(
+            key=f"{key}-pairs-{i}",
+            caption=PAIRS + at,
+            description=f"{PAIRS}{at} {finding.sentence}",
+            figure=figures.fault_pairs(_matrix(effects, onset)),
+        )
+    more = f" The {MOST} worst of {len(pairs)}; {finding.key}/effects.parquet has all."
+    caption = "Pairs of faults, worst first." + more * (len(pairs) > MOST)
+    yield _effects(pairs.head(MOST), caption, result, finding.key, folded=True)
+    yield Paragraph(
+        text="A row again, by its number:",
+        code=f"nlctl replay {shlex.quote(str(result.folder))} ROW --part {finding.key}",
+    )
+
+
+def _label(row: Mapping[Any, Any], with_onset: bool) -> str:
+    both = f"{row['first']} + {row['second']}" if row["second"] else str(row["first"])
+    return f"{both} at {row['onset']:g} s" if with_onset else both
+
+
+def _matrix(effects: pd.DataFrame, onset: float) -> pd.DataFrame:
+    """Return the margins of one onset as a symmetric table, single faults on the diagonal."""
+    rows = [row for row in effects.to_dict("records") if row["onset"] == onset]
+    names = sorted({row["first"] for row in rows})
+    place = {name: i for i, name in enumerate(names)}
+    square = np.full((len(names), len(names)), np.nan)
+    for row in rows:
+        i, j = place[row["first"]], place[row["second"] or row["first"]]
+        square[i, j] = square[j, i] = row["margin"]
+    return pd.DataFrame(square, index=names, columns=names)
+
+
+def _effects(
+    effects: pd.DataFrame, caption: str, result: Result, part: str, *, folded: bool = False
+) -> Table:
+    """Return a table of effects, with the command that runs each row again."""
+    folder = shlex.quote(str(result.folder))
+    keys, step = list(result.requirements.index), result.study.time.step
+    times = [f"{key} violated at" for key in keys]
+    return Table(
+        caption=caption,
+        columns=("fault", "onset (s)", "margin", *(f"{k} after (s)" for k in keys), "replay"),
+        rows=[
+            (
+                _label(row, with_onset=False),
+                row["onset"],
+                margin_text(row["margin"]),
+                *(_after(row[t], row["onset"], step) for t in times),
+                f"nlctl replay {folder} {number} --part {part}",
+            )
+            for number, row in effects.to_dict("index").items()
+        ],
+        folded=folded,
+    )
+
+
+def _after(time: float, onset: float, step: float) -> str:
+    """Return the time from the onset to a violation, which samples tell to within a `step`.
+
+    One before the onset has nothing to do with the fault.
+    """
+    if not np.isfinite(time):
+        return "–"
+    if time < onset - step:
+        return "before"
+    return f"{max(time - onset, 0.0):.4g}" if time - onset > step else f"≤ {step:g}"
+
+
+FAULTS = Kind(
+    name="faults",
+    schema=Faults,
+    run=_run,
+    title="Faults",
+    answers="what the faults under `[faults]` do, one at a time and in pairs, worst first",
+    claims="the spec holds under each of `tolerates`",
+    method=(
+        "Each fault is a block in a wire of the loop, all in one compiled diagram; which of them "
+        "begin, and when, are parameters. Rows are nominal but for these."
+    ),
+    check=_check,
+    runs=_runs,
+    largest=_largest,
+    experiment=_experiment,
+    measured=_measured,
+    items=_items,
+)

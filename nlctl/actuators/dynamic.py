@@ -1,0 +1,171 @@
+"""Actuators with dynamics: rate limiter, first-order and second-order lag."""
+
+from __future__ import annotations
+
+from ..arguments import number
+from ..equations import equation
+from ..functions import clip
+from ..params import param, record
+
+__all__ = ["Lag", "RateLimiter", "SecondOrderLag"]
+
+LAGS_BEHIND = "its output is a state that follows u later, no function v = k(u, t) u + eps_u of u"
+
+
+@record
+class RateLimiter:
+    """Rate limiter: an output that follows u no faster than it may.
+
+        v' = min(max(K (u - v), fall), rise)
+
+    While |v' | is within the limits, v follows u with the time constant 1/K; an ideal limiter, the
+    limit of large K, follows at once (Rundqwist, Stahl-Gunnarsson, Phase compensation of rate
+    limiters, CCA 1996).  A ramp slower than the limits is followed u' / K behind it.  The price of
+    a large K is a stiff state.
+
+    It does not obey (2): v depends on the past of u.
+
+    Parameters
+    ----------
+    v0 : float, optional
+        Output at the start.
+    """
+
+    rise: float = param(1.0, unit="1/s", meaning="greatest v'", above=0)
+    fall: float = param(-1.0, unit="1/s", meaning="least v'", below=0)
+    K: float = param(100.0, unit="1/s", meaning="gain that follows u within the limits", above=0)
+    v0: float = 0.0
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ("v",)
+    feedthrough = False
+    no_split = LAGS_BEHIND
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The output starts from v0."""
+        return {"v": float(self.v0)}
+
+    def check(self) -> None:
+        """The output starts somewhere."""
+        number("RateLimiter", "v0", self.v0)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """The limited rate."""
+        (v,) = x
+        return (clip(p.K * (u[0] - v), p.fall, p.rise),)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The state."""
+        (v,) = x
+        return (v,)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where the limits begin and end to count."""
+        (v,) = x
+        return p.K * (u[0] - v) - p.rise, p.K * (u[0] - v) - p.fall
+
+
+@record
+class Lag:
+    """First-order lag.
+
+        v' = (k u - v) / T
+
+    It does not obey (2): v depends on the past of u.
+
+    Parameters
+    ----------
+    v0 : float, optional
+        Output at the start.
+    """
+
+    k: float = param(1.0, unit="1", meaning="gain")
+    T: float = param(0.05, unit="s", meaning="time constant", above=0)
+    v0: float = 0.0
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ("v",)
+    feedthrough = False
+    no_split = LAGS_BEHIND
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The output starts from v0."""
+        return {"v": float(self.v0)}
+
+    def check(self) -> None:
+        """The output starts somewhere."""
+        number("Lag", "v0", self.v0)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """The lag."""
+        (v,) = x
+        return ((p.k * u[0] - v) / p.T,)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The state."""
+        (v,) = x
+        return (v,)
+
+
+@record
+class SecondOrderLag:
+    """Second-order lag.
+
+        v'' = omega^2 (k u - v) - 2 zeta omega v'
+
+    zeta < 1 overshoots, by exp(-pi zeta / sqrt(1 - zeta^2)) of a step.  It does not obey (2): v
+    depends on the past of u.
+
+    Parameters
+    ----------
+    v0 : float, optional
+        Output at the start; it starts at rest.
+    """
+
+    k: float = param(1.0, unit="1", meaning="gain")
+    omega: float = param(20.0, unit="rad/s", meaning="natural frequency", above=0)
+    zeta: float = param(0.7, unit="1", meaning="damping ratio", at_least=0)
+    v0: float = 0.0
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ("v", "v1")
+    feedthrough = False
+    no_split = LAGS_BEHIND
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The output starts from v0, at rest."""
+        return {"v": float(self.v0)}
+
+    def check(self) -> None:
+        """The output starts somewhere."""
+        number("SecondOrderLag", "v0", self.v0)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """The output's rate, and the oscillator."""
+        v, v1 = x
+        return v1, p.omega * (p.omega * (p.k * u[0] - v) - 2 * p.zeta * v1)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The first state."""
+        v, _ = x
+        return (v,)

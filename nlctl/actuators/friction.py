@@ -1,0 +1,264 @@
+"""Friction as a force law of velocity: Coulomb, Stribeck, Dahl, LuGre, Bouc-Wen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..equations import equation
+from ..errors import ParameterError
+from ..params import param, record
+
+__all__ = ["BoucWen", "Coulomb", "Dahl", "LuGre", "Stribeck"]
+
+FORCE_LAW = "it is a force law of a velocity, no actuator from u to v"
+
+
+@equation
+def stribeck_level(velocity, p):
+    """Steady friction level, F_c + (F_s - F_c) exp(-(velocity / v_s)^2)."""
+    return p.F_c + (p.F_s - p.F_c) * np.exp(-((velocity / p.v_s) ** 2))
+
+
+@equation
+def bristle_rate(z, velocity, p):
+    """Rate z' at which the bristles of the LuGre model bend."""
+    return velocity - p.sigma_0 * np.abs(velocity) * z / stribeck_level(velocity, p)
+
+
+def check_levels(spec: LuGre | Stribeck) -> None:
+    """Friction at rest is not below that of motion."""
+    if not spec.F_c <= spec.F_s:
+        raise ParameterError(
+            f"{type(spec).__name__} needs F_c <= F_s, got {spec.F_c:g} and {spec.F_s:g}"
+        )
+
+
+@record
+class Coulomb:
+    """Coulomb and viscous friction.
+
+        force = F_c sign(velocity) + sigma_2 velocity
+
+    A force law for velocities that keep their sign, or change it.  It does not hold a mass at
+    rest: there the sign chatters, and a run ends at the limit of its steps; `LuGre` sticks.
+    """
+
+    F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
+    sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
+
+    inputs = ("velocity",)
+    outputs = ("force",)
+    states = ()
+    feedthrough = True
+    no_split = FORCE_LAW
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The force law."""
+        (velocity,) = u
+        return (p.F_c * np.sign(velocity) + p.sigma_2 * velocity,)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where the velocity changes its sign."""
+        return (u[0],)
+
+
+@record
+class Stribeck:
+    """Friction that falls from rest to motion (Stribeck effect).
+
+        force = g(velocity) sign(velocity) + sigma_2 velocity
+        g(velocity) = F_c + (F_s - F_c) exp(-(velocity / v_s)^2)
+
+    (Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30, 1994, p. 1083.)  With F_s = F_c it
+    is `Coulomb`; it does not hold a mass at rest either.
+    """
+
+    F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
+    F_s: float = param(1.5, unit="N", meaning="static friction", above=0)
+    v_s: float = param(1e-3, unit="m/s", meaning="Stribeck velocity", above=0)
+    sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
+
+    inputs = ("velocity",)
+    outputs = ("force",)
+    states = ()
+    feedthrough = True
+    no_split = FORCE_LAW
+
+    def check(self) -> None:
+        """Static friction is not below Coulomb friction."""
+        check_levels(self)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The force law."""
+        (velocity,) = u
+        return (stribeck_level(velocity, p) * np.sign(velocity) + p.sigma_2 * velocity,)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where the velocity changes its sign."""
+        return (u[0],)
+
+
+@record
+class Dahl:
+    """Dahl's model of friction before sliding.
+
+        force' = sigma_0 (velocity - |velocity| force / F_c)
+
+    that is d force / d position = sigma_0 (1 - sign(velocity) force / F_c) (Dahl, AIAA Journal 14,
+    1976, p. 1675, with the exponent 1).  |force| <= F_c if it is so at the start.  The force is a
+    function of the path alone: it is rate-independent.
+    """
+
+    sigma_0: float = param(1e5, unit="N/m", meaning="stiffness before sliding", above=0)
+    F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
+
+    inputs = ("velocity",)
+    outputs = ("force",)
+    states = ("force",)
+    feedthrough = False
+    no_split = FORCE_LAW
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """The force along the path."""
+        (force,) = x
+        (velocity,) = u
+        return (p.sigma_0 * (velocity - np.abs(velocity) * force / p.F_c),)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The state."""
+        (force,) = x
+        return (force,)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where the velocity changes its sign."""
+        return (u[0],)
+
+
+@record
+class LuGre:
+    """LuGre model of friction: bristles that bend, and slip.
+
+        z'    = velocity - sigma_0 |velocity| z / g(velocity)
+        force = sigma_0 z + sigma_1 z' + sigma_2 velocity
+        g(velocity) = F_c + (F_s - F_c) exp(-(velocity / v_s)^2)
+
+    (Canudas de Wit, Olsson, Åström, Lischinsky, IEEE Transactions on Automatic Control 40, 1995,
+    p. 419; defaults from their table 1.)  |z| <= F_s / sigma_0 if it is so at the start.  At a
+    constant velocity the force tends to that of `Stribeck`.
+    """
+
+    sigma_0: float = param(1e5, unit="N/m", meaning="stiffness of the bristles", above=0)
+    sigma_1: float = param(
+        float(np.sqrt(1e5)), unit="N s/m", meaning="damping of the bristles", at_least=0
+    )
+    sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
+    F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
+    F_s: float = param(1.5, unit="N", meaning="static friction", above=0)
+    v_s: float = param(1e-3, unit="m/s", meaning="Stribeck velocity", above=0)
+
+    inputs = ("velocity",)
+    outputs = ("force",)
+    states = ("z",)
+    feedthrough = True
+    no_split = FORCE_LAW
+
+    def check(self) -> None:
+        """Static friction is not below Coulomb friction."""
+        check_levels(self)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """The mean deflection of the bristles."""
+        (z,) = x
+        (velocity,) = u
+        return (bristle_rate(z, velocity, p),)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The force of bent bristles and of viscosity."""
+        (z,) = x
+        (velocity,) = u
+        damping = p.sigma_1 * bristle_rate(z, velocity, p)
+        return (p.sigma_0 * z + damping + p.sigma_2 * velocity,)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where the velocity changes its sign."""
+        return (u[0],)
+
+
+@record
+class BoucWen:
+    """Bouc-Wen model of a hysteretic restoring force.
+
+        z' = alpha velocity - beta (gamma |velocity| |z|^(nu - 1) z + delta velocity |z|^nu)
+        force = z
+
+    in the form of the benchmark of Noël and Schoukens (Workshop on Nonlinear System Identification
+    Benchmarks, 2016), whose values are the defaults; its mass, damper and spring are 2 kg,
+    10 N s/m and 5e4 N/m.  z is a function of the path alone: it is rate-independent.
+
+    If gamma + delta > 0 and gamma >= delta, |z| <= (alpha / (beta (gamma + delta)))^(1 / nu) if it
+    is so at the start (Ikhouane, Rodellar, Systems with Hysteresis, 2007, chapter 2).  With the
+    benchmark's values gamma + delta < 0: along a path in one direction z grows without bound.
+    """
+
+    alpha: float = param(5e4, unit="N/m", meaning="stiffness at z = 0", above=0)
+    beta: float = param(1e3, unit="1/m", meaning="strength of the hysteresis", above=0)
+    gamma: float = param(0.8, unit="N^(1-nu)", meaning="part that opposes z")
+    delta: float = param(-1.1, unit="N^(1-nu)", meaning="part that opposes the velocity")
+    nu: float = param(1.0, unit="1", meaning="sharpness of the transition", at_least=1)
+
+    inputs = ("velocity",)
+    outputs = ("force",)
+    states = ("z",)
+    feedthrough = False
+    no_split = FORCE_LAW
+
+    @property
+    def z_max(self) -> float:
+        """Bound of |z|; infinite where there is none."""
+        sum_, difference = self.gamma + self.delta, self.gamma - self.delta
+        if not (sum_ > 0 and difference >= 0):
+            return float("inf")
+        return float((self.alpha / (self.beta * sum_)) ** (1 / self.nu))
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """The hysteretic force along the path."""
+        (z,) = x
+        (velocity,) = u
+        size = np.abs(z) ** p.nu
+        opposing = p.gamma * np.abs(velocity) * np.sign(z) * size + p.delta * velocity * size
+        return (p.alpha * velocity - p.beta * opposing,)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The state."""
+        (z,) = x
+        return (z,)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where the velocity or z changes its sign."""
+        return u[0], x[0]

@@ -1,0 +1,182 @@
+"""Inverses of actuators, as compensators in front of them: dead zone, sum of plays.
+
+An inverse takes the wanted output of the actuator as its input u; its own output v is what the
+actuator needs.  ``cascade({"inverse": DeadZoneInverse(), "zone": DeadZone(...)})`` is then v = u.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..equations import equation
+from ..params import param, record
+from .memories import checked_start, memory_names, started
+from .prandtl_ishlinskii import (
+    check_thresholds,
+    check_weights,
+    unit_contact,
+    unit_play,
+    weighted_band,
+    weighted_plays,
+)
+
+__all__ = ["DeadZoneInverse", "PrandtlIshlinskiiInverse"]
+
+
+@record
+class DeadZoneInverse:
+    """Right inverse of a dead zone with constant slopes.
+
+        v = u / slope_r + b_r    u > 0
+            0                    u = 0
+            u / slope_l + b_l    u < 0
+
+    (Tao, Kokotovic, IEEE Transactions on Automatic Control 39, 1994, p. 59.)  A `DeadZone` with
+    these parameters and without ripple has the output u.  The inverse jumps at u = 0.
+
+    It obeys (2) with k between 1 / slope_r and 1 / slope_l and eps_u between b_l and b_r.
+    """
+
+    slope_r: float = param(1.0, unit="1", meaning="slope on the right of the dead zone", above=0)
+    slope_l: float = param(0.8, unit="1", meaning="slope on the left of the dead zone", above=0)
+    b_r: float = param(0.5, unit="1", meaning="right break point of the dead zone", above=0)
+    b_l: float = param(-0.3, unit="1", meaning="left break point of the dead zone", below=0)
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ()
+    feedthrough = True
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Bounds (k_1, k_2) of k in (2): the slopes of the inverse."""
+        slopes = 1 / self.slope_r, 1 / self.slope_l
+        return min(slopes), max(slopes)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """What the dead zone needs."""
+        (wanted,) = u
+        if wanted > 0:
+            return (wanted / p.slope_r + p.b_r,)
+        if wanted < 0:
+            return (wanted / p.slope_l + p.b_l,)
+        return (wanted,)  # 0, or NaN
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """The jump."""
+        return (u[0],)
+
+    @staticmethod
+    @equation
+    def band(t, u, p):
+        """Least and greatest output near input u: at the jump, from one side to the other."""
+        right, left = u / p.slope_r, u / p.slope_l
+        return np.minimum(right, left) + p.b_l, np.maximum(right, left) + p.b_r
+
+
+@record
+class PrandtlIshlinskiiInverse:
+    """Inverse of a Prandtl-Ishlinskii operator, which is one as well.
+
+        v = W_0 u + sum_i W_i H_i,   H_i = min(max(H_i(t-), u - R_i), u + R_i)
+        W_0 = 1 / w_0,   W_i = 1 / m_i - 1 / m_(i-1),   m_i = w_0 + w_1 + ... + w_i
+        R_i = w_0 r_i + sum_(j <= i) w_j (r_i - r_j)
+
+    (Kuhnen, European Journal of Control 9, 2003, p. 407.)  w_0, w, r and v0 are those of the
+    operator.  Operator and inverse, one behind the other in either order, are the identity, if the
+    memories v0 fit each other as after some input: |v0[i] - v0[i-1]| <= r_i - r_(i-1).
+
+    It obeys (2) with the gain k = 1 / (w_0 + sum w_i) and |eps_u| <= sum |W_i| R_i.  In
+    python-control its memories relax as those of `PrandtlIshlinskii`.
+
+    Parameters
+    ----------
+    v0 : float or tuple of float, optional
+        Memories of the operator at the start: one for all, or one each.
+    """
+
+    w_0: float = param(0.6, unit="1", meaning="weight of u in the operator", above=0)
+    w: tuple[float, ...] = param(
+        (0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the operator's plays"
+    )
+    r: tuple[float, ...] = param(
+        (0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds of the operator, increasing", above=0
+    )
+    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memories", above=0)
+    v0: float | tuple[float, ...] = 0.0
+
+    inputs = ("u",)
+    outputs = ("v",)
+    feedthrough = True
+    vector = True
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names memory[0], ..., one for each play."""
+        return memory_names("memory", len(self.r))
+
+    memory = states
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """Memories that fit those of the operator."""
+        z = np.broadcast_to(np.asarray(self.v0, dtype=float), (len(self.r),))
+        w = np.array(self.w)
+        own = [
+            (self.w_0 + w[: i + 1].sum()) * z[i] + w[i + 1 :] @ z[i + 1 :] for i in range(len(w))
+        ]
+        return started("memory", own, len(self.r))
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Bounds (k_1, k_2) of k in (2): the slope of every play at its sides together."""
+        k = float(1 / (self.w_0 + np.sum(self.w)))
+        return k, k
+
+    def check(self) -> None:
+        """The operator has an increasing loading curve, and as many memories as thresholds."""
+        check_weights(self, "so that the operator has an inverse")
+        check_thresholds(self)
+        checked_start(self, len(self.r))
+
+    def derived(self) -> dict[str, Any]:
+        """Weights W_0, W and thresholds R of the inverse."""
+        m = self.w_0 + np.cumsum([0.0, *self.w])
+        r = np.array([0.0, *self.r])
+        return {"W_0": 1 / m[0], "W": np.diff(1 / m), "R": np.cumsum(m[:-1] * np.diff(r))}
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Relaxation of the memories onto the plays."""
+        return p.rate * (unit_play(u[0], x, p.R) - x)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The weighted sum."""
+        return (weighted_plays(u[0], x, p.W_0, p.W, p.R),)
+
+    @staticmethod
+    @equation
+    def commit(t, x, u, p):
+        """The plays."""
+        return unit_play(u[0], x, p.R)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Contact of each play with either side of its gap."""
+        return np.concatenate(unit_contact(u[0], x, p.R))
+
+    @staticmethod
+    @equation
+    def band(t, u, p):
+        """Least and greatest output at input u."""
+        return weighted_band(u, p.W_0, p.W, p.R)

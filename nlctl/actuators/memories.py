@@ -1,0 +1,38 @@
+"""Several memories in one block: their names, and where they start."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..arguments import vector
+from ..errors import ParameterError
+
+__all__ = ["checked_start", "memory_names", "started"]
+
+
+def memory_names(name: str, count: int) -> tuple[str, ...]:
+    """Return the names of states, ``memory[0]``, ``memory[1]``, ..."""
+    return tuple(f"{name}[{i}]" for i in range(count))
+
+
+def started(name: str, v0: Any, count: int) -> dict[str, float]:
+    """Return the initial values of `count` memories from one number for all, or one each."""
+    values = np.broadcast_to(np.asarray(v0, dtype=float), (count,))
+    return {f"{name}[{i}]": float(values[i]) for i in range(count)}
+
+
+def checked_start(spec: Any, count: int) -> np.ndarray:
+    """Return a record's v0 as an array.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither one finite number nor `count` of them.
+    """
+    who = type(spec).__name__
+    given = vector(who, "v0", np.atleast_1d(spec.v0))
+    if given.size not in (1, count):
+        raise ParameterError(f"{who} needs v0 to be 1 or {count} numbers, got {given.size}")
+    return given

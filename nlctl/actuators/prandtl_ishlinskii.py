@@ -1,0 +1,287 @@
+"""Hysteresis of plays: stop, Prandtl-Ishlinskii operator, one-sided dead zones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..arguments import number
+from ..equations import equation
+from ..errors import ParameterError
+from ..functions import clip
+from ..params import param, record
+from .memories import checked_start, memory_names, started
+from .static import BOUNDED_OUTPUT
+
+__all__ = ["OneSidedDeadZones", "PrandtlIshlinskii", "Stop"]
+
+
+@equation
+def unit_play(u, memory, r):
+    """Plays with unit slope and half gaps r: the memories clipped into [u - r, u + r]."""
+    return clip(memory, u - r, u + r)
+
+
+@equation
+def unit_contact(u, memory, r):
+    """How far plays are from either side of their gaps; exactly 0 where they touch it."""
+    return memory - (u - r), memory - (u + r)
+
+
+@equation
+def weighted_plays(u, memories, w_0, w, r):
+    """Prandtl-Ishlinskii operator: u and its plays, weighted."""
+    return w_0 * u + np.sum(w * unit_play(u, memories, r))
+
+
+@equation
+def weighted_band(u, w_0, w, r):
+    """Least and greatest value of the operator at input u, whatever the memories."""
+    middle, half = (w_0 + np.sum(w)) * u, np.sum(np.abs(w) * r)
+    return middle - half, middle + half
+
+
+@record
+class Stop:
+    """Stop operator, the elastic-plastic element dual to the play.
+
+        v = u - w,   w = min(max(w(t-), u - r), u + r)
+
+    w is the play of half gap r, and its last value the memory.  Stop and play add up to u
+    (Brokate, Sprekels, Hysteresis and Phase Transitions, 1996, section 2.3).  v follows the
+    changes of u until |v| = r, and stays there until u reverses.
+
+    It does not obey (2): |v| <= r for all u.  In python-control the memory relaxes onto the play,
+    as with `nlctl.Backlash`.
+
+    Parameters
+    ----------
+    v0 : float, optional
+        Memory w(0-) of the play at the start, the initial value of the state ``memory``.  The
+        output lies in [-r, r] from the first instant, whatever it is.
+    """
+
+    r: float = param(1.0, unit="1", meaning="largest |v|, half gap of the play", above=0)
+    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memory", above=0)
+    v0: float = 0.0
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ("memory",)
+    memory = ("memory",)
+    feedthrough = True
+    no_split = BOUNDED_OUTPUT
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The play starts from w(0-)."""
+        return {"memory": float(self.v0)}
+
+    def check(self) -> None:
+        """The memory has a finite start."""
+        number("Stop", "v0", self.v0)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Relaxation of the memory onto the play."""
+        (memory,) = x
+        return (p.rate * (unit_play(u[0], memory, p.r) - memory),)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """What the play leaves of u."""
+        (memory,) = x
+        return (u[0] - unit_play(u[0], memory, p.r),)
+
+    @staticmethod
+    @equation
+    def commit(t, x, u, p):
+        """The play."""
+        (memory,) = x
+        return (unit_play(u[0], memory, p.r),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where it begins or ends to yield: contact with either side of the gap."""
+        (memory,) = x
+        return unit_contact(u[0], memory, p.r)
+
+
+def check_weights(spec: Any, meaning: str) -> None:
+    """Refuse thresholds and weights of different number, and a slope that is not positive."""
+    who = type(spec).__name__
+    if len(spec.r) != len(spec.w):
+        raise ParameterError(
+            f"{who} needs one weight for each threshold, got {len(spec.w)} weights w and "
+            f"{len(spec.r)} thresholds r"
+        )
+    slopes = spec.w_0 + np.cumsum(spec.w)
+    if not np.all(slopes > 0):
+        i = int(np.argmax(~(slopes > 0)))
+        raise ParameterError(
+            f"{who} needs w_0 + w[0] + ... + w[{i}] > 0, {meaning}, got {slopes[i]:g}"
+        )
+
+
+def check_thresholds(spec: Any) -> None:
+    """Refuse thresholds that do not increase."""
+    if not np.all(np.diff(spec.r) > 0):
+        raise ParameterError(f"{type(spec).__name__} needs increasing thresholds r, got {spec.r}")
+
+
+@record
+class PrandtlIshlinskii:
+    """Prandtl-Ishlinskii operator: a weighted sum of plays.
+
+        v = w_0 u + sum_i w_i H_i,   H_i = min(max(H_i(t-), u - r_i), u + r_i)
+
+    with thresholds 0 < r_1 < r_2 < ... (Kuhnen, European Journal of Control 9, 2003, p. 407).  The
+    loading curve has the slope w_0 + ... + w_i behind the threshold r_i: these sums are positive.
+    Each play has its memory, the state ``memory[i]``.
+
+    It obeys (2) with the gain k = w_0 + sum w_i and |eps_u| <= sum |w_i| r_i, since
+    |H_i - u| <= r_i.  In python-control the memories relax onto the plays, as with
+    `nlctl.Backlash`.
+
+    Parameters
+    ----------
+    v0 : float or tuple of float, optional
+        Memories H_i(0-) at the start: one for all, or one each.
+    """
+
+    w_0: float = param(0.6, unit="1", meaning="weight of u itself", above=0)
+    w: tuple[float, ...] = param((0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the plays")
+    r: tuple[float, ...] = param(
+        (0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds, increasing", above=0
+    )
+    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memories", above=0)
+    v0: float | tuple[float, ...] = 0.0
+
+    inputs = ("u",)
+    outputs = ("v",)
+    feedthrough = True
+    vector = True
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names memory[0], ..., one for each play."""
+        return memory_names("memory", len(self.r))
+
+    memory = states
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The memories start from H_i(0-)."""
+        return started("memory", self.v0, len(self.r))
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Bounds (k_1, k_2) of k in (2): the slope of every play at its sides together."""
+        k = float(self.w_0 + np.sum(self.w))
+        return k, k
+
+    def check(self) -> None:
+        """A weight for each threshold, thresholds in order, an increasing loading curve."""
+        check_weights(self, "so that the loading curve increases")
+        check_thresholds(self)
+        checked_start(self, len(self.r))
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Relaxation of the memories onto the plays."""
+        return p.rate * (unit_play(u[0], x, p.r) - x)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The weighted sum."""
+        return (weighted_plays(u[0], x, p.w_0, p.w, p.r),)
+
+    @staticmethod
+    @equation
+    def commit(t, x, u, p):
+        """The plays."""
+        return unit_play(u[0], x, p.r)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Contact of each play with either side of its gap."""
+        return np.concatenate(unit_contact(u[0], x, p.r))
+
+    @staticmethod
+    @equation
+    def band(t, u, p):
+        """Least and greatest output at input u."""
+        return weighted_band(u, p.w_0, p.w, p.r)
+
+
+@record
+class OneSidedDeadZones:
+    """Superposition of one-sided dead zones: a piecewise linear characteristic without memory.
+
+        v = w_0 u + sum_i w_i S_i,   S_i = max(u - r_i, 0)  for r_i > 0
+                                           min(u - r_i, 0)  for r_i < 0
+
+    In ``cascade({"plays": PrandtlIshlinskii(), "zones": OneSidedDeadZones()})`` it makes hysteresis
+    loops that are not symmetric: Kuhnen's modified Prandtl-Ishlinskii operator (European Journal
+    of Control 9, 2003, p. 407).  Slopes are positive everywhere.
+
+    It obeys (2): v / u tends to the outer slopes, and k lies between the least and the greatest
+    slope.  There eps_u = 0, since v(0) = 0.
+    """
+
+    w_0: float = param(1.0, unit="1", meaning="slope at u = 0", above=0)
+    w: tuple[float, ...] = param((-0.3, 0.4), unit="1", meaning="changes of slope, outwards")
+    r: tuple[float, ...] = param((-0.5, 0.7), unit="1", meaning="where the slope changes")
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ()
+    feedthrough = True
+    vector = True
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Least and greatest slope, bounds (k_1, k_2) of k in (2)."""
+        slopes = self._slopes()
+        return float(slopes.min()), float(slopes.max())
+
+    def _slopes(self) -> np.ndarray:
+        order = np.argsort(np.abs(self.r))
+        r, w = np.array(self.r)[order], np.array(self.w)[order]
+        sides = (np.cumsum(w[r > 0]), np.cumsum(w[r < 0]))
+        return self.w_0 + np.concatenate(([0.0], *sides))
+
+    def check(self) -> None:
+        """A weight for each threshold, none at 0, and a positive slope everywhere."""
+        if len(self.r) != len(self.w):
+            check_weights(self, "")
+        if 0.0 in self.r:
+            raise ParameterError(
+                "OneSidedDeadZones needs thresholds r other than 0: the slope at 0 is w_0"
+            )
+        least = float(self._slopes().min())
+        if not least > 0:
+            raise ParameterError(
+                f"OneSidedDeadZones needs a positive slope everywhere, got {least:g} behind one of "
+                "the thresholds"
+            )
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The characteristic v(u)."""
+        beyond = np.where(p.r > 0, np.maximum(u[0] - p.r, 0.0), np.minimum(u[0] - p.r, 0.0))
+        return (p.w_0 * u[0] + np.sum(p.w * beyond),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """The thresholds."""
+        return u[0] - p.r

@@ -1,0 +1,222 @@
+"""Relays with hysteresis, one or many: relay, Preisach operator."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arguments import number, vector
+from ..equations import equation
+from ..errors import ParameterError
+from ..params import param, record
+from .memories import checked_start, memory_names, started
+from .static import BOUNDED_OUTPUT
+
+__all__ = ["Preisach", "Relay", "relay_grid"]
+
+
+@equation
+def kept_side(side):
+    """Side that a memory stands for: a memory that relaxes passes through the numbers between."""
+    return np.where(side < 0, -1.0, np.where(side >= 0, 1.0, side))  # NaN stays
+
+
+@equation
+def relay_side(u, side, on, off):
+    """Side of relays: +1 where u >= on, -1 where u <= off, in between that of the memory."""
+    free = np.where(u >= on, 1.0, np.where(u <= off, -1.0, u))
+    return np.where((off < u) & (u < on), kept_side(side), free)
+
+
+def check_sides(spec: Any, count: int) -> None:
+    """Refuse initial sides other than 1 and -1."""
+    sides = checked_start(spec, count)
+    if not np.all(np.abs(sides) == 1):
+        raise ParameterError(f"{type(spec).__name__} needs v0 of 1 and -1 only, got {spec.v0}")
+
+
+@record
+class Relay:
+    """Relay with hysteresis.
+
+        v = height s,   s = +1       u >= on
+                            -1       u <= off
+                            s(t-)    off < u < on
+
+    Its memory is the side s.  For u = A sin(w t) with thresholds on = -off = h < A its describing
+    function is 4 height / (pi A) (sqrt(1 - (h / A)^2) - i h / A) (Gelb, Vander Velde,
+    Multiple-Input Describing Functions, 1968, appendix B).
+
+    It does not obey (2): |v| = height for all u.  In python-control the memory relaxes onto the
+    side with the rate given, and its sign counts: a swing back that comes sooner than ln(2) / rate
+    after a switch is missed, everything else is exact but for the places of the jumps, which
+    a solver of SciPy does not locate.
+
+    Parameters
+    ----------
+    v0 : float, optional
+        Side s(0-) at the start, 1 or -1: the initial value of the state ``side``.
+    """
+
+    on: float = param(1.0, unit="1", meaning="input from which the relay is on")
+    off: float = param(-1.0, unit="1", meaning="input up to which the relay is off")
+    height: float = param(1.0, unit="1", meaning="output |v|", above=0)
+    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memory", above=0)
+    v0: float = -1.0
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ("side",)
+    memory = ("side",)
+    feedthrough = True
+    no_split = BOUNDED_OUTPUT
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The relay starts from its side s(0-)."""
+        return {"side": float(self.v0)}
+
+    def check(self) -> None:
+        """It goes off below where it goes on, and starts from one side."""
+        if not self.off < self.on:
+            raise ParameterError(f"Relay needs off < on, got {self.off:g} and {self.on:g}")
+        number("Relay", "v0", self.v0)
+        check_sides(self, 1)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Relaxation of the memory onto the side."""
+        (side,) = x
+        return (p.rate * (relay_side(u[0], side, p.on, p.off) - side),)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The side, with its height."""
+        (side,) = x
+        return (p.height * relay_side(u[0], side, p.on, p.off),)
+
+    @staticmethod
+    @equation
+    def commit(t, x, u, p):
+        """The side."""
+        (side,) = x
+        return (relay_side(u[0], side, p.on, p.off),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """The thresholds."""
+        return u[0] - p.on, u[0] - p.off
+
+
+def relay_grid(levels: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the thresholds (alpha, beta) of all relays on a grid of levels, alpha > beta.
+
+    Parameters
+    ----------
+    levels : sequence of float
+        n increasing numbers; they make n (n - 1) / 2 relays, in the order (1, 0), (2, 0), (2, 1),
+        (3, 0), ... of the indices of alpha and beta.
+
+    Raises
+    ------
+    ParameterError
+        If there are fewer than two levels, or they do not increase.
+    """
+    grid = vector("relay_grid", "levels", levels)
+    if grid.size < 2 or not np.all(np.diff(grid) > 0):
+        raise ParameterError(f"relay_grid needs two or more increasing levels, got {levels}")
+    upper, lower = np.tril_indices(grid.size, -1)
+    return tuple(map(float, grid[upper])), tuple(map(float, grid[lower]))
+
+
+GRID = relay_grid((-1.0, -0.5, 0.0, 0.5, 1.0))
+
+
+@record
+class Preisach:
+    """Preisach operator with finitely many relays.
+
+        v = sum_k w_k s_k,   s_k = +1         u >= alpha_k
+                                   -1         u <= beta_k
+                                   s_k(t-)    beta_k < u < alpha_k
+
+    with weights w_k >= 0 (Mayergoyz, Mathematical Models of Hysteresis, 1991, section 1.1).
+    `nlctl.relay_grid` makes the thresholds of a grid in the half-plane alpha > beta.
+
+    It does not obey (2): |v| <= sum w_k for all u.  In python-control each memory relaxes as that
+    of `nlctl.Relay`.
+
+    Parameters
+    ----------
+    v0 : float or tuple of float, optional
+        Sides s_k(0-) at the start, 1 or -1: one for all, or one each.
+    """
+
+    alpha: tuple[float, ...] = param(GRID[0], unit="1", meaning="inputs from which relays are on")
+    beta: tuple[float, ...] = param(GRID[1], unit="1", meaning="inputs up to which relays are off")
+    w: tuple[float, ...] = param((0.1,) * 10, unit="1", meaning="weights", at_least=0)
+    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memories", above=0)
+    v0: float | tuple[float, ...] = -1.0
+
+    inputs = ("u",)
+    outputs = ("v",)
+    feedthrough = True
+    vector = True
+    no_split = BOUNDED_OUTPUT
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names side[0], ..., one for each relay."""
+        return memory_names("side", len(self.w))
+
+    memory = states
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The relays start from their sides s_k(0-)."""
+        return started("side", self.v0, len(self.w))
+
+    def check(self) -> None:
+        """Each relay has two thresholds in order, a weight, and starts from one side."""
+        counts = [len(values) for values in (self.alpha, self.beta, self.w)]
+        if len(set(counts)) > 1:
+            raise ParameterError(
+                "Preisach needs as many alpha as beta and weights w, got {}, {} and {}".format(
+                    *counts
+                )
+            )
+        for k, (upper, lower) in enumerate(zip(self.alpha, self.beta, strict=True)):
+            if not lower < upper:
+                raise ParameterError(
+                    f"Preisach needs beta[{k}] < alpha[{k}], got {lower:g} and {upper:g}"
+                )
+        check_sides(self, len(self.w))
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Relaxation of the memories onto the sides."""
+        return p.rate * (relay_side(u[0], x, p.alpha, p.beta) - x)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The weighted sum of the sides."""
+        return (np.sum(p.w * relay_side(u[0], x, p.alpha, p.beta)),)
+
+    @staticmethod
+    @equation
+    def commit(t, x, u, p):
+        """The sides."""
+        return relay_side(u[0], x, p.alpha, p.beta)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """All thresholds."""
+        return np.concatenate((u[0] - p.alpha, u[0] - p.beta))

@@ -1,0 +1,7 @@
+"""Faults on any signal of any diagram: stuck, bias, drift, gain, noise, dropout, disconnection."""
+
+from .cut import with_faults
+from .effects import NEVER
+from .fault import KINDS, Fault
+
+__all__ = ["KINDS", "NEVER", "Fault", "with_faults"]

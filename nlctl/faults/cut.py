@@ -1,0 +1,299 @@
+"""Putting faults into a diagram: a signal is cut, and goes through the block of its fault."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import Any, Literal
+
+import control as ct
+import numpy as np
+
+from ..blocks import block, memory_states
+from ..diagrams import known_system, places
+from ..errors import DiagramError, ParameterError, UnknownNameError
+from ..names import Parameters, find_name, unknown
+from .fault import Fault
+
+__all__ = ["signal_names", "with_faults"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spot:
+    """Where a signal can be cut.
+
+    Attributes
+    ----------
+    diagram : str
+        Path of the diagram that has the wire; empty for the outermost one.
+    side : str
+        ``"output"`` or ``"input"`` of a part of the diagram, or ``"external"`` input of itself.
+    position : int
+        Where it stands among all outputs or inputs of the parts, or the inputs of the diagram.
+    label : str
+        What the fault is called after: ``"actuator_v"``.
+    """
+
+    diagram: str
+    side: Literal["output", "input", "external"]
+    position: int
+    label: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Cut:
+    """A fault in its place, and the output of the diagram's parts that it watches."""
+
+    fault: Fault
+    spot: Spot
+    watched: Spot | None
+
+
+def with_faults(diagram: Any, *faults: Fault) -> ct.InterconnectedSystem:
+    """Return a diagram with faults on its signals; the one that was given stays as it is.
+
+    Each signal is cut and goes through a block, whose parameters are addressed like all others:
+    ``"fault_actuator_v.onset"``, ``"fault_actuator_v.duration"``, ``"fault_actuator_v.value"``.
+    So one diagram, compiled once, serves for an ensemble of onsets and values; an onset of
+    `nlctl.faults.NEVER` is a fault that does not begin.  A fault inside of a nested diagram has
+    that diagram's name in front.  Several faults on one signal stand one behind the other, in their
+    order.  An output of the diagram is the signal behind the fault.
+
+    While no fault is present the right-hand side is the same, to the bit in python-control; in
+    machine code to the rounding of a product and a sum that are contracted across the cut.  A
+    fault with a memory (``stuck`` without a value, or with a condition) adds memory states, which
+    may change the steps that are chosen, within the tolerance.
+
+    Parameters
+    ----------
+    diagram : control.InterconnectedSystem or Compiled
+        Nested to any depth.  A `Compiled` stands for its diagram.
+    *faults : Fault
+
+    Returns
+    -------
+    control.InterconnectedSystem
+        States of the faults' memories come last in their diagram: start it from
+        `nlctl.initial_state`.
+
+    Raises
+    ------
+    UnknownNameError, AmbiguousNameError
+        If a fault, or its condition, names a signal that is not there, or not just one.
+    DiagramError
+        If it is no diagram.
+    ParameterError
+        If something else than a fault is given, or one that needs a memory in discrete time.
+    """
+    system = known_system("with_faults", diagram)
+    if not isinstance(system, ct.InterconnectedSystem):
+        raise DiagramError(
+            f"with_faults needs a diagram, got the block '{system.name}': make a diagram of it "
+            "with nlctl.interconnect"
+        )
+    for fault in faults:
+        if not isinstance(fault, Fault):
+            raise ParameterError(f"with_faults needs faults, nlctl.Fault(...), got {fault!r}")
+        _check_timebase(system, fault)
+    spots = _spots(system)
+    cuts = [_placed(system, spots, fault) for fault in faults]
+    return _rebuilt(system, "", cuts)
+
+
+def signal_names(diagram: Any) -> list[str]:
+    """Return the names of all signals that a fault can be on.
+
+    External inputs first, then outputs and inputs of all blocks and nested diagrams.
+    """
+    return list(_spots(known_system("signal_names", diagram)))
+
+
+def _check_timebase(system: ct.InterconnectedSystem, fault: Fault) -> None:
+    """Memories are committed between steps of an integrator."""
+    has_memory = fault.condition is not None or memory_states(fault.effect)
+    if has_memory and not ct.isctime(system):
+        what = "a condition" if fault.condition is not None else "no value"
+        raise ParameterError(
+            f"Fault '{fault.kind}' on '{fault.signal}' with {what} needs a diagram in continuous "
+            f"time, '{system.name}' has dt = {system.dt}: give a time, and a value"
+        )
+
+
+def _spots(system: ct.InterconnectedSystem) -> dict[str, Spot]:
+    """Return all signals of a diagram by their qualified names."""
+    found = {
+        label: Spot(diagram="", side="external", position=i, label=label)
+        for i, label in enumerate(system.input_labels)
+    }
+    for side in ("output", "input"):
+        for place in places(system):
+            if place.parent is None:
+                continue
+            offset = getattr(place.parent.system, f"{side}_offset")[place.position]
+            for i, label in enumerate(getattr(place.system, f"{side}_labels")):
+                spot = Spot(
+                    diagram=place.parent.path,
+                    side=side,
+                    position=offset + i,
+                    label=_identifier(f"{place.system.name}_{label}"),
+                )
+                found.setdefault(f"{place.path}.{label}", spot)
+    return found
+
+
+def _identifier(text: str) -> str:
+    return "".join(c if c.isalnum() else "_" for c in text)
+
+
+def _placed(system: Any, spots: Mapping[str, Spot], fault: Fault) -> _Cut:
+    """Find the signal of a fault, and that of its condition."""
+    spot = _found(spots, fault.signal)
+    if fault.condition is None:
+        return _Cut(fault=fault, spot=spot, watched=None)
+    inside = f"{spot.diagram}." if spot.diagram else ""
+    here = {n.removeprefix(inside): s for n, s in spots.items() if s.diagram == spot.diagram}
+    readable = {n: s for n, s in here.items() if s.side != "input"}
+    if inside:
+        part = next(p.system for p in places(system) if p.path == spot.diagram)
+        for i, label in enumerate(part.input_labels):
+            readable[label] = Spot(diagram="", side="external", position=i, label=label)
+    try:
+        watched = _found(readable, fault.condition.signal)
+    except UnknownNameError as error:
+        raise UnknownNameError(
+            f"{error} (the condition of a fault sees the signals of the diagram that the fault "
+            f"lies in, here '{spot.diagram or system.name}')"
+        ) from None
+    return _Cut(fault=fault, spot=spot, watched=watched)
+
+
+def _found(spots: Mapping[str, Spot], name: str) -> Spot:
+    """Return the signal that a name means: the full path, or the end of one; outputs first."""
+    for side in ("external", "output", "input"):
+        own = {n: s for n, s in spots.items() if s.side == side}
+        if name in own or any(n.endswith(f".{name}") for n in own):
+            return own[find_name("signal", name, own)]
+    raise unknown("signal", name, spots)
+
+
+def _rebuilt(system: Any, path: str, cuts: Sequence[_Cut]) -> Any:
+    """Return a copy of a diagram with the faults that lie in it, blocks copied as well."""
+    if not isinstance(system, ct.InterconnectedSystem):
+        return copy.copy(system)
+    inside = f"{path}." if path else ""
+    parts = [_rebuilt(part, f"{inside}{part.name}", cuts) for part in system.syslist]
+    wires, dt = _Wires(system), None if ct.isctime(system) else system.dt
+    for cut in cuts:
+        if cut.spot.diagram == path:
+            parts += wires.through(cut, {part.name for part in parts}, dt)
+    made = ct.InterconnectedSystem(
+        parts,
+        inputs=list(system.input_labels) or 0,
+        outputs=list(system.output_labels) or 0,
+        states=_state_labels(system, parts),
+        name=system.name,
+        dt=system.dt,
+        connection_type=system.connection_type,
+        warn_duplicate=False,
+    )
+    made.connect_map, made.input_map, made.output_map = wires.maps
+    _keep_params(system, made)
+    return made
+
+
+def _state_labels(system: ct.InterconnectedSystem, parts: Sequence[Any]) -> list[str]:
+    """Return the labels that states had, and those of parts that have more states now."""
+    labels: list[str] = []
+    for i, part in enumerate(parts):
+        before = system.syslist[i].nstates if i < len(system.syslist) else -1
+        if part.nstates == before:
+            offset = system.state_offset[i]
+            labels += system.state_labels[offset : offset + before]
+        else:
+            labels += [f"{part.name}_{label}" for label in part.state_labels]
+    return labels
+
+
+def _keep_params(before: ct.InterconnectedSystem, made: ct.InterconnectedSystem) -> None:
+    """Take over values that the diagram itself was given, and whether it has a scope."""
+    for name, value in before.params.items():
+        dict.__setitem__(made.params, name, value)
+    if isinstance(made.params, Parameters) and isinstance(before.params, Parameters):
+        made.params.scope = None if before.params.scope is None else made
+
+
+class _Wires:
+    """The maps of a diagram while blocks are put into its wires."""
+
+    def __init__(self, system: ct.InterconnectedSystem) -> None:
+        self.connect = system.connect_map.copy()
+        self.input = system.input_map.copy()
+        outputs = self.connect.shape[1]
+        self.from_outputs = system.output_map[:, :outputs].copy()
+        self.from_inputs = system.output_map[:, outputs:].copy()
+        self.source: dict[Spot, int] = {}  # the output that a cut signal comes from now
+
+    @property
+    def maps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """``connect_map``, ``input_map`` and ``output_map``."""
+        return self.connect, self.input, np.hstack([self.from_outputs, self.from_inputs])
+
+    def through(self, cut: _Cut, taken: set[str], dt: Any) -> list[Any]:
+        """Wire a fault; return its blocks."""
+        name = _free(cut.fault.name or f"fault_{cut.spot.label}", taken)
+        effect = block(cut.fault.effect, name, dt=dt)
+        row, column = self._add(effect)
+        self._cut(replace(cut.spot, label=""), row, column)
+        if cut.watched is None:
+            return [effect]
+        latch = block(cut.fault.latch, _free(f"{name}_condition", taken))
+        watch, on = self._add(latch)
+        self._read(replace(cut.watched, label=""), watch)
+        self.connect[row + 1, on] = self.connect[row + 2, on + 1] = 1.0
+        return [effect, latch]
+
+    def _add(self, made: Any) -> tuple[int, int]:
+        """Make room for a block; return its first input and output."""
+        row, column = self.connect.shape
+        more_in, more_out = made.ninputs, made.noutputs
+        self.connect = np.pad(self.connect, ((0, more_in), (0, more_out)))
+        self.input = np.pad(self.input, ((0, more_in), (0, 0)))
+        self.from_outputs = np.pad(self.from_outputs, ((0, 0), (0, more_out)))
+        self.from_inputs = np.pad(self.from_inputs, ((0, 0), (0, more_in)))
+        return row, column
+
+    def _cut(self, spot: Spot, row: int, column: int) -> None:
+        """Let a signal go to the input `row`, and what read it read the output `column`."""
+        if spot.side == "input":
+            reader = spot.position
+            self.connect[row], self.input[row] = self.connect[reader], self.input[reader]
+            self.connect[reader] = self.input[reader] = 0.0
+            self.connect[reader, column] = 1.0
+            return
+        before = self.source.get(spot, spot.position if spot.side == "output" else -1)
+        if before < 0:  # an external input
+            self.connect[:, column] += self.input[:, spot.position]
+            self.input[:, spot.position] = 0.0
+            self.input[row, spot.position] = 1.0
+        else:
+            for wires in (self.connect, self.from_outputs):
+                wires[:, column] = wires[:, before]
+                wires[:, before] = 0.0
+            self.connect[row, before] = 1.0
+        self.source[spot] = column
+
+    def _read(self, spot: Spot, row: int) -> None:
+        """Let the input `row` read a signal as all others do, behind its faults."""
+        column = self.source.get(spot, spot.position if spot.side == "output" else -1)
+        if column < 0:
+            self.input[row, spot.position] = 1.0
+        else:
+            self.connect[row, column] = 1.0
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """Return the name, numbered where it is taken."""
+    every = (name if i == 1 else f"{name}_{i}" for i in count(1))
+    return next(n for n in every if n not in taken)

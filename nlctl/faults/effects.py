@@ -1,0 +1,300 @@
+"""What a faulty signal becomes, as blocks: from the healthy signal to the faulty one.
+
+A fault begins at its ``onset`` and lasts ``duration`` seconds; before and afterwards the signal
+passes as it is.  Where a condition begins it, `Latch` remembers since when that has been met.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..equations import equation
+from ..errors import ParameterError
+from ..functions import noise_spectrum, noise_value
+from ..params import param, record
+
+__all__ = [
+    "NEVER",
+    "Bias",
+    "Drift",
+    "Latch",
+    "LockInPlace",
+    "LossOfEffectiveness",
+    "Noise",
+    "Outage",
+    "StuckAt",
+]
+
+NEVER = 1e12
+"""A time in s that no run reaches: as an onset, a fault that does not begin."""
+
+SHARPER = 20.0  # what is tracked is that much faster than what freezes it
+
+
+@equation
+def age(t, u, p):
+    """Time since the onset (s); negative before it.
+
+    With a condition `u` is (signal, on, since), and the fault begins at the later one of `since`
+    and the onset.
+    """
+    if u.size == 1:
+        return t - p.onset
+    if u[1] > 0.5:
+        return t - np.maximum(u[2], p.onset)
+    return -1.0
+
+
+@equation
+def is_present(t, u, p):
+    """Whether the fault has begun and not ended."""
+    return 0 <= age(t, u, p) < p.duration
+
+
+@record
+class _Effect:
+    """What all faults share: when they are present.
+
+    Parameters
+    ----------
+    has_condition : bool, optional
+        Whether a `Latch` begins it.
+    """
+
+    onset: float = param(0.0, unit="s", meaning="time before which the fault does not begin")
+    duration: float = param(NEVER, unit="s", meaning="how long it lasts, 1e12 for ever", above=0)
+    has_condition: bool = False
+
+    outputs = ("faulty",)
+    states = ()
+    feedthrough = True
+    vector = True
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The signal, and what the latch says."""
+        return ("signal", "on", "since") if self.has_condition else ("signal",)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Beginning and end of the fault."""
+        since = age(t, u, p)
+        return since, since - p.duration
+
+
+@record
+class Bias(_Effect):
+    """A constant offset: signal + value."""
+
+    value: float = param(0.0, unit="1", meaning="offset, in the unit of the signal")
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The signal, with the offset while the fault lasts."""
+        if is_present(t, u, p):
+            return (u[0] + p.value,)
+        return (u[0],)
+
+
+@record
+class Drift(_Effect):
+    """An offset that grows from 0 on: signal + value (t - onset)."""
+
+    value: float = param(0.0, unit="1/s", meaning="rate of the offset")
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The signal, with the growing offset while the fault lasts."""
+        if is_present(t, u, p):
+            return (u[0] + p.value * age(t, u, p),)
+        return (u[0],)
+
+
+@record
+class LossOfEffectiveness(_Effect):
+    """A wrong gain: value times the signal; 1 is healthy, 0 a total loss."""
+
+    value: float = param(1.0, unit="1", meaning="factor")
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The signal, times the factor while the fault lasts."""
+        if is_present(t, u, p):
+            return (p.value * u[0],)
+        return (u[0],)
+
+
+@record
+class Noise(_Effect):
+    """Band-limited noise, a fixed function of time: see `nlctl.BandLimitedNoise`."""
+
+    value: float = param(0.0, unit="1", meaning="root mean square of the noise", at_least=0)
+    low: float = param(0.0, unit="rad/s", meaning="lower end of the band", at_least=0)
+    high: float = param(50.0, unit="rad/s", meaning="upper end of the band", above=0)
+    seed: int = param(0, unit="1", meaning="seed of frequencies and phases", at_least=0)
+    components: int = param(32, unit="1", meaning="number of sines", at_least=1)
+
+    def check(self) -> None:
+        """A band has two ends."""
+        if not self.low < self.high:
+            raise ParameterError(f"Noise needs low < high, got {self.low:g} and {self.high:g}")
+
+    def derived(self) -> dict[str, Any]:
+        """Frequencies and phases, those of `nlctl.BandLimitedNoise` with one signal."""
+        omega, phase = noise_spectrum(self.low, self.high, [self.seed, 0], self.components)
+        return {"omega": omega, "phase": phase}
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The signal, with noise while the fault lasts."""
+        if is_present(t, u, p):
+            return (u[0] + noise_value(t, p.value, p.omega, p.phase),)
+        return (u[0],)
+
+
+@record
+class Outage(_Effect):
+    """Nothing arrives: 0 while it lasts (dropout), or for ever (disconnection)."""
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The signal, 0 while the fault lasts."""
+        if is_present(t, u, p):
+            return (0.0 * u[0],)  # NaN travels
+        return (u[0],)
+
+
+@record
+class StuckAt(_Effect):
+    """Stuck at a given value, whatever the signal is."""
+
+    value: float = param(0.0, unit="1", meaning="what it is stuck at, in the unit of the signal")
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The signal, the value while the fault lasts."""
+        if is_present(t, u, p):
+            return (p.value + 0.0 * u[0],)  # NaN travels
+        return (u[0],)
+
+
+@record
+class LockInPlace(_Effect):
+    """Stuck at the value that the signal had at the onset.
+
+    In machine code that value is remembered at the onset, exactly.  In python-control, which has
+    no hook for accepted steps, ``held`` follows the signal with the rate 20 ``rate`` and freezes
+    when ``caught``, which begins to rise at the onset, has passed 1/2: 0.7 / rate later.
+    The value is then off by about 0.7 |signal'| / rate.
+    """
+
+    rate: float = param(1e3, unit="1/s", meaning="relaxation rate in python-control", above=0)
+
+    states = ("held", "caught")
+    memory = states
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Relaxation: the held value follows until it is caught."""
+        begun = 1.0 if age(t, u, p) >= 0 else 0.0
+        if x[1] > 0.5:
+            return 0.0, p.rate * (begun - x[1])
+        return SHARPER * p.rate * (u[0] - x[0]), p.rate * (begun - x[1])
+
+    @staticmethod
+    @equation
+    def commit(t, x, u, p):
+        """Catch the signal once, at the onset."""
+        if age(t, u, p) >= 0 and x[1] <= 0.5:
+            return u[0], 1.0
+        return x[0], x[1]
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The signal, what was caught while the fault lasts."""
+        if is_present(t, u, p) and x[1] > 0.5:
+            return (x[0],)
+        return (u[0],)
+
+
+@equation
+def excess(u, p):
+    """By how much the condition of a `Latch` is met; > 0 holds."""
+    size = abs(u[0]) if p.magnitude else u[0]
+    return p.sign * (size - p.level)
+
+
+@record
+class Latch:
+    """Remembers since when a condition on a signal has been met: it need not last.
+
+    The condition is watched > level; |watched| > level with `is_magnitude`, < with `is_below`.
+    ``on`` is 1 from then on, and ``since`` the time at which it began (s).
+
+    In machine code it is met exactly where the signal passes the level at the ends of a step: a
+    peak that crosses the level and comes back within one step is not seen.  In python-control
+    ``on`` rises with a rate, and counts when it has passed 1/2: a condition that is met for less
+    than 0.7 / rate is not remembered, and what begins with it begins 0.7 / rate late.
+
+    Parameters
+    ----------
+    is_magnitude, is_below : bool, optional
+    """
+
+    level: float = param(1.0, unit="1", meaning="level, in the unit of the watched signal")
+    rate: float = param(1e3, unit="1/s", meaning="relaxation rate in python-control", above=0)
+    is_magnitude: bool = False
+    is_below: bool = False
+
+    inputs = ("watched",)
+    outputs = ("on", "since")
+    states = outputs
+    memory = outputs
+    feedthrough = False
+
+    def derived(self) -> dict[str, Any]:
+        """Signs of the condition, for the equations."""
+        return {"magnitude": int(self.is_magnitude), "sign": -1.0 if self.is_below else 1.0}
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """By how much the condition is met."""
+        return (excess(u, p),)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Relaxation: `on` rises while the condition is met, until then `since` follows t."""
+        on, since = x
+        if on > 0.5:
+            return p.rate * (1.0 - on), 0.0
+        met = 1.0 if excess(u, p) > 0 else 0.0
+        return p.rate * (met - on), SHARPER * p.rate * (t - since)
+
+    @staticmethod
+    @equation
+    def commit(t, x, u, p):
+        """Remember the first time at which the condition is met."""
+        on, since = x
+        if on <= 0.5 and excess(u, p) > 0:
+            return 1.0, t
+        return on, since
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """What is remembered."""
+        on, since = x
+        return on, since

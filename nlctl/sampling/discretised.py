@@ -1,0 +1,91 @@
+"""Blocks in continuous time as programs in discrete time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+
+from ..arguments import number, one_of
+from ..blocks import memory_states
+from ..errors import ParameterError
+from .rebuilt import rebuilt
+
+METHODS = ("euler", "tustin", "zoh")
+
+
+def discretise(system: Any, dt: float, method: str = "euler") -> Any:
+    """Make a block or diagram in discrete time of one in continuous time.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+    dt : float
+        Sampling time (s).
+    method : {"euler", "tustin", "zoh"}, optional
+        ``"euler"``: x[k+1] = x[k] + dt f(t[k], x[k], u[k]), of any block.  The others are for
+        linear blocks and are those of `control.sample_system`.
+
+    Returns
+    -------
+    control.InputOutputSystem
+        With the same signals, parameters and initial state.
+
+    Raises
+    ------
+    ParameterError
+        If `dt` is not positive, the method is for linear blocks only, or a block has a memory
+        that is no state in discrete time.
+    """
+    number("discretise", "dt", dt, above=0)
+    one_of("discretise", "method", method, METHODS)
+    if not isinstance(system, ct.InputOutputSystem):
+        raise ParameterError(
+            f"discretise needs a block or diagram, got {type(system).__name__}: nlctl.block makes "
+            "a block of a record"
+        )
+    if isinstance(system, ct.InterconnectedSystem):
+        return rebuilt(system, lambda part: _discretised(part, dt, method), dt)
+    return _discretised(system, dt, method)
+
+
+def _discretised(system: Any, dt: float, method: str) -> Any:
+    if not (system.nstates or 0):
+        made = system.copy(name=system.name)
+        made.dt = dt
+        return made
+    if system.dt not in (0, None):
+        raise ParameterError(f"'{system.name}' is in discrete time already (dt = {system.dt})")
+    if isinstance(system, ct.StateSpace):
+        names = {
+            "name": system.name,
+            "inputs": system.input_labels,
+            "outputs": system.output_labels,
+        }
+        return ct.sample_system(
+            system, dt, "forward_diff" if method == "euler" else method, **names
+        )
+    if method != "euler":
+        raise ParameterError(
+            f"discretise needs method='euler' for '{system.name}', which is not linear, got "
+            f"{method!r}"
+        )
+    spec = getattr(system, "spec", None)
+    for name in memory_states(spec)[:1]:
+        raise ParameterError(
+            f"'{system.name}' has a memory, '{name}', that is a state in continuous time only: "
+            "leave the block outside of what is sampled"
+        )
+    made = system.copy(name=system.name)
+    made.dt, made.updfcn = dt, _euler(system.updfcn, float(dt))
+    return made
+
+
+def _euler(f: Any, dt: float) -> Any:
+    """Return the forward difference of an equation x' = f(t, x, u, p)."""
+
+    def update(t, x, u, p):
+        rates = f(t, x, u, p)
+        return [x[i] + dt * rates[i] for i in range(len(x))]
+
+    return update

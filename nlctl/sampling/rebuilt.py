@@ -1,0 +1,74 @@
+"""A diagram with other blocks in the same places."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..names import Parameters
+
+
+def staged(diagram: Any, first: Any = None, last: Any = None) -> Any:
+    """Return a diagram whose inputs go through a block of as many, and its outputs as well.
+
+    Parameters
+    ----------
+    diagram : control.InterconnectedSystem
+        It stays as it is.
+    first, last : control.InputOutputSystem, optional
+        Blocks with as many outputs as inputs: one for each input, or output, of the diagram.
+    """
+    connect, given, shown = diagram.connect_map, diagram.input_map, diagram.output_map
+    parts = list(diagram.syslist)
+    if last is not None:  # it takes what the outputs were made of
+        y, u = np.split(shown, [connect.shape[1]], axis=1)
+        connect = np.block([[connect, np.zeros((len(connect), len(y)))],
+                            [y + u @ connect, np.zeros((len(y), len(y)))]])  # fmt: skip
+        given = np.vstack([given, u @ given])
+        shown = np.hstack([np.zeros_like(y), np.eye(len(y)), np.zeros((len(y), len(connect)))])
+        parts.append(last)
+    if first is not None:
+        count = given.shape[1]
+        shown = np.insert(shown, [connect.shape[1]] * count, 0.0, axis=1)
+        shown = np.hstack([shown, np.zeros((len(shown), count))])
+        connect = np.block([[connect, given], [np.zeros((count, connect.shape[1] + count))]])
+        given = np.vstack([np.zeros_like(given), np.eye(count)])
+        parts.append(first)
+    return _made(diagram, parts, (connect, given, shown), diagram.dt)
+
+
+def rebuilt(diagram: Any, change: Callable[[Any], Any], dt: Any) -> Any:
+    """Return a diagram of changed blocks, connected as those of another one are.
+
+    Parameters
+    ----------
+    diagram : control.InterconnectedSystem
+        Nested to any depth; it stays as it is.
+    change : callable
+        Takes a block and returns one with the same inputs and outputs.
+    dt : float
+        Timebase of the result.
+    """
+    parts = [
+        rebuilt(part, change, dt) if isinstance(part, ct.InterconnectedSystem) else change(part)
+        for part in diagram.syslist
+    ]
+    maps = (diagram.connect_map.copy(), diagram.input_map.copy(), diagram.output_map.copy())
+    return _made(diagram, parts, maps, dt)
+
+
+def _made(diagram: Any, parts: list[Any], maps: Any, dt: Any) -> Any:
+    """Return parts connected by these maps, with the signals and names of a diagram."""
+    made = ct.InterconnectedSystem(
+        parts, inputs=list(diagram.input_labels), outputs=list(diagram.output_labels),
+        name=diagram.name, dt=dt,
+    )  # fmt: skip
+    made.set_connect_map(maps[0])
+    made.set_input_map(maps[1])
+    made.set_output_map(maps[2])
+    if isinstance(made.params, Parameters) and diagram.params.scope is not None:
+        made.params.scope = made
+    return made

@@ -1,0 +1,181 @@
+"""Describing functions and relay oscillations: published formulas, exact periods, simulation."""
+
+import functools
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+import nlctl
+
+
+def sine(t, x, u, params):
+    """u = A sin t."""
+    return [params["A"] * np.sin(t)]
+
+
+def harmonic(t, x, u, params):
+    """The integrands of the first Fourier coefficients of v."""
+    return [u[0] * np.sin(t), u[0] * np.cos(t)]
+
+
+def source_and_sink():
+    """Return the sine of amplitude A, and the integrator of Fourier coefficients."""
+    source = ct.nlsys(None, sine, inputs=0, outputs=["u"], params={"A": 1.0}, name="source")
+    sink = ct.nlsys(
+        harmonic, lambda t, x, u, params: x, inputs=["v"], outputs=["a", "b"], states=2, name="sink"
+    )
+    return source, sink
+
+
+@functools.cache
+def compiled(kind):
+    source, sink = source_and_sink()
+    blocks = [source, nlctl.block(kind(), "actuator"), sink]
+    return nlctl.compile(nlctl.interconnect(blocks, outputs=["v", "a", "b"], name="rig"))
+
+
+SAMPLES = 4096
+
+
+def first_harmonic(kind, A, **params):
+    """Return N(A) by Fourier integrals along the run, and by FFT of its samples, of one period.
+
+    The second period is taken: by then memories have forgotten where they started.
+    """
+    times = np.linspace(0, 4 * np.pi, 2 * SAMPLES + 1)
+    named = {f"actuator.{name}": value for name, value in params.items()} | {"A": A}
+    run = nlctl.input_output_response(compiled(kind), times, params=named, rtol=1e-10, atol=1e-12)
+    v, a, b = run.outputs
+    integrals = (a[-1] - a[SAMPLES] + 1j * (b[-1] - b[SAMPLES])) / (np.pi * A)
+    coefficient = np.fft.rfft(v[SAMPLES:-1])[1] * 2 / SAMPLES / A
+    return integrals, 1j * coefficient
+
+
+def of_saturation(h):
+    """Describing function of clip(u / A, -h, h) for unit amplitude, h = limit / A."""
+    h = min(h, 1.0)
+    return 2 / np.pi * (np.arcsin(h) + h * np.sqrt(1 - h**2))
+
+
+def of_play(h):
+    """Of the play of half gap h for unit amplitude: Gelb and Vander Velde, appendix B."""
+    if h >= 1:
+        return 0.0
+    s = 1 - 2 * h
+    real = (np.pi / 2 + np.arcsin(s) + s * np.sqrt(1 - s**2)) / np.pi
+    return real - 1j * 4 * h * (1 - h) / np.pi
+
+
+def of_relay(h, height):
+    """Of the relay with thresholds +-h for unit amplitude."""
+    return 4 * height / np.pi * (np.sqrt(1 - h**2) - 1j * h) if h < 1 else 0.0
+
+
+amplitudes = st.floats(0.3, 5).map(lambda v: round(v, 3))
+shares = st.floats(0.05, 1.4).map(lambda v: round(v, 3)).filter(lambda h: abs(h - 1) > 0.02)
+
+
+class TestDescribingFunctions:
+    """Formula, Fourier integrals with all events located, and FFT."""
+
+    @given(A=amplitudes, h=shares)
+    @settings(max_examples=8)
+    def test_of_the_saturation(self, A, h):
+        """Gain 1 below the limit."""
+        found, by_fft = first_harmonic(nlctl.Saturation, A, limit=h * A)
+        assert found == pytest.approx(of_saturation(h), abs=1e-8)
+        assert by_fft == pytest.approx(of_saturation(h), abs=1e-6)
+
+    @given(A=amplitudes, h=shares)
+    @settings(max_examples=8)
+    def test_of_the_dead_zone(self, A, h):
+        """With saturation of the same width it adds up to 1."""
+        flat = {"slope_r": 1.0, "slope_l": 1.0, "ripple_r": 0.0, "ripple_l": 0.0}
+        found, by_fft = first_harmonic(nlctl.DeadZone, A, b_r=h * A, b_l=-h * A, **flat)
+        assert found == pytest.approx(1 - of_saturation(h), abs=1e-8)
+        assert by_fft == pytest.approx(1 - of_saturation(h), abs=1e-6)
+
+    @given(A=amplitudes, h=shares)
+    @settings(max_examples=8)
+    def test_of_the_play(self, A, h):
+        """It lags; with the stop it adds up to 1."""
+        gap = {"m_r": 1.0, "m_l": 1.0, "c_r": h * A, "c_l": -h * A}
+        found, by_fft = first_harmonic(nlctl.Backlash, A, **gap)
+        assert found == pytest.approx(of_play(h), abs=1e-8)
+        assert by_fft == pytest.approx(of_play(h), abs=1e-6)
+        found, _ = first_harmonic(nlctl.Stop, A, r=h * A)
+        assert found == pytest.approx(1 - of_play(h), abs=1e-8)
+
+    @given(A=amplitudes)
+    @settings(max_examples=4)
+    def test_of_the_sum_of_plays(self, A):
+        """It is linear in the operator."""
+        spec = nlctl.PrandtlIshlinskii()
+        plays = [w * of_play(r / A) for w, r in zip(spec.w, spec.r, strict=True)]
+        found, _ = first_harmonic(nlctl.PrandtlIshlinskii, A)
+        assert found == pytest.approx(spec.w_0 + sum(plays), abs=1e-8)
+
+    @given(A=amplitudes, h=shares, height=amplitudes)
+    @settings(max_examples=8)
+    def test_of_the_relay(self, A, h, height):
+        """Jumps between samples cost the FFT its accuracy, not the integrals."""
+        on = {"on": h * A, "off": -h * A, "height": height * A}
+        found, by_fft = first_harmonic(nlctl.Relay, A, **on)
+        assert found == pytest.approx(of_relay(h, height), abs=1e-7 * height)
+        assert by_fft == pytest.approx(of_relay(h, height), abs=4e-3 * height)
+
+
+def lag(omega, zeta):
+    """Return A, B, C of x'' + 2 zeta omega x' + omega^2 x = omega^2 v."""
+    A = np.array([[0.0, 1.0], [-(omega**2), -2 * zeta * omega]])
+    return A, np.array([0.0, omega**2]), np.array([1.0, 0.0])
+
+
+def half_cycle(omega, zeta, h):
+    """Return x(0) of the symmetric cycle whose relay is at +1 for a time h, then at -1.
+
+    x(h) = e^{A h} x(0) + A^{-1} (e^{A h} - I) B = -x(0).
+    """
+    A, B, _ = lag(omega, zeta)
+    E = expm(A * h)
+    return -np.linalg.solve(np.eye(2) + E, np.linalg.solve(A, (E - np.eye(2)) @ B))
+
+
+@pytest.mark.parametrize(("omega", "zeta", "width"), [(1, 0.5, 0.3), (2, 1, 0.1), (1, 2, 0.2)])
+def test_a_relay_around_a_second_order_lag_has_the_period_of_tsypkin(omega, zeta, width):
+    """Half a period solves -C x(h) = off with x(h) = -x(0): Tsypkin, Relay Control Systems, 1984.
+
+    The relay sees -y, switches to +1 where y falls to -width, and drives the lag.
+    """
+    C = lag(omega, zeta)[2]
+    h = brentq(lambda h: C @ half_cycle(omega, zeta, h) + width, 1e-2, 20.0, xtol=1e-14)
+    x0 = half_cycle(omega, zeta, h)
+    loop = nlctl.compile(oscillator(omega, zeta, width))
+    times = h * np.arange(0, 12, 0.25)
+    start = {"plant.v": x0[0], "plant.v1": x0[1], "relay.side": 1.0}
+    run = nlctl.input_output_response(loop, times, 0, start, rtol=1e-11, atol=1e-13)
+    signs = np.repeat([1.0, -1.0] * 6, 4)
+    quarter = run.states[:2].T * signs[:, None]
+    np.testing.assert_allclose(quarter, np.tile(quarter[:4], (12, 1)), atol=1e-7)
+    inside = np.arange(48) % 4 != 0
+    np.testing.assert_array_equal(run.outputs[1, inside], signs[inside])
+
+
+def oscillator(omega, zeta, width):
+    """Return the relay in feedback with the lag."""
+    minus = ct.nlsys(None, lambda t, x, u, p: [-u[0]], inputs=["y"], outputs=["e"], name="minus")
+    plant = nlctl.block(nlctl.SecondOrderLag(omega=omega, zeta=zeta), "plant")
+    relay = nlctl.block(nlctl.Relay(on=width, off=-width), "relay")
+    return ct.interconnect(
+        [plant, relay, minus],
+        connections=[["plant.u", "relay.v"], ["minus.y", "plant.v"], ["relay.u", "minus.e"]],
+        inputs=[],
+        outlist=["plant.v", "relay.v"],
+        outputs=["y", "s"],
+        name="oscillator",
+    )
