@@ -59,7 +59,7 @@ KIND = '''
 import numpy as np
 from pydantic import Field
 
-from analysis.figures import margins
+from analysis.figures import margins_figure
 from analysis.report.document import Figure
 from analysis.studies import Asked, Kind, made
 
@@ -98,7 +98,8 @@ def measured(finding, asked):
 def items(finding, result, asked, key):
     values = finding.tables["values"][asked.of].to_numpy()
     words = f"{asked.of} of the runs."
-    yield Figure(key=f"{key}-values", caption=words, description=words, figure=margins(values))
+    figure = margins_figure(values)
+    yield Figure(key=f"{key}-values", caption=words, description=words, figure=figure)
 
 
 spread = Kind(
