@@ -12,18 +12,14 @@ import numba
 import numpy as np
 
 from ..machine.address import call_rhs
-from .control import choose_method, choose_step, memory_error, next_step, rejected
+from .control import choose_method, choose_step, next_step, rejected
 from .events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
 from .methods import rodas5p, tsit5
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
 from .samples import next_stop, take_samples
 from .state import DERIVATIVES, INNER, RUNNING
-from .workspace import AUTO, UNKNOWN, evaluate, inputs_at
-
-# of what memories would become by the two solutions: by so much of the difference they are as
-# accurate as by the stiff method at the same tolerance (measured on Example 2, zeta of 2 to 2.7)
-SHARE = 0.1
+from .workspace import AUTO, UNKNOWN, inputs_at
 
 
 @numba.njit(**INNER)
@@ -53,40 +49,6 @@ def _explicit_attempt(rhs, task, lanes, w):
     tsit5.difference(hh, k, change)
     tsit5.weighed(x, w.x_new_flat, change, task.rtol, task.atol, parts)
     tsit5.errors(w.x_ahead, w.x_new, w.x_stage, w.k, w.error, w.rate)
-    if task.memory.size:
-        _weigh_memories(rhs, task, lanes, w)
-
-
-@numba.njit(**INNER)
-def _weigh_memories(rhs, task, lanes, w):
-    """Raise errors to those of what memories would become.
-
-    The difference of the solutions of order 5 and 4 is in w.dx_ahead.  Where a memory stands still,
-    both leave it where it is.
-    """
-    weighed = False
-    for j in range(lanes.size):
-        weighed |= w.error[j] <= 1.0 and _carries(task, w, j)
-    if not weighed:
-        return
-    for i in range(w.x.shape[0]):
-        for j in range(lanes.size):
-            w.x_ahead[i, j] = w.x_new[i, j] - w.dx_ahead[i, j]
-    evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
-    for j in range(lanes.size):
-        if w.error[j] <= 1.0 and _carries(task, w, j):  # a rejected step keeps its error
-            error = SHARE * memory_error(task.corners, w.g, w.g_ahead, task.rtol, task.atol, j)
-            if not error <= w.error[j]:
-                w.error[j] = error
-
-
-@numba.njit(**INNER)
-def _carries(task, w, j):
-    """Whether one of a lane's memories is another at the end of the step than at its start."""
-    for i in range(task.memory.size):  # noqa: SIM110 (no generators in machine code)
-        if w.x[task.memory[i], j] != w.g[task.corners + i, j]:
-            return True
-    return False
 
 
 @numba.njit(**INNER)

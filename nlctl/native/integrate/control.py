@@ -35,17 +35,23 @@ def choose_step(lane, stop, over, max_steps):
 
 
 @numba.njit(**INNER)
-def memory_error(corners, g, g_other, rtol, atol, j):
+def memory_error(task, x, g, g_other, j):
     """Return the largest difference of what a lane's memories would become, over its tolerance.
 
     A memory that is carried along is a state like any other, and follows from the others by an
     equation that may amplify their errors: in Example 2 that of r by 6000, and with it the time
     at which the memory is seen to reverse.  So `g` is of a step's solution and `g_other` of one
     that differs from it by the error.
+
+    What only one of them moves does not count: where a relay switches, or a memory begins to move,
+    is an event, and is located as one.
     """
     largest, spoilt = 0.0, 0.0
-    for i in range(corners, g.shape[0]):
-        part = abs(g[i, j] - g_other[i, j]) / (atol + rtol * abs(g[i, j]))
+    for m in range(task.memory.size):
+        i, before = task.corners + m, x[task.memory[m], j]
+        if g[i, j] == before or g_other[i, j] == before:
+            continue
+        part = abs(g[i, j] - g_other[i, j]) / (task.atol + task.rtol * abs(g[i, j]))
         largest = part if part > largest else largest
         spoilt += 0.0 * part  # NaN or infinity: no maximum keeps it
     return largest + spoilt

@@ -136,7 +136,7 @@ def _memory_error(rhs, task, lanes, w):
     for i in range(error.size):
         w.x_ahead[i, 0] = w.x_new[i, 0] + error[i]
     evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
-    return SHARE * memory_error(task.corners, w.g, w.g_ahead, task.rtol, task.atol, 0)
+    return SHARE * memory_error(task, w.x, w.g, w.g_ahead, 0)
 
 
 @numba.njit(**INNER)
