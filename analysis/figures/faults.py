@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ..robustness.stl.spec import violates
 from .axes import BLUE, GREY, ORANGE, WIDTH
 from .labels import number_axes, plain
-from .searches import COLOURS, INK, centred
+from .searches import COLOURS, MAP_INK, centred
 
 __all__ = ["fault_margins", "fault_pairs"]
 
@@ -42,7 +42,7 @@ def fault_pairs(margin: pd.DataFrame) -> Figure:
     value = np.clip(np.nan_to_num(margin.to_numpy(dtype=float), nan=-REACH), -REACH, REACH)
     image = ax.imshow(value, cmap=COLOURS, norm=centred(value), aspect="auto")
     rows, columns = np.nonzero(violates(margin.to_numpy()))
-    ax.plot(columns, rows, "x", color=INK, markersize=4)
+    ax.plot(columns, rows, "x", color=MAP_INK, markersize=4)
     names = [plain(name) for name in margin.index]
     ax.set_yticks(np.arange(count), names, parse_math=False, fontsize="small")
     ax.set_xticks(np.arange(count), names, parse_math=False, fontsize="small", rotation=90)

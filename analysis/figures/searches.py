@@ -20,8 +20,8 @@ from .runs import clipped_margins
 __all__ = ["degradation", "deviations", "failure_map_figure", "radius_steps", "search"]
 
 SEARCHERS = {"corners": GREY, "uniform": BLUE, "CMA-ES": GREEN}
-INK = "#111111"  # on the map, which is light on dark pages as well
-COLOURS = ListedColormap(colormaps["PuOr"](np.linspace(0.15, 0.85, 256)))  # INK shows on all
+MAP_INK = "#111111"  # on the map, which is light on dark pages as well
+COLOURS = ListedColormap(colormaps["PuOr"](np.linspace(0.15, 0.85, 256)))  # MAP_INK shows on all
 
 
 def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
@@ -140,17 +140,17 @@ def failure_map_figure(
     image = ax.imshow(
         field, extent=span, origin="lower", aspect="auto", cmap=COLOURS, norm=centred(margin)
     )
-    ax.plot(x, y, ".", color=INK, markersize=1.5, alpha=0.5, rasterized=True)
+    ax.plot(x, y, ".", color=MAP_INK, markersize=1.5, alpha=0.5, rasterized=True)
     if margin.min() <= 0 < margin.max():
-        ax.tricontour(net, margin, levels=[0.0], colors=INK, linewidths=1.6)
+        ax.tricontour(net, margin, levels=[0.0], colors=MAP_INK, linewidths=1.6)
     if box is not None:
         (left, right), (low, high) = box
         ax.plot(
-            [left, right, right, left, left], [low, low, high, high, low], "--", color=INK,
+            [left, right, right, left, left], [low, low, high, high, low], "--", color=MAP_INK,
             linewidth=1.2,
         )  # fmt: skip
     if nominal is not None:
-        ax.plot(*nominal, "*", color=INK, markeredgecolor="white", markersize=13)
+        ax.plot(*nominal, "*", color=MAP_INK, markeredgecolor="white", markersize=13)
     ax.set_xlim(*span[:2])
     ax.set_ylim(*span[2:])
     ax.set_xlabel(plain((labels or names)[0]), parse_math=False)

@@ -126,6 +126,11 @@ def relay_grid(levels: Sequence[float]) -> tuple[tuple[float, ...], tuple[float,
     ------
     ParameterError
         If there are fewer than two levels, or they do not increase.
+
+    Examples
+    --------
+    >>> nlctl.relay_grid([-1, 0, 1])
+    ((0.0, 1.0, 1.0), (-1.0, -1.0, 0.0))
     """
     grid = vector("relay_grid", "levels", levels)
     if grid.size < 2 or not np.all(np.diff(grid) > 0):
@@ -134,7 +139,7 @@ def relay_grid(levels: Sequence[float]) -> tuple[tuple[float, ...], tuple[float,
     return tuple(map(float, grid[upper])), tuple(map(float, grid[lower]))
 
 
-GRID = relay_grid((-1.0, -0.5, 0.0, 0.5, 1.0))
+_GRID = relay_grid((-1.0, -0.5, 0.0, 0.5, 1.0))
 
 
 @record
@@ -157,8 +162,8 @@ class Preisach:
         Sides s_k(0-) at the start, 1 or -1: one for all, or one each.
     """
 
-    alpha: tuple[float, ...] = param(GRID[0], unit="1", meaning="inputs from which relays are on")
-    beta: tuple[float, ...] = param(GRID[1], unit="1", meaning="inputs up to which relays are off")
+    alpha: tuple[float, ...] = param(_GRID[0], unit="1", meaning="inputs from which relays are on")
+    beta: tuple[float, ...] = param(_GRID[1], unit="1", meaning="inputs up to which relays are off")
     w: tuple[float, ...] = param((0.1,) * 10, unit="1", meaning="weights", at_least=0)
     rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memories", above=0)
     v0: float | tuple[float, ...] = -1.0

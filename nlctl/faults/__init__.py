@@ -2,6 +2,6 @@
 
 from .cut import with_faults
 from .effects import NEVER
-from .fault import KINDS, Fault
+from .fault import FAULT_KINDS, Fault
 
-__all__ = ["KINDS", "NEVER", "Fault", "with_faults"]
+__all__ = ["FAULT_KINDS", "NEVER", "Fault", "with_faults"]

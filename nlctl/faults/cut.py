@@ -86,6 +86,13 @@ def with_faults(diagram: Any, *faults: Fault) -> ct.InterconnectedSystem:
         If it is no diagram.
     ParameterError
         If something else than a fault is given, or one that needs a memory in discrete time.
+
+    Examples
+    --------
+    >>> loop = nlctl.paper.example_1()
+    >>> weak = nlctl.with_faults(loop, nlctl.Fault("actuator.v", "gain", 0.5, at=10.0))
+    >>> float(nlctl.parameters(weak).value["fault_actuator_v.onset"])
+    10.0
     """
     system = known_system("with_faults", diagram)
     if not isinstance(system, ct.InterconnectedSystem):

@@ -18,7 +18,7 @@ from ..params import param, record
 __all__ = [
     "NEVER",
     "Bias",
-    "Drift",
+    "DriftFault",
     "Latch",
     "LockInPlace",
     "LossOfEffectiveness",
@@ -101,7 +101,7 @@ class Bias(_Effect):
 
 
 @record
-class Drift(_Effect):
+class DriftFault(_Effect):
     """An offset that grows from 0 on: signal + value (t - onset)."""
 
     value: float = param(0.0, unit="1/s", meaning="rate of the offset")

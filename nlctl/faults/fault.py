@@ -16,7 +16,7 @@ from ..names import unknown
 from .condition import Condition, parse_condition
 from .effects import (
     Bias,
-    Drift,
+    DriftFault,
     Latch,
     LockInPlace,
     LossOfEffectiveness,
@@ -25,13 +25,13 @@ from .effects import (
     StuckAt,
 )
 
-__all__ = ["KINDS", "Fault"]
+__all__ = ["FAULT_KINDS", "Fault"]
 
-KINDS: Mapping[str, Any] = MappingProxyType(
+FAULT_KINDS: Mapping[str, Any] = MappingProxyType(
     {
         "stuck": StuckAt,
         "bias": Bias,
-        "drift": Drift,
+        "drift": DriftFault,
         "gain": LossOfEffectiveness,
         "noise": Noise,
         "dropout": Outage,
@@ -87,9 +87,11 @@ class Fault:
 
     Examples
     --------
-    >>> Fault("actuator.v", "gain", 0.5, at=10.0)
-    >>> Fault("plant.y", "stuck", when="|e| > 0.1")
-    >>> Fault("controller.x1", "dropout", at=5.0, until=5.5)
+    >>> half = nlctl.Fault("actuator.v", "gain", 0.5, at=10.0)
+    >>> stuck = nlctl.Fault("plant.y", "stuck", when="|e| > 0.1")
+    >>> dropout = nlctl.Fault("controller.x1", "dropout", at=5.0, until=5.5)
+    >>> half.kind, half.at
+    ('gain', 10.0)
     """
 
     signal: str
@@ -109,10 +111,10 @@ class Fault:
         if self.kind == "delay":
             raise ParameterError(
                 f"{self._who} cannot be a delay: a diagram keeps no history of its signals; take "
-                "one of " + ", ".join(KINDS)
+                "one of " + ", ".join(FAULT_KINDS)
             )
-        if self.kind not in KINDS:
-            raise unknown("kind of fault", str(self.kind), KINDS, f"on '{self.signal}'")
+        if self.kind not in FAULT_KINDS:
+            raise unknown("kind of fault", str(self.kind), FAULT_KINDS, f"on '{self.signal}'")
         self._check_value()
         self._check_trigger()
         self.effect  # noqa: B018 (it is checked where it is made)
@@ -125,7 +127,7 @@ class Fault:
         """A kind has a value, or none."""
         if self.value is not None:
             number(self._who, "value", self.value)
-            if KINDS[self.kind] is Outage:
+            if FAULT_KINDS[self.kind] is Outage:
                 raise ParameterError(f"{self._who} takes no value, it is 0, got {self.value!r}")
         elif self.kind in NEEDS:
             raise ParameterError(f"{self._who} needs a value, its {NEEDS[self.kind]}, got none")
@@ -150,7 +152,9 @@ class Fault:
                 raise ParameterError(
                     f"{self._who} needs until > at, got {self.until:g} s and {self.onset:g} s"
                 )
-        if (self.kind == "dropout") != (self.until is not None) and KINDS[self.kind] is Outage:
+        if (self.kind == "dropout") != (self.until is not None) and FAULT_KINDS[
+            self.kind
+        ] is Outage:
             what = "needs" if self.kind == "dropout" else "takes no"
             other = "disconnection" if self.kind == "dropout" else "dropout"
             raise ParameterError(
@@ -179,7 +183,9 @@ class Fault:
             given["value"] = self.value
         if self.kind == "noise":
             given |= {"low": self.low, "high": self.high, "seed": self.seed}
-        record = LockInPlace if self.kind == "stuck" and self.value is None else KINDS[self.kind]
+        record = (
+            LockInPlace if self.kind == "stuck" and self.value is None else FAULT_KINDS[self.kind]
+        )
         try:
             return record(**given)
         except ParameterError as error:

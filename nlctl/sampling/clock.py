@@ -14,7 +14,7 @@ from ..arguments import number
 from ..errors import ParameterError
 from ..params import whole_number
 
-MOST = 50_000_000  # instants of one run
+_MOST = 50_000_000  # instants of one run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,9 +201,9 @@ def _instants_of(moment: Moment, begin: float, end: float) -> np.ndarray:
     late = _exact(clock.jitter)
     first = max(0, -((start + late - _exact(begin)) // dt))
     last = max(first - 1, -((start - _exact(end)) // dt))
-    if last - first > MOST:
+    if last - first > _MOST:
         raise ParameterError(
-            f"a sampling time of {clock.dt:g} s has more than {MOST:,} samples from {begin:g} to "
+            f"a sampling time of {clock.dt:g} s has more than {_MOST:,} samples from {begin:g} to "
             f"{end:g} s: simulate a shorter time"
         )
     scale = lcm(start.denominator, dt.denominator)

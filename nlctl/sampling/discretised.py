@@ -11,7 +11,7 @@ from ..blocks import memory_states
 from ..errors import ParameterError
 from .rebuilt import rebuilt
 
-METHODS = ("euler", "tustin", "zoh")
+_METHODS = ("euler", "tustin", "zoh")
 
 
 def discretise(system: Any, dt: float, method: str = "euler") -> Any:
@@ -36,9 +36,16 @@ def discretise(system: Any, dt: float, method: str = "euler") -> Any:
     ParameterError
         If `dt` is not positive, the method is for linear blocks only, or a block has a memory
         that is no state in discrete time.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> lag = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="lag")
+    >>> float(nlctl.discretise(lag, 0.1).A[0, 0])
+    0.9
     """
     number("discretise", "dt", dt, above=0)
-    one_of("discretise", "method", method, METHODS)
+    one_of("discretise", "method", method, _METHODS)
     if not isinstance(system, ct.InputOutputSystem):
         raise ParameterError(
             f"discretise needs a block or diagram, got {type(system).__name__}: nlctl.block makes "

@@ -229,10 +229,14 @@ def sampled(
 
     Examples
     --------
-    >>> plant = ct.tf(1, [1, 1], inputs="u", outputs="y", name="plant")
-    >>> law = ct.nlsys(None, lambda t, x, u, params: 2 * (1 - u), inputs="y", outputs="u")
-    >>> loop = ct.interconnect([plant, sampled(law, 0.1)], inputs=[], outputs=["y"])
-    >>> nlctl.input_output_response(loop, [0, 0.1]).outputs[-1]  # 2 (1 - exp(-0.1))
+    >>> import control as ct
+    >>> plant = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="plant")
+    >>> law = ct.ss([], [], [], -2, 0.1, inputs="y", outputs="u", name="law")
+    >>> parts = [plant, nlctl.sampled(law)]
+    >>> loop = ct.interconnect(parts, inputs=[], outputs=["y"], inplist=[])
+    >>> run = nlctl.input_output_response(loop, [0, 0.1], 0, {"plant.x[0]": 1.0})
+    >>> round(float(run.outputs[0, -1]), 6)  # 3 exp(-0.1) - 2
+    0.714512
     """
     for name, value in (("input_quantum", input_quantum), ("output_quantum", output_quantum)):
         number("sampled", name, value, at_least=0)

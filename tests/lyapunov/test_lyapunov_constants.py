@@ -166,7 +166,7 @@ def test_a_visited_box_contains_what_was_visited():
     response = nlctl.input_output_response(example(1), np.linspace(0, 0.5, 51))
     box = visited_box(response, margin=0.05)
     assert box.provenance == "sampled"
-    assert "+ 5%" in str(box)
+    assert "5 % more" in str(box)
     for name in ("x1", "x2", "u", "v"):
         y = response.outputs[response.output_labels.index(name)]
         low, high = box[name]

@@ -226,7 +226,7 @@ def test_a_burst_feeds_on_the_integral_of_the_nussbaum_function():
 
 def test_no_word_of_the_figures_is_hidden():
     """With the run of Example 2 that the page shows; nothing is cut off or lies on a curve."""
-    record = read_record(dataclasses.replace(burst(), predictions=(found()[2].creep,) * 2))
+    record = read_record(dataclasses.replace(burst(), predictions=(found()[2].slow_drift,) * 2))
     made = [i.figure for s in part() for i in s.items if isinstance(i, Figure)]
     made += [figures.burst(record), figures.story(*np.zeros((3, 9)), record)]
     made += [figures.long_zeta({"Example 2 with the phase": record})]

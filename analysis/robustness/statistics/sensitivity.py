@@ -14,7 +14,7 @@ from nlctl.errors import ParameterError
 
 from ..stl.spec import FAILED
 from ..uncertainty.design import Design, affordable, checked_entropy, listed, sobol_points
-from ..uncertainty.space import Space, from_unit_cube, sampled
+from ..uncertainty.space import Space, from_quantiles, from_unit_cube
 from .guarantee import Margins, checked_confidence, series_of
 from .paired import holm
 
@@ -175,7 +175,7 @@ def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
     mixed = np.tile(a, (d, 1, 1))
     for i in range(d):
         mixed[i, :, i] = b[:, i]
-    points = sampled(space, np.concatenate([a, b, mixed.reshape(-1, d)]))
+    points = from_quantiles(space, np.concatenate([a, b, mixed.reshape(-1, d)]))
     return listed(space, "Saltelli", points, entropy, {"size": size})
 
 

@@ -16,7 +16,7 @@ from nlctl.arguments import flag, of_type, whole_number
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
-from .space import Space, from_unit_cube, nominal, sampled
+from .space import Space, from_quantiles, from_unit_cube, nominal
 
 __all__ = [
     "Design",
@@ -120,7 +120,7 @@ def rows(design: Design, numbers: range) -> pd.DataFrame:
     unit = np.empty((len(numbers), len(design.space.names)))
     for i, number in enumerate(numbers):
         unit[i] = np.random.default_rng(row_seed(design, number)).random(unit.shape[1])
-    return sampled(design.space, unit).set_axis(index)
+    return from_quantiles(design.space, unit).set_axis(index)
 
 
 def numbered(table: pd.DataFrame, first: int) -> pd.DataFrame:
@@ -257,7 +257,7 @@ def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
     """
     entropy = checked_entropy(entropy)
     unit = sobol_points(len(space.names), size, entropy)
-    return listed(space, "Sobol'", sampled(space, unit), entropy)
+    return listed(space, "Sobol'", from_quantiles(space, unit), entropy)
 
 
 def sobol_points(dimension: int, size: int, entropy: int) -> np.ndarray:
@@ -281,7 +281,7 @@ def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Desi
     affordable("a Latin hypercube", size, len(space.names))
     entropy = checked_entropy(entropy)
     unit = qmc.LatinHypercube(len(space.names), rng=entropy).random(size)
-    return listed(space, "Latin hypercube", sampled(space, unit), entropy)
+    return listed(space, "Latin hypercube", from_quantiles(space, unit), entropy)
 
 
 def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = None) -> Design:

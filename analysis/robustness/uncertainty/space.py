@@ -23,10 +23,10 @@ __all__ = [
     "checked_rows",
     "combinations",
     "ends",
+    "from_quantiles",
     "from_unit_cube",
     "moved",
     "nominal",
-    "sampled",
     "scaled",
 ]
 
@@ -115,7 +115,7 @@ def moved(middle: float, value: Any, factor: float) -> Any:
     return middle + factor * (value - middle)
 
 
-def sampled(space: Space, unit: np.ndarray) -> pd.DataFrame:
+def from_quantiles(space: Space, unit: np.ndarray) -> pd.DataFrame:
     """Turn points of the unit cube into values, each coordinate by its law's quantile function.
 
     Uniform points become draws of the laws.

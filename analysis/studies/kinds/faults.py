@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 __all__ = ["FAULTS"]
 
 TOGETHER = 256  # unfinished runs that are simulated again side by side
-MOST = 40  # rows of the table of pairs
-MARGINS = "Least margin that each fault leaves, worst first, drawn between −1 and 1."
+_MOST = 40  # rows of the table of pairs
+_MARGINS = "Least margin that each fault leaves, worst first, drawn between −1 and 1."
 PAIRS = (
     "Least margin under each pair of faults, on the diagonal under one alone, drawn between −1 and "
     "1. Cross: violated."
@@ -266,8 +266,8 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     margin = pd.Series(single["margin"].to_numpy(), index=names)
     yield Figure(
         key=f"{key}-margins",
-        caption=MARGINS,
-        description=f"{MARGINS} "
+        caption=_MARGINS,
+        description=f"{_MARGINS} "
         + "; ".join(f"{n}: {margin_text(m)}" for n, m in zip(names, margin, strict=True)),
         figure=figures.fault_margins(margin),
     )
@@ -283,9 +283,9 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
             description=f"{PAIRS}{at} {finding.sentence}",
             figure=figures.fault_pairs(_matrix(effects, onset)),
         )
-    more = f" The {MOST} worst of {len(pairs)}; {finding.key}/effects.parquet has all."
-    caption = "Pairs of faults, worst first." + more * (len(pairs) > MOST)
-    yield _effects(pairs.head(MOST), caption, result, finding.key, folded=True)
+    more = f" The {_MOST} worst of {len(pairs)}; {finding.key}/effects.parquet has all."
+    caption = "Pairs of faults, worst first." + more * (len(pairs) > _MOST)
+    yield _effects(pairs.head(_MOST), caption, result, finding.key, folded=True)
     yield Paragraph(
         text="A row again, by its number:",
         code=f"nlctl replay {shlex.quote(str(result.folder))} ROW --part {finding.key}",

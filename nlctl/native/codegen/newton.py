@@ -26,7 +26,7 @@ from .solver import DONE, GUESS, PASS, Solver
 
 BASE, _TRIAL = 0.0, 1.0  # phases of a search besides DONE
 STARTS = (0.0, 1.0, -1.0)
-MOST = 16  # signals of one loop; elimination is written out, and grows with their third power
+_MOST = 16  # signals of one loop; elimination is written out, and grows with their third power
 _STEPS = 60.0  # trials from one start, halvings included
 SMALL_STEP = 1e-9  # relative; the next one, of about its square, would not be seen
 _ROUNDING = 4 * 2.0**-52
@@ -50,8 +50,8 @@ def solver(name: str, guesses: Sequence[Expr], found: Sequence[Expr]) -> tuple[S
         If an opaque function is in the loop, which has no derivative, or there are too many
         signals.
     """
-    if len(guesses) > MOST:
-        raise Untraceable(f"{len(guesses)} signals have to be found together, {MOST} can be")
+    if len(guesses) > _MOST:
+        raise Untraceable(f"{len(guesses)} signals have to be found together, {_MOST} can be")
     nodes = needed(found)
     within = inside(nodes, guesses)
     outside = dict.fromkeys(

@@ -16,7 +16,7 @@ from ...sampling.system import Happening
 from ..diagram.schedule import Node, Schedule
 from ..parameters import Slot, current_values, slots
 
-MOST = 40  # ways in which clocks meet
+_MOST = 40  # ways in which clocks meet
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,10 +56,10 @@ class Program:
             If there is too much.
         """
         found = tuple(meetings(self.clocks))
-        if len(found) > MOST:
+        if len(found) > _MOST:
             raise CompileError(
                 f"{len(self.clocks)} clocks of sampled blocks may meet in {len(found)} ways, at "
-                f"most {MOST} can be compiled: give blocks of one rate the same offset and delay"
+                f"most {_MOST} can be compiled: give blocks of one rate the same offset and delay"
             )
         return found
 

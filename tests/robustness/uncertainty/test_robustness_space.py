@@ -16,9 +16,9 @@ from analysis.robustness.uncertainty.space import (
     arguments,
     combinations,
     ends,
+    from_quantiles,
     from_unit_cube,
     nominal,
-    sampled,
     scaled,
 )
 
@@ -81,7 +81,7 @@ def test_a_whole_number_needs_a_law_of_whole_numbers():
         resolved(Space(quantities=(Uncertain(name="sensor.seed", bounds=(0, 9)),)), noise)
     space = Space(quantities=(Uncertain(name="sensor.seed", law=stats.randint(0, 10)),))
     space = resolved(space, noise)
-    table = sampled(space, np.linspace(0, 1, 101)[:, None])
+    table = from_quantiles(space, np.linspace(0, 1, 101)[:, None])
     assert set(table["sensor.seed"]) == set(range(10))
     assert arguments(space, table)["params"]["sensor.seed"].dtype.kind == "i"
 
@@ -102,7 +102,7 @@ def test_uniform_points_become_draws_of_the_laws():
     """The quantile function at u is where the distribution function is u."""
     u = np.random.default_rng(1).random((500, 3))
     space = Space(quantities=(B_R, X1), choices=(ACTUATOR,))
-    table = sampled(space, u)
+    table = from_quantiles(space, u)
     np.testing.assert_allclose(B_R.law.cdf(table["actuator.b_r"]), u[:, 0], atol=1e-12)
     np.testing.assert_allclose(X1.law.cdf(table["plant.x1(0)"]), u[:, 1], atol=1e-12)
     np.testing.assert_array_equal(table["actuator"] == "backlash", u[:, 2] >= 0.5)
@@ -110,14 +110,16 @@ def test_uniform_points_become_draws_of_the_laws():
 
 def test_the_faces_of_the_cube_give_finite_values():
     """u = 0 and u = 1 of a normal law are far out, not infinite."""
-    assert np.isfinite(sampled(Space(quantities=(X1,)), np.array([[0.0], [1.0]]))).all(axis=None)
+    assert np.isfinite(from_quantiles(Space(quantities=(X1,)), np.array([[0.0], [1.0]]))).all(
+        axis=None
+    )
 
 
 def test_choices_come_with_their_weights():
     """A weight of 0 is never drawn; shares converge to the weights."""
     choice = Choice(name="actuator", options=dict.fromkeys("abc"), weights=(0.25, 0.0, 0.75))
     u = (np.arange(1000)[:, None] + 0.5) / 1000
-    labels = sampled(Space(choices=(choice,)), u)["actuator"]
+    labels = from_quantiles(Space(choices=(choice,)), u)["actuator"]
     assert labels.value_counts().to_dict() == {"c": 750, "a": 250}
 
 
@@ -128,7 +130,7 @@ def test_scaling_multiplies_the_distance_to_the_nominal_value(factor, u):
         quantities=(Uncertain(name="b_r", bounds=(0.3, 0.9), nominal=0.5),), choices=(ACTUATOR,)
     )
     points = np.array([[u, 0.7]])
-    for mapping in (sampled, from_unit_cube):
+    for mapping in (from_quantiles, from_unit_cube):
         full, part = mapping(space, points), mapping(scaled(space, factor), points)
         assert part.b_r[0] - 0.5 == pytest.approx(factor * (full.b_r[0] - 0.5), abs=1e-12)
         assert part.actuator[0] == full.actuator[0] == "backlash"
@@ -189,7 +191,10 @@ def test_every_combination_of_choices_is_built_and_checked():
         (lambda: Space(quantities=(B_R,), scale=-1), "scale >= 0"),
         (lambda: scaled(Space(quantities=(B_R,)), 2), "has no nominal value: give one"),
         (lambda: nominal(Space(quantities=(B_R,))), "has no nominal value"),
-        (lambda: sampled(Space(quantities=(B_R,)), np.zeros((2, 2))), r"shape \(n, 1\), got"),
+        (
+            lambda: from_quantiles(Space(quantities=(B_R,)), np.zeros((2, 2))),
+            r"shape \(n, 1\), got",
+        ),
         (lambda: from_unit_cube(Space(quantities=(B_R,)), np.array([[np.nan]])), r"in \[0, 1\]"),
     ],
 )
