@@ -18,7 +18,7 @@ from scipy.special import erfcx
 
 import nlctl
 from nlctl.native import CompileError
-from nlctl.native.codegen.newton import MOST, SINGULAR, STARTS, improved, newton_step
+from nlctl.native.codegen.newton import _MOST, SINGULAR, STARTS, improved, newton_step
 from nlctl.native.codegen.solver import DONE, GUESS
 
 needs_jit = pytest.mark.skipif(
@@ -191,7 +191,7 @@ def test_a_loop_is_audited():
     assert run.statistics.status.name == "OK"
 
 
-@pytest.mark.parametrize("n", [MOST, MOST + 1])
+@pytest.mark.parametrize("n", [_MOST, _MOST + 1])
 def test_many_signals_in_a_loop(n):
     """Each is the cosine of its right neighbour and of itself: all are equal."""
 
@@ -201,12 +201,12 @@ def test_many_signals_in_a_loop(n):
     block = static("f", output, n, n)
     wires = [[f"f.u[{i}]", f"f.y[{i}]"] for i in range(n)]
     diagram = ct.interconnect([block], wires, outlist=["f.y[0]"], name="ring")
-    if n > MOST:
+    if n > _MOST:
         with pytest.raises(CompileError, match=f"{n} signals have to be found together"):
             solved(diagram)
         return
     compiled = solved(diagram)
-    assert len(compiled.schedule.loops[0].torn) == MOST
+    assert len(compiled.schedule.loops[0].torn) == _MOST
     y = np.empty(1)
     interpreted(compiled)[1](0.0, [], [], compiled.parameter_vector(), y)
     assert y == pytest.approx(brentq(lambda v: np.cos(v) - v, 0, 1, xtol=1e-15), rel=1e-14)
