@@ -387,3 +387,48 @@ def parameters(system: Any) -> pd.DataFrame:
         },
         index=pd.Index([row.name for row in rows], name="parameter"),
     )
+
+
+def reconnected(before: Any, parts: Sequence[Any], maps: Any, dt: Any) -> ct.InterconnectedSystem:
+    """Return parts connected by maps in the place of a diagram: with its signals and parameters.
+
+    Parameters
+    ----------
+    before : control.InterconnectedSystem
+        It stays as it is.
+    parts : sequence of control.InputOutputSystem
+        In the places of its own, others behind them.
+    maps : tuple of ndarray
+        ``connect_map``, ``input_map`` and ``output_map``.
+    dt : float, bool or None
+        Timebase.
+    """
+    made = ct.InterconnectedSystem(
+        parts,
+        inputs=list(before.input_labels) or 0,
+        outputs=list(before.output_labels) or 0,
+        states=_state_labels(before, parts),
+        name=before.name,
+        dt=dt,
+        connection_type=before.connection_type,
+        warn_duplicate=False,
+    )
+    made.connect_map, made.input_map, made.output_map = maps
+    for name, value in before.params.items():
+        dict.__setitem__(made.params, name, value)
+    if isinstance(made.params, Parameters) and isinstance(before.params, Parameters):
+        made.params.scope = None if before.params.scope is None else made
+    return made
+
+
+def _state_labels(before: Any, parts: Sequence[Any]) -> list[str]:
+    """Return the labels that states had, and those of parts that have more states now."""
+    labels: list[str] = []
+    for i, part in enumerate(parts):
+        had = before.syslist[i].nstates if i < len(before.syslist) else -1
+        if part.nstates == had:
+            offset = before.state_offset[i]
+            labels += before.state_labels[offset : offset + had]
+        else:
+            labels += [f"{part.name}_{label}" for label in part.state_labels]
+    return labels

@@ -12,9 +12,9 @@ import control as ct
 import numpy as np
 
 from ..blocks import block, memory_states
-from ..diagrams import known_system, places
+from ..diagrams import known_system, places, reconnected
 from ..errors import DiagramError, ParameterError, UnknownNameError
-from ..names import Parameters, find_name, unknown
+from ..names import find_name, unknown
 from .fault import Fault
 
 __all__ = ["signal_names", "with_faults"]
@@ -195,40 +195,7 @@ def _rebuilt(system: Any, path: str, cuts: Sequence[_Cut]) -> Any:
     for cut in cuts:
         if cut.spot.diagram == path:
             parts += wires.through(cut, {part.name for part in parts}, dt)
-    made = ct.InterconnectedSystem(
-        parts,
-        inputs=list(system.input_labels) or 0,
-        outputs=list(system.output_labels) or 0,
-        states=_state_labels(system, parts),
-        name=system.name,
-        dt=system.dt,
-        connection_type=system.connection_type,
-        warn_duplicate=False,
-    )
-    made.connect_map, made.input_map, made.output_map = wires.maps
-    _keep_params(system, made)
-    return made
-
-
-def _state_labels(system: ct.InterconnectedSystem, parts: Sequence[Any]) -> list[str]:
-    """Return the labels that states had, and those of parts that have more states now."""
-    labels: list[str] = []
-    for i, part in enumerate(parts):
-        before = system.syslist[i].nstates if i < len(system.syslist) else -1
-        if part.nstates == before:
-            offset = system.state_offset[i]
-            labels += system.state_labels[offset : offset + before]
-        else:
-            labels += [f"{part.name}_{label}" for label in part.state_labels]
-    return labels
-
-
-def _keep_params(before: ct.InterconnectedSystem, made: ct.InterconnectedSystem) -> None:
-    """Take over values that the diagram itself was given, and whether it has a scope."""
-    for name, value in before.params.items():
-        dict.__setitem__(made.params, name, value)
-    if isinstance(made.params, Parameters) and isinstance(before.params, Parameters):
-        made.params.scope = None if before.params.scope is None else made
+    return reconnected(system, parts, wires.maps, system.dt)
 
 
 class _Wires:

@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..names import Parameters
+from ..diagrams import reconnected
 
 
 def staged(diagram: Any, first: Any = None, last: Any = None) -> Any:
@@ -37,7 +37,7 @@ def staged(diagram: Any, first: Any = None, last: Any = None) -> Any:
         connect = np.block([[connect, given], [np.zeros((count, connect.shape[1] + count))]])
         given = np.vstack([np.zeros_like(given), np.eye(count)])
         parts.append(first)
-    return _made(diagram, parts, (connect, given, shown), diagram.dt)
+    return reconnected(diagram, parts, (connect, given, shown), diagram.dt)
 
 
 def rebuilt(diagram: Any, change: Callable[[Any], Any], dt: Any) -> Any:
@@ -57,18 +57,4 @@ def rebuilt(diagram: Any, change: Callable[[Any], Any], dt: Any) -> Any:
         for part in diagram.syslist
     ]
     maps = (diagram.connect_map.copy(), diagram.input_map.copy(), diagram.output_map.copy())
-    return _made(diagram, parts, maps, dt)
-
-
-def _made(diagram: Any, parts: list[Any], maps: Any, dt: Any) -> Any:
-    """Return parts connected by these maps, with the signals and names of a diagram."""
-    made = ct.InterconnectedSystem(
-        parts, inputs=list(diagram.input_labels), outputs=list(diagram.output_labels),
-        name=diagram.name, dt=dt,
-    )  # fmt: skip
-    made.set_connect_map(maps[0])
-    made.set_input_map(maps[1])
-    made.set_output_map(maps[2])
-    if isinstance(made.params, Parameters) and diagram.params.scope is not None:
-        made.params.scope = made
-    return made
+    return reconnected(diagram, parts, maps, dt)

@@ -331,3 +331,27 @@ def test_two_rates_are_linearized_over_their_common_period():
     odd = [Clock(dt=0.1), Clock(dt=0.1234567)]
     with pytest.raises(ParameterError, match="too long"):
         common_period(odd)
+
+
+def test_a_diagram_keeps_the_parameters_that_it_was_given():
+    """Those of `ct.interconnect` and of its own, not those that its blocks had."""
+
+    def gain(name, inputs, outputs):
+        return ct.nlsys(
+            None, lambda t, x, u, params: [params["k"] * u[0]], inputs=inputs, outputs=outputs,
+            params={"k": 1.0}, name=name,
+        )  # fmt: skip
+
+    inner = ct.interconnect(
+        [gain("one", ["y"], ["m"]), gain("two", ["m"], ["u"])],
+        inputs=["y"], outputs=["u"], params={"k": -2.0}, name="law",
+    )  # fmt: skip
+    for made in (nlctl.sampled(inner, 0.1), nlctl.sampled(inner, 0.1, delay=0.05)):
+        assert made.params["k"] == -2.0
+    loop = closed(nlctl.sampled(inner, 0.1))
+    for engine in ("native", "python-control"):
+        run = nlctl.input_output_response(loop, T[:2], 0, start(loop), engine=engine)
+        assert run.outputs[1, 0] == pytest.approx(4.0)
+    known = nlctl.adaptive_neural(2)
+    known.params["law.beta"] = 9.0
+    assert nlctl.discretise(known, 0.01).params["law.beta"] == 9.0
