@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -121,29 +121,47 @@ class Sampled(ct.NonlinearIOSystem):
                 "at each of them (engine='python-control' is the reference)"
             )
         x = np.array(x, dtype=float)
-        own, waiting, held = self.parts(x)
-        samples = self.clock.sampling in now
+        own, _, _ = self.parts(x)
         if not self.acts(now):
             return np.zeros(x.size)
-        result = [own, waiting, held]
-        if self.releases(now):
-            result[2] = waiting[waiting.size - held.size :]
-        if samples:
-            given = _rounded(np.asarray(u, dtype=float), self.input_quantum)
-            y = self._new(t, own, given)
-            result[0] = np.reshape(self.inner._rhs(t, own, given), -1) if own.size else own
-            if waiting.size:
-                result[1] = np.concatenate([y, waiting[: waiting.size - y.size]])
-            else:
-                result[2] = y
-        return np.concatenate(result)
+
+        def computed() -> tuple[Any, Any]:
+            given = rounded(np.asarray(u, dtype=float), self.input_quantum)
+            following = np.reshape(self.inner._rhs(t, own, given), -1) if own.size else own
+            return following, self._new(t, own, given)
+
+        return np.concatenate(self.after(now, x, computed))
 
     def _out(self, t: float, x: Any, u: Any) -> np.ndarray:
         own, waiting, held = self.parts(np.asarray(x, dtype=float))
         now = _HAPPENING.get() or frozenset()
         if self.answers(now):
-            return self._new(t, own, _rounded(np.asarray(u, dtype=float), self.input_quantum))
-        return waiting[waiting.size - held.size :] if self.releases(now) else held
+            return self._new(t, own, rounded(np.asarray(u, dtype=float), self.input_quantum))
+        return self.shown(now, waiting, held)
+
+    def after(self, now: Happening, x: Any, computed: Callable[[], tuple[Any, Any]]) -> list[Any]:
+        """Return the parts of the states after what happens, one behind the other.
+
+        Parameters
+        ----------
+        now : frozenset of Moment
+        x : array_like of shape (nstates,)
+            Numbers, or what stands for them.
+        computed : callable
+            Returns what a sample makes: the block's own next states, and its outputs.
+        """
+        own, waiting, held = self.parts(x)
+        held = self.shown(now, waiting, held)
+        if self.clock.sampling not in now:
+            return [own, waiting, held]
+        following, y = computed()
+        if not self.clock.pending:
+            return [following, y]
+        return [following, y, waiting[: len(waiting) - len(held)], held]
+
+    def shown(self, now: Happening, waiting: Any, held: Any) -> Any:
+        """Return the outputs that are held, those that have waited if they follow now."""
+        return waiting[len(waiting) - len(held) :] if self.releases(now) else held
 
     def acts(self, now: Happening) -> bool:
         """Whether anything happens to it."""
@@ -155,7 +173,7 @@ class Sampled(ct.NonlinearIOSystem):
 
     def _new(self, t: float, own: np.ndarray, u: np.ndarray) -> np.ndarray:
         y = np.asarray(self.inner._out(t, own, u), dtype=float).reshape(-1)
-        return _rounded(y, self.output_quantum)
+        return rounded(y, self.output_quantum)
 
 
 def _nothing(t: float, x: Any, u: Any, params: Any) -> Any:
@@ -163,8 +181,8 @@ def _nothing(t: float, x: Any, u: Any, params: Any) -> Any:
     raise AssertionError("the equations of a sampled block are those of the block inside")
 
 
-def _rounded(values: Any, quantum: float) -> Any:
-    """Round to multiples of a quantum, halves to the even one."""
+def rounded(values: Any, quantum: float) -> Any:
+    """Round to multiples of a quantum, halves to the even one; 0 for none."""
     return quantum * np.rint(values / quantum) if quantum else values
 
 

@@ -15,8 +15,9 @@ from ...errors import CompileError
 from ...expressions.arrays import Tracer, as_array, concatenated, full, leaf_vector, scalar, traced
 from ...expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable, needed
 from ...expressions.operators import elementwise
+from ...expressions.stage import Stage
 from ...expressions.trace import trace
-from ...sampling.system import Happening
+from ...sampling.system import Happening, rounded
 from ..diagram.feedthrough import feedthrough
 from ..diagram.schedule import (
     AlgebraicLoop,
@@ -256,9 +257,9 @@ class Reader:
         node = self.blocks[i]
         if node.sampled:
             if not node.sampled.answers(self.what):
-                _, waiting, held = self._divided(node)
-                return waiting[-held.size :] if node.sampled.releases(self.what) else held
-            return self._rounded(node.sampled.output_quantum, self._own_outputs(i, unknown))
+                _, waiting, held = node.sampled.parts(self._every_state(i))
+                return node.sampled.shown(self.what, waiting, held)
+            return self._rounded(self._own_outputs(i, unknown), node.sampled.output_quantum)
         return self._own_outputs(i, unknown)
 
     def _own_outputs(self, i: int, unknown: Collection[int]) -> Tracer:
@@ -275,7 +276,7 @@ class Reader:
             ]
         )
         if node.sampled:
-            inputs = self._rounded(node.sampled.input_quantum, inputs)
+            inputs = self._rounded(inputs, node.sampled.input_quantum)
         if linear:
             return self._linear(node, system.C, system.D, inputs)
         return self._function(i, "output", [system.outfcn], inputs, system.noutputs)
@@ -289,30 +290,25 @@ class Reader:
     def next_states(self, i: int) -> Tracer:
         """Return the states of a sampled block after what happens."""
         sampled: Any = self.blocks[i].sampled
-        own, waiting, held = self._divided(self.blocks[i])
-        if sampled.releases(self.what):
-            held = waiting[-held.size :]
-        if sampled.clock.sampling in self.what:
+
+        def computed() -> tuple[Tracer, Tracer]:
             direct = replace(self.blocks[i], direct=feedthrough(self.blocks[i].system))
             reader = replace(self, blocks=[*self.blocks[:i], direct, *self.blocks[i + 1 :]])
-            y = self._rounded(sampled.output_quantum, reader._own_outputs(i, ()))
-            own = self._own_states(i)
-            if waiting.size:
-                waiting = concatenated(self.graph, [y, waiting[: -y.size]]) if y.size else waiting
-            else:
-                held = y
-        return concatenated(self.graph, [own, waiting, held])
+            return self._own_states(i), self._rounded(
+                reader._own_outputs(i, ()), sampled.output_quantum
+            )
 
-    def _divided(self, node: Node) -> tuple[Tracer, Tracer, Tracer]:
-        """Return a sampled block's own states, waiting outputs and held outputs."""
-        sampled: Any = node.sampled
-        return sampled.parts(leaf_vector(self.graph, "x", node.state_offset, (node.size,)))
+        parts = sampled.after(self.what, self._every_state(i), computed)
+        return concatenated(self.graph, parts)
 
-    def _rounded(self, quantum: float, values: Tracer) -> Tracer:
-        if not quantum or not values.size:
-            return values
-        steps = elementwise(self.graph, "rint", elementwise(self.graph, "div", values, quantum))
-        return elementwise(self.graph, "mul", quantum, steps)
+    def _rounded(self, values: Tracer, quantum: float) -> Tracer:
+        """Return what converters with steps of a quantum make of values."""
+        return Stage(self.graph).copied(rounded)(values, quantum) if values.size else values
+
+    def _every_state(self, i: int) -> Tracer:
+        """Return a sampled block's own states, and behind them what waits and is held."""
+        node = self.blocks[i]
+        return leaf_vector(self.graph, "x", node.state_offset, (node.size,))
 
     def _own_states(self, i: int) -> Tracer:
         node, system = self.blocks[i], self.blocks[i].system
@@ -320,7 +316,7 @@ class Reader:
             return self._states(node)
         inputs = self.wired(node.inputs)
         if node.sampled:
-            inputs = self._rounded(node.sampled.input_quantum, inputs)
+            inputs = self._rounded(inputs, node.sampled.input_quantum)
         if isinstance(system, ct.StateSpace):
             return self._linear(node, system.A, system.B, inputs)
         return self._function(i, "update", [system.updfcn], inputs, system.nstates)
