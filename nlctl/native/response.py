@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import DivergedError
 from ..responses.arguments import evaluation_array, input_array, interpolated, state_array
-from ..responses.time_response import Response
+from ..responses.time_response import Response, response_of
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .compiled import Compiled
@@ -112,23 +112,10 @@ def _response(
 ) -> Response:
     system, run = compiled.system, made.statistics
     ok = run.status is Status.OK
-    response = Response(
-        made.time[shown],
-        made.outputs[:, shown],
-        made.states[:, shown],
-        inputs[:, shown],
-        issiso=system.issiso(),
-        params=dict(system.params) | dict(params or {}),
-        output_labels=system.output_labels,
-        input_labels=system.input_labels,
-        state_labels=system.state_labels,
-        title=f"Input/output response for {system.name}",
-        sysname=system.name,
-        success=ok,
-        message=None if ok else _message(system, run),
-        squeeze=form.get("squeeze"),
-        transpose=form.get("transpose", False),
-        return_x=form.get("return_states", False),
-    )
+    signals = (made.time, made.outputs, made.states, inputs)
+    response = response_of(
+        system, [x[..., shown] for x in signals], params, form,
+        success=ok, message=None if ok else _message(system, run),
+    )  # fmt: skip
     response.statistics = run
     return response

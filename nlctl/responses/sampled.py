@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import control as ct
 import numpy as np
 
 from ..diagrams import leaves
 from ..sampling.clock import Instants, instants
 from ..sampling.system import Happening, Sampled, happening
 from .arguments import interpolated
+from .time_response import response_of
 
 
 def sampled_states(system: Any) -> dict[int, Any]:
@@ -80,7 +80,8 @@ def from_sample_to_sample(
         y[:, taken] = np.reshape(part.y, (y.shape[0], grid.size))[:, columns]
         path = np.reshape(part.x, (states.shape[0], grid.size))
         states[:, taken], x = path[:, columns], path[:, -1].copy()
-    return _response(system, wanted, interpolated(inputs, times, wanted), y, states, params, form)
+    signals = (wanted, y, states, interpolated(inputs, times, wanted))
+    return response_of(system, signals, params, form)
 
 
 def _segments(due: Instants, times: np.ndarray) -> Iterator[tuple[float, float, Happening]]:
@@ -98,15 +99,3 @@ def _after(system: Any, point: Any, what: Happening, params: Any) -> Any:
         return point[1]
     with happening(what):
         return np.asarray(system.dynamics(*point, params=params)).reshape(-1)
-
-
-def _response(
-    system: Any, times: Any, inputs: Any, y: Any, states: Any, params: Any, form: dict[str, Any]
-) -> Any:
-    return ct.TimeResponseData(
-        times, y, states, inputs, issiso=system.issiso(), params=dict(system.params) | params,
-        output_labels=system.output_labels, input_labels=system.input_labels,
-        state_labels=system.state_labels, sysname=system.name,
-        title=f"Input/output response for {system.name}", squeeze=form["squeeze"],
-        transpose=bool(form["transpose"]), return_x=bool(form["return_states"]),
-    )  # fmt: skip

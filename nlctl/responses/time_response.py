@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import control as ct
@@ -46,6 +47,43 @@ def as_response(response: ct.TimeResponseData) -> Response:
     made = Response.__new__(Response)
     made.__dict__.update(response.__dict__)
     return made
+
+
+def response_of(
+    system: Any,
+    signals: Sequence[Any],
+    params: Any,
+    form: Mapping[str, Any],
+    **more: Any,
+) -> Response:
+    """Return a response of a system.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+    signals : sequence of ndarray
+        Times (s) of shape (k,), then outputs, states and inputs of shapes (..., k).
+    params : mapping or None
+        Parameters of the run.
+    form : mapping
+        ``squeeze``, ``transpose`` and ``return_states`` as in `control.TimeResponseData`.
+    **more
+        Further arguments of it.
+    """
+    return Response(
+        *signals,
+        issiso=system.issiso(),
+        params=dict(system.params) | dict(params or {}),
+        output_labels=system.output_labels,
+        input_labels=system.input_labels,
+        state_labels=system.state_labels,
+        title=f"Input/output response for {system.name}",
+        sysname=system.name,
+        squeeze=form.get("squeeze"),
+        transpose=bool(form.get("transpose")),
+        return_x=bool(form.get("return_states")),
+        **more,
+    )
 
 
 def _names(labels: Any) -> str:
