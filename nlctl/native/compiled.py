@@ -195,7 +195,8 @@ class Compiled:
         Raises
         ------
         CompileError, UnknownNameError, ParameterError
-            As `linearize`, and if there is no such parameter.
+            As `linearize`, if there is no such parameter, and if numbers follow from it outside of
+            the equations, by a record's `derived`.
         """
         return parameter_jacobian(self, parameters, x0, u0, t, params)
 

@@ -16,6 +16,7 @@ from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Untraceable, needed
 from ..names import unknown
+from ..params import declared_params, equation_arguments, with_overrides
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from .codegen.blocks import Equations
@@ -23,7 +24,9 @@ from .parameters import length
 
 if TYPE_CHECKING:
     from .compiled import Compiled
+    from .diagram.schedule import Node
 
+STEP = 1e-6  # by which a parameter is moved, to see what follows from it
 DIRECTION = "v"  # the array of a direction: of states, then inputs, then what else is varied
 _DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
@@ -239,18 +242,44 @@ def parameter_jacobian(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Differentiate by parameters; see `Compiled.parameter_jacobian`."""
     system = compiled.system
-    places = {
-        (slot.name if not slot.shape else f"{slot.name}[{k}]"): slot.offset + k
-        for block in compiled.program.layout.values()
-        for slot in block.values()
-        if slot.kind == "f"
-        for k in range(slot.size)
-    }
+    places, owners = {}, {}
+    for i, own in compiled.program.layout.items():
+        for slot in own.values():
+            for k in range(slot.size if slot.kind == "f" else 0):
+                name = f"{slot.name}[{k}]" if slot.shape else slot.name
+                places[name], owners[name] = slot.offset + k, compiled.schedule.nodes[i]
+    compiled.parameter_vector(params)  # blocks have the run's parameters then
     start = (system.nstates or 0) + (system.ninputs or 0)
     directions = np.zeros((start + length(compiled.program.layout), len(parameters)))
     for k, name in enumerate(parameters):
         if name not in places:
             raise unknown("parameter", name, places, f"of '{system.name}' that is a float")
+        _check_enters_alone(owners[name], name)
         directions[start + places[name], k] = 1.0
     found = jacobian(compiled, x0, u0, t, params, directions)
     return found["dx"], found["y"]
+
+
+def _check_enters_alone(node: Node, name: str) -> None:
+    """Refuse a parameter that numbers follow from: these are constants to the equations."""
+    spec: Any = getattr(node.system, "current_spec", None)
+    field, _, place = name.removeprefix(f"{node.path}.").partition("[")
+    if not hasattr(spec, "derived") or field not in declared_params(spec):
+        return
+    values = np.asarray(getattr(spec, field), dtype=float)
+    flat = int(place.removesuffix("]") or 0)
+    value, key = float(values.ravel()[flat]), field
+    if values.ndim:
+        key += f"[{', '.join(map(str, np.unravel_index(flat, values.shape)))}]"
+    now = equation_arguments(spec)._asdict()
+    for moved in (value + STEP * max(abs(value), 1.0), value - STEP * max(abs(value), 1.0)):
+        try:
+            then = equation_arguments(with_overrides(spec, {key: moved}, node.path))._asdict()
+        except ParameterError:  # out of its bounds: the other side tells
+            continue
+        for other in spec.derived():
+            if not np.array_equal(now[other], then[other]):
+                raise CompileError(
+                    f"'{name}' has no exact derivative: '{other}' of block '{node.path}' follows "
+                    "from it outside of the equations: take differences of runs"
+                )
