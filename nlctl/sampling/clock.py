@@ -199,8 +199,9 @@ def common_period(clocks: Sequence[Clock]) -> tuple[float, float, float]:
 def _instants_of(moment: Moment, begin: float, end: float) -> np.ndarray:
     clock, start, dt = moment.clock, _start(moment), _exact(moment.clock.dt)
     late = _exact(clock.jitter)
-    first = max(0, -((start + late - _exact(begin)) // dt))
-    last = max(first - 1, -((start - _exact(end)) // dt))
+    # one more on either side: which are inside is asked of the rounded times
+    first = max(0, -((start + late - _exact(begin)) // dt) - 1)
+    last = max(first - 1, -((start - _exact(end)) // dt) + 1)
     if last - first > _MOST:
         raise ParameterError(
             f"a sampling time of {clock.dt:g} s has more than {_MOST:,} samples from {begin:g} to "

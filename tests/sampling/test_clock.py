@@ -34,6 +34,16 @@ def test_two_runs_have_the_instants_of_one(clocks, middle):
         np.testing.assert_array_equal(joined, getattr(whole, name))
 
 
+@given(st.lists(CLOCKS, min_size=1, max_size=3), st.data())
+def test_a_run_that_resumes_at_an_instant_has_it(clocks, data):
+    """Once, in the second run, also where the decimals of the clock round to it from below."""
+    whole = instants(clocks, 0.0, 7.0)
+    middle = float(data.draw(st.sampled_from(whole.times.tolist())))
+    first, second = instants(clocks, 0.0, middle), instants(clocks, middle, 7.0)
+    assert second.times[0] == middle
+    np.testing.assert_array_equal(np.concatenate([first.times, second.times]), whole.times)
+
+
 @given(st.lists(CLOCKS, min_size=1, max_size=3))
 def test_whatever_happens_at_once_is_foreseen(clocks):
     assert set(instants(clocks, 0.0, 30.0).patterns) <= set(meetings(clocks))

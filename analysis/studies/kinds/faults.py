@@ -30,7 +30,7 @@ from ..file.field_types import Flag, Names, Size
 from ..finding import Finding
 from ..kind import Asked, Ground, Kind, Setup, made
 from ..page import text as text
-from ..page.text import margin_text
+from ..page.text import DID_NOT_END, margin_text
 
 if TYPE_CHECKING:
     from ...report.document import Item
@@ -40,7 +40,9 @@ __all__ = ["FAULTS"]
 
 TOGETHER = 256  # unfinished runs that are simulated again side by side
 _MOST = 40  # rows of the table of pairs
-_MARGINS = "Least margin that each fault leaves, worst first, drawn between −1 and 1."
+_MARGINS = (
+    "Least margin that each fault leaves, worst first, drawn between −1 and 1. Hatched: violated."
+)
 PAIRS = (
     "Least margin under each pair of faults, on the diagonal under one alone, drawn between −1 and "
     "1. Cross: violated."
@@ -211,7 +213,7 @@ def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
     words = (
         f"The loop without a fault {'meets' if alone > 0 else 'already violates'} the spec (margin "
         f"{margin_text(alone)}). {len(bad)} of {len(single)} single faults violate it; the worst "
-        f"is {worst['first']} at {worst['onset']:g} s (margin {margin_text(worst['margin'])})."
+        f"is {worst['first']} at {worst['onset']:g} s ({_in_words(worst['margin'])})."
     )
     if asked.pairs:
         words += (
@@ -234,6 +236,11 @@ def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
         numbers=numbers,
         tables={"effects": effects},
     )
+
+
+def _in_words(margin: float) -> str:
+    text = margin_text(margin)
+    return f"its run {text}" if text == DID_NOT_END else f"margin {text}"
 
 
 def _answer(asked: Faults, violating: pd.DataFrame) -> dict[str, str]:

@@ -150,7 +150,8 @@ def inputs_at(t, times, inputs, lanes, u):
         m = min(lanes[j].segment, times.size - 2)  # a lane that has finished is not moved on
         share = (t[j] - times[m]) / (times[m + 1] - times[m])
         for i in range(u.shape[0]):
-            u[i, j] = inputs[i, m] * (1.0 - share) + inputs[i, m + 1] * share
+            first, last = inputs[i, m], inputs[i, m + 1]  # exact at both, and where they are equal
+            u[i, j] = last if share == 1.0 else first + share * (last - first)
 
 
 @numba.njit(**INNER)

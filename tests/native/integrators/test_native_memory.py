@@ -470,3 +470,14 @@ class TestExample2:
             assert abs(made - best).max() <= 100 * rtol
         if method == "tsit5":
             assert abs(made - best).max() <= 1e-9
+
+
+def test_a_constant_input_is_constant_between_its_times():
+    """To the bit: a rounding of it would carry the memory along."""
+    gap = nlctl.compile(nlctl.block(nlctl.Stop(r=1.0), "gap"))
+    rng = np.random.default_rng(8)
+    for level in rng.uniform(1.5, 2.5, 40):
+        times = np.cumsum(rng.uniform(0.1, 1.0, 8))
+        inputs = np.where(np.arange(8) == 0, 0.0, level)
+        run = nlctl.input_output_response(gap, times, inputs, audit=False)
+        assert set(run.states[0, 1:]) == {level - 1.0}
