@@ -15,8 +15,8 @@ from types import BuiltinFunctionType, CellType, CodeType, FunctionType, MethodT
 from typing import Any
 
 import numpy as np
-from numba.core.registry import CPUDispatcher
 
+from ..upstream.numba_internals import CPUDispatcher
 from .arrays import Tracer, concatenated, full, traced
 from .functions import FUNCTIONS, MATH
 from .graph import NUMPY, Graph, Untraceable
