@@ -69,5 +69,5 @@ def _made(compiled: Compiled) -> Any:
         return None
     n, m = compiled.system.nstates or 0, compiled.system.ninputs or 0
     rows = along(equations, "dx", {"x": 0, "u": n, "t": n + m})
-    lowered = lower_along(compiled.schedule, compiled.program, equations.graph, rows, DIRECTIONS)
+    lowered = lower_along(compiled.schedule, compiled.program, equations, rows, DIRECTIONS)
     return lowered, *lowered_code(lowered)

@@ -8,14 +8,14 @@ generator makes machine code of the plan (`codegen.ir`), and one interpreter car
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...expressions.arrays import Tracer
-from ...expressions.graph import Expr, Graph, needed
+from ...expressions.graph import Expr, needed
 from ..diagram.schedule import Schedule
 from ..parameters import length
 from .blocks import Equations, equations
@@ -126,7 +126,7 @@ def lower(
 def lower_along(
     schedule: Schedule,
     program: Program,
-    graph: Graph,
+    equations: Equations,
     derivatives: Sequence[tuple[Expr | None, int]],
     lanes: int = 8,
 ) -> Lowered:
@@ -136,8 +136,8 @@ def lower_along(
     ----------
     schedule : Schedule
     program : Program
-    graph : Graph
-        Where the derivatives are kept.
+    equations : Equations
+        What was differentiated; its graph keeps the derivatives.
     derivatives : sequence
         Of the rows of dx one after the other: an expression, None where it is 0, and its length.
         They read the direction in an array ``"v"``.
@@ -150,10 +150,10 @@ def lower_along(
     """
     stores, row = [], 0
     for expr, size in derivatives:
-        expr = graph.const(0.0) if expr is None else expr
+        expr = equations.graph.const(0.0) if expr is None else expr
         stores += split(Store(array="dx", row=row, expr=expr, size=size))
         row += size
-    found = Equations(graph=graph, results={}, calls={}, solvers={})
+    found = replace(equations, calls={})  # what is opaque has no derivatives
     return _lowered(schedule, program, found, ALONG, {"along": stores}, lanes)
 
 
