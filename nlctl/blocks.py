@@ -13,6 +13,7 @@ import numpy as np
 from .errors import BlockError, ParameterError
 from .names import Parameters, base_name, unknown
 from .params import declared_params, ensure_checked, equation_arguments, is_checked, with_overrides
+from .upstream.control_internals import OwnParameters, current_parameters, set_parameters
 
 
 class Spec(Protocol):
@@ -93,7 +94,7 @@ class ParameterRow:
         return str(self.value) if isinstance(self.value, bool) else f"{self.value:g}"
 
 
-class Block(ct.NonlinearIOSystem):
+class Block(OwnParameters):
     """A python-control system made from a record; see `block`.
 
     Attributes
@@ -117,7 +118,7 @@ class Block(ct.NonlinearIOSystem):
             name=name,
             **kwargs,
         )
-        self._update_params(None)
+        set_parameters(self, None)
 
     @property
     def params(self) -> Parameters:
@@ -129,7 +130,7 @@ class Block(ct.NonlinearIOSystem):
     def params(self, values: Mapping[str, Any]) -> None:
         if values:
             self.spec = self._resolved(values)
-            self._update_params(None)
+            set_parameters(self, None)
 
     def _own(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return the overrides among `params` that are this block's, by field name."""
@@ -142,11 +143,12 @@ class Block(ct.NonlinearIOSystem):
                 raise unknown("parameter", name, fields, f"of block '{self.name}'")
         return own
 
-    def _update_params(self, params: Mapping[str, Any] | None) -> None:
-        # python-control calls this before a run; its equations then get the result as `p`.
-        before, self.current_spec = self.current_spec, self._resolved(params or {})
-        if self.current_spec is not before:
-            self._current_params = equation_arguments(self.current_spec)
+    def taken(self, params: Mapping[str, Any]) -> Any:
+        """Return what equations get as `p`; python-control asks for it before a run."""
+        before, self.current_spec = self.current_spec, self._resolved(params)
+        if self.current_spec is before:
+            return current_parameters(self)
+        return equation_arguments(self.current_spec)
 
     def _resolved(self, params: Mapping[str, Any]) -> Any:
         """Return the record with overrides; they must not change the number of signals.
@@ -318,13 +320,13 @@ def event_count(made: Block) -> int:
     if not hasattr(made.spec, "corners"):
         return 0
     u = np.full(made.ninputs or 0, 0.25)
-    return len(made.spec.corners(0.0, default_state(made), u, made._current_params))
+    return len(made.spec.corners(0.0, default_state(made), u, current_parameters(made)))
 
 
 def _probe(made: Block) -> None:
     """Call the equations once: sizes must match, and feedthrough must be declared truly."""
     spec, who = made.spec, f"{type(made.spec).__name__} (block '{made.name}')"
-    x, u, p = default_state(made), np.full(made.ninputs or 0, 0.25), made._current_params
+    x, u, p = default_state(made), np.full(made.ninputs or 0, 0.25), current_parameters(made)
     with np.errstate(all="ignore"):
         results = [("output", spec.output, made.noutputs)]
         if made.nstates:

@@ -22,6 +22,7 @@ from .blocks import (
 from .errors import DiagramError, ParameterError
 from .names import Parameters, find_name, unknown
 from .params import as_numbers, declared_params
+from .upstream.control_internals import set_parameters
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -339,7 +340,7 @@ def parameter_names(system: ct.InputOutputSystem) -> list[str]:
 def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
     """Return the parameter table of a diagram, with the values of a run without overrides."""
     if isinstance(system, ct.NonlinearIOSystem):
-        system._update_params(None)
+        set_parameters(system, None)
     rows: list[ParameterRow] = []
     for leaf in leaves(system):
         if isinstance(within(leaf.system), Block):

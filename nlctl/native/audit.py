@@ -18,13 +18,14 @@ import numpy as np
 
 from ..errors import ParameterError, UsageError
 from ..sampling.system import happening
+from ..upstream.control_internals import outputs_now, rates_now, set_parameters
 from .codegen.blocks import equations
 from .codegen.lower import lower
 from .compiled import Compiled
+from .diagram.block_inputs import block_inputs
 from .diagram.schedule import Signal
 from .machine.evaluations import Machine, prepared_parameters
 from .machine.routine import lowered_code
-from .thirdparty.python_control import block_inputs, block_outputs, block_rates
 
 _POINTS = 5  # of a trajectory, its start and end among them
 _ROUNDING = 1e-10  # relative difference that rounding explains without a closer look
@@ -214,7 +215,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
     t, x, u = point
     nodes = compiled.schedule.nodes
     if compiled.system.nstates:
-        compiled.system._update_params(dict(trial.params) if trial.params else None)
+        set_parameters(compiled.system, dict(trial.params) if trial.params else None)
     y = _signals(compiled, trial, point)
     counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
     outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
@@ -222,10 +223,10 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
     for i in dict.fromkeys((*compiled.schedule.order, *range(len(nodes)))):
         node, (block, inputs) = nodes[i], given[i]
         own = slice(node.state_offset, node.state_offset + (block.nstates or 0))
-        pairs = [(outputs[i], block_outputs, block.output_labels)]
-        pairs += [(ours[0][own], block_rates, block.state_labels)] if block.nstates else []
+        pairs = [(outputs[i], outputs_now, block.output_labels)]
+        pairs += [(ours[0][own], rates_now, block.state_labels)] if block.nstates else []
         for a, function, labels in pairs if block.noutputs else pairs[1:]:
-            b = function(block, t, x[own], inputs)
+            b = function(block, t, x[own], inputs).astype(float)
             moved = np.zeros_like(b)
             for near in _near((t, x[own], inputs), trial):
                 np.maximum(moved, np.abs(function(block, *near) - b), out=moved)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..blocks import Block
 from ..errors import UsageError
+from ..upstream.control_internals import current_parameters
 
 if TYPE_CHECKING:
     from .diagram.schedule import Node
@@ -64,10 +65,10 @@ def current_values(system: Any) -> Mapping[str, Any]:
     they are none of its business.
     """
     if isinstance(system, Block):
-        return system._current_params._asdict()
+        return current_parameters(system)._asdict()
     if isinstance(system, ct.StateSpace):
         return {}
-    params = system._current_params
+    params = current_parameters(system)
     return {k: params[k] for k in params if k in system.params or "." not in str(k)}
 
 

@@ -20,6 +20,7 @@ from ..expressions.arrays import Tracer
 from ..expressions.graph import Expr, Graph, needed
 from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol
 from ..params import declared_params
+from ..upstream.control_internals import set_parameters
 from .codegen.blocks import Reader
 from .diagram.schedule import Node, Schedule, Signal, schedule
 from .parameters import Slot, slots_of
@@ -93,7 +94,7 @@ def typeset(
     u = -\\kappa \\left(\\beta r + W_{\\psi} + \\mathrm{robust} + Y_{d}\\right)
     """
     system = ct.ss(system) if isinstance(system, ct.TransferFunction) else system
-    system._update_params(params)
+    set_parameters(system, params)
     read = schedule(system, solve_loops=True)
     return tuple(_block(read, node, values) for node in read.nodes)
 

@@ -13,6 +13,7 @@ import numpy as np
 from ..arguments import number
 from ..blocks import block, default_state
 from ..errors import ParameterError, UsageError
+from ..upstream.control_internals import Around, outputs_now, rates_now
 from .clock import Clock, Moment
 from .discretised import discretise
 from .rebuilt import rebuilt, staged
@@ -37,7 +38,7 @@ def happening(what: Happening = frozenset()) -> Iterator[None]:
         _HAPPENING.reset(token)
 
 
-class Sampled(ct.NonlinearIOSystem):
+class Sampled(Around):
     """A block in discrete time, in a diagram of continuous time; made by `sampled`.
 
     Its states are those of the block, the outputs that are on their way, the first to come last,
@@ -101,18 +102,8 @@ class Sampled(ct.NonlinearIOSystem):
         """Whether its outputs are new ones, made of the inputs that it has now."""
         return self.clock.sampling in now and not self.clock.pending
 
-    def _update_params(self, params: Any) -> None:
-        self.inner._update_params(params)
-
-    @property
-    def _current_params(self) -> Any:
-        return self.inner._current_params
-
-    @_current_params.setter
-    def _current_params(self, values: Any) -> None:
-        """Nothing: they are the block's, which python-control has set already."""
-
-    def _rhs(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def rates(self, t: float, x: Any, u: Any) -> np.ndarray:
+        """Return what becomes of its states; see `happening`."""
         now = _HAPPENING.get()
         if now is None:
             raise UsageError(
@@ -127,12 +118,13 @@ class Sampled(ct.NonlinearIOSystem):
 
         def computed() -> tuple[Any, Any]:
             given = rounded(np.asarray(u, dtype=float), self.input_quantum)
-            following = np.reshape(self.inner._rhs(t, own, given), -1) if own.size else own
+            following = rates_now(self.inner, t, own, given) if own.size else own
             return following, self._new(t, own, given)
 
         return np.concatenate(self.after(now, x, computed))
 
-    def _out(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def answer(self, t: float, x: Any, u: Any) -> np.ndarray:
+        """Return its outputs; see `happening`."""
         own, waiting, held = self.parts(np.asarray(x, dtype=float))
         now = _HAPPENING.get() or frozenset()
         if self.answers(now):
@@ -172,7 +164,7 @@ class Sampled(ct.NonlinearIOSystem):
         return bool(self.clock.delay) and self.clock.release in now
 
     def _new(self, t: float, own: np.ndarray, u: np.ndarray) -> np.ndarray:
-        y = np.asarray(self.inner._out(t, own, u), dtype=float).reshape(-1)
+        y = outputs_now(self.inner, t, own, u).astype(float)
         return rounded(y, self.output_quantum)
 
 

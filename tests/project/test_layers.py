@@ -150,6 +150,21 @@ def test_private_names_of_numba_stand_in_one_module():
     assert {n for n, modules in found.items() if modules} == {"nlctl.upstream.numba_internals"}
 
 
+CONTROL = ("_update_params", "_current_params", "_rhs", "_out")
+
+
+def test_private_names_of_python_control_stand_in_one_module():
+    """Those of `NonlinearIOSystem`, whether read, called or overridden."""
+    found = {}
+    for name, tree in MODULES.items():
+        used = [n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)]
+        used += [n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)]
+        found[name] = set(used) & set(CONTROL)
+    assert {n: names for n, names in found.items() if names} == {
+        "nlctl.upstream.control_internals": set(CONTROL)
+    }
+
+
 def lines_of_functions(path, lines):
     """Yield the name and the lines of code of every function, docstrings not counted."""
     for node in ast.walk(MODULES[module_name(path)]):

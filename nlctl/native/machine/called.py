@@ -19,6 +19,7 @@ import numpy as np
 
 from ...blocks import Block
 from ...errors import CompileError
+from ...upstream.control_internals import current_parameters
 from ...upstream.numba_internals import CPUDispatcher
 from ..codegen.calls import Call, Source
 from ..parameters import Slot, current_values
@@ -65,7 +66,7 @@ def call_of(
         functions=tuple(functions),
         template=dict(current_values(node.system)),
         slots=slots,
-        record=type(node.system._current_params) if isinstance(node.system, Block) else None,
+        record=type(current_parameters(node.system)) if isinstance(node.system, Block) else None,
         lengths=(1, node.system.nstates or 0, len(node.inputs), size, count),
     )
     # a name without a value is an error in Python, and 0 in numba's machine code

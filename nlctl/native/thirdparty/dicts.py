@@ -162,7 +162,7 @@ def _values(typing_context, params):
 @overload(operator.getitem, prefer_literal=True)
 def _getitem(params, key):
     index = params.field(key) if isinstance(params, Params) else None
-    return None if index is None else (lambda params, key: _values(params)[index])
+    return None if index is None else (lambda params, key: _values(params)[index])  # pyright: ignore[reportCallIssue]
 
 
 @overload(operator.contains, prefer_literal=True)
@@ -180,4 +180,4 @@ def _get(params, key, default=None):
     index = params.field(key)
     if index is None:
         return lambda params, key, default=None: default
-    return lambda params, key, default=None: _values(params)[index]
+    return lambda params, key, default=None: _values(params)[index]  # pyright: ignore[reportCallIssue]
