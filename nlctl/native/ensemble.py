@@ -31,6 +31,7 @@ from .integrate.driver import (
     prepared,
     trajectory,
 )
+from .integrate.methods.tableau import Tableau
 from .integrate.state import RUNNING, STIFF, Status
 from .machine.ahead import compile_for
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
@@ -105,7 +106,7 @@ def ensemble_response(
     rtol: float = 1e-6,
     atol: float = 1e-8,
     max_steps: int = 1_000_000,
-    method: str | None = None,
+    method: str | Tableau | None = None,
     progress: Callable[[int], object] | None = None,
     audit: Audit = True,
 ) -> Ensemble:
@@ -139,7 +140,7 @@ def ensemble_response(
     rtol, atol : float, optional
     max_steps : int, optional
         A member that needs more steps ends with the status STEP_LIMIT.
-    method : str, optional
+    method : str or Tableau, optional
         As in `nlctl.input_output_response`.
     progress : callable, optional
         Called with the number of finished members.

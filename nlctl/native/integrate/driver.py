@@ -19,6 +19,9 @@ from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
 from .discrete import simulate_discrete
 from .memory import with_table
+from .methods import EXPLICIT_PAIRS
+from .methods.tableau import Tableau
+from .methods.tsit5 import TSIT5
 from .state import DERIVATIVES, RUNNING, Status
 from .workspace import (
     AUTO,
@@ -32,7 +35,7 @@ from .workspace import (
     new_work,
 )
 
-METHODS = {"auto": AUTO, "tsit5": EXPLICIT, "rodas5p": IMPLICIT}
+METHODS = {"auto": AUTO, **dict.fromkeys(EXPLICIT_PAIRS, EXPLICIT), "rodas5p": IMPLICIT}
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
 
 
@@ -46,8 +49,9 @@ class Settings:
         Tolerances; the error of a step is weighed with atol + rtol |x|.
     max_steps : int
         Attempted steps after which a run ends as STEP_LIMIT.
-    method : {"auto", "tsit5", "rodas5p"}
-        Explicit pair of orders 5(4), stiff method of orders 5(4), or whichever is faster.
+    method : {"auto", "tsit5", "rodas5p"} or Tableau
+        Explicit pair of orders 5(4), stiff method of orders 5(4), or whichever is faster; an
+        explicit pair of your own as its tableau.
     step : float
         Fixed step (s) instead of error control; 0 for error control.
     """
@@ -55,11 +59,20 @@ class Settings:
     rtol: float = 1e-8
     atol: float = 1e-10
     max_steps: int = 10_000_000_000
-    method: str = "auto"
+    method: str | Tableau = "auto"
     step: float = 0.0
 
+    @property
+    def pair(self) -> Tableau:
+        """The explicit pair that is used, alone or in turn with the stiff method."""
+        return (
+            self.method
+            if isinstance(self.method, Tableau)
+            else EXPLICIT_PAIRS.get(self.method, TSIT5)
+        )
+
     def __post_init__(self) -> None:
-        if self.method not in METHODS:
+        if not isinstance(self.method, Tableau) and self.method not in METHODS:
             raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
         for name in ("rtol", "atol", "step", "max_steps"):
             if not isinstance(getattr(self, name), Real):
@@ -234,14 +247,20 @@ def prepared(
         atol=float(settings.atol),
         fixed=float(settings.step),
         max_steps=int(settings.max_steps),
-        method=METHODS[settings.method],
+        method=EXPLICIT if isinstance(settings.method, Tableau) else METHODS[settings.method],
+        order=float(settings.pair.order),
+        stable=float(settings.pair.stable),
+        **settings.pair.arrays(),
         alone=int(count == 1),
         **_instants(compiled, code, times),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
     )
     signals = compiled.system.noutputs or 0
-    work = new_work(x0, times, inputs.shape[0], program.events, signals, len(program.sampled))
+    work = new_work(
+        x0, times, inputs.shape[0], program.events, signals, len(program.sampled),
+        settings.pair.stages,
+    )  # fmt: skip
     work.lanes["stiff"] = settings.method == "rodas5p"
     return Run(machine=code, task=task, work=work)
 

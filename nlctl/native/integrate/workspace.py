@@ -14,7 +14,7 @@ import numpy as np
 
 from ..machine.address import call_out, call_rhs
 from .memory import type_of, with_table
-from .methods import rodas5p, tsit5
+from .methods import rodas5p
 from .state import INNER, new_lanes
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
@@ -35,6 +35,12 @@ class Task(NamedTuple):
     fixed: float  # step size, 0 if it is to be chosen
     max_steps: int
     method: int
+    order: float  # of the explicit pair
+    stable: float  # h |lambda| up to which its steps are
+    A: np.ndarray  # and its tableau, see `Tableau.arrays`
+    B: np.ndarray
+    C: np.ndarray
+    E: np.ndarray
     alone: int  # whether this is a single run
     ticks: np.ndarray  # times at which something happens to sampled blocks
     which: np.ndarray  # which of the functions then
@@ -99,7 +105,13 @@ _STATES = ("x", "x_new", "x_stage", "x_ahead", "dx_ahead")
 
 
 def new_work(
-    x0: np.ndarray, times: np.ndarray, inputs: int, events: int, outputs: int, sampled: int = 0
+    x0: np.ndarray,
+    times: np.ndarray,
+    inputs: int,
+    events: int,
+    outputs: int,
+    sampled: int = 0,
+    stages: int = 3,
 ) -> Work:
     """Return the arrays for integrating members from `x0` (states, lanes) on."""
     n, lanes = x0.shape
@@ -110,7 +122,7 @@ def new_work(
         **dict.fromkeys(("e", "e_start", "e_low", "e_high", "behind"), (events, lanes)),
         **dict.fromkeys(("t", "h", "error", "rate", "t_end"), (lanes,)),
         "hh": (n * lanes,),
-        "k": (tsit5.STAGES, n, lanes),
+        "k": (stages, n, lanes),
         "u": (inputs, lanes),
         "s": (sampled, lanes),
         **dict.fromkeys(("jacobian", "columns"), (stiff, stiff)),
@@ -126,7 +138,7 @@ def new_work(
     for name, rows in (("samples", n), ("y", outputs)):
         arrays[name] = np.full((times.size, rows, lanes), np.nan)
     flat = {f"{x}_flat": arrays[x].reshape(-1) for x in _STATES}
-    k_flat = arrays["k"].reshape(tsit5.STAGES, n * lanes)
+    k_flat = arrays["k"].reshape(stages, n * lanes)
     pivots = np.zeros(stiff, dtype=np.int64)
     records = new_lanes(times, lanes)
     return with_table(Work, lanes=records, **arrays, **flat, k_flat=k_flat, pivots=pivots)
@@ -136,7 +148,8 @@ _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
 TASK = type_of(  # only the types of these matter
     with_table(
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
-        fixed=0.0, max_steps=0, method=0, alone=0, ticks=_LINE, which=_NONE, samples=_NONE,
+        fixed=0.0, max_steps=0, method=0, order=0.0, stable=0.0, A=_GRID, B=_GRID, C=_LINE, E=_LINE,
+        alone=0, ticks=_LINE, which=_NONE, samples=_NONE,
         due=np.zeros((1, 1), dtype=np.int64), sampled=_NONE, derivatives=0, c_along=_GRID,
     )
 )  # fmt: skip

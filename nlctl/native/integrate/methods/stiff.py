@@ -131,7 +131,7 @@ def _memory_error(rhs, task, lanes, w):
     error = w.x_stage_flat  # not needed any more
     rodas5p.end_slope(lanes[0].step, w.x_flat, w.x_new_flat, w.U, error)
     for i in range(error.size):
-        error[i] = w.k[6, i, 0] - error[i]
+        error[i] = w.k[w.k.shape[0] - 1, i, 0] - error[i]
     rodas5p.solve(w.columns, w.pivots, error)
     for i in range(error.size):
         w.x_ahead[i, 0] = w.x_new[i, 0] + error[i]
@@ -165,7 +165,7 @@ def stiff_attempt(rhs, along, task, lanes, w):
     for i in range(n):
         w.x_new[i, 0] = w.x_stage[i, 0] + w.U[7, i]
     w.t[0] = lane.t + h
-    evaluate(rhs, task, lanes, w, w.x_new, w.k[6], w.g)
+    evaluate(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1], w.g)
     w.error[0] = rodas5p.error_norm(w.x, w.x_new, w.U, task.rtol, task.atol)
     if task.memory.size:
         error = _memory_error(rhs, task, lanes, w)
