@@ -344,6 +344,11 @@ def tracking_metrics(
     error, control, actuated, weights, gain : str, optional
         Names of the signals e, u, v, |W_hat| and zeta; an empty name leaves its numbers out.
 
+    Returns
+    -------
+    tuple of Metric
+        Each a function of a response, with unit and meaning.
+
     Raises
     ------
     ParameterError

@@ -273,6 +273,16 @@ def known_system(who: str, system: Any) -> Any:
 def state_names(system: ct.InputOutputSystem) -> list[str]:
     """Return the qualified names of all states, ``"controller.law.zeta"``, in vector order.
 
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram or a block.
+
+    Returns
+    -------
+    list of str
+        One for each state.
+
     Examples
     --------
     >>> import nlctl

@@ -107,6 +107,16 @@ def record(cls: type[_T]) -> type[_T]:
     Bounds come from `param`; a method ``check(self)``, where the class has one, looks at rules
     that concern several fields and raises `ParameterError`.
 
+    Parameters
+    ----------
+    cls : type
+        With fields made by `param`.
+
+    Returns
+    -------
+    type
+        The dataclass.
+
     Raises
     ------
     ParameterError

@@ -152,6 +152,11 @@ def prove(
     max_boxes : int, optional
         Number of boxes after which the rest counts as undecided.
 
+    Returns
+    -------
+    Proof
+        Proved, refuted at a point, or undecided.
+
     Raises
     ------
     ParameterError

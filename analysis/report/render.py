@@ -54,6 +54,11 @@ def render_html(
         Processes that help with drawing the figures.
     drawn : mapping, optional
         Figures that are drawn already, see `analysis.report.svg.draw_ahead`.
+
+    Returns
+    -------
+    str
+        The page.
     """
     placed = place_anchors(report)
     light, told = summary(report.claims)
@@ -100,7 +105,17 @@ def _pairs(caption: str, columns: tuple[str, str], values: Mapping[str, str]) ->
 
 
 def render_json(report: Report) -> str:
-    """Return every number and table of the report as JSON."""
+    """Return every number and table of the report as JSON.
+
+    Parameters
+    ----------
+    report : Report
+
+    Returns
+    -------
+    str
+        JSON; numbers that are not finite are text.
+    """
     content = {
         "title": report.title,
         "question": report.question,
@@ -176,6 +191,16 @@ def write_report(
 
 def file_hashes(paths: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     """Return name and SHA-256 of data files, for `Report.files`.
+
+    Parameters
+    ----------
+    paths : iterable of path
+        Data files.
+
+    Returns
+    -------
+    dict of str to str
+        Hexadecimal digests by file name.
 
     Raises
     ------

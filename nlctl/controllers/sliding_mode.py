@@ -65,6 +65,10 @@ def sliding_mode(
         `SlidingModeLaw` by default.
     name : str, optional
 
+    Returns
+    -------
+    control.InterconnectedSystem
+
     Raises
     ------
     DiagramError

@@ -83,6 +83,16 @@ def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -
 def uninterrupted(response: Any) -> Any:
     """Return a response that was computed with `ignore_errors`, if Ctrl-C has not ended it.
 
+    Parameters
+    ----------
+    response : control.TimeResponseData
+        Of `nlctl.input_output_response`.
+
+    Returns
+    -------
+    control.TimeResponseData
+        The same.
+
     Raises
     ------
     KeyboardInterrupt

@@ -368,6 +368,11 @@ def read_parts(
     inputs : bool, optional
         Whether external inputs may be added to the plant's v.
 
+    Returns
+    -------
+    Parts
+        The pieces, with their records and initial states.
+
     Raises
     ------
     DiagramError

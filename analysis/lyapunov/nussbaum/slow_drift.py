@@ -166,6 +166,18 @@ def burst_peak(lobe: Lobe, kG: float) -> float:
 
     r^2/2 grows by int k G N dzeta, against which disturbances and beta r are small.
 
+    Parameters
+    ----------
+    lobe : Lobe
+        Where N has the wrong sign.
+    kG : float
+        Product of actuator gain k and input gain G, > 0.
+
+    Returns
+    -------
+    float
+        In the unit of r.
+
     Raises
     ------
     ParameterError

@@ -158,6 +158,11 @@ def robustness_radius(
     confidence : float, optional
     entropy : int, optional
 
+    Returns
+    -------
+    Radius
+        The factor of the smallest such box that was found, and each step of the search.
+
     Raises
     ------
     ParameterError

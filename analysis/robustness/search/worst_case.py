@@ -123,6 +123,11 @@ def worst_case(
         The search ends with the first batch that has a margin <= target; 0 ends it with the first
         violation.
 
+    Returns
+    -------
+    WorstCase
+        The row, its margin, and every run of the search.
+
     Raises
     ------
     ParameterError

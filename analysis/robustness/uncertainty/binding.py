@@ -32,6 +32,17 @@ def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
     Both ends of every box are tried: a parameter's own bounds refuse them here, not in the middle
     of a study.  (Draws beyond the box of a law with infinite support are refused when they come.)
 
+    Parameters
+    ----------
+    space : Space
+        Quantities with their laws, and choices.
+    diagram : control.InputOutputSystem or Compiled
+        Whose parameters and states it names.
+
+    Returns
+    -------
+    Space
+
     Raises
     ------
     UnknownNameError, AmbiguousNameError

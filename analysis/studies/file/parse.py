@@ -73,6 +73,11 @@ def read_study(
     trust : bool, optional
         Whether code may be run from outside of that folder and of installed packages.
 
+    Returns
+    -------
+    StudyFile
+        The study, its loop and its experiment.
+
     Raises
     ------
     StudyError
