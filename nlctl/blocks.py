@@ -46,7 +46,7 @@ class Spec(Protocol):
         States that are memory.  Within a step of the native engine they stand still.
     commit : callable, optional
         ``commit(t, x, u, p)`` returns what the states in `memory` become at the end of a step
-        that was accepted.  A step in which a memory would turn round is divided where it does.
+        that was accepted.  A step in which a memory would reverse is divided where it does.
         It must be continuous except where a corner changes its sign.
     derived : callable, optional
         ``derived(self) -> dict`` of numbers that follow from the parameters; `p` has them too.

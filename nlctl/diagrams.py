@@ -35,7 +35,7 @@ class Place:
     Attributes
     ----------
     path : str
-        Names of the diagrams around it and its own, joined by dots; empty for the outermost
+        Names of the diagrams around it and its own, separated by dots; empty for the outermost
         diagram.
     parameter_path : str
         The same without diagrams that do not put their name in front of their parameters'
@@ -120,7 +120,7 @@ def interconnect(
     inputs : sequence of str, optional
         Signals that come from outside.
     outputs : sequence of str, optional
-        Signals that the diagram delivers; by default every output of every block.
+        Outputs of the diagram; by default every output of every block.
     name : str, optional
         Name of the diagram.
 
@@ -131,11 +131,11 @@ def interconnect(
     Raises
     ------
     DiagramError
-        If two blocks share a name, deliver the same signal, or an input is fed by nothing or
+        If two blocks share a name, have the same output, or an input is fed by nothing or
         twice, if one block stands in the diagram twice, or if a controller is for plants of a
         lower order than the one that it is connected to.
     UnknownNameError
-        If `outputs` names a signal that no block delivers, or `inputs` one that none takes.
+        If `outputs` names a signal that is the output of no block, or `inputs` one that none takes.
 
     Examples
     --------
@@ -202,13 +202,13 @@ def _check_blocks(systems: Sequence[Any]) -> None:
 
 
 def _signal_sources(systems: Sequence[ct.InputOutputSystem]) -> dict[str, str]:
-    """Return ``{signal: name of the block that delivers it}``."""
+    """Return ``{signal: name of the block whose output it is}``."""
     sources: dict[str, str] = {}
     for system in systems:
         for signal in system.output_labels:
             if signal in sources:
                 raise DiagramError(
-                    f"signal '{signal}' is delivered by '{sources[signal]}' and by "
+                    f"signal '{signal}' is an output of '{sources[signal]}' and by "
                     f"'{system.name}'; rename one, or add them in a ct.summing_junction"
                 )
             sources[signal] = system.name
@@ -222,7 +222,7 @@ def _check_inputs(
     for i, signal in enumerate(inputs):
         if signal in sources:
             raise DiagramError(
-                f"signal '{signal}' is an external input and is delivered by "
+                f"signal '{signal}' is an external input and an output of "
                 f"'{sources[signal]}'; rename one"
             )
         if signal in inputs[:i]:
@@ -233,7 +233,9 @@ def _check_inputs(
         for signal in system.input_labels:
             if signal not in sources and signal not in inputs:
                 error = unknown("signal", signal, [*sources, *inputs])
-                raise DiagramError(f"block '{system.name}' takes a signal nobody delivers: {error}")
+                raise DiagramError(
+                    f"block '{system.name}' takes a signal that no block outputs: {error}"
+                )
 
 
 def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str, str]) -> None:

@@ -70,7 +70,7 @@ def find_name(kind: str, name: str, known: Mapping[str, Any], clashes: Iterable[
     if matches[0] in clashes:
         raise AmbiguousNameError(
             f"{kind} '{name}' belongs to two blocks of this diagram with the same name; "
-            "give the blocks different names, or join the inner diagrams with "
+            "give the blocks different names, or connect the inner diagrams with "
             "nlctl.interconnect(..., name=...), which puts their name in front"
         )
     return matches[0]

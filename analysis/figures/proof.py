@@ -84,7 +84,7 @@ def burst(run: LongRun) -> Figure:
 
 
 def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) -> Figure:
-    """The paper in one picture: the output follows, and zeta creeps until the gain turns round.
+    """The paper in one picture: the output follows, and zeta drifts until the gain reverses.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def windowed_maximum(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi)
 
 
 def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
-    """The Nussbaum argument of long runs that do not burst, and where it is foretold to stop.
+    """The Nussbaum argument of long runs that do not burst, and where it is predicted to stop.
 
     Parameters
     ----------

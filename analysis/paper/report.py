@@ -242,7 +242,7 @@ def _proved(horizon: float, watch: ProgressWatch) -> dict[int, proofs.Evidence]:
 
 @contextmanager
 def _far_away(far: bool, whole: bool) -> Iterator[Future[dict[str, LongRun]]]:
-    """Run the loops far beyond 20 s while the body goes on, or nothing."""
+    """Run the loops far beyond 20 s while the body continues, or nothing."""
     if far:
         with proofs.far_runs_in_background(whole=whole) as long_runs:
             yield long_runs

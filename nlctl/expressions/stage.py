@@ -355,7 +355,7 @@ class _Numpy:
     @staticmethod
     def concatenate(graph, parts, axis=0):
         if axis not in (0, -1):
-            raise Untraceable("arrays that are joined along another axis")
+            raise Untraceable("arrays that are concatenated along another axis")
         return concatenated(graph, [traced(graph, p) for p in parts])
 
     @staticmethod

@@ -6,7 +6,7 @@ they compute is planned for one member or several; one generator writes LLVM IR 
 it stands, as numba compiles it or back in Python (`machine.called`, `thirdparty/`); algebraic loops
 are refused, or solved by Newton's method with the derivatives of their own expressions.
 
-`integrate/` moves members side by side through time, each with its own steps.  `response` makes of
+`integrate/` moves batched members through time, each with its own steps.  `response` makes of
 one run what python-control returns, `ensemble` runs many.
 """
 

@@ -1,4 +1,4 @@
-"""Many runs of one compiled diagram: side by side in SIMD lanes, lanes side by side in threads."""
+"""Many runs of one compiled diagram: batched in SIMD lanes, batches in threads."""
 
 from __future__ import annotations
 
@@ -227,7 +227,7 @@ def _group(
     settings: Settings,
     stop: _Stop,
 ) -> Iterator[Trajectory]:
-    """Run up to WIDTH members side by side; yield them in their order."""
+    """Run up to WIDTH members in a batch; yield them in their order."""
     compiled, (x0, p) = every.compiled, every.batch(numbers, ENSEMBLE_WIDTH)
     alone = settings.method == "rodas5p" or not ct.isctime(compiled.system)
     if alone:

@@ -160,7 +160,7 @@ def filled(p: np.ndarray, slot: Slot, value: Any) -> None:
     Raises
     ------
     UsageError
-        If its shape is another than when the diagram was compiled, or it is no whole number any
+        If its shape is another than when the diagram was compiled, or it is not an integer any
         more.
     """
     array = np.asarray(value) if is_numeric(value) else None
@@ -170,7 +170,7 @@ def filled(p: np.ndarray, slot: Slot, value: Any) -> None:
             f"parameter '{slot.name}' had shape {slot.shape} when the diagram was "
             f"compiled and cannot {now} now: compile again"
         )
-    whole = {"i": "a whole number", "b": "True or False"}.get(slot.kind)
+    whole = {"i": "an integer", "b": "True or False"}.get(slot.kind)
     if whole and not slot.shape and array.dtype.kind == "f" and array != np.trunc(array):
         raise UsageError(
             f"parameter '{slot.name}' was {whole} when the diagram was compiled and cannot be "

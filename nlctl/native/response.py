@@ -62,7 +62,7 @@ def respond(
     compare(compiled, trial, audit)
     run = made.statistics
     if run.status is Status.STOPPED and not ignore_errors:
-        raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error goes on
+        raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error continues
     if run.status is not Status.OK and not ignore_errors:
         raise DivergedError(_message(system, run), run.time)
     shown = np.flatnonzero(np.isin(made.time, wanted))

@@ -12,8 +12,8 @@ windows it is a balance,
 
 .. math:: \frac{dA}{dt} = p \left\langle \frac1{|N|} \right\rangle - q,
 
-so that the drift stops where |N| = p / q, if the lobe has such a place; otherwise it goes on until
-the budget is spent.  p and q are fitted to a response.
+so that the drift stops where |N| = p / q, if the lobe has such a place; otherwise it continues
+until the budget is spent.  p and q are fitted to a response.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class SlowDrift:
         Mean of A' over each window (1/s), the first windows left out.
     burst, burst_range : float, tuple of float
         Forecast of the time (s) at which the budget is spent, infinite where the drift stops or
-        turns round before; and the earliest and the latest time when mean rate and dependence on
+        reverses before; and the earliest and the latest time when mean rate and dependence on
         1/|N| are moved by two standard errors each, and the time that is left by 5 % more.  It
         is meant to hold the burst in nine of ten loops at least, and has done so in simulated ones
         (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference go on as

@@ -138,7 +138,7 @@ class Prepared:
 
 
 def prepare(experiment: Experiment) -> Prepared:
-    """Build and compile every diagram of an experiment, and hold names and values against them.
+    """Build and compile every diagram of an experiment, and validate names and values against them.
 
     Parameters
     ----------

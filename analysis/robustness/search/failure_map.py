@@ -224,7 +224,7 @@ def _quarters(cell: _Cell) -> tuple[_Cell, ...]:
 
 
 def boundary(made: FailureMap) -> pd.DataFrame:
-    """Return points on the boundary: where margins joined by lines along the triangles are 0.
+    """Return points on the boundary: where margins connected by lines along the triangles are 0.
 
     Margins beyond +-1 count as +-1.
 

@@ -123,7 +123,7 @@ def _parts(
         places, fields = {}, {}
         for quantity in space.quantities:
             owner = None if quantity.is_initial else owner_of(system, quantity.name)
-            if owner is not None:  # a foreign block takes what it is given
+            if owner is not None:  # a third-party block takes what it is given
                 place, key = owner
                 places[place.path] = place
                 fields.setdefault(place.path, {})[quantity.name] = key

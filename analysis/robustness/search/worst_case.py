@@ -131,7 +131,7 @@ def worst_case(
     Raises
     ------
     ParameterError
-        If `runs` is no whole number >= 1, or an option of a choice has weight 0.
+        If `runs` is not an integer >= 1, or an option of a choice has weight 0.
     KeyboardInterrupt
         If Ctrl-C comes before the first batch is done; later it ends the search.
     """

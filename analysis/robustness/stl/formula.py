@@ -7,8 +7,8 @@
     eventually(a):  max of rho_a over the same
 
 (Donzé, Maler: Robust satisfaction of temporal logic over real-valued signals, FORMATS 2010).
-rho > 0 holds, rho < 0 fails.  Signals are joined by lines between samples, through the parabola's
-vertex at local extrema; on these lines the margins are exact, sliding windows included.
+rho > 0 holds, rho < 0 fails.  Signals are connected by lines between samples, through the
+parabola's vertex at local extrema; on these lines the margins are exact, sliding windows included.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A space held against the diagrams that it is to be applied to."""
+"""A space validated against the diagrams that it is to be applied to."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
     ParameterError
         If an end of a box breaks a rule of the block.
     SpaceError
-        If a parameter is no number, is a whole number while its law is not, a name means the same
+        If a parameter is no number, is an integer while its law is not, a name means the same
         as another one, or the diagram's own value lies outside the box.
     """
     system = diagram.system if isinstance(diagram, Compiled) else diagram
@@ -113,7 +113,7 @@ def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Place, str] | Non
 def _check_whole(quantity: Uncertain, wanted: bool) -> None:
     if wanted and not quantity.is_whole:
         raise SpaceError(
-            f"'{quantity.name}' is a whole number and needs a law of whole numbers, such as "
+            f"'{quantity.name}' is an integer and needs a law of integers, such as "
             f"scipy.stats.randint(0, 10), got {quantity.law_text}"
         )
 

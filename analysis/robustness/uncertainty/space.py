@@ -163,7 +163,7 @@ def from_quantiles(space: Space, unit: np.ndarray) -> pd.DataFrame:
 def from_unit_cube(space: Space, unit: np.ndarray) -> pd.DataFrame:
     """Turn points of the unit cube into values, linearly between the ends of each box.
 
-    Arguments and errors as in `sampled`; whole numbers are rounded.
+    Arguments and errors as in `sampled`; integers are rounded.
     """
 
     def between(quantity: Uncertain, u: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""File -> study, held against its loop; every mistake at once."""
+"""File -> study, validated against its loop; every mistake at once."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def read_study(
     folder: Path | None = None,
     trust: bool = False,
 ) -> StudyFile:
-    """Read a study file, and hold every name in it against the loop.
+    """Read a study file, and validate every name in it against the loop.
 
     The files and modules that it names are run, see `trust`.
 

@@ -43,7 +43,7 @@ class Node:
     Attributes
     ----------
     path : str
-        Names of the diagrams around it and its own, joined by dots.
+        Names of the diagrams around it and its own, separated by dots.
     system : control.InputOutputSystem
     state_offset : int
         Where its states begin in the diagram's state vector.

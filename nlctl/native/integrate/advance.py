@@ -1,4 +1,4 @@
-"""Integration of members side by side: step control, events, memory, output samples.
+"""Integration of batched members: step control, events, memory, output samples.
 
 Each round tries one step for every member ("lane") that is still running.  Members have their own
 times and step sizes and never see each other.  A single run is one lane, and may also use the
@@ -71,7 +71,7 @@ def _judge(task, lanes, w, done, passed):
         lane.t = t_new
         next_step(lane, w.error[j], w.rate[j], task)
         done[j] = True
-        if memories:  # at a corner of the inputs memories may turn round as well
+        if memories:  # at a corner of the inputs memories may reverse as well
             at_corner = lane.ends and w.u.shape[0] > 0
             passed[j] = at_corner or _began_to_move(corners, w.e_start, w.e, j)
         passed[j] |= found == EVENT

@@ -165,7 +165,7 @@ def _sampled(
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """Members that are integrated side by side, and all arrays that this needs.
+    """Members that are integrated in a batch, and all arrays that this needs.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
-"""Events inside a step: corners, and memories that turn round.
+"""Events inside a step: corners, and memories that reverse.
 
-A switching function that changes its sign marks a corner; a memory turns round where the rate at
+A switching function that changes its sign marks a corner; a memory reverses where the rate at
 which it would be carried along changes its sign or becomes zero.  In both cases the step is
 repeated, shorter each time, until it ends right behind the event: all stages but a negligible
 rest then lie on one side, and what the rest costs is below one local error.  Regula falsi with the

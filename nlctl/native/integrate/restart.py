@@ -1,4 +1,4 @@
-"""Where a run begins or goes on behind an event: memories are committed, or locked far behind."""
+"""Where a run begins or resumes behind an event: memories are committed, or locked far behind."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def _lock(rhs, task, lanes, w, chosen):
 
     The stages of a step are approximations: with the memory right behind, one that falls back a
     little would see it standing still, and the step would not be smooth.  Only where the memory
-    turns round does its value count again, and there it is committed.
+    reverses does its value count again, and there it is committed.
 
     A memory that counts wherever it stands, a relay's, is not carried but about to jump.  It
     keeps its value up to the corner where it jumps; at that corner already, it jumps.

@@ -53,7 +53,7 @@ class Task(NamedTuple):
 
 
 class Work(NamedTuple):
-    """The arrays for integrating members side by side: (states, lanes), (events, lanes), ..."""
+    """The arrays for integrating batched members: (states, lanes), (events, lanes), ..."""
 
     lanes: np.ndarray  # a record for each member, see `_lane`
     samples: np.ndarray  # the states at the task's times: (times, states, lanes)

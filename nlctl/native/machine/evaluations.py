@@ -1,4 +1,4 @@
-"""A program's machine code for members side by side, whichever way it can be had."""
+"""A program's machine code for batched members, whichever way it can be had."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .routine import called_back, entry, lowered_code, raise_failures
 if TYPE_CHECKING:
     from ..compiled import Compiled
 
-ENSEMBLE_WIDTH = 8  # members side by side in ensembles: one AVX-512 register
+ENSEMBLE_WIDTH = 8  # members of a batch in ensembles: one AVX-512 register
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""One step of an explicit Runge-Kutta pair, whatever its tableau, for members side by side.
+"""One step of an explicit Runge-Kutta pair, whatever its tableau, for batched members.
 
 Arrays have the member ("lane") as their last index, so that one loop serves all of them: state
 ``x[i, lane]``, stages ``k[s, i, lane]``.  What a lane computes never depends on another lane.
