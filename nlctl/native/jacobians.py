@@ -20,6 +20,7 @@ from ..params import declared_params, equation_arguments, with_overrides
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from .codegen.blocks import Equations
+from .codegen.lower import DIRECTION
 from .codegen.solver import searched
 from .parameters import length
 
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from .diagram.schedule import Node
 
 STEP = 1e-6  # by which a parameter is moved, to see what follows from it
-DIRECTION = "v"  # the array of a direction: of states, then inputs, then what else is varied
 _DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
 

@@ -16,7 +16,6 @@ from .state import DIVERGED, FIRST_PATIENCE, INNER, OK, RUNNING, STEP_LIMIT, STE
 SMALLEST = 4e-16  # of the time: no shorter step can be told from none
 TRIAL = 20  # steps of the stiff method before it is judged
 MAX_PATIENCE = 2000
-COST = 0.35  # of a step of the stiff method in explicit ones, for each state and 10 more
 
 
 @numba.njit(**INNER)
@@ -66,7 +65,7 @@ def rejected(lane, error, task):
         return False
     lane.rejected += 1
     lane.tries = 0
-    order = rodas5p.ORDER if lane.stiff else task.order
+    order = rodas5p.ORDER if lane.stiff else task.pair_order
     lane.h = lane.step * (max(0.2, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
     if task.fixed > 0.0 or not (finite or lane.h > SMALLEST * abs(lane.t)):
         lane.status = DIVERGED
@@ -76,7 +75,7 @@ def rejected(lane, error, task):
 @numba.njit(**INNER)
 def next_step(lane, error, rate, task):
     """Propose the next step after an accepted one: PI control, and stability."""
-    log_error, memories, slower = np.log(max(error, 1e-10)), task.memory.size, 5.0 / task.order
+    log_error, memories, slower = np.log(max(error, 1e-10)), task.memory.size, 5.0 / task.pair_order
     # at equilibrium the error is 0.17 of its tolerance; of the stiff method, whose steps cost
     # more and do not end at a limit of stability, 0.44
     now, before = (0.17, 0.04) if lane.stiff else (0.14 * slower, 0.08 * slower)
@@ -97,11 +96,11 @@ def next_step(lane, error, rate, task):
 
 
 @numba.njit(**INNER)
-def choose_method(lane, states, task):
+def choose_method(lane, task):
     """Go over to the stiff method where stability limits the step, and back where it does not pay.
 
     The stiff method is first tried; it stays while it gets further with a step tried than the
-    explicit one would by more than what its steps cost.
+    explicit one would by more than what its steps cost, `cost` explicit ones each.
     """
     tried = lane.accepted + lane.rejected
     if not lane.stiff:
@@ -113,9 +112,8 @@ def choose_method(lane, states, task):
         return
     lane.stiff += 1
     if lane.stiff % TRIAL == 0:
-        cost = COST * (states + 10)
         limit = task.stable / max(lane.rate, 1e-300)
-        pays = lane.t - lane.judged_at > cost * limit * (tried - lane.judged_after)
+        pays = lane.t - lane.judged_at > task.cost * limit * (tried - lane.judged_after)
         lane.judged_at, lane.judged_after = lane.t, tried
         if lane.stiff == TRIAL:
             lane.patience = FIRST_PATIENCE if pays else min(2 * lane.patience, MAX_PATIENCE)

@@ -20,6 +20,7 @@ from ..machine.integrators import integrators
 from .discrete import simulate_discrete
 from .memory import with_table
 from .methods import EXPLICIT_PAIRS
+from .methods.lu import WHOLE, Elimination, cost
 from .methods.tableau import Tableau
 from .methods.tsit5 import TSIT5
 from .state import DERIVATIVES, RUNNING, Status
@@ -198,8 +199,8 @@ def begin(run: Run) -> None:
 def go_on(run: Run, rounds: int = ROUNDS) -> None:
     """Try up to `rounds` steps in every lane that is still running."""
     rhs, _ = run.machine.entries
-    along = 0 if run.along is None else run.along.entry
-    integrators()["advance"](rhs, along, run.task, run.work, rounds)
+    point, along = (0, 0) if run.along is None else run.along.entries
+    integrators()["advance"](rhs, point, along, run.task, run.work, rounds)
     run.machine.check(run.task.p)
 
 
@@ -211,6 +212,7 @@ def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
     del given["table"]
     given["derivatives"] = EXACT if along else DIFFERENCES
     given["c_along"] = along.c if along else given["c_along"]
+    given |= _linear_equations(run.work.x.shape[0], along.elimination if along else WHOLE)
     run.lanes["status"] = RUNNING
     return replace(run, task=with_table(Task, like=TASK, **given), along=along)
 
@@ -248,13 +250,14 @@ def prepared(
         fixed=float(settings.step),
         max_steps=int(settings.max_steps),
         method=EXPLICIT if isinstance(settings.method, Tableau) else METHODS[settings.method],
-        order=float(settings.pair.order),
+        pair_order=float(settings.pair.order),
         stable=float(settings.pair.stable),
         **settings.pair.arrays(),
         alone=int(count == 1),
         **_instants(compiled, code, times),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
+        **_linear_equations(len(x0), WHOLE),
     )
     signals = compiled.system.noutputs or 0
     work = new_work(
@@ -263,6 +266,11 @@ def prepared(
     )  # fmt: skip
     work.lanes["stiff"] = settings.method == "rodas5p"
     return Run(machine=code, task=task, work=work)
+
+
+def _linear_equations(n: int, order: Elimination) -> dict[str, Any]:
+    """Return how the stiff method solves them, and what its steps cost then."""
+    return {**vars(order), "cost": cost(n, order)}
 
 
 def _instants(compiled: Compiled, code: Machine, times: np.ndarray) -> dict[str, np.ndarray]:

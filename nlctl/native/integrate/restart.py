@@ -211,7 +211,8 @@ def _first_step(rhs, task, lanes, w):
     for j in range(lanes.size):
         h0 = lanes[j].h
         largest = max(np.sqrt(d1[j]), np.sqrt(d2[j]) / h0)
-        h1 = max(1e-6, h0 * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** (1.0 / task.order)
+        power = 1.0 / task.pair_order
+        h1 = max(1e-6, h0 * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** power
         h = min(100 * h0, h1, span)
         lanes[j].h = task.fixed if task.fixed > 0.0 else (h if np.isfinite(h) else h0)
 
