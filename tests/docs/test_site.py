@@ -48,14 +48,6 @@ def test_every_public_name_is_in_the_reference(module):
     assert sorted(told) == sorted(importlib.import_module(module).__all__)
 
 
-def test_code_of_the_explanations_runs():
-    """Blocks of Python on pages in Markdown, which assert what the text says."""
-    for path in (DOCS / "explanation").glob("*.md"):
-        for code in re.findall(r"```python\n(.*?)```", text(path), flags=re.DOTALL):
-            assert "assert" in code
-            exec(compile(code, str(path), "exec"), {})
-
-
 def built(folder, *options):
     """Build the site in a folder; return what Sphinx says of it."""
     needed("sphinx_gallery", "docs")
