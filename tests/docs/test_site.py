@@ -15,7 +15,10 @@ from rows import each_row
 DOCS = ROOT / "docs"
 GALLERY = sorted((DOCS / "gallery").glob("*.py"))
 SCRIPTS = GALLERY + sorted([*DOCS.glob("tutorials/*.py"), *DOCS.glob("how-to/*.py")])
-PUBLIC = ["nlctl", "nlctl.paper", "analysis.lyapunov", "analysis.robustness", "analysis.studies"]
+PUBLIC = [
+    *("nlctl", "nlctl.paper", "analysis.lyapunov", "analysis.robustness", "analysis.studies"),
+    *("analysis.report", "analysis.loop_report"),
+]
 
 
 def text(path):
