@@ -22,7 +22,7 @@ __all__ = ["Zero", "adaptive_neural"]
 
 @record
 class Zero:
-    """A block that delivers 0: put it in the place of a piece that is to be left out.
+    """A block whose outputs are 0: put it in the place of a piece that is to be left out.
 
     Parameters
     ----------
@@ -62,8 +62,8 @@ def adaptive_neural(
 
         filtered_error -> basis -> weights, robust -> law
 
-    It takes x1, ..., xn and yd, yd1, ..., ydn, and delivers e, r, u, zeta, delta_hat, W_norm;
-    no zeta where the law has none.
+    It takes x1, ..., xn and yd, yd1, ..., ydn; its outputs are e, r, u, zeta, delta_hat, W_norm,
+    without zeta where the law has none.
     It knows neither the plant nor the actuator: the same controller drives a dead zone and
     backlash.
 

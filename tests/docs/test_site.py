@@ -12,6 +12,8 @@ from extras import needed
 from places import ROOT
 from rows import each_row
 
+from analysis.catalogue import block_records
+
 DOCS = ROOT / "docs"
 GALLERY = sorted((DOCS / "gallery").glob("*.py"))
 SCRIPTS = GALLERY + sorted([*DOCS.glob("tutorials/*.py"), *DOCS.glob("how-to/*.py")])
@@ -33,6 +35,14 @@ def test_a_script_of_the_gallery_is_short_and_asserts(script):
     asserted = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Assert)]
     assert asserted
     assert not any(isinstance(node.test, ast.Constant) for node in asserted)
+
+
+def test_every_block_is_in_the_gallery():
+    """Its characteristic, its step response, or a loop with it; at least 25 scripts in all."""
+    shown = " ".join(map(text, GALLERY))
+    missing = [name for name in block_records() if not re.search(rf"\b{name}\b", shown)]
+    assert missing == []
+    assert len(GALLERY) >= 25
 
 
 def test_every_page_that_is_executed_asserts_something():
