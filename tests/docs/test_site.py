@@ -2,17 +2,19 @@
 
 import ast
 import importlib
+import itertools
 import os
 import re
 import subprocess
 import sys
 
 import pytest
-from extras import needed
+from extras import needed, needed_program
 from places import ROOT
 from rows import each_row
 
 from analysis.catalogue import block_records
+from analysis.report.browser import BROWSERS
 
 DOCS = ROOT / "docs"
 GALLERY = sorted((DOCS / "gallery").glob("*.py"))
@@ -25,6 +27,13 @@ PUBLIC = [
 
 def text(path):
     return path.read_text(encoding="utf-8")
+
+
+PAGES = (
+    *("index", "auto/tutorials/index", "auto/tutorials/t7_from_simulink", "auto/gallery/index"),
+    *("how-to/index", "explanation/paper", "reference/blocks", "reference/study-files"),
+    *("studies", "glossary"),
+)
 
 
 @each_row("script", [path.name for path in GALLERY])
@@ -69,12 +78,38 @@ def built(folder, *options):
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
 
 
-@pytest.mark.docs
-def test_the_site_builds_without_a_warning(tmp_path):
-    """Links, names and formulas; nothing is executed."""
-    said = built(str(tmp_path), "-D", "plot_gallery=0")
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, built without a warning; nothing is executed."""
+    folder = tmp_path_factory.mktemp("site")
+    said = built(str(folder), "-D", "plot_gallery=0")
     assert said.returncode == 0, said.stderr
-    assert "<math" in text(tmp_path / "explanation" / "paper.html")
+    return folder
+
+
+@pytest.mark.docs
+def test_the_site_builds_without_a_warning(site):
+    """Links, names and formulas."""
+    assert "<math" in text(site / "explanation" / "paper.html")
+
+
+@pytest.mark.docs
+@pytest.mark.browser
+def test_axe_finds_nothing_on_ten_pages(site):
+    """Contrast, names, roles, headings, keyboard, in both colour schemes."""
+    axe = needed("axe_playwright_python.sync_playwright", "browser")
+    chromium = needed_program(BROWSERS)
+    found = []
+    with needed("playwright.sync_api", "browser").sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--disable-quic"])
+        for name, scheme in itertools.product(PAGES, ("light", "dark")):
+            page = browser.new_page(color_scheme=scheme)
+            page.goto((site / f"{name}.html").as_uri())
+            violations = axe.Axe().run(page).response["violations"]
+            found += [(name, scheme, v["id"], v["nodes"][0]["html"][:200]) for v in violations]
+            page.close()
+        browser.close()
+    assert found == []
 
 
 @pytest.mark.docs
