@@ -2,7 +2,6 @@
 
 import ast
 import importlib
-import itertools
 import os
 import re
 import subprocess
@@ -96,13 +95,14 @@ def test_the_site_builds_without_a_warning(site):
 @pytest.mark.docs
 @pytest.mark.browser
 def test_axe_finds_nothing_on_ten_pages(site):
-    """Contrast, names, roles, headings, keyboard, in both colour schemes."""
+    """Contrast, names, roles, headings, keyboard; of some pages in the dark, too."""
     axe = needed("axe_playwright_python.sync_playwright", "browser")
     chromium = needed_program(BROWSERS)
     found = []
     with needed("playwright.sync_api", "browser").sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--disable-quic"])
-        for name, scheme in itertools.product(PAGES, ("light", "dark")):
+        looked_at = [(name, "light") for name in PAGES] + [(name, "dark") for name in PAGES[:3]]
+        for name, scheme in looked_at:
             page = browser.new_page(color_scheme=scheme)
             page.goto((site / f"{name}.html").as_uri())
             violations = axe.Axe().run(page).response["violations"]
