@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -11,6 +10,7 @@ import control as ct
 import numpy as np
 
 from .errors import BlockError, ParameterError
+from .host.notebook import table_html
 from .names import Parameters, base_name, unknown
 from .params import declared_params, ensure_checked, equation_arguments, is_checked, with_overrides
 from .upstream.control_internals import OwnParameters, current_parameters, set_parameters
@@ -182,17 +182,9 @@ class Block(OwnParameters):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        head = repr(self).splitlines()[0]
-        rows = "".join(
-            "<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in cells) + "</tr>"
-            for cells in (
-                (r.name, r.text, r.unit, r.bounds, r.meaning) for r in parameter_rows(self)
-            )
-        )
-        titles = "".join(
-            f"<th>{t}</th>" for t in ("parameter", "value", "unit", "bounds", "meaning")
-        )
-        return f"<p>{html.escape(head)}</p><table><tr>{titles}</tr>{rows}</table>"
+        rows = [(r.name, r.text, r.unit, r.bounds, r.meaning) for r in parameter_rows(self)]
+        titles = ("parameter", "value", "unit", "bounds", "meaning")
+        return table_html(repr(self).splitlines()[0], titles, rows)
 
 
 def _names(labels: Sequence[str]) -> str:

@@ -100,6 +100,7 @@ def simulate(
     show_metrics(times, signals)
     if csv is not None:
         _write_csv(csv, times, signals)
+        print(csv)
     if plot is not None:
         from analysis.paper.figures import overview
 

@@ -13,6 +13,7 @@ import control as ct
 import numpy as np
 
 from ..errors import ParameterError
+from ..host.notebook import table_html
 from ..names import unknown
 from ..params import checked_times, whole_number
 from ..responses.arguments import checked_params, input_array
@@ -81,6 +82,11 @@ class Ensemble:
     table: pd.DataFrame
     time: np.ndarray
     signals: Mapping[str, np.ndarray]
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: how the members ended, and the first of them."""
+        rows = ((n, *row) for n, *row in self.table.head(ROWS).itertuples())
+        return table_html(repr(self).splitlines()[0], ["", *map(str, self.table.columns)], rows)
 
     def __repr__(self) -> str:
         ended = self.table["status"].value_counts() if len(self.table) else {}

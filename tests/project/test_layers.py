@@ -22,6 +22,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["analysis.figures", "analysis.report"],
     ["analysis.studies"],
     ["analysis.paper"],
+    ["analysis.loop_report"],
     ["analysis.cli"],
 ]
 BLOCK_MODULES = LAYERS[3]
