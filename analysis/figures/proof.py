@@ -73,7 +73,7 @@ def burst(run: LongRun) -> Figure:
 
 
 def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) -> Figure:
-    """The paper in one picture: the output follows, and zeta creeps until the gain turns round.
+    """The paper in one picture: the output follows, and zeta drifts until the gain changes its sign.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def windowed_maximum(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi)
 
 
 def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
-    """The Nussbaum argument of long runs that do not burst, and where it is foretold to stop."""
+    """The Nussbaum argument of long runs that do not burst, and where it is predicted to stop."""
     figure, (ax,) = stacked_axes()
     for (label, run), (colour, style) in zip(runs.items(), STYLES, strict=False):
         ax.plot(run.time, run.signals["zeta"], style, color=colour, linewidth=1.4, label=label)

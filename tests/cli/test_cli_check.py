@@ -47,7 +47,7 @@ def test_the_published_loop_holds_and_the_paper_does_not():
     assert (done.returncode, content["holds"], content["answer"]) == (5, True, "undecided")
     lines = {line["key"]: line for line in content["lines"]}
     corrected = [line for line in lines.values() if line["reading"] == "corrected"]
-    assert [x["key"] for x in corrected if x["status"] == "undecided"] == ["creep"]
+    assert [x["key"] for x in corrected if x["status"] == "undecided"] == ["slow drift"]
     assert lines["(31)"]["status"] == "checked"
     assert lines["(31) literal"]["status"] == "violated"
     assert 0 < lines["(31) literal"]["time"] < 20
@@ -186,7 +186,7 @@ def test_summary_counts_every_line_once_and_names_what_fails(found):
     counts = said.splitlines()[1].partition(":")[2].split(",")
     assert sum(int(part.split()[0]) for part in counts) == len(found.lines)
     assert "none of the corrected statements" in said
-    assert "undecided: creep (1 s show nothing of it" in said
+    assert "undecided: slow drift (1 s show nothing of it" in said
     assert "Lemma 1" in said.splitlines()[-1]
 
 
