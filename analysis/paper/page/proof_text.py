@@ -68,8 +68,8 @@ PROVED = (
     "in closed form."
 )
 CHECKED = (
-    "Only checked: seen to hold at every sample of this run, up to rounding. That is not a proof for "
-    "other runs, nor between samples."
+    "Only checked: seen to hold at every sample of this run, up to rounding. That is not a proof "
+    "for other runs, nor between samples."
 )
 VIOLATED = (
     "Violated: statements of the proof in their corrected form that do not hold along this run."
