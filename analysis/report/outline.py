@@ -36,7 +36,7 @@ __all__ = [
 SHELL = frozenset(
     ["claims", "contents", "provenance", "files", "lead", "lead-title", "lead-desc"]
 )  # anchors of the page itself
-_LONG = 32  # characters of a word that must be broken to fit a column
+_LONG = 36  # characters of a word that must be broken to fit a column
 _NOT_FINITE = {"nan": "NaN", "inf": "∞", "-inf": "−∞"}
 _SHORT = 24  # characters of a text that stays on one line
 

@@ -32,7 +32,7 @@ _UNIT = re.compile(
 )
 _TAIL = re.compile(r"[,.;:)\]]+")
 _RELATED = re.compile(r"(?<=[=<>≤≥±≈]) (?=[−+]?[\d∞])")
-_SYMBOL = re.compile(rf"(?<!\S)(\(?[^\W\d]\S{{0,3}}|\|\S{{1,4}}\|) (?=[=<>≤≥±≈]{NO_BREAK})")
+_SYMBOL = re.compile(rf"(?<!\S)(\(?[^\W\d]\S{{0,19}}|\|\S{{1,12}}\|) (?=[=<>≤≥±≈]{NO_BREAK})")
 _PER_CENT = re.compile(r"(?<=\d)(?=%(?![\w%]))")
 _NUMBERED = re.compile(r"\b(Example|Lemma|row|size) (?=\d)")
 _SLASH = re.compile(rf"(?<=\d{NO_BREAK}/) (?=[A-Za-z])")
