@@ -112,7 +112,9 @@ def simulate(
 def check(
     loop: LoopArgument,
     set_: Set = None,
-    horizon: Annotated[float, typer.Option(help="Length of the runs in s.")] = 20.0,
+    horizon: Annotated[
+        float, typer.Option("--until", "--horizon", help="Horizon of the runs in s.")
+    ] = 20.0,
     ensemble: Annotated[
         int,
         typer.Option(

@@ -84,7 +84,7 @@ def burst(run: LongRun) -> Figure:
 
 
 def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) -> Figure:
-    """The paper in one picture: the output follows, and zeta drifts until the gain reverses.
+    """The paper in one picture: the output follows, and zeta drifts until N changes its sign.
 
     Parameters
     ----------

@@ -22,6 +22,7 @@ from .axes import (
     BLUE,
     GREY,
     ORANGE,
+    PURPLE,
     SHORT_LINE,
     STYLES,
     TIME,
@@ -195,7 +196,7 @@ def fans(
                 ax.fill_between(
                     time[nodes], *band, color=BLUE, alpha=opacity, linewidth=0, label=inside
                 )
-        ax.plot(time, np.clip(worst[name], low, high), "--", color=ORANGE, label="worst run")
+        ax.plot(time, np.clip(worst[name], low, high), "--", color=PURPLE, label="worst run")
         ax.plot(time, np.clip(nominal[name], low, high), color=GREY, label="nominal")
         for value, start, end in own:
             ax.hlines(value, start, end, color=ORANGE, linewidth=1.6, alpha=0.8, label=LIMIT)

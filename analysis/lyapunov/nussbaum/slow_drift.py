@@ -125,15 +125,15 @@ class SlowDrift:
 
     @property
     def verdict(self) -> str:
-        """One of "creeps", "settles", "turned round", "undecided".
+        """One of "drifts", "settles", "reversed", "undecided".
 
-        "turned round": the mean rate of the last windows is not positive; "settles": it is, and
-        in all fits the drift stops in this lobe; "creeps": in none; "undecided" otherwise.
+        "reversed": the mean rate of the last windows is not positive; "settles": it is, and
+        in all fits the drift stops in this lobe; "drifts": in none; "undecided" otherwise.
         """
         if not self.recent.mean() > 0:
-            return "turned round" if self.recent.mean() <= 0 else "undecided"
+            return "reversed" if self.recent.mean() <= 0 else "undecided"
         if self.rest is None:
-            return "creeps" if self.rest_range is None else "undecided"
+            return "drifts" if self.rest_range is None else "undecided"
         return "settles" if self.rest_range and self.rest_range[1] < self.lobe.high else "undecided"
 
     def __str__(self) -> str:

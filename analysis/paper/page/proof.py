@@ -87,7 +87,7 @@ def _burst(far: Mapping[str, LongRun]) -> Iterator[Item]:
 def _far_table(far: Mapping[str, LongRun]) -> Table:
     return Table(
         caption=text.FAR_CAPTION,
-        columns=("loop", "rtol", "runs until (s)", "max |e₁| before", "foretold", "happened"),
+        columns=("loop", "rtol", "runs until (s)", "max |e₁| before", "predicted", "happened"),
         rows=[
             (
                 FAR_HORIZONS[key][0],

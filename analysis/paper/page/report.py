@@ -93,7 +93,7 @@ def paper_sections(
 
 
 def _lead(runs: _Runs, long: LongRun | None) -> Figure:
-    """Return the picture at the top: Example 2 follows its reference, and zeta creeps."""
+    """Return the picture at the top: Example 2 follows its reference, and zeta drifts."""
     run = runs["2"]
     told = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_DRIFT}"
     if long is not None and np.isfinite(long.burst):

@@ -25,7 +25,10 @@ from .validate import checked_experiment
 __all__ = ["StudyFile", "read_study"]
 
 _ROUNDS = 5  # mistakes may stand behind mistakes
-NAMELESS = {"title": "a study", "seed": 0}  # while the rest of a mistaken file is looked at
+STAND_INS = {  # while the rest of a mistaken file is looked at
+    "study": {"title": "a study", "seed": 0},
+    "time": {"end": 1e5, "step": 0.1},  # formulas look ahead by less
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -141,8 +144,9 @@ def _validated(
         problems = told + [p for p in found if not follows(p, told)]
         for problem in reversed(found):
             _remove(rest, problem.place)
-        if any(problem.place[:1] == ("study",) for problem in found):
-            rest["study"] = NAMELESS
+        for name, table in STAND_INS.items():
+            if any(problem.place[:1] == (name,) for problem in found) and name not in rest:
+                rest[name] = table
     return None, problems, entries
 
 
