@@ -5,6 +5,7 @@ from .adaptive import Zero, adaptive_neural
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
 from .nussbaum import NussbaumLaw
+from .performance import FunnelControl, PrescribedPerformance
 from .pid import PID
 from .rbf import (
     AdaptiveWeights,
@@ -23,11 +24,13 @@ __all__ = [
     "DeadZoneNussbaumLaw",
     "FilteredError",
     "FixedGainLaw",
+    "FunnelControl",
     "GaussianBasis",
     "KnownSignLaw",
     "LeakyNussbaumLaw",
     "MonotoneNussbaumLaw",
     "NussbaumLaw",
+    "PrescribedPerformance",
     "RobustTerm",
     "SlidingModeLaw",
     "Zero",
