@@ -29,6 +29,7 @@ from .actuators import (
 from .blocks import Block, Spec, block
 from .controllers import (
     PID,
+    AdaptiveDeadZoneInverse,
     AdaptiveWeights,
     DeadZoneNussbaumLaw,
     FilteredError,
@@ -82,6 +83,7 @@ from .sampling import Clock, Sampled, discretise, sampled
 
 __all__ = [
     "PID",
+    "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
     "AlgebraicLoopError",
     "AmbiguousNameError",

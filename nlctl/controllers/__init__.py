@@ -2,6 +2,7 @@
 
 from .ablations import FixedGainLaw, ablations, replaced
 from .adaptive import Zero, adaptive_neural
+from .adaptive_inverse import AdaptiveDeadZoneInverse
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
 from .nussbaum import NussbaumLaw
@@ -20,6 +21,7 @@ from .sliding_mode import SlidingModeLaw, sliding_mode
 
 __all__ = [
     "PID",
+    "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
     "DeadZoneNussbaumLaw",
     "FilteredError",
