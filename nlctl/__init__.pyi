@@ -29,15 +29,18 @@ from .actuators import (
 from .blocks import Block, Spec, block
 from .controllers import (
     PID,
+    AdaptiveDeadZoneInverse,
     AdaptiveWeights,
     DeadZoneNussbaumLaw,
     FilteredError,
     FixedGainLaw,
+    FunnelControl,
     GaussianBasis,
     KnownSignLaw,
     LeakyNussbaumLaw,
     MonotoneNussbaumLaw,
     NussbaumLaw,
+    PrescribedPerformance,
     RobustTerm,
     SlidingModeLaw,
     Zero,
@@ -80,6 +83,7 @@ from .sampling import Clock, Sampled, discretise, sampled
 
 __all__ = [
     "PID",
+    "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
     "AlgebraicLoopError",
     "AmbiguousNameError",
@@ -109,6 +113,7 @@ __all__ = [
     "FixedGainLaw",
     "ForcedDuffing",
     "FunctionReference",
+    "FunnelControl",
     "Gain",
     "GaussianBasis",
     "Genesio",
@@ -123,6 +128,7 @@ __all__ = [
     "PrandtlIshlinskii",
     "PrandtlIshlinskiiInverse",
     "Preisach",
+    "PrescribedPerformance",
     "PureFeedback",
     "Quantiser",
     "RateLimiter",
