@@ -119,7 +119,7 @@ class Compiled:
             )
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks
             self.system._update_params(params)
-            return packed(self.schedule.nodes, self.program.layout, self.program.fixed)
+            return packed(self.schedule.holders, self.program.layout, self.program.fixed)
 
     def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
         """Return the right-hand side, as ``system.dynamics`` does."""

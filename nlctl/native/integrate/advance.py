@@ -94,7 +94,7 @@ def _judge(task, lanes, w, done, passed):
         if found == AGAIN:
             lane.rejected += 1
             continue
-        t_new = next_stop(task, lane, w.u) if lane.ends else lane.t + lane.step
+        t_new = next_stop(task, lane, j, w.u) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
             _sample(lane, j, task.times, t_new, w.x, w.x_new, w.k, w.U, w.samples)
         step_accepted(lane, found == EVENT)
@@ -157,7 +157,7 @@ def advance(rhs, along, task, w, rounds):
         for j in range(lanes.size):
             if lanes[j].status == RUNNING:
                 over = lanes[j].segment == task.times.size - 1
-                choose_step(lanes[j], next_stop(task, lanes[j], w.u), over, task.max_steps)
+                choose_step(lanes[j], next_stop(task, lanes[j], j, w.u), over, task.max_steps)
                 running += lanes[j].status == RUNNING
         if not running:
             return

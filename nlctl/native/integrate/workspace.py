@@ -36,8 +36,8 @@ class Task(NamedTuple):
     max_steps: int
     method: int
     alone: int  # whether this is a single run
-    ticks: np.ndarray  # times at which something happens to sampled blocks
-    which: np.ndarray  # which of the functions then
+    ticks: np.ndarray  # (lanes, instants): when something happens to sampled blocks, then inf
+    which: np.ndarray  # (lanes, instants): which of the functions then
     samples: np.ndarray  # these functions
     due: np.ndarray  # (functions, sampled states): whether it makes the next state
     sampled: np.ndarray  # indices of these states
@@ -133,11 +133,12 @@ def new_work(
 
 
 _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
+_PLACES = np.zeros((1, 1), dtype=np.int64)
 TASK = type_of(  # only the types of these matter
     with_table(
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
-        fixed=0.0, max_steps=0, method=0, alone=0, ticks=_LINE, which=_NONE, samples=_NONE,
-        due=np.zeros((1, 1), dtype=np.int64), sampled=_NONE, derivatives=0, c_along=_GRID,
+        fixed=0.0, max_steps=0, method=0, alone=0, ticks=_GRID, which=_PLACES, samples=_NONE,
+        due=_PLACES, sampled=_NONE, derivatives=0, c_along=_GRID,
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
