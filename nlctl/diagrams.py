@@ -350,7 +350,7 @@ def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
     return rows
 
 
-def samplings(system: Any) -> list[tuple[str, Any]]:
+def samplings(system: Any) -> list[tuple[Any, Any]]:
     """Return what says how blocks are sampled, each once, behind the path of its parameters."""
     every = [sampling_of(leaf.system) for leaf in leaves(system)]
     found: dict[int, Any] = {id(made): made for made in every if made is not None}
