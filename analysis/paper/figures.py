@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,6 +24,7 @@ from ..figures.axes import (
 from . import TAIL, CaseRun
 
 __all__ = [
+    "DRAWN",
     "actuator_path",
     "adaptation",
     "control_input",
@@ -36,7 +38,7 @@ __all__ = [
 ]
 
 
-_DRAWN = ("paper", "sliding mode", "PID", "certified")  # of the controllers on computers
+DRAWN = ("paper", "sliding mode", "PID", "certified")  # of the controllers on computers
 
 
 def _one(time: np.ndarray, curves: Mapping[str, np.ndarray], label: str) -> Figure:
@@ -147,9 +149,9 @@ def sampling_errors(record: pd.DataFrame, titles: Mapping[str, str], band: float
     figure, axes = stacked_axes(rows=len(titles), height=2.2)
     shown: dict[str, object] = {}
     for ax, (example, title) in zip(axes, titles.items(), strict=True):
-        part = record.query("example == @example and quantity == 'dt'")
-        for label, (colour, style) in zip(_DRAWN, STYLES, strict=True):
-            line = part.query("controller == @label").sort_values("value")
+        part: Any = record[(record["example"] == example) & (record["quantity"] == "dt")]
+        for label, (colour, style) in zip(DRAWN, STYLES, strict=True):
+            line = part[part["controller"] == label].sort_values("value")
             good = line["error"].notna().to_numpy()
             last = int(np.argmin(good)) if not good.all() else good.size
             x, y = 1e3 * line["value"].to_numpy()[:last], line["error"].to_numpy()[:last]
@@ -157,7 +159,7 @@ def sampling_errors(record: pd.DataFrame, titles: Mapping[str, str], band: float
             if 0 < last < good.size:
                 ax.plot(x[-1:], y[-1:], "x", color=colour, markersize=7)
         ax.axhline(band, color=GREY, linewidth=0.9)
-        ax.set(xscale="log", yscale="log", ylabel=f"{title}: largest $|y - y_d|$")
+        ax.set(xscale="log", yscale="log", ylim=(5e-3, 10), ylabel=f"{title}: $|y - y_d|$")
     axes[-1].set(xlabel="sampling time (ms)")
     legend_above(axes[0], shown)
     return figure

@@ -9,7 +9,7 @@ import pandas as pd
 
 from ...report.document import Figure, Paragraph, Section, Table
 from .. import TAIL
-from ..figures import sampling_errors
+from ..figures import DRAWN, sampling_errors
 from ..sampling_limits import BAND, PEAK, QUANTITIES, Quantity, limits
 
 __all__ = ["sampling_section"]
@@ -30,7 +30,7 @@ def sampling_section(record: pd.DataFrame) -> Section:
         key="sampling",
         title="On a computer",
         items=[
-            Paragraph(text=" ".join(_sentence(found, example) for example in _TITLES)),
+            *(Paragraph(text=_sentence(found, example)) for example in _TITLES),
             Figure(
                 key="sampling-errors",
                 caption=f"Largest |y − yd| for t ≥ {TAIL:g} s against the sampling time, by "
@@ -40,35 +40,25 @@ def sampling_section(record: pd.DataFrame) -> Section:
             ),
             _table(found),
             Paragraph(
-                text="These are runs of a kept record, 21 for each entry of the table; two of them "
-                "are run again for this page and agree to 1e-3. The command that makes all of "
-                "them again: python -m analysis.paper.sampling_limits"
+                text="These are runs of a kept record, 13 to 21 for each entry of the table; two "
+                "of them are run again for this page and agree to 1e-3. The command that makes all "
+                "of them again: python -m analysis.paper.sampling_limits"
             ),
         ],
     )
 
 
 def _sentence(found: pd.DataFrame, example: str) -> str:
-    """Say how far the paper's controller goes, and which rivals go less or more far."""
-    dt: Any = found.loc[example][("dt", "good")]
+    """Say how far the paper's controller goes, and its rivals of the figure."""
     own: Any = found.loc[(example, "paper")]
     dt_text, delay, measured, given = (_text(own, quantity) for quantity in QUANTITIES)
-    rivals = dt.drop("paper")
-    longer, shorter = rivals[rivals > dt["paper"]], rivals[~(rivals >= dt["paper"])]
+    rivals = [f"'{r}' {_text(found.loc[(example, r)], QUANTITIES[0])}" for r in DRAWN[1:]]
     return (
         f"{_TITLES[example]} with the paper's controller keeps |y − yd| ≤ {BAND:g} for "
-        f"t ≥ {TAIL:g} s and |u| ≤ {PEAK:g} up to a sampling time of {dt_text}, a delay of {delay}, "
-        f"measurements in steps of {measured} and u in steps of {given}; of the others "
-        f"{_named(longer)} bear a longer sampling time, {_named(shorter)} do not bear this one."
+        f"t ≥ {TAIL:g} s and |u| ≤ {PEAK:g} up to a sampling time of {dt_text}, a delay of "
+        f"{delay}, measurements in steps of {measured}, and u in steps of {given}; sampling times "
+        f"that its rivals bear are {', '.join(rivals)}."
     )
-
-
-def _named(dt: Any) -> str:
-    texts = [
-        f"'{label}' ({1e3 * value:.3g} ms)" if np.isfinite(value) else f"'{label}' (not 1 ms)"
-        for label, value in dt.items()
-    ]
-    return ", ".join(texts) or "none"
 
 
 def _text(row: Any, quantity: Quantity) -> str:
