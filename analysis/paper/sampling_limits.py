@@ -30,8 +30,8 @@ __all__ = [
     "RECORD",
     "Quantity",
     "checked_record",
+    "controller_program",
     "limits",
-    "on_a_computer",
     "sampling_runs",
     "where_it_ends",
 ]
@@ -90,7 +90,7 @@ QUANTITIES = (
 )
 
 
-def on_a_computer(controller: Any, *, delays: bool = False) -> Any:
+def controller_program(controller: Any, *, delays: bool = False) -> Any:
     """Return a controller as a program with Euler's method, of which `QUANTITIES` may be varied.
 
     Parameters
@@ -130,7 +130,7 @@ def sampling_runs(
     for quantity in QUANTITIES:
         delays = quantity.key == "delay"
         if delays not in loops and (wanted is None or quantity.key in wanted):
-            program = on_a_computer(controller, delays=delays)
+            program = controller_program(controller, delays=delays)
             loops[delays] = compiled_loop(paper.EXAMPLES[example](controller=program))
         if wanted is None:
             run = _runner(loops[delays], quantity)

@@ -18,7 +18,7 @@ from nlctl.errors import UsageError
 from nlctl.expressions.functions import FUNCTIONS, MATH
 from nlctl.native import CompileError
 from nlctl.native.codegen.along import derivatives
-from nlctl.native.integrate.workspace import DIRECTIONS
+from nlctl.native.integrate.state import DIRECTIONS
 
 ROWS = sorted(FUNCTIONS)
 DOMAIN = {"arccosh": (1.1, 4.0), "arcsin": (-0.9, 0.9), "arccos": (-0.9, 0.9)}
@@ -255,6 +255,7 @@ def test_a_solved_loop_has_the_derivative_of_its_implicit_function(n):
     directions[: n + 1, : n + 1] = np.eye(n + 1)
     dx = np.empty((n, DIRECTIONS))
     wide = [np.repeat(np.atleast_1d(v)[:, None], DIRECTIONS, 1) for v in (x, r)]
+    made.point(np.zeros(DIRECTIONS), *wide, made.c)
     made.function(np.zeros(DIRECTIONS), *wide, made.c, directions, dx)
     np.testing.assert_allclose(dx[:, : n + 1], total, rtol=1e-13, atol=1e-14)
 

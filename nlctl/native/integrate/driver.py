@@ -20,6 +20,7 @@ from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
 from .discrete import simulate_discrete
 from .memory import with_table
+from .methods.lu import WHOLE, Elimination, cost
 from .state import DERIVATIVES, RUNNING, Status
 from .workspace import (
     AUTO,
@@ -186,8 +187,8 @@ def begin(run: Run) -> None:
 def go_on(run: Run, rounds: int = ROUNDS) -> None:
     """Try up to `rounds` steps in every lane that is still running."""
     rhs, _ = run.machine.entries
-    along = 0 if run.along is None else run.along.entry
-    integrators()["advance"](rhs, along, run.task, run.work, rounds)
+    point, along = (0, 0) if run.along is None else run.along.entries
+    integrators()["advance"](rhs, point, along, run.task, run.work, rounds)
     run.machine.check(run.task.p)
 
 
@@ -199,6 +200,7 @@ def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
     del given["table"]
     given["derivatives"] = EXACT if along else DIFFERENCES
     given["c_along"] = along.c if along else given["c_along"]
+    given |= _linear_equations(run.work.x.shape[0], along.elimination if along else WHOLE)
     run.lanes["status"] = RUNNING
     return replace(run, task=with_table(Task, like=TASK, **given), along=along)
 
@@ -241,11 +243,17 @@ def prepared(
         **_instants(compiled, code, due),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
+        **_linear_equations(len(x0), WHOLE),
     )
     signals = compiled.system.noutputs or 0
     work = new_work(x0, times, inputs.shape[0], program.events, signals, len(program.sampled))
     work.lanes["stiff"] = settings.method == "rodas5p"
     return Run(machine=code, task=task, work=work)
+
+
+def _linear_equations(n: int, order: Elimination) -> dict[str, Any]:
+    """Return how the stiff method solves them, and what its steps cost then."""
+    return {**vars(order), "cost": cost(n, order)}
 
 
 def _instants(compiled: Compiled, code: Machine, due: list[Instants]) -> dict[str, np.ndarray]:

@@ -15,11 +15,10 @@ import numpy as np
 from ..machine.address import call_out, call_rhs
 from .memory import type_of, with_table
 from .methods import rodas5p, tsit5
-from .state import INNER, new_lanes
+from .state import DIRECTIONS, INNER, new_lanes
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
 UNKNOWN, DIFFERENCES, EXACT = 0, 1, 2  # where the stiff method has its Jacobian from
-DIRECTIONS = 8  # that are taken together
 
 
 class Task(NamedTuple):
@@ -43,6 +42,14 @@ class Task(NamedTuple):
     sampled: np.ndarray  # indices of these states
     derivatives: int  # UNKNOWN until the stiff method asks for them
     c_along: np.ndarray  # what exact ones read besides their arguments
+    cost: float  # of a step of the stiff method, in explicit ones
+    order: np.ndarray  # of pivots, and where their entries are: see `lu.Elimination`
+    below: np.ndarray
+    below_start: np.ndarray
+    right: np.ndarray
+    right_start: np.ndarray
+    source: np.ndarray
+    target: np.ndarray
     table: np.ndarray
 
 
@@ -82,16 +89,18 @@ class Work(NamedTuple):
     x_ahead_flat: np.ndarray
     k_flat: np.ndarray
     dx_ahead_flat: np.ndarray
-    jacobian: np.ndarray  # of the stiff method, empty with several lanes
+    jacobian: np.ndarray  # of the stiff method, empty with several lanes: see `jacobian_place`
+    jacobian_flat: np.ndarray
     columns: np.ndarray  # of 1 / (h gamma) - J, and of its factors
+    factors: np.ndarray
     f_t: np.ndarray
     pivots: np.ndarray
     U: np.ndarray
     t_along: np.ndarray  # what exact derivatives are evaluated with, a direction in each column
     x_along: np.ndarray
     u_along: np.ndarray
-    v: np.ndarray
-    dx_along: np.ndarray
+    v: np.ndarray  # the directions
+    finite: np.ndarray
     table: np.ndarray
 
 
@@ -113,23 +122,34 @@ def new_work(
         "k": (tsit5.STAGES, n, lanes),
         "u": (inputs, lanes),
         "s": (sampled, lanes),
-        **dict.fromkeys(("jacobian", "columns"), (stiff, stiff)),
+        "jacobian": (stiff // DIRECTIONS + 1, stiff, DIRECTIONS),
+        "columns": (stiff, stiff),
+        "factors": (stiff * stiff,),
         "f_t": (stiff,),
         "U": (rodas5p.STAGES, stiff),
-        "t_along": (DIRECTIONS,),
-        **dict.fromkeys(("x_along", "dx_along"), (stiff, DIRECTIONS)),
+        **dict.fromkeys(("t_along", "finite"), (DIRECTIONS,)),
+        "x_along": (stiff, DIRECTIONS),
         "u_along": (inputs, DIRECTIONS),
-        "v": (stiff + inputs + 1, DIRECTIONS),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
     arrays["x"][:] = x0
     for name, rows in (("samples", n), ("y", outputs)):
         arrays[name] = np.full((times.size, rows, lanes), np.nan)
     flat = {f"{x}_flat": arrays[x].reshape(-1) for x in _STATES}
+    flat["jacobian_flat"] = arrays["jacobian"].reshape(-1)
+    arrays["v"] = directions(stiff, inputs)
     k_flat = arrays["k"].reshape(tsit5.STAGES, n * lanes)
     pivots = np.zeros(stiff, dtype=np.int64)
     records = new_lanes(times, lanes)
     return with_table(Work, lanes=records, **arrays, **flat, k_flat=k_flat, pivots=pivots)
+
+
+def directions(n: int, inputs: int) -> np.ndarray:
+    """Return unit vectors of n states and, behind the inputs, of time, `DIRECTIONS` together."""
+    v = np.zeros((n // DIRECTIONS + 1, n + inputs + 1, DIRECTIONS))
+    for c in range(n + 1):
+        v[c // DIRECTIONS, c if c < n else n + inputs, c % DIRECTIONS] = 1.0
+    return v
 
 
 _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
@@ -139,6 +159,8 @@ TASK = type_of(  # only the types of these matter
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
         fixed=0.0, max_steps=0, method=0, alone=0, ticks=_GRID, which=_PLACES, samples=_NONE,
         due=_PLACES, sampled=_NONE, derivatives=0, c_along=_GRID,
+        cost=0.0, order=_NONE, below=_NONE, below_start=_NONE, right=_NONE, right_start=_NONE,
+        source=_NONE, target=_NONE,
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
