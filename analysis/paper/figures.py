@@ -24,7 +24,7 @@ from ..figures.axes import (
 from . import TAIL, CaseRun
 
 __all__ = [
-    "DRAWN",
+    "SAMPLED_CONTROLLERS",
     "actuator_path",
     "adaptation",
     "control_input",
@@ -38,7 +38,12 @@ __all__ = [
 ]
 
 
-DRAWN = ("paper", "sliding mode", "PID", "certified")  # of the controllers on computers
+SAMPLED_CONTROLLERS = (
+    "paper",
+    "sliding mode",
+    "PID",
+    "certified",
+)  # of the controllers on computers
 
 
 def _one(time: np.ndarray, curves: Mapping[str, np.ndarray], label: str) -> Figure:
@@ -150,7 +155,7 @@ def sampling_errors(record: pd.DataFrame, titles: Mapping[str, str], band: float
     shown: dict[str, object] = {}
     for ax, (example, title) in zip(axes, titles.items(), strict=True):
         part: Any = record[(record["example"] == example) & (record["quantity"] == "dt")]
-        for label, (colour, style) in zip(DRAWN, STYLES, strict=True):
+        for label, (colour, style) in zip(SAMPLED_CONTROLLERS, STYLES, strict=True):
             line = part[part["controller"] == label].sort_values("value")
             good = line["error"].notna().to_numpy()
             last = int(np.argmin(good)) if not good.all() else good.size

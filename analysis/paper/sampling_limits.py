@@ -27,16 +27,16 @@ __all__ = [
     "BAND",
     "PEAK",
     "QUANTITIES",
-    "RECORD",
+    "SAMPLING_RECORD",
     "Quantity",
     "checked_record",
     "controller_program",
-    "limits",
     "sampling_runs",
+    "spec_ends",
     "where_it_ends",
 ]
 
-RECORD = Path(__file__).with_name("sampling-limits.csv")
+SAMPLING_RECORD = Path(__file__).with_name("sampling-limits.csv")
 BAND, PEAK = 0.15, 15.0  # the spec of reports/example-1.toml: |y - yd| from 10 s on, and |u|
 _STEP = 0.002  # s: sampling time where something else is varied
 _WAITING = 20  # sampling times that the longest delay takes
@@ -182,7 +182,7 @@ def where_it_ends(table: pd.DataFrame) -> tuple[float, float]:
     return (float(values[bad[0] - 1]) if bad[0] else np.nan), float(values[bad[0]])
 
 
-def limits(record: pd.DataFrame) -> pd.DataFrame:
+def spec_ends(record: pd.DataFrame) -> pd.DataFrame:
     """Return where each controller's spec ends.
 
     Returns
@@ -200,7 +200,7 @@ def limits(record: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
-def checked_record(path: Path = RECORD) -> pd.DataFrame:
+def checked_record(path: Path = SAMPLING_RECORD) -> pd.DataFrame:
     """Return the record, if the paper's own loops are those of which it was made.
 
     Raises
@@ -242,8 +242,8 @@ def _main() -> None:
         for example in paper.EXAMPLES
         for label in compared_controllers(example)
     )
-    made.to_csv(RECORD, index=False, float_format="%.6g")
-    print(limits(made).to_string())
+    made.to_csv(SAMPLING_RECORD, index=False, float_format="%.6g")
+    print(spec_ends(made).to_string())
 
 
 if __name__ == "__main__":

@@ -8,11 +8,11 @@ from analysis.paper.controllers import compared_controllers
 from analysis.paper.page.sampling import sampling_section
 from analysis.paper.sampling_limits import (
     QUANTITIES,
-    RECORD,
+    SAMPLING_RECORD,
     check_lines,
     checked_record,
-    limits,
     sampling_runs,
+    spec_ends,
     where_it_ends,
 )
 from nlctl import paper
@@ -38,8 +38,8 @@ def test_the_spec_ends_at_its_first_violation(errors, peaks, expected):
 
 
 def test_the_record_has_all_controllers_and_quantities():
-    record = pd.read_csv(RECORD)
-    found = limits(record)
+    record = pd.read_csv(SAMPLING_RECORD)
+    found = spec_ends(record)
     wanted = [(e, label) for e in paper.EXAMPLES for label in compared_controllers(e)]
     assert list(found.index) == wanted
     for quantity in QUANTITIES:
@@ -50,7 +50,7 @@ def test_the_record_has_all_controllers_and_quantities():
 
 def test_a_record_of_other_equations_is_refused(tmp_path):
     """The run of today tells, and the command that makes the record again is named."""
-    record = pd.read_csv(RECORD)
+    record = pd.read_csv(SAMPLING_RECORD)
     record["error"] *= 1.01
     record.to_csv(tmp_path / "record.csv", index=False)
     with pytest.raises(ValueError, match=r"example_1.*python -m analysis\.paper\.sampling_limits"):
@@ -60,7 +60,7 @@ def test_a_record_of_other_equations_is_refused(tmp_path):
 def test_the_section_says_what_the_record_says():
     record = checked_record()
     section = sampling_section(record)
-    row = limits(record).loc[("example_1", "paper")]
+    row = spec_ends(record).loc[("example_1", "paper")]
     assert f"sampling time of {1e3 * row[('dt', 'good')]:.3g} ms" in section.items[0].text
     *_, shown, _ = section.items
     assert len(shown.rows) == sum(len(compared_controllers(example)) for example in paper.EXAMPLES)
@@ -70,7 +70,7 @@ def test_the_section_says_what_the_record_says():
 @pytest.mark.parametrize("example", paper.EXAMPLES)
 def test_every_controllers_line_is_one_of_today(example):
     """Where its run ends well, at the least value of each quantity."""
-    record = pd.read_csv(RECORD)
+    record = pd.read_csv(SAMPLING_RECORD)
     for label in compared_controllers(example):
         own = record[(record["example"] == example) & (record["controller"] == label)]
         kept = own.groupby("quantity", sort=False).head(1)

@@ -9,8 +9,8 @@ import pandas as pd
 
 from ...report.document import Figure, Paragraph, Section, Table
 from .. import TAIL
-from ..figures import DRAWN, sampling_errors
-from ..sampling_limits import BAND, PEAK, QUANTITIES, Quantity, limits
+from ..figures import SAMPLED_CONTROLLERS, sampling_errors
+from ..sampling_limits import BAND, PEAK, QUANTITIES, Quantity, spec_ends
 
 __all__ = ["sampling_section"]
 
@@ -25,7 +25,7 @@ def sampling_section(record: pd.DataFrame) -> Section:
     record : pandas.DataFrame
         Of `analysis.paper.sampling_limits.checked_record`.
     """
-    found = limits(record)
+    found = spec_ends(record)
     return Section(
         key="sampling",
         title="On a computer",
@@ -52,7 +52,9 @@ def _sentence(found: pd.DataFrame, example: str) -> str:
     """Say how far the paper's controller goes, and its rivals of the figure."""
     own: Any = found.loc[(example, "paper")]
     dt_text, delay, measured, given = (_text(own, quantity) for quantity in QUANTITIES)
-    rivals = [f"'{r}' {_text(found.loc[(example, r)], QUANTITIES[0])}" for r in DRAWN[1:]]
+    rivals = [
+        f"'{r}' {_text(found.loc[(example, r)], QUANTITIES[0])}" for r in SAMPLED_CONTROLLERS[1:]
+    ]
     return (
         f"{_TITLES[example]} with the paper's controller keeps |y − yd| ≤ {BAND:g} for "
         f"t ≥ {TAIL:g} s and |u| ≤ {PEAK:g} up to a sampling time of {dt_text}, a delay of "
