@@ -17,7 +17,7 @@ from .events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
 from .methods import rodas5p, tsit5
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
-from .samples import next_stop, take_samples
+from .samples import begin_afresh, next_stop, take_samples
 from .state import DERIVATIVES, INNER, RUNNING
 from .workspace import AUTO, UNKNOWN, inputs_at
 
@@ -180,6 +180,7 @@ def advance(rhs, point, along, task, w, rounds):
         if task.ticks.size and take_samples(task, lanes, w, sampled):
             for j in range(lanes.size):
                 passed[j] = sampled[j] or (passed[j] and task.memory.size > 0)
+            begin_afresh(task, lanes, w, sampled)
             restart(rhs, task, lanes, w, passed)
         elif task.memory.size and any_passed:
             restart(rhs, task, lanes, w, passed)

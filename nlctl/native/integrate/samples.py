@@ -54,6 +54,22 @@ def take_samples(task, lanes, w, sampled):
 
 
 @numba.njit(**INNER)
+def begin_afresh(task, lanes, w, sampled):
+    """Forget what was known of steps where a sample is taken: a run that resumes there knows none.
+
+    The first step tried is the time to what comes next.
+    """
+    for j in range(lanes.size):
+        lane = lanes[j]
+        if not sampled[j]:
+            continue
+        gap = next_stop(task, lane, j, w.u) - lane.t
+        lane.h = task.fixed if task.fixed > 0.0 else max(gap, 1e-12 * abs(lane.t))
+        lane.log_error_before = lane.last = lane.low = lane.high = 0.0
+        lane.tries = lane.same_side = lane.short = lane.quiet = lane.slow = 0
+
+
+@numba.njit(**INNER)
 def _is_due(task, lane, j):
     running = lane.status == RUNNING
     return running and lane.tick < task.ticks.shape[1] and task.ticks[j, lane.tick] <= lane.t
