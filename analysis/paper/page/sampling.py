@@ -58,8 +58,8 @@ def _sentence(found: pd.DataFrame, example: str) -> str:
     return (
         f"{_TITLES[example]} with the paper's controller keeps |y − yd| ≤ {BAND:g} for "
         f"t ≥ {TAIL:g} s and |u| ≤ {PEAK:g} up to a sampling time of {dt_text}; at 2 ms a delay of "
-        f"{delay}, or measurements in steps of {measured}, or u in steps of {given}; sampling times "
-        f"that its rivals bear are {', '.join(rivals)}."
+        f"{delay}, or measurements in steps of {measured}, or u in steps of {given}; times "
+        f"between samples that its rivals bear are {', '.join(rivals)}."
     )
 
 
