@@ -79,7 +79,7 @@ from .params import param, record
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
-from .sampling import Clock, Sampled, discretise, sampled
+from .sampling import Clock, Sampled, Sampling, discretise, sampled
 
 __all__ = [
     "PID",
@@ -135,6 +135,7 @@ __all__ = [
     "Relay",
     "RobustTerm",
     "Sampled",
+    "Sampling",
     "Saturation",
     "SecondOrderLag",
     "SlidingModeLaw",

@@ -302,6 +302,11 @@ def within(system: Any) -> Any:
     return getattr(system, "inner", system)
 
 
+def sampling_of(system: Any) -> Any:
+    """Return the block with the parameters of a sampled block's sampling; None of any other."""
+    return getattr(system, "sampling", None)
+
+
 def memory_states(spec: Any) -> tuple[str, ...]:
     """Return the names of a record's memory states."""
     return tuple(getattr(spec, "memory", ())) if hasattr(spec, "commit") else ()

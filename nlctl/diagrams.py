@@ -17,6 +17,7 @@ from .blocks import (
     default_state,
     parameter_rows,
     record_rows,
+    sampling_of,
     within,
 )
 from .errors import DiagramError, ParameterError
@@ -357,7 +358,18 @@ def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
     for leaf in leaves(system):
         if isinstance(within(leaf.system), Block):
             rows += parameter_rows(within(leaf.system), f"{leaf.parameter_path}.")
+    for path, owner in samplings(system):
+        rows += parameter_rows(owner, f"{path}.")
     return rows
+
+
+def samplings(system: Any) -> list[tuple[Any, Any]]:
+    """Return what says how blocks are sampled, each once, behind the path of its parameters."""
+    every = [sampling_of(leaf.system) for leaf in leaves(system)]
+    found: dict[int, Any] = {id(made): made for made in every if made is not None}
+    owners = system.params.owners if isinstance(system.params, Parameters) else {}
+    paths = {id(owner): name.rpartition(".")[0] for name, owner in owners.items()}
+    return [(paths.get(key, made.name), made) for key, made in found.items()]
 
 
 def parameters(system: Any) -> pd.DataFrame:

@@ -17,10 +17,11 @@ import control as ct
 import numpy as np
 
 from ..errors import ParameterError, UsageError
-from ..sampling.system import happening
+from ..sampling.system import Happening, happening
 from ..upstream.control_internals import outputs_now, rates_now, set_parameters
 from .codegen.blocks import equations
 from .codegen.lower import lower
+from .codegen.program import instants_of
 from .compiled import Compiled
 from .diagram.block_inputs import block_inputs
 from .diagram.schedule import Signal
@@ -55,6 +56,8 @@ class Trial:
         The same parameters as python-control takes them.
     width : int
         Members that the machine code of the run takes.
+    meetings : tuple of frozenset
+        What may happen to sampled blocks in that machine code.
     """
 
     time: np.ndarray
@@ -63,6 +66,7 @@ class Trial:
     p: np.ndarray
     params: Mapping[str, Any] | None
     width: int
+    meetings: tuple[Happening, ...] = ()
 
 
 def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
@@ -88,12 +92,13 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
         return
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
         width = trial.width if ct.isctime(compiled.system) else 1
-        code, c = prepared_parameters(compiled, trial.p, width)
+        (due,) = instants_of(compiled.schedule, compiled.program, trial.time, trial.p[:, None])
+        code, c = prepared_parameters(compiled, trial.p, width, due.patterns)
         done = compiled.__dict__.setdefault("_audited", [])
         if wanted is True and any(known is code for known in done):
             return
         done.append(code)
-        evaluated = _evaluated(compiled, code, c)
+        evaluated, trial = _evaluated(compiled, code, c), replace(trial, meetings=code.meetings)
         for point in _points(trial):
             _compare(compiled, trial, evaluated, point)
 
@@ -132,8 +137,8 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
     if not all(np.isfinite(values).all() for values in ours):
         return  # the run says that it diverged
     try:
-        theirs = _by_python_control(compiled, point, trial.params)
-        again = _by_python_control(compiled, point, trial.params)
+        theirs = _by_python_control(compiled, point, trial)
+        again = _by_python_control(compiled, point, trial)
     except RuntimeError as error:
         if "lgebraic loop" not in str(error) or compiled.program.sampled:
             raise
@@ -168,13 +173,13 @@ def _close(a: np.ndarray, b: np.ndarray, relative: float = _ROUNDING, absolute: 
     return (a == b) | (np.abs(a - b) <= relative * np.maximum(np.abs(a), np.abs(b)) + absolute)
 
 
-def _by_python_control(compiled: Compiled, point: Any, params: Any) -> Values:
-    system, given = compiled.system, {"params": dict(params)} if params else {}
+def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> Values:
+    system, given = compiled.system, {"params": dict(trial.params)} if trial.params else {}
     with happening():
         rates = system.dynamics(*point, **given) if system.nstates else np.empty(0)
         outputs = system.output(*point, **given) if system.noutputs else np.empty(0)
     after, rows = [], list(compiled.program.sampled)
-    for what in compiled.program.meetings:
+    for what in trial.meetings:
         with happening(what):
             after.append(system.dynamics(*point, **given)[rows])
     return tuple(np.asarray(v, dtype=float).reshape(-1) for v in (rates, outputs, *after))
@@ -204,7 +209,7 @@ def _shaken(compiled: Compiled, point: Any, trial: Trial, base: Values) -> Value
     """Return how far python-control's values move from `base` when all is rounded."""
     moved = [np.zeros_like(values) for values in base]
     for near in _near(point, trial):
-        found = _by_python_control(compiled, near, trial.params)
+        found = _by_python_control(compiled, near, trial)
         for total, a, b in zip(moved, base, found, strict=True):
             np.maximum(total, np.abs(a - b), out=total)
     return tuple(moved)

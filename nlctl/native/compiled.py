@@ -120,7 +120,7 @@ class Compiled:
             )
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks
             set_parameters(self.system, params)
-            return packed(self.schedule.nodes, self.program.layout, self.program.fixed)
+            return packed(self.schedule.holders, self.program.layout, self.program.fixed)
 
     def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
         """Return the right-hand side, as ``system.dynamics`` does."""

@@ -59,8 +59,12 @@ class Around(ct.NonlinearIOSystem):
         """Return its outputs."""
         raise NotImplementedError
 
-    def _update_params(self, params: Mapping[str, Any] | None) -> None:
+    def override(self, params: Mapping[str, Any] | None) -> None:
+        """Let the system inside have these overrides from now on."""
         set_parameters(self.inner, params)
+
+    def _update_params(self, params: Mapping[str, Any] | None) -> None:
+        self.override(params)
 
     @property
     def _current_params(self) -> Any:

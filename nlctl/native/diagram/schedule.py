@@ -17,7 +17,7 @@ import control as ct
 import numpy as np
 
 from ...blocks import within
-from ...diagrams import places
+from ...diagrams import places, samplings
 from ...sampling.system import Happening, Sampled
 from ..thirdparty.captured import Captured, noted
 from ..thirdparty.checks import check_functions
@@ -109,6 +109,8 @@ class Schedule:
         Parts of the order that are solved for; empty unless that was asked for.
     captured : tuple of Captured
         What the blocks' functions read from around them.
+    samplings : tuple of Node
+        What says how blocks are sampled: without signals, but with parameters.
     """
 
     system: Any
@@ -118,6 +120,12 @@ class Schedule:
     outputs: tuple[Combination, ...]
     loops: tuple[AlgebraicLoop, ...]
     captured: tuple[Captured, ...]
+    samplings: tuple[Node, ...] = ()
+
+    @property
+    def holders(self) -> tuple[Node, ...]:
+        """All that has parameters, in their order."""
+        return (*self.nodes, *self.samplings)
 
     @property
     def simple(self) -> bool:
@@ -170,10 +178,16 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
     return _ordered(
         Schedule(
             system=system, nodes=nodes, order=(), unknown=(), outputs=outputs, loops=(),
-            captured=tuple(read),
+            captured=tuple(read), samplings=tuple(_samplings(system)),
         ),
         solve_loops,
     )  # fmt: skip
+
+
+def _samplings(system: Any) -> Iterator[Node]:
+    for path, made in samplings(system):
+        none = np.zeros((0, 0), dtype=bool)
+        yield Node(path=path, system=made, state_offset=0, inputs=(), direct=none)
 
 
 def _ordered(read: Schedule, solve_loops: bool) -> Schedule:

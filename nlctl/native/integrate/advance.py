@@ -16,7 +16,7 @@ from .events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
 from .methods import explicit, rodas5p
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
-from .samples import next_stop, take_samples
+from .samples import begin_afresh, next_stop, take_samples
 from .state import DERIVATIVES, INNER, RUNNING
 from .workspace import AUTO, UNKNOWN
 
@@ -64,7 +64,7 @@ def _judge(task, lanes, w, done, passed):
         if found == AGAIN:
             lane.rejected += 1
             continue
-        t_new = next_stop(task, lane, w.u) if lane.ends else lane.t + lane.step
+        t_new = next_stop(task, lane, j, w.u) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
             _sample(lane, j, task, t_new, w)
         step_accepted(lane, found == EVENT)
@@ -127,7 +127,7 @@ def advance(rhs, point, along, task, w, rounds):
         for j in range(lanes.size):
             if lanes[j].status == RUNNING:
                 over = lanes[j].segment == task.times.size - 1
-                choose_step(lanes[j], next_stop(task, lanes[j], w.u), over, task.max_steps)
+                choose_step(lanes[j], next_stop(task, lanes[j], j, w.u), over, task.max_steps)
                 running += lanes[j].status == RUNNING
         if not running:
             return
@@ -150,6 +150,7 @@ def advance(rhs, point, along, task, w, rounds):
         if task.ticks.size and take_samples(task, lanes, w, sampled):
             for j in range(lanes.size):
                 passed[j] = sampled[j] or (passed[j] and task.memory.size > 0)
+            begin_afresh(task, lanes, w, sampled)
             restart(rhs, task, lanes, w, passed)
         elif task.memory.size and any_passed:
             restart(rhs, task, lanes, w, passed)

@@ -12,8 +12,9 @@ import numpy as np
 
 from ...errors import ParameterError
 from ...names import unknown
-from ...sampling.clock import instants
+from ...sampling.clock import Instants
 from ..codegen.along import Along, derivatives
+from ..codegen.program import instants_of
 from ..compiled import Compiled
 from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
@@ -234,7 +235,8 @@ def prepared(
 ) -> Run:
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, count = compiled.program, x0.shape[1]
-    code = machine(compiled, p, count)
+    due = instants_of(compiled.schedule, program, times, p)
+    code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     c = np.zeros((code.rows, count))
     code.prepare(np.ascontiguousarray(p), c)
     task = with_table(
@@ -254,7 +256,7 @@ def prepared(
         stable=float(settings.pair.stable),
         **settings.pair.arrays(),
         alone=int(count == 1),
-        **_instants(compiled, code, times),
+        **_instants(compiled, code, due),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
         **_linear_equations(len(x0), WHOLE),
@@ -273,18 +275,23 @@ def _linear_equations(n: int, order: Elimination) -> dict[str, Any]:
     return {**vars(order), "cost": cost(n, order)}
 
 
-def _instants(compiled: Compiled, code: Machine, times: np.ndarray) -> dict[str, np.ndarray]:
-    """Return when something happens to sampled blocks, and what."""
-    program = compiled.program
-    due = instants(program.clocks, float(times[0]), float(times[-1]), program.meetings)
-    written = np.zeros((max(len(due.patterns), 1), len(program.sampled)), dtype=np.int64)
+def _instants(compiled: Compiled, code: Machine, due: list[Instants]) -> dict[str, np.ndarray]:
+    """Return when something happens to sampled blocks of each lane, and what."""
+    sampled, places = compiled.program.sampled, {what: k for k, what in enumerate(code.meetings)}
+    ticks = np.full((len(due), max(one.times.size for one in due)), np.inf)
+    which = np.zeros(ticks.shape, dtype=np.int64)
+    for lane, one in enumerate(due):
+        functions = np.array([places[what] for what in one.patterns], dtype=np.int64)
+        ticks[lane, : one.times.size] = one.times
+        which[lane, : one.times.size] = functions[one.which] if one.times.size else 0
+    written = np.zeros((max(len(code.samples), 1), len(sampled)), dtype=np.int64)
     for k in range(len(code.samples)):
         for store in code.lowered.functions[f"sample{k}"].plan.stores:
             if store.array == "s":
                 written[k, store.row : store.row + store.size] = 1
     return {
-        "ticks": due.times, "which": due.which, "samples": code.sample_entries, "due": written,
-        "sampled": np.array(program.sampled, dtype=np.int64),
+        "ticks": ticks, "which": which, "samples": code.sample_entries, "due": written,
+        "sampled": np.array(sampled, dtype=np.int64),
     }  # fmt: skip
 
 

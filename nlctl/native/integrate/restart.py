@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .samples import take_samples
+from .samples import begin_afresh, take_samples
 from .state import INNER
 from .workspace import evaluate
 
@@ -221,8 +221,10 @@ def start(rhs, task, w):
     """Begin at the initial states in w.x: commit the memories, propose first steps."""
     lanes = w.lanes
     everyone = np.ones(lanes.size, np.bool_)
+    sampled = np.zeros(lanes.size, np.bool_)
     if task.ticks.size:
-        take_samples(task, lanes, w, np.zeros(lanes.size, np.bool_))
+        take_samples(task, lanes, w, sampled)
     restart(rhs, task, lanes, w, everyone)
     _first_step(rhs, task, lanes, w)
+    begin_afresh(task, lanes, w, sampled)
     restart(rhs, task, lanes, w, everyone)

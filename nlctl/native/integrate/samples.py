@@ -11,17 +11,17 @@ from .workspace import inputs_at
 
 
 @numba.njit(**INNER)
-def next_stop(task, lane, u):
+def next_stop(task, lane, j, u):
     """Return where a step must end.
 
     That is when something happens to sampled blocks, with inputs at their next corner, and at the
     last time.
     """
-    times, ticks = task.times, task.ticks
+    times = task.times
     stop = times[-1]
     if u.shape[0] and lane.segment < times.size - 1:
         stop = times[lane.segment + 1]
-    return min(stop, ticks[lane.tick]) if lane.tick < ticks.size else stop
+    return min(stop, task.ticks[j, lane.tick]) if lane.tick < task.ticks.shape[1] else stop
 
 
 @numba.njit(**INNER)
@@ -32,20 +32,20 @@ def take_samples(task, lanes, w, sampled):
     """
     found = False
     for j in range(lanes.size):
-        sampled[j] = _is_due(task, lanes[j])
+        sampled[j] = _is_due(task, lanes[j], j)
         found |= sampled[j]
     for k in range(task.samples.size if found else 0):
         wanted = False
         for j in range(lanes.size):
             w.t[j] = lanes[j].t
-            wanted |= sampled[j] and task.which[lanes[j].tick] == k
+            wanted |= sampled[j] and task.which[j, lanes[j].tick] == k
         if not wanted:
             continue
         if w.u.shape[0]:
             inputs_at(w.t, task.times, task.inputs, lanes, w.u)
         call_out(task.samples[k], w.t, w.x, w.u, task.p, w.s)
         for j in range(lanes.size):
-            if sampled[j] and task.which[lanes[j].tick] == k:
+            if sampled[j] and task.which[j, lanes[j].tick] == k:
                 _take(task, lanes[j], w, j, k)
     for j in range(lanes.size):
         if sampled[j]:
@@ -54,9 +54,25 @@ def take_samples(task, lanes, w, sampled):
 
 
 @numba.njit(**INNER)
-def _is_due(task, lane):
+def begin_afresh(task, lanes, w, sampled):
+    """Forget what was known of steps where a sample is taken: a run that resumes there knows none.
+
+    The first step tried is the time to what comes next.
+    """
+    for j in range(lanes.size):
+        lane = lanes[j]
+        if not sampled[j]:
+            continue
+        gap = next_stop(task, lane, j, w.u) - lane.t
+        lane.h = task.fixed if task.fixed > 0.0 else max(gap, 1e-12 * abs(lane.t))
+        lane.log_error_before = lane.last = lane.low = lane.high = 0.0
+        lane.tries = lane.same_side = lane.short = lane.quiet = lane.slow = 0
+
+
+@numba.njit(**INNER)
+def _is_due(task, lane, j):
     running = lane.status == RUNNING
-    return running and lane.tick < task.ticks.size and task.ticks[lane.tick] <= lane.t
+    return running and lane.tick < task.ticks.shape[1] and task.ticks[j, lane.tick] <= lane.t
 
 
 @numba.njit(**INNER)

@@ -41,8 +41,8 @@ class Task(NamedTuple):
     C: np.ndarray
     E: np.ndarray
     alone: int  # whether this is a single run
-    ticks: np.ndarray  # times at which something happens to sampled blocks
-    which: np.ndarray  # which of the functions then
+    ticks: np.ndarray  # (lanes, instants): when something happens to sampled blocks, then inf
+    which: np.ndarray  # (lanes, instants): which of the functions then
     samples: np.ndarray  # these functions
     due: np.ndarray  # (functions, sampled states): whether it makes the next state
     sampled: np.ndarray  # indices of these states
@@ -165,12 +165,13 @@ def directions(n: int, inputs: int) -> np.ndarray:
 
 
 _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
+_PLACES = np.zeros((1, 1), dtype=np.int64)
 TASK = type_of(  # only the types of these matter
     with_table(
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
         fixed=0.0, max_steps=0, method=0, pair_order=0.0, stable=0.0, A=_GRID, B=_GRID,
-        C=_LINE, E=_LINE, alone=0, ticks=_LINE, which=_NONE, samples=_NONE,
-        due=np.zeros((1, 1), dtype=np.int64), sampled=_NONE, derivatives=0, c_along=_GRID,
+        C=_LINE, E=_LINE, alone=0, ticks=_GRID, which=_PLACES, samples=_NONE,
+        due=_PLACES, sampled=_NONE, derivatives=0, c_along=_GRID,
         cost=0.0, order=_NONE, below=_NONE, below_start=_NONE, right=_NONE, right_start=_NONE,
         source=_NONE, target=_NONE,
     )
