@@ -12,8 +12,9 @@ import numba
 import numpy as np
 
 from ..machine.address import call_rhs
-from .control import choose_method, choose_step, next_step, rejected
-from .events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
+from .control import choose_method, choose_step, next_step, rejected, shorten
+from .events import AGAIN, CLEAR, EVENT, locate, step_accepted
+from .excursions import SHORTER, unforeseen, without_excursion
 from .methods import rodas5p, tsit5
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
@@ -38,7 +39,7 @@ def _explicit_attempt(rhs, task, lanes, w):
             inputs_at(w.t, task.times, task.inputs, lanes, w.u)
         if s < 6:
             tsit5.combined(x, hh, k, s, w.x_stage_flat)
-            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.g)
+            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.g_inside[min(s, 4) - 1])
         else:
             tsit5.combined(x, hh, k, s, w.x_new_flat)
             call_rhs(rhs, w.t, w.x_new, w.u, task.p, w.k[s], w.g)
@@ -83,16 +84,22 @@ def _judge(task, lanes, w, done, passed):
         done[j] = passed[j] = False
         if lane.status != RUNNING or rejected(lane, w.error[j], task.fixed):
             continue
-        growing = lane.step > 2.0 * lane.last and lane.step > shortest and lane.tries == 0
-        if memories and growing and task.fixed == 0.0 and unforeseen(w, lane.step, j):
-            lane.rejected += 1
-            lane.h = 0.3 * lane.step
+        free = task.fixed == 0.0 and lane.step > shortest
+        growing = lane.step > 2.0 * lane.last and lane.tries == 0
+        if memories and growing and free and unforeseen(w, lane.step, j):
+            shorten(lane, SHORTER)
             continue
         found = CLEAR
         if w.e.shape[0]:
             found = locate(lane, corners, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j)
         if found == AGAIN:
             lane.rejected += 1
+            continue
+        part = 1.0
+        if free and not lane.stiff:  # memories have slopes, and their stages too much noise
+            part = without_excursion(w, corners, memories == 0, j)
+        if part < 1.0:
+            shorten(lane, part)
             continue
         t_new = next_stop(task, lane, w.u) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:

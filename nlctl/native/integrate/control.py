@@ -72,6 +72,14 @@ def rejected(lane, error, fixed):
 
 
 @numba.njit(**INNER)
+def shorten(lane, part):
+    """Have part of the step just tried be tried instead, whatever was located in it."""
+    lane.rejected += 1
+    lane.tries = 0
+    lane.h = part * lane.step
+
+
+@numba.njit(**INNER)
 def next_step(lane, error, rate, fixed, memories):
     """Propose the next step after an accepted one: PI control, and stability."""
     log_error = np.log(max(error, 1e-10))
