@@ -195,7 +195,7 @@ def _ordered(read: Schedule, solve_loops: bool) -> Schedule:
     nodes = read.nodes
     try:
         order = tuple(TopologicalSorter(_blocks_before(nodes)).static_order())
-        return replace(read, order=order, unknown=(frozenset(),) * len(order), loops=())
+        return replace(read, order=order, unknown=_not_yet_known(nodes, order), loops=())
     except CycleError:  # look closer: which output depends on which input
         nodes = tuple(replace(n, direct=closer_feedthrough(n.system, n.direct)) for n in nodes)
         ordering = _Ordering(nodes=nodes)
@@ -243,6 +243,17 @@ def _blocks_before(nodes: tuple[Node, ...]) -> dict[int, set[int]]:
             if node.direct[:, j].any():
                 before[i] |= {s.block for s in combination if s.block is not None}
     return before
+
+
+def _not_yet_known(nodes: tuple[Node, ...], order: Iterable[int]) -> tuple[frozenset[int], ...]:
+    """Return which inputs of each block come later in an order: no output of it needs these."""
+    done: set[int | None] = {None}
+    unknown = []
+    for i in order:
+        inputs = enumerate(nodes[i].inputs)
+        unknown.append(frozenset(j for j, c in inputs if any(s.block not in done for s in c)))
+        done.add(i)
+    return tuple(unknown)
 
 
 @dataclass(kw_only=True)

@@ -11,8 +11,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .control import choose_method, choose_step, next_step, rejected
-from .events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
+from .control import choose_method, choose_step, next_step, rejected, shorten
+from .events import AGAIN, CLEAR, EVENT, locate, step_accepted
+from .excursions import SHORTER, unforeseen, without_excursion
 from .methods import explicit, rodas5p
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
@@ -53,16 +54,22 @@ def _judge(task, lanes, w, done, passed):
         done[j] = passed[j] = False
         if lane.status != RUNNING or rejected(lane, w.error[j], task):
             continue
-        growing = lane.step > 2.0 * lane.last and lane.step > shortest and lane.tries == 0
-        if memories and growing and task.fixed == 0.0 and unforeseen(w, lane.step, j):
-            lane.rejected += 1
-            lane.h = 0.3 * lane.step
+        free = task.fixed == 0.0 and lane.step > shortest
+        growing = lane.step > 2.0 * lane.last and lane.tries == 0
+        if memories and growing and free and unforeseen(w, lane.step, j):
+            shorten(lane, SHORTER)
             continue
         found = CLEAR
         if w.e.shape[0]:
             found = locate(lane, corners, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j)
         if found == AGAIN:
             lane.rejected += 1
+            continue
+        part = 1.0
+        if free and not lane.stiff:  # memories have slopes, and their stages too much noise
+            part = without_excursion(task, w, memories == 0, j)
+        if part < 1.0:
+            shorten(lane, part)
             continue
         t_new = next_stop(task, lane, j, w.u) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:

@@ -73,6 +73,14 @@ def rejected(lane, error, task):
 
 
 @numba.njit(**INNER)
+def shorten(lane, part):
+    """Have part of the step just tried be tried instead, whatever was located in it."""
+    lane.rejected += 1
+    lane.tries = 0
+    lane.h = part * lane.step
+
+
+@numba.njit(**INNER)
 def next_step(lane, error, rate, task):
     """Propose the next step after an accepted one: PI control, and stability."""
     log_error, memories, slower = np.log(max(error, 1e-10)), task.memory.size, 5.0 / task.pair_order

@@ -35,23 +35,6 @@ def triggered(start, end, is_memory, behind):
 
 
 @numba.njit(**INNER)
-def unforeseen(w, h, j):
-    """Whether an event function has changed over a step otherwise than its slopes say.
-
-    Error control sees the states only.  Where what drives a memory is no state, a step may grow
-    until it passes over turns that both ends know nothing of.
-    """
-    for i in range(w.g.shape[0]):
-        change = w.g[i, j] - w.g_start[i, j]
-        before, after = h * w.slope_start[i, j], h * w.slope[i, j]
-        scale = abs(change) + abs(before) + abs(after)
-        noise = 1e-12 * abs(w.g[i, j])
-        if abs(change - 0.5 * (before + after)) > 0.2 * scale + noise:
-            return True
-    return False
-
-
-@numba.njit(**INNER)
 def first_root(lane, corners, e_start, e_low, e_high, behind, j):
     """Return where the first event between the lengths low and high lies, -1 if there is none.
 

@@ -77,6 +77,7 @@ class Work(NamedTuple):
     k: np.ndarray  # derivatives at the stages
     g: np.ndarray  # switching functions, and what memories would become
     g_start: np.ndarray
+    g_inside: np.ndarray  # inside the step being tried, see `excursions`; the last is scratch
     e: np.ndarray  # event functions: those of corners, and the rates of memories
     e_start: np.ndarray
     e_low: np.ndarray  # at the ends of the bracket in which an event is located
@@ -130,6 +131,7 @@ def new_work(
         **dict.fromkeys(("g", "g_ahead", "g_start", "slope", "slope_start"), (events, lanes)),
         **dict.fromkeys(("e", "e_start", "e_low", "e_high", "behind"), (events, lanes)),
         **dict.fromkeys(("t", "h", "error", "rate", "t_end"), (lanes,)),
+        "g_inside": (4, events, lanes),
         "hh": (n * lanes,),
         "k": (stages, n, lanes),
         "u": (inputs, lanes),
