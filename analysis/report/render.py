@@ -230,6 +230,14 @@ def framed(report: Report) -> Framed:
     """Return a report as a notebook shows it: the whole page, in a frame.
 
     The page's content policy holds inside of the frame, and its script reaches nothing outside.
+
+    Parameters
+    ----------
+    report : Report
+
+    Returns
+    -------
+    Framed
     """
     return Framed(title=plain_text(report.title), page=render_html(report))
 

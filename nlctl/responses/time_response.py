@@ -52,7 +52,7 @@ class Response(ct.TimeResponseData):
 
 
 def _in_text(values: np.ndarray) -> list[str]:
-    """Return one text for each output; those of several traces stand side by side."""
+    """Return one text for each output; those of several traces in one row."""
     return [", ".join(f"{v:.6g}" for v in np.ravel(own)) for own in values]
 
 

@@ -13,11 +13,11 @@ import numba
 from .methods.tsit5 import TSIT5
 from .state import INNER
 
-INSIDE = tuple(map(float, TSIT5.c[1:4]))  # parts of a step at which switching functions are kept
-FIRST, SECOND, THIRD = INSIDE
-GRID = 32
-NEAR = 0.01  # of the range: a minimum so close to 0 is looked at in a shorter step
-DIP = 1e-4  # of the range: a minimum no deeper below the ends is one of them
+_INSIDE = tuple(map(float, TSIT5.c[1:4]))  # parts of a step at which switching functions are kept
+_FIRST, _SECOND, _THIRD = _INSIDE
+_GRID = 32
+_NEAR = 0.01  # of the range: a minimum so close to 0 is looked at in a shorter step
+_DIP = 1e-4  # of the range: a minimum no deeper below the ends is one of them
 SHORTER = 0.3  # part of a step to be tried where its switching functions cannot be foreseen
 
 
@@ -42,7 +42,7 @@ def without_excursion(task, w, free, j):
     with an end on the other side, only once.  With `free` that is asked of the polynomial through
     them as well.
     """
-    if task.C.size < 5 or (task.C[1], task.C[2], task.C[3]) != INSIDE:
+    if task.C.size < 5 or (task.C[1], task.C[2], task.C[3]) != _INSIDE:
         return 1.0
     for i in range(task.corners):
         start = w.e_start[i, j]
@@ -64,7 +64,7 @@ def without_excursion(task, w, free, j):
 def _turning_part(start, one, two, three, end, free):
     """Return where a function that starts at or above 0 is below 0 before it comes back, or 1.
 
-    Between its values at the parts 0, `INSIDE` and 1 it is taken for the polynomial through them.
+    Between its values at the parts 0, `_INSIDE` and 1 it is taken for the polynomial through them.
     Where that may be wrong by more than its distance from 0, its minimum counts as below 0.
     """
     least = min(start, one, two, three, end)
@@ -76,11 +76,11 @@ def _turning_part(start, one, two, three, end, free):
         and (one < 0.0 and not (two < 0.0 and three < 0.0 and end < 0.0))
         and max(two, three, end) > 0.0
     ):
-        return FIRST
+        return _FIRST
     if two < 0.0 and max(three, end) > 0.0:
-        return SECOND
+        return _SECOND
     if three < 0.0 and end > 0.0:
-        return THIRD
+        return _THIRD
     if least < 0.0:
         return 1.0  # one crossing, for `locate`
     return _lowest(start, one, two, three, end, extent) if free else 1.0
@@ -89,19 +89,19 @@ def _turning_part(start, one, two, three, end, free):
 @numba.njit(**INNER)
 def _lowest(start, one, two, three, end, extent):
     """Return where the polynomial through five values has a minimum near or below 0, or 1."""
-    # divided differences at 0, FIRST, SECOND, 1 and THIRD
-    a = (one - start) / FIRST
-    b = ((two - one) / (SECOND - FIRST) - a) / SECOND
-    c = ((end - two) / (1.0 - SECOND) - (two - one) / (SECOND - FIRST)) / (1.0 - FIRST) - b
-    cubic = start + THIRD * (a + (THIRD - FIRST) * (b + (THIRD - SECOND) * c))
+    # divided differences at 0, _FIRST, _SECOND, 1 and _THIRD
+    a = (one - start) / _FIRST
+    b = ((two - one) / (_SECOND - _FIRST) - a) / _SECOND
+    c = ((end - two) / (1.0 - _SECOND) - (two - one) / (_SECOND - _FIRST)) / (1.0 - _FIRST) - b
+    cubic = start + _THIRD * (a + (_THIRD - _FIRST) * (b + (_THIRD - _SECOND) * c))
     error = abs(three - cubic)
     if error > 0.2 * extent:
         return SHORTER
-    d = (three - cubic) / (THIRD * (THIRD - FIRST) * (THIRD - SECOND) * (THIRD - 1.0))
-    lowest, part = min(start, end) - DIP * extent, 1.0
-    for n in range(1, GRID):
-        x = (n / GRID) ** 2  # closer where a step starts that ended at a minimum
-        value = start + x * (a + (x - FIRST) * (b + (x - SECOND) * (c + (x - 1.0) * d)))
+    d = (three - cubic) / (_THIRD * (_THIRD - _FIRST) * (_THIRD - _SECOND) * (_THIRD - 1.0))
+    lowest, part = min(start, end) - _DIP * extent, 1.0
+    for n in range(1, _GRID):
+        x = (n / _GRID) ** 2  # closer where a step starts that ended at a minimum
+        value = start + x * (a + (x - _FIRST) * (b + (x - _SECOND) * (c + (x - 1.0) * d)))
         if value < lowest:
             lowest, part = value, x
-    return part if lowest <= error + NEAR * extent else 1.0
+    return part if lowest <= error + _NEAR * extent else 1.0
