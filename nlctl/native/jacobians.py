@@ -77,7 +77,7 @@ def tangent(compiled: Compiled) -> Tangent:
             f"'{compiled.system.name}' has no exact derivatives, since {why}: use "
             "ct.linearize(diagram), which takes differences"
         )
-    n, m = compiled.system.nstates or 0, compiled.system.ninputs or 0
+    n, m = compiled.system.nstates or 0, compiled.schedule.ninputs
     starts = {"x": 0, "u": n, "p": n + m}
     rows = {name: along(found, name, starts) for name in names}
     return Tangent(rows=rows, assumed=dict(found.graph.assumptions))

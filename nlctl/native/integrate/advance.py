@@ -13,13 +13,15 @@ import numpy as np
 
 from ..machine.address import call_rhs
 from .control import choose_method, choose_step, next_step, rejected
+from .delays import is_full, keep, look_within, unresolved
 from .events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
+from .inputs import inputs_at
 from .methods import rodas5p, tsit5
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
 from .samples import next_stop, take_samples
 from .state import DERIVATIVES, INNER, RUNNING
-from .workspace import AUTO, UNKNOWN, inputs_at
+from .workspace import AUTO, UNKNOWN
 
 
 @numba.njit(**INNER)
@@ -35,7 +37,7 @@ def _explicit_attempt(rhs, task, lanes, w):
         for j in range(count):
             w.t[j] = lanes[j].t + tsit5.C[s] * w.h[j]
         if w.u.shape[0]:
-            inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+            inputs_at(task, lanes, w)
         if s < 6:
             tsit5.combined(x, hh, k, s, w.x_stage_flat)
             call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.g)
@@ -94,7 +96,9 @@ def _judge(task, lanes, w, done, passed):
         if found == AGAIN:
             lane.rejected += 1
             continue
-        t_new = next_stop(task, lane, w.u) if lane.ends else lane.t + lane.step
+        if task.delays.shape[0] and unresolved(task, lane, w, j, found == EVENT):
+            continue
+        t_new = next_stop(task, lane, w, j) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
             _sample(lane, j, task.times, t_new, w.x, w.x_new, w.k, w.U, w.samples)
         step_accepted(lane, found == EVENT)
@@ -153,11 +157,13 @@ def advance(rhs, along, task, w, rounds):
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     sampled = np.zeros(lanes.size, np.bool_)
     for _ in range(rounds):
+        if is_full(task, lanes, w):
+            return
         running = 0
         for j in range(lanes.size):
             if lanes[j].status == RUNNING:
                 over = lanes[j].segment == task.times.size - 1
-                choose_step(lanes[j], next_stop(task, lanes[j], w.u), over, task.max_steps)
+                choose_step(lanes[j], next_stop(task, lanes[j], w, j), over, task.max_steps)
                 running += lanes[j].status == RUNNING
         if not running:
             return
@@ -168,6 +174,8 @@ def advance(rhs, along, task, w, rounds):
             stiff_attempt(rhs, along, task, lanes, w)
         else:
             _explicit_attempt(rhs, task, lanes, w)
+        if task.delays.shape[0]:
+            look_within(task, lanes, w)
         if task.memory.size:
             for j in range(lanes.size):
                 w.t_end[j] = lanes[j].t + lanes[j].step
@@ -177,9 +185,11 @@ def advance(rhs, along, task, w, rounds):
                 w.e[i, j] = w.g[i, j]
         any_passed = _judge(task, lanes, w, done, passed)
         _take(task, w, done)
+        delays = task.delays.shape[0] > 0
+        jumped = delays and keep(task, lanes, w, done, passed)
         if task.ticks.size and take_samples(task, lanes, w, sampled):
             for j in range(lanes.size):
-                passed[j] = sampled[j] or (passed[j] and task.memory.size > 0)
+                passed[j] = sampled[j] or (passed[j] and (task.memory.size > 0 or delays))
             restart(rhs, task, lanes, w, passed)
-        elif task.memory.size and any_passed:
+        elif jumped or (task.memory.size and any_passed):
             restart(rhs, task, lanes, w, passed)

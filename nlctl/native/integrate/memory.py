@@ -21,7 +21,7 @@ from numba.np.arrayobj import populate_array
 from numba.np.numpy_support import as_dtype
 
 _INT = ir.IntType(64)
-_ENTRY = 4  # numbers in the table for each field: a number, or an address and up to three lengths
+_ENTRY = 5  # numbers in the table for each field: a number, or an address and up to four lengths
 
 
 class Pointed(types.Type):

@@ -6,22 +6,25 @@ import numba
 import numpy as np
 
 from ..machine.address import call_out
+from .delays import next_break
+from .inputs import inputs_at
 from .state import INNER, RUNNING
-from .workspace import inputs_at
 
 
 @numba.njit(**INNER)
-def next_stop(task, lane, u):
+def next_stop(task, lane, w, j):
     """Return where a step must end.
 
-    That is when something happens to sampled blocks, with inputs at their next corner, and at the
-    last time.
+    That is when something happens to sampled blocks, with inputs at their next corner, where a
+    break leaves a transport delay, and at the last time.
     """
     times, ticks = task.times, task.ticks
     stop = times[-1]
-    if u.shape[0] and lane.segment < times.size - 1:
+    if task.inputs.shape[0] and lane.segment < times.size - 1:
         stop = times[lane.segment + 1]
-    return min(stop, ticks[lane.tick]) if lane.tick < ticks.size else stop
+    if lane.tick < ticks.size:
+        stop = min(stop, ticks[lane.tick])
+    return next_break(task, w, lane, j, stop) if task.delays.shape[0] else stop
 
 
 @numba.njit(**INNER)
@@ -42,7 +45,7 @@ def take_samples(task, lanes, w, sampled):
         if not wanted:
             continue
         if w.u.shape[0]:
-            inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+            inputs_at(task, lanes, w)
         call_out(task.samples[k], w.t, w.x, w.u, task.p, w.s)
         for j in range(lanes.size):
             if sampled[j] and task.which[lanes[j].tick] == k:

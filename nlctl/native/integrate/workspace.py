@@ -13,6 +13,7 @@ import numba
 import numpy as np
 
 from ..machine.address import call_out, call_rhs
+from .inputs import DEGREE, inputs_at
 from .memory import type_of, with_table
 from .methods import rodas5p, tsit5
 from .state import INNER, new_lanes
@@ -43,6 +44,12 @@ class Task(NamedTuple):
     sampled: np.ndarray  # indices of these states
     derivatives: int  # UNKNOWN until the stiff method asks for them
     c_along: np.ndarray  # what exact ones read besides their arguments
+    delays: np.ndarray  # (lines, lanes) in s
+    direct: np.ndarray  # (lines, lines): whether what arrives at one is what leaves the other
+    signals: (
+        np.ndarray
+    )  # the function that fills the outputs, and behind them what arrives at the lines
+    outputs: int  # number of the outputs
     table: np.ndarray
 
 
@@ -92,6 +99,21 @@ class Work(NamedTuple):
     u_along: np.ndarray
     v: np.ndarray
     dx_along: np.ndarray
+    past: np.ndarray  # polynomials of the lines' signals: (steps, lines, powers, lanes)
+    past_t: np.ndarray  # when these steps began
+    past_h: np.ndarray  # and how long they were
+    level: np.ndarray  # (steps, lines, lanes): which derivative jumps at their beginnings
+    kept: np.ndarray  # how many there are
+    first: np.ndarray  # (lines, lanes): the break that has arrived last
+    next: np.ndarray  # and that will arrive next, -1 if none is known
+    fresh: np.ndarray  # which derivative jumps now
+    since: np.ndarray  # when the step being tried began
+    seen: np.ndarray  # outputs and signals at nodes of that step
+    tried: np.ndarray  # its polynomials
+    missed: np.ndarray  # what these miss, over its tolerance; -1 where it is a jump
+    missed_at_end: np.ndarray
+    shown: np.ndarray  # what leaves the lines at the task's times: (times, lines, lanes)
+    shown_to: np.ndarray  # up to which of these
     table: np.ndarray
 
 
@@ -99,9 +121,18 @@ _STATES = ("x", "x_new", "x_stage", "x_ahead", "dx_ahead")
 
 
 def new_work(
-    x0: np.ndarray, times: np.ndarray, inputs: int, events: int, outputs: int, sampled: int = 0
+    x0: np.ndarray,
+    times: np.ndarray,
+    inputs: int,
+    events: int,
+    outputs: int,
+    sampled: int = 0,
+    lines: int = 0,
 ) -> Work:
-    """Return the arrays for integrating members from `x0` (states, lanes) on."""
+    """Return the arrays for integrating members from `x0` (states, lanes) on.
+
+    The inputs include the lines, and so do the outputs what arrives there.
+    """
     n, lanes = x0.shape
     stiff = n if lanes == 1 else 0  # the stiff method is for single runs
     shapes: dict[str, tuple[int, ...]] = {
@@ -120,8 +151,20 @@ def new_work(
         **dict.fromkeys(("x_along", "dx_along"), (stiff, DIRECTIONS)),
         "u_along": (inputs, DIRECTIONS),
         "v": (stiff + inputs + 1, DIRECTIONS),
+        "past": (0, lines, DEGREE + 1, lanes),
+        **dict.fromkeys(("past_t", "past_h"), (0, lanes)),
+        **dict.fromkeys(("since", "missed", "missed_at_end"), (lanes,)),
+        "seen": (DEGREE + 3 if lines else 0, outputs, lanes),
+        "tried": (lines, DEGREE + 1, lanes),
+        "shown": (times.size, lines, lanes),
+    }
+    counts: dict[str, tuple[int, ...]] = {
+        "level": (0, lines, lanes),
+        **dict.fromkeys(("first", "next", "fresh"), (lines, lanes)),
+        **dict.fromkeys(("kept", "shown_to"), (lanes,)),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    arrays |= {name: np.zeros(shape, dtype=np.int64) for name, shape in counts.items()}
     arrays["x"][:] = x0
     for name, rows in (("samples", n), ("y", outputs)):
         arrays[name] = np.full((times.size, rows, lanes), np.nan)
@@ -138,27 +181,17 @@ TASK = type_of(  # only the types of these matter
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
         fixed=0.0, max_steps=0, method=0, alone=0, ticks=_LINE, which=_NONE, samples=_NONE,
         due=np.zeros((1, 1), dtype=np.int64), sampled=_NONE, derivatives=0, c_along=_GRID,
+        delays=_GRID, direct=np.zeros((1, 1), dtype=np.int64), signals=_NONE, outputs=0,
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
 
 
 @numba.njit(**INNER)
-def inputs_at(t, times, inputs, lanes, u):
-    """Fill `u` with the inputs at each lane's time: linear within a segment of the time grid."""
-    for j in range(lanes.size):
-        m = min(lanes[j].segment, times.size - 2)  # a lane that has finished is not moved on
-        share = (t[j] - times[m]) / (times[m + 1] - times[m])
-        for i in range(u.shape[0]):
-            first, last = inputs[i, m], inputs[i, m + 1]  # exact at both, and where they are equal
-            u[i, j] = last if share == 1.0 else first + share * (last - first)
-
-
-@numba.njit(**INNER)
 def evaluate(rhs, task, lanes, w, x, dx, g):
     """Evaluate the right-hand side at the times w.t; memory stands still within a step."""
     if w.u.shape[0]:
-        inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+        inputs_at(task, lanes, w)
     call_rhs(rhs, w.t, x, w.u, task.p, dx, g)
     for i in task.memory:
         for j in range(lanes.size):
@@ -174,8 +207,10 @@ def outputs(rhs, out, task, w):
     for m in range(task.times.size):
         for j in range(w.t.size):
             w.t[j] = task.times[m]
-            for i in range(w.u.shape[0]):
+            for i in range(task.inputs.shape[0]):
                 w.u[i, j] = task.inputs[i, m]
+            for i in range(task.delays.shape[0]):
+                w.u[task.inputs.shape[0] + i, j] = w.shown[m, i, j]
         if task.memory.size:
             call_rhs(rhs, w.t, states[m], w.u, task.p, w.dx_ahead, w.g)
             for i in range(task.memory.size):

@@ -7,8 +7,9 @@ import numpy as np
 
 from ...machine.address import call_along
 from ..control import TRIAL, memory_error
+from ..inputs import inputs_at
 from ..state import INNER
-from ..workspace import DIFFERENCES, evaluate, inputs_at
+from ..workspace import DIFFERENCES, evaluate
 from . import rodas5p
 
 RELATIVE = 1.5e-8  # square root of the machine precision
@@ -35,7 +36,7 @@ def _exact(along, task, lanes, w):
     """Fill them with the derivatives of the equations; return whether all are finite."""
     n, m, wide = w.x.shape[0], w.u.shape[0], w.dx_along.shape[1]
     if m:
-        inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+        inputs_at(task, lanes, w)
     for j in range(wide):
         w.t_along[j] = w.t[0]
         for i in range(n):
