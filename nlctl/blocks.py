@@ -176,8 +176,8 @@ class Block(ct.NonlinearIOSystem):
         if line is None:
             raise UsageError(
                 f"block '{self.name}' delays its signals, and python-control does not keep the "
-                "past: use nlctl.input_output_response (engine='python-control' is the reference), "
-                "nlctl.compile(...).linearize(x0, pade=order) in the place of ct.linearize"
+                "past: use nlctl.input_output_response (engine='python-control' is the reference); "
+                "to linearize, put ct.ss(ct.tf(*ct.pade(delay, n))) in its place"
             )
         line.arriving = np.array(u, dtype=float).reshape(-1)
         return line.leaving(float(t))

@@ -18,8 +18,8 @@ class TransportDelay:
         y_i(t) = u_i(t - delay)
 
     A run knows its signals from its first time t_0 on; earlier they are `before`, or what
-    `history` says.  The delay breaks algebraic loops.  It has no finite state: `Compiled.linearize`
-    takes ``pade=order``, and a run cannot be resumed from its last state alone.
+    `history` says.  The delay breaks algebraic loops.  It has no finite state: to linearize, put
+    `control.pade` in its place; a run cannot be resumed from its last state alone.
 
     Parameters
     ----------

@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 from scipy.linalg import expm
 
+from ..delays.lines import delayed_blocks
 from ..errors import CompileError, ParameterError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
@@ -67,9 +68,15 @@ def tangent(compiled: Compiled) -> Tangent:
     Raises
     ------
     CompileError
-        If a function is opaque, or there are algebraic loops.
+        If a function is opaque, or there are algebraic loops or transport delays.
     """
     found = compiled.equations
+    if compiled.schedule.lines:
+        delays = ", ".join(f"'{b.name}'" for b in delayed_blocks(compiled.system))
+        raise CompileError(
+            f"'{compiled.system.name}' has the transport delays {delays}, and so no finite state: "
+            "put ct.ss(ct.tf(*ct.pade(delay, n))) in the place of each"
+        )
     names = ("dx", "y", *(name for name in found.results if name.startswith("sample")))
     why = inexact(compiled, names)
     if why is not None:

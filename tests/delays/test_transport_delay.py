@@ -291,6 +291,12 @@ def test_python_control_itself_is_refused():
             function()
 
 
+def test_linearization_is_refused_and_names_the_delay():
+    loop, x0 = delayed_integrator(delay=0.5)
+    with pytest.raises(nlctl.CompileError, match=r"transport delays 'wire'.*ct\.pade"):
+        nlctl.compile(loop).linearize(x0)
+
+
 def test_the_stiff_method_is_refused():
     loop, x0 = delayed_integrator(delay=0.5)
     with pytest.raises(nlctl.ParameterError, match="tsit5"):
