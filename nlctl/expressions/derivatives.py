@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from .arrays import scalar
+from .elimination import linear_solution
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
 from .stage import Stage
@@ -14,7 +18,10 @@ __all__ = ["tangents"]
 
 
 def tangents(
-    graph: Graph, results: Iterable[Expr], seed: Callable[[Expr], Expr | None]
+    graph: Graph,
+    results: Iterable[Expr],
+    seed: Callable[[Expr], Expr | None],
+    fixed_points: Mapping[str, Sequence[Expr]] | None = None,
 ) -> list[Expr | None]:
     """Return the derivatives of expressions along a direction in what they are made of.
 
@@ -26,38 +33,55 @@ def tangents(
     seed : callable
         Takes what is read from an array (a leaf) and returns its own derivative, an expression of
         the same size, or None for 0.
+    fixed_points : mapping, optional
+        For what is searched for, by the name of the search: the numbers F(z), as expressions of
+        the solution z, that are equal to it.  Its derivative is that of the implicit function.
 
     Returns
     -------
     list of Expr or None
         None where the derivative is 0 whatever the values are.  At kinks and jumps: the
-        derivative of the side that the value belongs to.
+        derivative of the side that the value belongs to.  The derivative of NaN is NaN.
 
     Raises
     ------
     Untraceable
         If an opaque function, which has no expressions, is among what results are made of.
     """
-    reader, results = _Reader(graph, seed), list(results)
-    for node in needed(results):
-        reader.known[node] = reader.tangent(node)
-    return [reader.known[expr] for expr in results]
+    return _Reader(graph, seed, fixed_points or {}).read(list(results))
 
 
 class _Reader:
     """Goes through a graph once; `known` are the derivatives so far."""
 
-    def __init__(self, graph: Graph, seed: Callable[[Expr], Expr | None]) -> None:
-        self.graph, self.seed = graph, seed
-        self.known: dict[Expr, Expr | None] = {}
+    def __init__(
+        self,
+        graph: Graph,
+        seed: Callable[[Expr], Expr | None],
+        fixed_points: Mapping[str, Sequence[Expr]],
+        known: Mapping[Expr, Expr | None] | None = None,
+    ) -> None:
+        self.graph, self.seed, self.fixed_points = graph, seed, fixed_points
+        self.known: dict[Expr, Expr | None] = dict(known or {})
         self._partials: dict[tuple[str, int], Any] = {}
         self._stage = Stage(graph)
+
+    def read(self, results: list[Expr]) -> list[Expr | None]:
+        """Return the derivatives of results."""
+        for node in needed(results):
+            if node not in self.known:
+                self.known[node] = self.tangent(node)
+        return [self.known[expr] for expr in results]
 
     def tangent(self, node: Expr) -> Expr | None:
         """Return the derivative of an expression whose parts have theirs."""
         if node.op == "leaf":
             return self.seed(node)
+        if node.op == "const" and node.kind == "f" and math.isnan(node.data):
+            return node
         parts = [self.known[arg] for arg in node.args]
+        if node.op == "solve" and node.data[0] in self.fixed_points:
+            return self._of_solution(node) if any(parts) else None
         if node.op in ("call", "solve"):
             raise Untraceable(f"{node.data[0]} is no expression: it has no derivative")
         if all(part is None for part in parts) or node.op in COMPARISONS or node.op in LOGIC:
@@ -65,6 +89,23 @@ class _Reader:
         if node.op in FUNCTIONS:
             return self._function(node, parts)
         return getattr(self, f"_{node.op}")(node, *parts)
+
+    def _of_solution(self, node: Expr) -> Expr:
+        """Differentiate z = F(z, w): z' = F_z z' + F_w w'; NaN where I - F_z is singular."""
+        found, n = list(self.fixed_points[node.data[0]]), node.size or 1
+
+        def read(seed: Callable[[Expr], Expr | None], of_solution: Expr | None) -> list[Any]:
+            reader = _Reader(self.graph, seed, self.fixed_points, {node: of_solution})
+            return [scalar(self.graph, self._zero_if_none(e)) for e in reader.read(found)]
+
+        units = [self.graph.table(row) for row in np.eye(n).tolist()]
+        columns = [read(lambda _: None, unit) for unit in units]
+        matrix = [[float(i == j) - columns[j][i] for j in range(n)] for i in range(n)]
+        solve = self._stage.copied(linear_solution)
+        changes, is_regular = solve(matrix, read(self.seed, None))
+        where = self._stage.numpy.where
+        parts = [scalar(self.graph, where(is_regular, c, np.nan).only) for c in changes]
+        return self.graph.joined([(part.only, 1) for part in parts])
 
     def _zero_if_none(self, tangent: Expr | None) -> Expr:
         return self.graph.const(0.0) if tangent is None else tangent

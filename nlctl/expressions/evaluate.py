@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -12,7 +12,9 @@ __all__ = ["evaluate_expressions"]
 
 
 def evaluate_expressions(
-    results: Iterable[Expr], arrays: Mapping[str, np.ndarray]
+    results: Iterable[Expr],
+    arrays: Mapping[str, np.ndarray],
+    searches: Mapping[str, Callable[[np.ndarray], np.ndarray]] | None = None,
 ) -> list[np.ndarray]:
     """Return the values of expressions.
 
@@ -21,6 +23,9 @@ def evaluate_expressions(
     results : iterable of Expr
     arrays : mapping
         What is read, by name: ``"t"``, ``"x"``, ``"u"``, ``"p"``, of shape (rows, points).
+    searches : mapping, optional
+        What finds the signals of algebraic loops, by name: from all that it is given, of shape
+        (rows, points), in as many columns.
 
     Returns
     -------
@@ -37,7 +42,11 @@ def evaluate_expressions(
     results = list(results)
     with np.errstate(all="ignore"):  # infinity and NaN travel, as they do in machine code
         for node in needed(results):
-            values[node] = _value(node, [values[arg] for arg in node.args], arrays)
+            parts = [values[arg] for arg in node.args]
+            if node.op == "solve" and searches and node.data[0] in searches:
+                values[node] = searches[node.data[0]](_joined(parts, node.data[1]))
+            else:
+                values[node] = _value(node, parts, arrays)
     return [values[expr] for expr in results]
 
 
@@ -56,7 +65,7 @@ def _value(node: Expr, parts: list[np.ndarray], arrays: Mapping[str, np.ndarray]
         start, step = node.data
         return parts[0][[start + step * i for i in range(node.size or 1)]]
     if node.op == "concat":
-        return _joined(node, parts)
+        return _joined(parts, node.data)
     if node.op == "sum":
         return parts[0].sum(axis=0)
     if node.op in ("call", "solve"):
@@ -64,7 +73,7 @@ def _value(node: Expr, parts: list[np.ndarray], arrays: Mapping[str, np.ndarray]
     return numpy_function(node.op)(*parts)
 
 
-def _joined(node: Expr, parts: list[np.ndarray]) -> np.ndarray:
+def _joined(parts: list[np.ndarray], lengths: Iterable[int]) -> np.ndarray:
     points = np.broadcast_shapes((1,), *(part.shape[-1:] for part in parts))
-    rows = [np.broadcast_to(p, (n, *points)) for p, n in zip(parts, node.data, strict=True)]
-    return np.concatenate(rows)
+    rows = [np.broadcast_to(p, (n, *points)) for p, n in zip(parts, lengths, strict=True)]
+    return np.concatenate([np.zeros((0, *points)), *rows])

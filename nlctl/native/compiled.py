@@ -49,8 +49,8 @@ class Compiled:
     run it, and ``compiled.linearize(x0)`` linearizes it with exact derivatives, in the place of
     ``ct.linearize``.  Every other function of python-control takes ``compiled.system``.
 
-    The stiff method's Jacobian is exact too.  Where a function is opaque or algebraic loops are
-    solved it is taken by differences; the printed form says so, and why.
+    The stiff method's Jacobian is exact too.  Where a function is opaque it is taken by
+    differences; the printed form says so, and why.
     """
 
     schedule: Schedule
@@ -160,7 +160,7 @@ class Compiled:
         Raises
         ------
         CompileError
-            If a function is called as it stands, or there are algebraic loops.
+            If a function is called as it stands.
         ParameterError, UsageError
             If an argument is refused.
 

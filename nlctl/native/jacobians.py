@@ -21,6 +21,7 @@ from ..params import declared_params, equation_arguments, with_overrides
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from .codegen.blocks import Equations
+from .codegen.solver import searched
 from .parameters import length
 
 if TYPE_CHECKING:
@@ -51,8 +52,6 @@ class Tangent:
 
 def inexact(compiled: Compiled, results: Sequence[str] = ("dx",)) -> str | None:
     """Return why there are no exact derivatives of a diagram's results, None if there are."""
-    if compiled.schedule.loops:
-        return "it has algebraic loops"
     found = compiled.equations
     parts = [e for name in results for _, array in found.results[name] for e, _ in array.pieces()]
     for node in needed(parts):
@@ -68,7 +67,7 @@ def tangent(compiled: Compiled) -> Tangent:
     Raises
     ------
     CompileError
-        If a function is opaque, or there are algebraic loops or transport delays.
+        If a function is opaque, or there are transport delays.
     """
     found = compiled.equations
     if compiled.schedule.lines:
@@ -125,7 +124,7 @@ def along(
 
     try:
         with _DIFFERENTIATING, np.errstate(all="ignore"):
-            found = tangents(graph, [expr for expr, _ in pieces], seed)
+            found = tangents(graph, [expr for expr, _ in pieces], seed, equations.fixed_points)
     except Untraceable as error:
         raise CompileError(f"the equations have no derivatives: {error}") from None
     return list(zip(found, [size for _, size in pieces], strict=True))
@@ -157,9 +156,11 @@ def jacobian(
     columns = {"t": [t], "x": state_array(system, x0), "u": _inputs(system, u0), "p": p}
     arrays = {name: np.asarray(v, dtype=float)[:, None] for name, v in columns.items()}
     arrays[DIRECTION] = directions
+    searches = {name: searched(one) for name, one in compiled.equations.solvers.items()}
     count, found = directions.shape[1], {}
     for name, rows in made.rows.items():
-        values = iter(evaluate_expressions([e for e, _ in rows if e is not None], arrays))
+        wanted = [e for e, _ in rows if e is not None]
+        values = iter(evaluate_expressions(wanted, arrays, searches))
         parts = [
             np.broadcast_to(0.0 if expr is None else next(values), (size, count))
             for expr, size in rows
@@ -185,6 +186,11 @@ def linearize(
         x0, u0 = x0.states, x0.inputs if u0 is None else u0
     system = compiled.system
     n, m = system.nstates or 0, system.ninputs or 0
+    if n == 1 and m == 0:
+        raise UsageError(
+            f"a control.StateSpace cannot have one state and no input, as '{system.name}' has: "
+            "give the diagram an input"
+        )
     directions = np.eye(n + m + length(compiled.program.layout), n + m)
     found = jacobian(compiled, x0, u0, t, params, directions)
     rates, outputs, dt = found["dx"], found["y"], system.dt

@@ -292,9 +292,11 @@ def test_python_control_itself_is_refused():
 
 
 def test_linearization_is_refused_and_names_the_delay():
-    loop, x0 = delayed_integrator(delay=0.5)
+    wire = nlctl.block(nlctl.TransportDelay(delay=0.5), "wire")
+    plant = ct.ss(0, 1, 1, 0, inputs="y", outputs="x", name="plant")
+    system = ct.interconnect([wire, plant], inputs=["u"], outputs=["x"])
     with pytest.raises(nlctl.CompileError, match=r"transport delays 'wire'.*ct\.pade"):
-        nlctl.compile(loop).linearize(x0)
+        nlctl.compile(system).linearize([0.0], [0.0])
 
 
 def test_the_stiff_method_is_refused():

@@ -17,6 +17,8 @@ import nlctl
 from nlctl.errors import UsageError
 from nlctl.expressions.functions import FUNCTIONS, MATH
 from nlctl.native import CompileError
+from nlctl.native.codegen.along import derivatives
+from nlctl.native.integrate.state import DIRECTIONS
 
 ROWS = sorted(FUNCTIONS)
 DOMAIN = {"arccosh": (1.1, 4.0), "arcsin": (-0.9, 0.9), "arccos": (-0.9, 0.9)}
@@ -192,18 +194,12 @@ def test_what_python_control_takes_instead_of_a_compiled_diagram():
 
 
 def test_what_has_no_exact_derivatives_is_refused():
-    """Opaque functions and algebraic loops, with advice; an operating point is taken."""
+    """Opaque functions, with advice; an operating point is taken."""
     decay = ct.nlsys(
-        lambda t, x, u, p: [-float(np.linalg.norm(x)) * x[0]], states=1, inputs=0, name="decay"
+        lambda t, x, u, p: [-float(np.linalg.norm(x)) * x[0]], states=1, inputs=1, name="decay"
     )
     with pytest.raises(CompileError, match=r"no exact derivatives.*ct\.linearize"):
         nlctl.compile(decay).linearize([1.0])
-    ring = ct.interconnect(
-        [ct.nlsys(None, lambda t, x, u, p: [0.5 * u[0]], name="gain", inputs="u", outputs="y")],
-        connections=[["gain.u", "gain.y"]], outlist=["gain.y"],
-    )  # fmt: skip
-    with pytest.raises(CompileError, match="algebraic loops"):
-        nlctl.compile(ring, algebraic_loops="solve").linearize([])
     pendulum = ct.nlsys(
         lambda t, x, u, p: [x[1], u[0] - np.sin(x[0])], states=2, inputs=1, name="pendulum"
     )
@@ -213,3 +209,84 @@ def test_what_has_no_exact_derivatives_is_refused():
     )
     with pytest.raises(nlctl.ParameterError, match="u0 needs 1 finite"):
         nlctl.compile(pendulum).linearize([0.0, 0.0], [1.0, 2.0])
+
+
+def rings(n, gain):
+    """Return n rings, each driven by the one before: v = gain sin(r - y), y = x + tanh(v) / 3."""
+    plants = [
+        ct.nlsys(
+            lambda t, x, u, p: [u[0] - x[0] ** 3], lambda t, x, u, p: [x[0] + np.tanh(u[0]) / 3],
+            states=1, inputs="v", outputs="y", name=f"plant{i}",
+        ) for i in range(n)
+    ]  # fmt: skip
+    controllers = [
+        ct.nlsys(
+            None, lambda t, x, u, p: [p["gain"] * np.sin(u[0] - u[1])],
+            inputs=["r", "y"], outputs="v", name=f"controller{i}", params={"gain": gain},
+        ) for i in range(n)
+    ]  # fmt: skip
+    wires = [[f"plant{i}.v", f"controller{i}.v"] for i in range(n)]
+    wires += [[f"controller{i}.y", f"plant{i}.y"] for i in range(n)]
+    wires += [[f"controller{i}.r", f"plant{i - 1}.y"] for i in range(1, n)]
+    return ct.interconnect(
+        [*plants, *controllers], connections=wires, inplist="controller0.r", inputs="r",
+        outlist=[f"plant{n - 1}.y"], outputs="y",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_a_solved_loop_has_the_derivative_of_its_implicit_function(n):
+    """With v' = a (r' - y'), y' = x' + b v' of every ring by hand: v' = a (r' - x') / (1 + a b)."""
+    compiled = nlctl.compile(rings(n, 0.8), algebraic_loops="solve")
+    x, r = 0.3 * np.random.default_rng(n).normal(size=n), np.array([0.7])
+    found = compiled.linearize(x, r)
+    rates, y = compiled.dynamics(0.0, x, r), float(r[0])
+    dy, total = np.eye(n + 1)[n], []
+    for i in range(n):
+        v = rates[i] + x[i] ** 3
+        a, b = 0.8 * np.cos(y - (x[i] + np.tanh(v) / 3)), (1 - np.tanh(v) ** 2) / 3
+        dv = a * (dy - np.eye(n + 1)[i]) / (1 + a * b)
+        total.append(dv - 3 * x[i] ** 2 * np.eye(n + 1)[i])
+        dy, y = np.eye(n + 1)[i] + b * dv, x[i] + np.tanh(v) / 3
+    np.testing.assert_allclose(np.hstack([found.A, found.B]), total, rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(np.hstack([found.C, found.D])[0], dy, rtol=1e-13, atol=1e-14)
+    made = derivatives(compiled, compiled.parameter_vector())
+    directions = np.zeros((n + 2, DIRECTIONS))
+    directions[: n + 1, : n + 1] = np.eye(n + 1)
+    dx = np.empty((n, DIRECTIONS))
+    wide = [np.repeat(np.atleast_1d(v)[:, None], DIRECTIONS, 1) for v in (x, r)]
+    made.point(np.zeros(DIRECTIONS), *wide, made.c)
+    made.function(np.zeros(DIRECTIONS), *wide, made.c, directions, dx)
+    np.testing.assert_allclose(dx[:, : n + 1], total, rtol=1e-13, atol=1e-14)
+
+
+def test_a_loop_without_a_solution_or_with_many_has_no_derivative():
+    """NaN, not 0: v = exp(v) + u has a solution for u < -1 only, v = v + 0 u has all."""
+    none = ct.nlsys(
+        None, lambda t, x, u, p: [np.exp(u[0]) + u[1]], inputs=["v", "u"], outputs="y", name="f"
+    )
+    ring = ct.interconnect(
+        [none], connections=[["f.v", "f.y"]], inplist="f.u", inputs="u", outlist="f.y", outputs="y"
+    )
+    compiled = nlctl.compile(ring, algebraic_loops="solve")
+    v = float(compiled.output(0.0, [], [-2.0])[0])
+    slope = compiled.linearize([], [-2.0]).D[0, 0]
+    np.testing.assert_allclose(slope, 1 / (1 - np.exp(v)), rtol=1e-14)
+    assert np.isnan(compiled.linearize([], [2.0]).D[0, 0])
+
+
+def test_the_derivative_of_nan_is_nan():
+    """A branch that is NaN has no slope of 0."""
+    half = ct.nlsys(
+        lambda t, x, u, p: [np.where(x[0] > 0, u[0] - x[0], np.nan)], states=1, inputs=1
+    )
+    compiled = nlctl.compile(half)
+    assert compiled.linearize([1.0]).A == -1.0
+    assert np.isnan(compiled.linearize([-1.0]).A)
+
+
+def test_one_state_without_an_input_is_refused():
+    """python-control has no such StateSpace, and says so in words about matrices."""
+    decay = ct.nlsys(lambda t, x, u, p: [-x[0]], states=1, inputs=0, name="decay")
+    with pytest.raises(UsageError, match="'decay' has: give the diagram an input"):
+        nlctl.compile(decay).linearize([1.0])

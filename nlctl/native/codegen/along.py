@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..integrate.workspace import DIRECTIONS
+from ...expressions.dependence import structure
+from ..integrate.methods.lu import Elimination, elimination
+from ..integrate.state import DIRECTIONS
 from ..jacobians import along, inexact
 from ..machine.routine import entry, lowered_code
 from .lower import lower_along
@@ -30,19 +32,25 @@ class Along:
 
     Attributes
     ----------
+    point : callable
+        ``point(t, x, u, c)``, once for each point.
     function : callable
         ``function(t, x, u, c, v, dx)``, every array with a direction in each column.  A direction
         `v` has the rows of the states, the inputs, and time.
     c : ndarray of shape (rows, DIRECTIONS)
+    elimination : Elimination
+        How linear equations with the Jacobian matrix of the states are solved.
     """
 
+    point: Any
     function: Any
     c: np.ndarray
+    elimination: Elimination
 
     @property
-    def entry(self) -> Any:
-        """What integrators take of the function."""
-        return entry(self.function)
+    def entries(self) -> tuple[Any, Any]:
+        """What integrators take of the functions."""
+        return entry(self.point), entry(self.function)
 
 
 def derivatives(compiled: Compiled, p: np.ndarray) -> Along | None:
@@ -57,10 +65,10 @@ def derivatives(compiled: Compiled, p: np.ndarray) -> Along | None:
     made = compiled.__dict__["_along"]
     if made is None or not made[0].holds_for(p):
         return None
-    lowered, prepare, function = made
+    lowered, prepare, point, function, order = made
     c = np.zeros((lowered.size, DIRECTIONS))
     prepare(np.repeat(p[:, None], DIRECTIONS, axis=1), c)
-    return Along(function=function, c=c)
+    return Along(point=point, function=function, c=c, elimination=order)
 
 
 def _made(compiled: Compiled) -> Any:
@@ -69,5 +77,7 @@ def _made(compiled: Compiled) -> Any:
         return None
     n, m = compiled.system.nstates or 0, compiled.schedule.ninputs
     rows = along(equations, "dx", {"x": 0, "u": n, "t": n + m})
-    lowered = lower_along(compiled.schedule, compiled.program, equations.graph, rows, DIRECTIONS)
-    return lowered, *lowered_code(lowered)
+    lowered = lower_along(compiled.schedule, compiled.program, equations, rows, DIRECTIONS)
+    pieces = [piece for _, array in equations.results["dx"] for piece in array.pieces()]
+    order = elimination(structure(pieces, "x", n))
+    return lowered, *lowered_code(lowered), order

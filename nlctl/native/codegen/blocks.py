@@ -51,12 +51,16 @@ class Equations:
         Opaque functions by name.
     solvers : dict
         Searches for the signals of algebraic loops, by name.
+    fixed_points : dict
+        By the same names: what the blocks of a loop make of the signals found, in their
+        expressions; they are equal to these.
     """
 
     graph: Graph
     results: dict[str, list[tuple[int, Tracer]]]
     calls: dict[str, Call]
     solvers: dict[str, Solver]
+    fixed_points: dict[str, list[Expr]]
 
 
 def equations(
@@ -108,8 +112,9 @@ def equations(
             then.read(at_instant)
             results |= then.all_known({f"sample{k}": _next(then)})
     return Equations(
-        graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers
-    )
+        graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers,
+        fixed_points=reader.fixed_points,
+    )  # fmt: skip
 
 
 def _next(reader: Reader) -> list[tuple[int, Tracer]]:
@@ -172,7 +177,7 @@ class Reader:
         What stands for signals that are being solved for.
     solved : list of Tracer
         Signals that have been.
-    calls, solvers : dict
+    calls, solvers, fixed_points : dict
         By name.
     what : frozenset of Moment
         What happens to sampled blocks.
@@ -189,6 +194,7 @@ class Reader:
     solved: list[Tracer] = field(default_factory=list)
     calls: dict[str, Call] = field(default_factory=dict)
     solvers: dict[str, Solver] = field(default_factory=dict)
+    fixed_points: dict[str, list[Expr]] = field(default_factory=dict)
     what: Happening = frozenset()
     lines: Mapping[Signal, int] = field(default_factory=dict)
 
@@ -218,7 +224,7 @@ class Reader:
         name, places = f"loop{len(self.solvers)}", range(loop.start, loop.stop)
         leaves = [self.graph.leaf(name, k, None) for k in range(len(loop.torn))]
         self._guessed(schedule, places, loop.torn, [scalar(self.graph, leaf) for leaf in leaves])
-        found = [self.taken(signal, 1).reshape(-1)[0].only for signal in loop.torn]
+        found = self._made(loop.torn)
         try:
             made, given = solver(name, leaves, found)
         except Untraceable as error:
@@ -233,6 +239,11 @@ class Reader:
         results = _results(self.graph, "solve", name, pieces, made.count)
         self.solved.append(results)
         self._guessed(schedule, places, loop.torn, [results[k] for k in range(made.count)])
+        self.fixed_points[name] = self._made(loop.torn)
+
+    def _made(self, torn: Sequence[Signal]) -> list[Expr]:
+        """Return what the blocks have made of signals that were guessed."""
+        return [self.taken(signal, 1).reshape(-1)[0].only for signal in torn]
 
     def _guessed(
         self, schedule: Schedule, places: range, torn: Sequence[Signal], values: Sequence[Tracer]

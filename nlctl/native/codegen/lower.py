@@ -7,15 +7,15 @@ generator makes machine code of the plan (`codegen.ir`), and one interpreter car
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...expressions.arrays import Tracer
-from ...expressions.graph import Expr, Graph, needed
+from ...expressions.graph import Expr, needed
 from ..diagram.schedule import Schedule
 from ..parameters import length
 from .blocks import Equations, equations
@@ -29,7 +29,8 @@ from .solver import Solver
 PREPARE = {"prepare": ("p", "c")}
 EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g"), "out": ("t", "x", "u", "c", "y")}
 SAMPLE = ("t", "x", "u", "c", "s")  # of those of sampled blocks
-ALONG = {"along": ("t", "x", "u", "c", "v", "dx")}
+POINT, DIRECTION = "point", "v"
+ALONG = {POINT: ("t", "x", "u", "c"), "along": ("t", "x", "u", "c", DIRECTION, "dx")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +42,8 @@ class Lowered:
     functions : mapping
         Plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g)``,
         ``out(t, x, u, c, y)`` and a ``sample(t, x, u, c, s)`` for each meeting of the clocks of
-        sampled blocks, or ``along(t, x, u, c, v, dx)``.  All arrays have a row per number and a
+        sampled blocks, or ``point(t, x, u, c)`` and then, as often as there are directions,
+        ``along(t, x, u, c, v, dx)``.  All arrays have a row per number and a
         column per member, `t` is one row.  `prepare` fills `c` with all that depends on the
         parameters `p` alone; the rest of `c` is room that the others write to, so members that
         run at the same time need a `c` each.
@@ -126,7 +128,7 @@ def lower(
 def lower_along(
     schedule: Schedule,
     program: Program,
-    graph: Graph,
+    equations: Equations,
     derivatives: Sequence[tuple[Expr | None, int]],
     lanes: int = 8,
 ) -> Lowered:
@@ -136,8 +138,8 @@ def lower_along(
     ----------
     schedule : Schedule
     program : Program
-    graph : Graph
-        Where the derivatives are kept.
+    equations : Equations
+        What was differentiated; its graph keeps the derivatives.
     derivatives : sequence
         Of the rows of dx one after the other: an expression, None where it is 0, and its length.
         They read the direction in an array ``"v"``.
@@ -150,11 +152,11 @@ def lower_along(
     """
     stores, row = [], 0
     for expr, size in derivatives:
-        expr = graph.const(0.0) if expr is None else expr
+        expr = equations.graph.const(0.0) if expr is None else expr
         stores += split(Store(array="dx", row=row, expr=expr, size=size))
         row += size
-    found = Equations(graph=graph, results={}, calls={}, solvers={})
-    return _lowered(schedule, program, found, ALONG, {"along": stores}, lanes)
+    found = replace(equations, calls={})  # what is opaque has no derivatives
+    return _lowered(schedule, program, found, ALONG, {POINT: [], "along": stores}, lanes)
 
 
 def _lowered(
@@ -182,19 +184,29 @@ def _lowered(
 def _planned(
     stores: Mapping[str, list[Store]], arguments: Mapping[str, tuple[str, ...]], parameters: int
 ) -> tuple[dict[str, Function], int]:
-    """Return the plans of all functions, and how many rows of `c` they need."""
-    known = _parameters_alone([s.expr for part in stores.values() for s in part], parameters)
-    prepared = [
-        Store(array="c", row=r, expr=e, size=e.size or 1)
-        for e, (_, r) in known.items()
-        if r >= parameters
-    ]
-    functions, size = {}, parameters + sum(store.size for store in prepared)
+    """Return the plans of all functions, and how many rows of `c` they need.
+
+    What depends on parameters alone is computed by `prepare`, and what else depends on no
+    direction by `point`.
+    """
+    results = [s.expr for part in stores.values() for s in part]
+    varying = {node for node in needed(results) if node.varies}
+    known = _computed_before(results, varying, parameters)
+    prepared = _kept(known, parameters)
+    size = parameters + sum(store.size for store in prepared)
+    wanted, before = (
+        {"prepare": prepared, **stores},
+        {"prepare": {}, **dict.fromkeys(stores, known)},
+    )
+    if POINT in stores:
+        later = _computed_before(results, _along(results), size, known)
+        wanted[POINT], before["along"] = _kept(later, size), known | later
+        size += sum(store.size for store in wanted[POINT])
+    functions = {}
     for name, given in {**PREPARE, **arguments}.items():
-        first = name in PREPARE
-        planned = plan_function(prepared if first else stores[name], {} if first else known, size)
+        planned = plan_function(wanted[name], before[name], size)
         size = planned.rows
-        copied = parameters if first else 0
+        copied = parameters if name in PREPARE else 0
         functions[name] = Function(arguments=given, plan=planned, copied=copied)
     return functions, size
 
@@ -212,25 +224,53 @@ def _stores(name: str, row: int, array: Tracer) -> list[Store]:
     return found
 
 
-def _parameters_alone(results: list[Expr], rows: int) -> dict[Expr, tuple[str, int]]:
-    """Return what is used and depends on parameters alone, with its place in `c`.
+def _along(results: Sequence[Expr]) -> set[Expr]:
+    """Return what depends on the direction."""
+    found: set[Expr] = set()
+    for node in needed(results):
+        if any(arg in found for arg in node.args) or _reads(node, DIRECTION):
+            found.add(node)
+    return found
 
-    That is where a parameter has it in `p`, and behind all of them, from `rows` on, what is
-    computed of them.
+
+def _reads(node: Expr, array: str) -> bool:
+    return node.op == "leaf" and node.data[0] == array
+
+
+def _computed_before(
+    results: Sequence[Expr],
+    inside: Collection[Expr],
+    rows: int,
+    known: Mapping[Expr, tuple[str, int]] | None = None,
+) -> dict[Expr, tuple[str, int]]:
+    """Return what is used and is not inside, with its place in `c`, beyond what is known already.
+
+    A parameter has the place there that it has in `p`; what is computed lies from `rows` on.
     """
-    nodes = needed(results, ())
-    inside = {node for node in nodes if node.varies}
+    known, inside = known or {}, set(inside)
+    nodes = needed(results, known)
     used = set(results) - inside
     for node in reversed(nodes):
         for arg in node.args if node in inside else ():
             if arg.kind == "b":  # truth values have no place in an array of floats
                 inside.add(arg)
-            elif not arg.varies:
+            elif arg not in inside:
                 used.add(arg)
     found = {}
     for node in nodes:
-        if node in used and node.op == "leaf" and node.size is None:
+        if node not in used or node in known or node.op == "const":
+            continue
+        if _reads(node, "p") and node.size is None:
             found[node] = ("c", node.data[1])
-        elif node in used and node.op != "const":
+        elif _reads(node, "p") or node.op != "leaf":
             found[node], rows = ("c", rows), rows + (node.size or 1)
     return found
+
+
+def _kept(found: Mapping[Expr, tuple[str, int]], rows: int) -> list[Store]:
+    """Return what is to be computed and kept in `c`, from `rows` on."""
+    return [
+        Store(array=array, row=row, expr=expr, size=expr.size or 1)
+        for expr, (array, row) in found.items()
+        if row >= rows
+    ]

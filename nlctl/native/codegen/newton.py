@@ -18,6 +18,7 @@ import numpy as np
 
 from ...expressions.arrays import Tracer, scalar
 from ...expressions.derivatives import tangents
+from ...expressions.elimination import largest_magnitude, linear_solution
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from ...expressions.stage import Stage
 from .plan import Function, Store, plan_function
@@ -30,7 +31,6 @@ _MOST = 16  # signals of one loop; elimination is written out, and grows with th
 _STEPS = 60.0  # trials from one start, halvings included
 SMALL_STEP = 1e-9  # relative; the next one, of about its square, would not be seen
 _ROUNDING = 4 * 2.0**-52
-SINGULAR = 1e-7  # relative to the largest entry: a solution would have lost half of its digits
 
 
 def solver(name: str, guesses: Sequence[Expr], found: Sequence[Expr]) -> tuple[Solver, list[Expr]]:
@@ -149,16 +149,16 @@ def improved(
     """
     phase, count, start, best = state[:4]
     guess, base = state[4 : 4 + n], state[4 + n : 4 + 2 * n]
-    apart = _largest([found[i] - guess[i] for i in range(n)])
+    apart = largest_magnitude([found[i] - guess[i] for i in range(n)])
     count = count + 1.0
-    solved = np.logical_and(phase == _TRIAL, apart <= _ROUNDING * _largest(found))
+    solved = np.logical_and(phase == _TRIAL, apart <= _ROUNDING * largest_magnitude(found))
     better = apart < best  # NaN is not; the first one is infinite
-    step, is_regular = newton_step(
+    step, is_regular = linear_solution(
         [[jacobian[i][j] - (1.0 if i == j else 0.0) for j in range(n)] for i in range(n)],
         [guess[i] - found[i] for i in range(n)],
     )
     moved = [guess[i] + step[i] for i in range(n)]
-    is_short = _largest(step) <= SMALL_STEP * _largest(moved)
+    is_short = largest_magnitude(step) <= SMALL_STEP * largest_magnitude(moved)
     again = np.where(
         better, np.logical_not(is_regular), np.logical_or(phase == BASE, count > _STEPS)
     )
@@ -178,40 +178,3 @@ def improved(
         phase, np.where(again, 0.0, count), np.where(again, start + 1.0, start), best,
         *new_guess, *new_base,
     ]  # fmt: skip
-
-
-def _largest(values: Sequence[Any]) -> Any:
-    """Return the largest magnitude; NaN stays NaN."""
-    largest = abs(values[0])
-    for value in values[1:]:
-        largest = np.maximum(largest, abs(value))
-    return largest
-
-
-def newton_step(matrix: Sequence[Sequence[Any]], b: Sequence[Any]) -> tuple[list[Any], Any]:
-    """Return the solution of ``matrix @ x = b``, and whether the matrix is regular.
-
-    Gaussian elimination with partial pivoting: rows are exchanged by choosing their numbers.
-    """
-    n = len(b)
-    rows = [[*row, value] for row, value in zip(matrix, b, strict=True)]
-    largest = _largest([1.0, *(entry for row in matrix for entry in row)])
-    is_regular = largest < np.inf
-    for i in range(n):
-        for k in range(i + 1, n):
-            swapped = abs(rows[k][i]) > abs(rows[i][i])
-            upper = [np.where(swapped, rows[k][j], rows[i][j]) for j in range(i, n + 1)]
-            lower = [np.where(swapped, rows[i][j], rows[k][j]) for j in range(i, n + 1)]
-            rows[i], rows[k] = [*rows[i][:i], *upper], [*rows[k][:i], *lower]
-        is_regular = np.logical_and(is_regular, abs(rows[i][i]) > SINGULAR * largest)
-        for k in range(i + 1, n):
-            factor = rows[k][i] / rows[i][i]
-            below = [rows[k][j] - factor * rows[i][j] for j in range(i + 1, n + 1)]
-            rows[k] = [*rows[k][: i + 1], *below]
-    x: list[Any] = [0.0] * n
-    for i in range(n - 1, -1, -1):
-        rest = rows[i][n]
-        for j in range(i + 1, n):
-            rest = rest - rows[i][j] * x[j]
-        x[i] = rest / rows[i][i]
-    return x, is_regular

@@ -48,6 +48,19 @@ class Solver:
     initial: tuple[float, ...]
 
 
+def searched(solver: Solver) -> Callable[[np.ndarray], np.ndarray]:
+    """Return a search as a function of what it is given, a column per point."""
+    find = plain_solver(solver)
+
+    def search(given: np.ndarray) -> np.ndarray:
+        c = np.concatenate([given, np.empty((solver.count, given.shape[1]))])
+        for point in range(given.shape[1]):
+            find(c, 0, point)
+        return c[solver.given :]
+
+    return search
+
+
 def plain_solver(solver: Solver) -> Callable[[np.ndarray, int, int], None]:
     """Return a search as plain Python, called with c, a row and a member."""
     step = interpreted_function(solver.function, 1, {})

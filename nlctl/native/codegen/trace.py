@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from ...blocks import Block
 from ...expressions.arrays import Tracer, leaf_vector, scalar
-from ...expressions.graph import Expr, Graph, Untraceable
+from ...expressions.dependence import structure
+from ...expressions.graph import Graph, Untraceable
 from ...expressions.operators import elementwise
 from ...expressions.trace import trace
 from ..parameters import Slot, current_values
@@ -69,47 +70,4 @@ def dependence(system: Any, function: Callable[..., Any], slots: Mapping[str, Sl
         return found
     if result.size != system.noutputs or graph.assumptions:
         return found
-    long = result.axis is not None
-    if long:
-        exprs = [(result.only, k if result.only.size else None) for k in range(result.size)]
-    else:
-        exprs = [(expr, None) for expr in result.cells.flat]
-    for row, expr in zip(found, exprs, strict=True):
-        row[:] = False
-        row[list(_inputs(*expr))] = True
-    return found
-
-
-def _inputs(expr: Expr, element: int | None) -> set[int]:
-    """Return the inputs that an element of a vector, or a whole expression, is made of."""
-    found: set[int] = set()
-    seen: set[tuple[Expr, int | None]] = set()
-    waiting = [(expr, element)]
-    while waiting:
-        part, k = waiting.pop()
-        if (part, k) in seen:
-            continue
-        seen.add((part, k))
-        waiting.extend(_parts(part, k))
-        if part.op == "leaf" and part.data[0] == "u":
-            _, start, step = part.data
-            places = range(part.size or 1) if k is None else [k]
-            found.update(start + step * i for i in places)
-    return found
-
-
-def _parts(part: Expr, k: int | None) -> Iterator[tuple[Expr, int | None]]:
-    """Yield what element k of an expression is made of, or all of it."""
-    if part.op == "concat" and k is not None:
-        for piece, length in zip(part.args, part.data, strict=True):
-            if k < length:
-                yield piece, k if piece.size else None
-                return
-            k -= length
-    elif part.op == "item":
-        yield part.args[0], part.data
-    elif part.op == "slice" and k is not None:
-        yield part.args[0], part.data[0] + k * part.data[1]
-    else:
-        whole = part.op in ("sum", "call")
-        yield from ((arg, k if arg.size and not whole else None) for arg in part.args)
+    return structure(list(result.pieces()), "u", system.ninputs or 0)

@@ -111,7 +111,7 @@ def _judge(task, lanes, w, done, passed):
         passed[j] |= found == EVENT
         any_passed |= passed[j]
         if task.method == AUTO:
-            choose_method(lane, w.x.shape[0], task.alone)
+            choose_method(lane, task.cost, task.alone)
     return any_passed
 
 
@@ -147,7 +147,7 @@ def _take(task, w, done):
             w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
 
 
-def advance(rhs, along, task, w, rounds):
+def advance(rhs, point, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
     A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
@@ -171,7 +171,7 @@ def advance(rhs, along, task, w, rounds):
             lanes[0].status = DERIVATIVES
             return
         if lanes[0].stiff:
-            stiff_attempt(rhs, along, task, lanes, w)
+            stiff_attempt(rhs, point, along, task, lanes, w)
         else:
             _explicit_attempt(rhs, task, lanes, w)
         if task.delays.shape[0]:

@@ -15,7 +15,6 @@ from .state import DIVERGED, FIRST_PATIENCE, INNER, OK, RUNNING, STEP_LIMIT, STE
 SMALLEST = 4e-16  # of the time: no shorter step can be told from none
 TRIAL = 20  # steps of the stiff method before it is judged
 MAX_PATIENCE = 2000
-COST = 0.35  # of a step of the stiff method in explicit ones, for each state and 10 more
 
 
 @numba.njit(**INNER)
@@ -95,11 +94,11 @@ def next_step(lane, error, rate, fixed, memories):
 
 
 @numba.njit(**INNER)
-def choose_method(lane, states, alone):
+def choose_method(lane, cost, alone):
     """Go over to the stiff method where stability limits the step, and back where it does not pay.
 
     The stiff method is first tried; it stays while it gets further with a step tried than the
-    explicit one would by more than what its steps cost.
+    explicit one would by more than what its steps cost, `cost` explicit ones each.
     """
     tried = lane.accepted + lane.rejected
     if not lane.stiff:
@@ -111,7 +110,6 @@ def choose_method(lane, states, alone):
         return
     lane.stiff += 1
     if lane.stiff % TRIAL == 0:
-        cost = COST * (states + 10)
         limit = tsit5.STABLE / max(lane.rate, 1e-300)
         pays = lane.t - lane.judged_at > cost * limit * (tried - lane.judged_after)
         lane.judged_at, lane.judged_after = lane.t, tried

@@ -20,6 +20,7 @@ from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
 from .discrete import simulate_discrete
 from .memory import with_table
+from .methods.lu import WHOLE, Elimination, cost
 from .state import DERIVATIVES, RUNNING, Status
 from .workspace import (
     AUTO,
@@ -194,8 +195,8 @@ def go_on(run: Run, rounds: int = ROUNDS) -> Run:
     """Try up to `rounds` steps in every lane that is still running."""
     run = replace(run, work=with_room(run.task, run.work))
     rhs, _ = run.machine.entries
-    along = 0 if run.along is None else run.along.entry
-    integrators()["advance"](rhs, along, run.task, run.work, rounds)
+    point, along = (0, 0) if run.along is None else run.along.entries
+    integrators()["advance"](rhs, point, along, run.task, run.work, rounds)
     run.machine.check(run.task.p)
     return run
 
@@ -208,6 +209,7 @@ def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
     del given["table"]
     given["derivatives"] = EXACT if along else DIFFERENCES
     given["c_along"] = along.c if along else given["c_along"]
+    given |= _linear_equations(run.work.x.shape[0], along.elimination if along else WHOLE)
     run.lanes["status"] = RUNNING
     return replace(run, task=with_table(Task, like=TASK, **given), along=along)
 
@@ -253,6 +255,7 @@ def prepared(
         **lines_of(compiled, p),
         signals=code.signal_entry,
         outputs=compiled.system.noutputs or 0,
+        **_linear_equations(len(x0), WHOLE),
     )
     work = new_work(
         x0, times, inputs.shape[0] + len(read.lines), program.events, len(read.outputs),
@@ -273,6 +276,11 @@ def _method(compiled: Compiled, settings: Settings) -> str:
             "method='rodas5p'"
         )
     return "tsit5"
+
+
+def _linear_equations(n: int, order: Elimination) -> dict[str, Any]:
+    """Return how the stiff method solves them, and what its steps cost then."""
+    return {**vars(order), "cost": cost(n, order)}
 
 
 def _instants(compiled: Compiled, code: Machine, times: np.ndarray) -> dict[str, np.ndarray]:

@@ -16,11 +16,10 @@ from ..machine.address import call_out, call_rhs
 from .inputs import DEGREE, inputs_at
 from .memory import type_of, with_table
 from .methods import rodas5p, tsit5
-from .state import INNER, new_lanes
+from .state import DIRECTIONS, INNER, new_lanes
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
 UNKNOWN, DIFFERENCES, EXACT = 0, 1, 2  # where the stiff method has its Jacobian from
-DIRECTIONS = 8  # that are taken together
 
 
 class Task(NamedTuple):
@@ -46,10 +45,16 @@ class Task(NamedTuple):
     c_along: np.ndarray  # what exact ones read besides their arguments
     delays: np.ndarray  # (lines, lanes) in s
     direct: np.ndarray  # (lines, lines): whether what arrives at one is what leaves the other
-    signals: (
-        np.ndarray
-    )  # the function that fills the outputs, and behind them what arrives at the lines
+    signals: np.ndarray  # the function that fills the outputs, and then what arrives at the lines
     outputs: int  # number of the outputs
+    cost: float  # of a step of the stiff method, in explicit ones
+    order: np.ndarray  # of pivots, and where their entries are: see `lu.Elimination`
+    below: np.ndarray
+    below_start: np.ndarray
+    right: np.ndarray
+    right_start: np.ndarray
+    source: np.ndarray
+    target: np.ndarray
     table: np.ndarray
 
 
@@ -89,16 +94,18 @@ class Work(NamedTuple):
     x_ahead_flat: np.ndarray
     k_flat: np.ndarray
     dx_ahead_flat: np.ndarray
-    jacobian: np.ndarray  # of the stiff method, empty with several lanes
+    jacobian: np.ndarray  # of the stiff method, empty with several lanes: see `jacobian_place`
+    jacobian_flat: np.ndarray
     columns: np.ndarray  # of 1 / (h gamma) - J, and of its factors
+    factors: np.ndarray
     f_t: np.ndarray
     pivots: np.ndarray
     U: np.ndarray
     t_along: np.ndarray  # what exact derivatives are evaluated with, a direction in each column
     x_along: np.ndarray
     u_along: np.ndarray
-    v: np.ndarray
-    dx_along: np.ndarray
+    v: np.ndarray  # the directions
+    finite: np.ndarray
     past: np.ndarray  # polynomials of the lines' signals: (steps, lines, powers, lanes)
     past_t: np.ndarray  # when these steps began
     past_h: np.ndarray  # and how long they were
@@ -144,19 +151,38 @@ def new_work(
         "k": (tsit5.STAGES, n, lanes),
         "u": (inputs, lanes),
         "s": (sampled, lanes),
-        **dict.fromkeys(("jacobian", "columns"), (stiff, stiff)),
+        "jacobian": (stiff // DIRECTIONS + 1, stiff, DIRECTIONS),
+        "columns": (stiff, stiff),
+        "factors": (stiff * stiff,),
         "f_t": (stiff,),
         "U": (rodas5p.STAGES, stiff),
-        "t_along": (DIRECTIONS,),
-        **dict.fromkeys(("x_along", "dx_along"), (stiff, DIRECTIONS)),
+        **dict.fromkeys(("t_along", "finite"), (DIRECTIONS,)),
+        "x_along": (stiff, DIRECTIONS),
         "u_along": (inputs, DIRECTIONS),
-        "v": (stiff + inputs + 1, DIRECTIONS),
+    }
+    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    arrays |= _past(times.size, outputs, lines, lanes)
+    arrays["x"][:] = x0
+    for name, rows in (("samples", n), ("y", outputs)):
+        arrays[name] = np.full((times.size, rows, lanes), np.nan)
+    flat = {f"{x}_flat": arrays[x].reshape(-1) for x in _STATES}
+    flat["jacobian_flat"] = arrays["jacobian"].reshape(-1)
+    arrays["v"] = directions(stiff, inputs)
+    k_flat = arrays["k"].reshape(tsit5.STAGES, n * lanes)
+    pivots = np.zeros(stiff, dtype=np.int64)
+    records = new_lanes(times, lanes)
+    return with_table(Work, lanes=records, **arrays, **flat, k_flat=k_flat, pivots=pivots)
+
+
+def _past(times: int, outputs: int, lines: int, lanes: int) -> dict[str, np.ndarray]:
+    """Return the arrays for delayed signals; there is no place for a step yet."""
+    shapes: dict[str, tuple[int, ...]] = {
         "past": (0, lines, DEGREE + 1, lanes),
         **dict.fromkeys(("past_t", "past_h"), (0, lanes)),
         **dict.fromkeys(("since", "missed", "missed_at_end"), (lanes,)),
         "seen": (DEGREE + 3 if lines else 0, outputs, lanes),
         "tried": (lines, DEGREE + 1, lanes),
-        "shown": (times.size, lines, lanes),
+        "shown": (times, lines, lanes),
     }
     counts: dict[str, tuple[int, ...]] = {
         "level": (0, lines, lanes),
@@ -164,15 +190,15 @@ def new_work(
         **dict.fromkeys(("kept", "shown_to"), (lanes,)),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-    arrays |= {name: np.zeros(shape, dtype=np.int64) for name, shape in counts.items()}
-    arrays["x"][:] = x0
-    for name, rows in (("samples", n), ("y", outputs)):
-        arrays[name] = np.full((times.size, rows, lanes), np.nan)
-    flat = {f"{x}_flat": arrays[x].reshape(-1) for x in _STATES}
-    k_flat = arrays["k"].reshape(tsit5.STAGES, n * lanes)
-    pivots = np.zeros(stiff, dtype=np.int64)
-    records = new_lanes(times, lanes)
-    return with_table(Work, lanes=records, **arrays, **flat, k_flat=k_flat, pivots=pivots)
+    return arrays | {name: np.zeros(shape, dtype=np.int64) for name, shape in counts.items()}
+
+
+def directions(n: int, inputs: int) -> np.ndarray:
+    """Return unit vectors of n states and, behind the inputs, of time, `DIRECTIONS` together."""
+    v = np.zeros((n // DIRECTIONS + 1, n + inputs + 1, DIRECTIONS))
+    for c in range(n + 1):
+        v[c // DIRECTIONS, c if c < n else n + inputs, c % DIRECTIONS] = 1.0
+    return v
 
 
 _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
@@ -182,6 +208,8 @@ TASK = type_of(  # only the types of these matter
         fixed=0.0, max_steps=0, method=0, alone=0, ticks=_LINE, which=_NONE, samples=_NONE,
         due=np.zeros((1, 1), dtype=np.int64), sampled=_NONE, derivatives=0, c_along=_GRID,
         delays=_GRID, direct=np.zeros((1, 1), dtype=np.int64), signals=_NONE, outputs=0,
+        cost=0.0, order=_NONE, below=_NONE, below_start=_NONE, right=_NONE, right_start=_NONE,
+        source=_NONE, target=_NONE,
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))

@@ -19,6 +19,11 @@ def call_out(out, t, x, u, p, y):
     out(t, x, u, p, y)
 
 
+def call_point(point, t, x, u, c):
+    """Evaluate what derivatives at a point have in common."""
+    point(t, x, u, c)
+
+
 def call_along(along, t, x, u, c, v, dx):
     """Evaluate the derivative of a right-hand side along directions."""
     along(t, x, u, c, v, dx)
@@ -48,5 +53,7 @@ _register(call_rhs, lambda typing_context, f, t, x, u, p, dx, g: _by_address(
     typing_context, f, t, x, u, p, dx, g))  # fmt: skip
 _register(call_out, lambda typing_context, f, t, x, u, p, y: _by_address(
     typing_context, f, t, x, u, p, y))  # fmt: skip
+_register(call_point, lambda typing_context, f, t, x, u, c: _by_address(
+    typing_context, f, t, x, u, c))  # fmt: skip
 _register(call_along, lambda typing_context, f, t, x, u, c, v, dx: _by_address(
     typing_context, f, t, x, u, c, v, dx))  # fmt: skip

@@ -39,7 +39,7 @@ WANTED = [
     )
     for function, *arguments in (
         (restart.start, _ADDRESS, TASK, WORK),
-        (advance.advance, _ADDRESS, _ADDRESS, TASK, WORK, numba.intp),
+        (advance.advance, _ADDRESS, _ADDRESS, _ADDRESS, TASK, WORK, numba.intp),
         (workspace.outputs, _ADDRESS, _ADDRESS, TASK, WORK),
     )
 ]

@@ -10,7 +10,7 @@ from stiff_problems import PROBLEMS
 
 import nlctl
 from nlctl.native.codegen.along import derivatives
-from nlctl.native.integrate.workspace import DIRECTIONS
+from nlctl.native.integrate.state import DIRECTIONS
 
 run: Any = nlctl.input_output_response
 needs_jit = pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="thousands of steps")
@@ -60,8 +60,9 @@ class TestExact:
             columns = v[:, first : first + DIRECTIONS]
             part[:, : columns.shape[1]] = columns
             dx = np.full((n, DIRECTIONS), np.nan)
-            repeated = (np.repeat(np.atleast_1d(a)[:, None], DIRECTIONS, axis=1) for a in (x, u))
-            made.function(np.full(DIRECTIONS, t), *map(np.array, repeated), made.c, part, dx)
+            repeated = [np.repeat(np.atleast_1d(a)[:, None], DIRECTIONS, 1) for a in (x, u)]
+            made.point(np.full(DIRECTIONS, t), *repeated, made.c)
+            made.function(np.full(DIRECTIONS, t), *repeated, made.c, part, dx)
             found.append(dx[:, : columns.shape[1]])
         found = np.hstack(found)
         linear = compiled.linearize(x, u if m else None, t)

@@ -17,8 +17,9 @@ from scipy.optimize import brentq
 from scipy.special import erfcx
 
 import nlctl
+from nlctl.expressions.elimination import SINGULAR, linear_solution
 from nlctl.native import CompileError
-from nlctl.native.codegen.newton import _MOST, SINGULAR, STARTS, improved, newton_step
+from nlctl.native.codegen.newton import _MOST, STARTS, improved
 from nlctl.native.codegen.solver import DONE, GUESS
 
 needs_jit = pytest.mark.skipif(
@@ -42,7 +43,7 @@ def test_a_newton_step_is_the_solution_of_its_equations(n, seed):
     matrix, b = rng.normal(size=(n, n)), rng.normal(size=n)
     matrix[0, 0] *= rng.integers(0, 2)
     if np.linalg.cond(matrix) < 1e5:
-        x, is_regular = newton_step(matrix.tolist(), b.tolist())
+        x, is_regular = linear_solution(matrix.tolist(), b.tolist())
         assert is_regular
         np.testing.assert_allclose(x, np.linalg.solve(matrix, b), rtol=1e-9)
 
@@ -62,7 +63,7 @@ def test_a_newton_step_is_the_solution_of_its_equations(n, seed):
 def test_singular_matrices_are_told(matrix, expected):
     """Also those that are not finite."""
     with np.errstate(all="ignore"):
-        assert bool(newton_step(matrix, [1.0] * len(matrix))[1]) == expected
+        assert bool(linear_solution(matrix, [1.0] * len(matrix))[1]) == expected
 
 
 def searched(f, slope):

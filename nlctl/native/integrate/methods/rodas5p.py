@@ -65,52 +65,6 @@ H[2] = (
 
 
 @numba.njit(**INNER)
-def factorise(columns, pivots):
-    """Factorise a square matrix in place, P M = L U, with partial pivoting.
-
-    Row `c` of `columns` is the matrix's column `c`: every inner loop then runs through memory and
-    adds nothing up, so that SIMD registers are full and no order of additions is left to a
-    compiler.
-    """
-    n = columns.shape[0]
-    for c in range(n):
-        best = c
-        for i in range(c + 1, n):
-            if abs(columns[c, i]) > abs(columns[c, best]):
-                best = i
-        pivots[c] = best
-        if best != c:
-            for j in range(n):
-                columns[j, c], columns[j, best] = columns[j, best], columns[j, c]
-        inverse = 1.0 / columns[c, c]
-        for i in range(c + 1, n):
-            columns[c, i] *= inverse
-        for j in range(c + 1, n):
-            factor = columns[j, c]
-            if factor != 0.0:
-                for i in range(c + 1, n):
-                    columns[j, i] -= columns[c, i] * factor
-
-
-@numba.njit(**INNER)
-def solve(columns, pivots, b):
-    """Solve with the factors of `factorise`; `b` becomes the solution."""
-    n = b.size
-    for i in range(n):
-        other = pivots[i]
-        b[i], b[other] = b[other], b[i]
-    for c in range(n):
-        factor = b[c]
-        for i in range(c + 1, n):
-            b[i] -= columns[c, i] * factor
-    for c in range(n - 1, -1, -1):
-        factor = b[c] / columns[c, c]
-        b[c] = factor
-        for i in range(c):
-            b[i] -= columns[c, i] * factor
-
-
-@numba.njit(**INNER)
 def stage(s, x, U, result):
     """Fill `result` with the state of stage `s`."""
     for i in range(x.size):

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ...machine.address import call_along
+from ...machine.address import call_along, call_point
 from ..control import TRIAL, memory_error
 from ..inputs import inputs_at
 from ..state import INNER
 from ..workspace import DIFFERENCES, evaluate
-from . import rodas5p
+from . import lu, rodas5p
+from .lu import place
 
 RELATIVE = 1.5e-8  # square root of the machine precision
 FLOOR = 1e-4  # a state smaller than this is varied as if it were so large
@@ -19,64 +20,51 @@ SHARE = 0.3  # of the defect at the end of a step: what of it may be an error of
 
 
 @numba.njit(**INNER)
-def _jacobian(rhs, along, task, lanes, w):
+def _jacobian(rhs, point, along, task, lanes, w):
     """Fill w.jacobian and w.f_t at the start of a step.
 
     Where a derivative is not finite, that of sqrt(x) at 0 for instance, differences are taken.
     """
     lane = lanes[0]
     w.t[0] = lane.t
-    if task.derivatives == DIFFERENCES or not _exact(along, task, lanes, w):
+    if task.derivatives == DIFFERENCES or not _exact(point, along, task, lanes, w):
         _differences(rhs, task, lanes, w)
     lane.jacobian_at = lane.t
 
 
 @numba.njit(**INNER)
-def _exact(along, task, lanes, w):
+def _exact(point, along, task, lanes, w):
     """Fill them with the derivatives of the equations; return whether all are finite."""
-    n, m, wide = w.x.shape[0], w.u.shape[0], w.dx_along.shape[1]
+    n, m, lane = w.x.shape[0], w.u.shape[0], lanes[0]
+    wide, last = w.finite.size, n // w.finite.size
     if m:
         inputs_at(task, lanes, w)
     for j in range(wide):
-        w.t_along[j] = w.t[0]
+        w.t_along[j], w.finite[j] = w.t[0], 0.0
         for i in range(n):
             w.x_along[i, j] = w.x[i, 0]
         for i in range(m):
             w.u_along[i, j] = w.u[i, 0]
+    k = min(lane.segment, task.times.size - 2)
+    for i in range(m):  # inputs change as time goes on
+        rise = task.inputs[i, k + 1] - task.inputs[i, k]
+        w.v[last, n + i, n - last * wide] = rise / (task.times[k + 1] - task.times[k])
+    call_point(point, w.t_along, w.x_along, w.u_along, task.c_along)
     total = 0.0
-    for first in range(0, n + 1, wide):
-        last = min(first + wide, n + 1)
-        _directions(task, lanes[0], first, last, w)
-        call_along(along, w.t_along, w.x_along, w.u_along, task.c_along, w.v, w.dx_along)
+    for part in range(last + 1):
+        found = w.jacobian[part]
+        call_along(along, w.t_along, w.x_along, w.u_along, task.c_along, w.v[part], found)
         for i in task.memory:
             for j in range(wide):
-                w.dx_along[i, j] = 0.0
+                found[i, j] = 0.0
         for i in range(n):
-            for c in range(first, last):
-                slope = w.dx_along[i, c - first]
-                total += 0.0 * slope
-                if c < n:
-                    w.jacobian[i, c] = slope
-                else:
-                    w.f_t[i] = slope
+            for j in range(wide):
+                w.finite[j] += 0.0 * found[i, j]  # NaN of NaN and infinity
+    for j in range(wide):
+        total += w.finite[j]
+    for i in range(n):
+        w.f_t[i] = w.jacobian_flat[place(i, n, n)]
     return total == 0.0
-
-
-@numba.njit(**INNER)
-def _directions(task, lane, first, last, w):
-    """Fill w.v with unit vectors: states `first` to `last`, behind all of them time."""
-    n, m = w.x.shape[0], w.u.shape[0]
-    for i in range(w.v.shape[0]):
-        for j in range(w.v.shape[1]):
-            w.v[i, j] = 0.0
-    for c in range(first, min(last, n)):
-        w.v[c, c - first] = 1.0
-    if last > n:
-        k = min(lane.segment, task.times.size - 2)
-        for i in range(m):  # inputs change as time goes on
-            rise = task.inputs[i, k + 1] - task.inputs[i, k]
-            w.v[n + i, n - first] = rise / (task.times[k + 1] - task.times[k])
-        w.v[n + m, n - first] = 1.0
 
 
 @numba.njit(**INNER)
@@ -90,7 +78,7 @@ def _differences(rhs, task, lanes, w):
         delta = w.x_ahead[c, 0] - w.x[c, 0]
         evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
         for i in range(n):
-            w.jacobian[i, c] = (w.dx_ahead[i, 0] - w.k[0, i, 0]) / delta
+            w.jacobian_flat[place(i, c, n)] = (w.dx_ahead[i, 0] - w.k[0, i, 0]) / delta
         w.x_ahead[c, 0] = w.x[c, 0]
     w.t[0] = lane.t + max(AHEAD * lane.step, 1e-12 * abs(lane.t))
     evaluate(rhs, task, lanes, w, w.x, w.dx_ahead, w.g_ahead)
@@ -101,7 +89,7 @@ def _differences(rhs, task, lanes, w):
 @numba.njit(**INNER)
 def _spectral_radius(w):
     """Estimate the largest eigenvalue's magnitude by a few steps of the power method."""
-    n = w.jacobian.shape[0]
+    n = w.x.shape[0]
     v, product, rate = np.zeros(n), np.zeros(n), 0.0
     for i in range(n):
         v[i] = 0.5 + (0.6180339887 * (i + 1)) % 1.0  # like no matrix's null space
@@ -110,7 +98,7 @@ def _spectral_radius(w):
         for i in range(n):
             product[i] = 0.0
             for j in range(n):
-                product[i] += w.jacobian[i, j] * v[j]
+                product[i] += w.jacobian_flat[place(i, j, n)] * v[j]
             before += v[i] * v[i]
             after += product[i] * product[i]
         rate = np.sqrt(after / before)
@@ -122,7 +110,7 @@ def _spectral_radius(w):
 
 
 @numba.njit(**INNER)
-def _memory_error(rhs, task, lanes, w):
+def _memory_error(rhs, task, lanes, w, only_entries):
     """Return the largest error of what memories would become, over its tolerance.
 
     Estimated by the defect f - x' of the solution at the end of the step, divided by
@@ -133,7 +121,7 @@ def _memory_error(rhs, task, lanes, w):
     rodas5p.end_slope(lanes[0].step, w.x_flat, w.x_new_flat, w.U, error)
     for i in range(error.size):
         error[i] = w.k[6, i, 0] - error[i]
-    rodas5p.solve(w.columns, w.pivots, error)
+    lu.solve(task, only_entries, w, error)
     for i in range(error.size):
         w.x_ahead[i, 0] = w.x_new[i, 0] + error[i]
     evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
@@ -141,18 +129,14 @@ def _memory_error(rhs, task, lanes, w):
 
 
 @numba.njit(**INNER)
-def stiff_attempt(rhs, along, task, lanes, w):
+def stiff_attempt(rhs, point, along, task, lanes, w):
     """Try a step of Rodas5P in the only lane."""
     n, lane, h = w.x.shape[0], lanes[0], lanes[0].step
     if lane.jacobian_at != lane.t:
-        _jacobian(rhs, along, task, lanes, w)
+        _jacobian(rhs, point, along, task, lanes, w)
         if (lane.stiff + 1) % TRIAL == 0:  # when the methods are compared
             w.rate[0] = _spectral_radius(w)
-    for i in range(n):
-        for j in range(n):
-            w.columns[j, i] = -w.jacobian[i, j]
-        w.columns[i, i] += 1.0 / (h * rodas5p.GAMMA)
-    rodas5p.factorise(w.columns, w.pivots)
+    only_entries = lu.factorise(task, 1.0 / (h * rodas5p.GAMMA), w)
     for s in range(rodas5p.STAGES):
         w.t[0] = lane.t + rodas5p.NODES[s] * h
         if s == 0:
@@ -162,13 +146,13 @@ def stiff_attempt(rhs, along, task, lanes, w):
             rodas5p.stage(s, w.x_flat, w.U, w.x_stage_flat)
             evaluate(rhs, task, lanes, w, w.x_stage, w.dx_ahead, w.g_ahead)
         rodas5p.right_side(s, h, w.dx_ahead_flat, w.f_t, w.U)
-        rodas5p.solve(w.columns, w.pivots, w.U[s])
+        lu.solve(task, only_entries, w, w.U[s])
     for i in range(n):
         w.x_new[i, 0] = w.x_stage[i, 0] + w.U[7, i]
     w.t[0] = lane.t + h
     evaluate(rhs, task, lanes, w, w.x_new, w.k[6], w.g)
     w.error[0] = rodas5p.error_norm(w.x, w.x_new, w.U, task.rtol, task.atol)
     if task.memory.size:
-        error = _memory_error(rhs, task, lanes, w)
+        error = _memory_error(rhs, task, lanes, w, only_entries)
         if not error <= w.error[0]:
             w.error[0] = error

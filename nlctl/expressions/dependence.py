@@ -1,0 +1,58 @@
+"""Which results depend on which entries of an array: the structure of a Jacobian matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .graph import Expr, needed
+
+__all__ = ["structure"]
+
+_WHOLE = ("sum", "call", "solve")  # each element of the result depends on all that goes in
+
+
+def structure(results: Sequence[tuple[Expr, int]], array: str, count: int) -> np.ndarray:
+    """Return which results are made of which entries of an array, whatever the values are.
+
+    Parameters
+    ----------
+    results : sequence of tuple
+        Expressions, one after the other, each with its length.
+    array : str
+        The array that leaves read: ``"x"``, for instance.
+    count : int
+        Its entries.
+
+    Returns
+    -------
+    ndarray of bool, shape (rows, count)
+        False only where a derivative is 0 for all values.
+    """
+    found: dict[Expr, np.ndarray] = {}
+    for node in needed([expr for expr, _ in results]):
+        found[node] = _of_node(node, [found[arg] for arg in node.args], array, count)
+    rows = [np.broadcast_to(found[expr], (size, count)) for expr, size in results]
+    return np.concatenate([np.zeros((0, count), dtype=bool), *rows])
+
+
+def _of_node(node: Expr, parts: list[np.ndarray], array: str, count: int) -> np.ndarray:
+    """Return a row for each element of an expression, or one for all of them."""
+    nothing = np.zeros((1, count), dtype=bool)
+    if node.op == "leaf" and node.data[0] == array:
+        _, start, step = node.data
+        return np.eye(count, dtype=bool)[start + step * np.arange(node.size or 1)]
+    if node.op in _WHOLE:
+        return np.concatenate([nothing, *parts]).any(axis=0)[None]
+    if node.op in ("item", "slice"):
+        start, step = (node.data, 1) if node.op == "item" else node.data
+        whole = np.broadcast_to(parts[0], (node.args[0].size or 1, count))
+        return whole[start + step * np.arange(node.size or 1)]
+    if node.op == "concat":
+        return np.concatenate(
+            [np.broadcast_to(p, (n, count)) for p, n in zip(parts, node.data, strict=True)]
+        )
+    for part in parts:
+        nothing = nothing | part
+    return nothing
