@@ -57,12 +57,12 @@ def block_summaries() -> dict[str, dict[str, str]]:
 
 
 def _records(group: str) -> dict[str, str]:
-    """Return the public records of a module or of the modules of a package."""
+    """Return the public records of a module, or of a package and the rooms in it."""
     folder = Path(errors.__file__).parent / group
     own = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
     found = dict(
         line
-        for path in (sorted(folder.glob("*.py")) or [own])
+        for path in (sorted(folder.rglob("*.py")) or [own])
         for line in _lines(ast.parse(path.read_bytes()))
     )
     return {name: found[name] for name in _public(ast.parse(own.read_bytes())) if name in found}

@@ -194,8 +194,8 @@ def integral(t, y):
     """Integral of y by the composite Simpson rule on any samples, exact for parabolas.
 
     Of an odd number of intervals the last takes the parabola through the last three samples, as
-    in `scipy.integrate.simpson`.  Two samples are joined by a line.  Where neighbouring intervals
-    differ by more than a factor of 2, weights may be negative.
+    in `scipy.integrate.simpson`.  Two samples are connected by a line.  Where neighbouring
+    intervals differ by more than a factor of 2, weights may be negative.
     """
     h = consecutive_differences(t)
     if h.size == 1:
@@ -279,7 +279,7 @@ def time_within(t, y, lower, upper):
 
 @equation
 def reversals(t, y, above=0.0):
-    """How often y turns round: the turns between swings of more than `above`."""
+    """How often y reverses: the turns between swings of more than `above`."""
     if not np.all(np.isfinite(y)):
         return np.nan
     steps = consecutive_differences(y)
@@ -343,6 +343,11 @@ def tracking_metrics(
         Swings of the control input up to this size do not count as reversals.
     error, control, actuated, weights, gain : str, optional
         Names of the signals e, u, v, |W_hat| and zeta; an empty name leaves its numbers out.
+
+    Returns
+    -------
+    tuple of Metric
+        Each a function of a response, with unit and meaning.
 
     Raises
     ------

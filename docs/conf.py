@@ -73,6 +73,6 @@ sphinx_gallery_conf = {
     "matplotlib_animations": False,
     "image_srcset": ["2x"],
     "nested_sections": False,
-    "reset_modules": ("matplotlib", "strict.warnings_are_errors"),
+    "reset_modules": ("matplotlib", "strict.warnings_are_errors", "strict.labels_fit"),
 }
 warnings.filterwarnings("ignore", message=".*non-interactive.*", category=UserWarning)

@@ -29,15 +29,18 @@ from .actuators import (
 from .blocks import Block, Spec, block
 from .controllers import (
     PID,
+    AdaptiveDeadZoneInverse,
     AdaptiveWeights,
     DeadZoneNussbaumLaw,
     FilteredError,
     FixedGainLaw,
+    FunnelControl,
     GaussianBasis,
     KnownSignLaw,
     LeakyNussbaumLaw,
     MonotoneNussbaumLaw,
     NussbaumLaw,
+    PrescribedPerformance,
     RobustTerm,
     SlidingModeLaw,
     Zero,
@@ -77,10 +80,11 @@ from .params import param, record
 from .plants import ForcedDuffing, Genesio, PureFeedback
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
-from .sampling import Clock, Sampled, discretise, sampled
+from .sampling import Clock, Sampled, Sampling, discretise, sampled
 
 __all__ = [
     "PID",
+    "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
     "AlgebraicLoopError",
     "AmbiguousNameError",
@@ -110,6 +114,7 @@ __all__ = [
     "FixedGainLaw",
     "ForcedDuffing",
     "FunctionReference",
+    "FunnelControl",
     "Gain",
     "GaussianBasis",
     "Genesio",
@@ -124,12 +129,14 @@ __all__ = [
     "PrandtlIshlinskii",
     "PrandtlIshlinskiiInverse",
     "Preisach",
+    "PrescribedPerformance",
     "PureFeedback",
     "Quantiser",
     "RateLimiter",
     "Relay",
     "RobustTerm",
     "Sampled",
+    "Sampling",
     "Saturation",
     "SecondOrderLag",
     "SlidingModeLaw",

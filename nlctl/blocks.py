@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -13,8 +12,10 @@ import control as ct
 import numpy as np
 
 from .errors import BlockError, ParameterError, UsageError
+from .host.notebook import table_html
 from .names import Parameters, base_name, unknown
 from .params import declared_params, ensure_checked, equation_arguments, is_checked, with_overrides
+from .upstream.control_internals import OwnParameters, current_parameters, set_parameters
 
 
 class Spec(Protocol):
@@ -47,7 +48,7 @@ class Spec(Protocol):
         States that are memory.  Within a step of the native engine they stand still.
     commit : callable, optional
         ``commit(t, x, u, p)`` returns what the states in `memory` become at the end of a step
-        that was accepted.  A step in which a memory would turn round is divided where it does.
+        that was accepted.  A step in which a memory would reverse is divided where it does.
         It must be continuous except where a corner changes its sign.
     derived : callable, optional
         ``derived(self) -> dict`` of numbers that follow from the parameters; `p` has them too.
@@ -131,7 +132,7 @@ def past(lines: Mapping[Any, DelayLine]) -> Iterator[None]:
         _PAST.reset(token)
 
 
-class Block(ct.NonlinearIOSystem):
+class Block(OwnParameters):
     """A python-control system made from a record; see `block`.
 
     Attributes
@@ -155,7 +156,7 @@ class Block(ct.NonlinearIOSystem):
             name=name,
             **kwargs,
         )
-        self._update_params(None)
+        set_parameters(self, None)
 
     @property
     def params(self) -> Parameters:
@@ -167,11 +168,12 @@ class Block(ct.NonlinearIOSystem):
     def params(self, values: Mapping[str, Any]) -> None:
         if values:
             self.spec = self._resolved(values)
-            self._update_params(None)
+            set_parameters(self, None)
 
-    def _out(self, t: float, x: Any, u: Any) -> Any:
+    def answer(self, t: float, x: Any, u: Any) -> Any:
+        """Return its outputs; of a transport delay what `past` says, see there."""
         if not is_delayed(self):
-            return super()._out(t, x, u)
+            return super().answer(t, x, u)
         line = (_PAST.get() or {}).get(id(self))
         if line is None:
             raise UsageError(
@@ -193,11 +195,12 @@ class Block(ct.NonlinearIOSystem):
                 raise unknown("parameter", name, fields, f"of block '{self.name}'")
         return own
 
-    def _update_params(self, params: Mapping[str, Any] | None) -> None:
-        # python-control calls this before a run; its equations then get the result as `p`.
-        before, self.current_spec = self.current_spec, self._resolved(params or {})
-        if self.current_spec is not before:
-            self._current_params = equation_arguments(self.current_spec)
+    def taken(self, params: Mapping[str, Any]) -> Any:
+        """Return what equations get as `p`; python-control asks for it before a run."""
+        before, self.current_spec = self.current_spec, self._resolved(params)
+        if self.current_spec is before:
+            return current_parameters(self)
+        return equation_arguments(self.current_spec)
 
     def _resolved(self, params: Mapping[str, Any]) -> Any:
         """Return the record with overrides; they must not change the number of signals.
@@ -231,17 +234,9 @@ class Block(ct.NonlinearIOSystem):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        head = repr(self).splitlines()[0]
-        rows = "".join(
-            "<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in cells) + "</tr>"
-            for cells in (
-                (r.name, r.text, r.unit, r.bounds, r.meaning) for r in parameter_rows(self)
-            )
-        )
-        titles = "".join(
-            f"<th>{t}</th>" for t in ("parameter", "value", "unit", "bounds", "meaning")
-        )
-        return f"<p>{html.escape(head)}</p><table><tr>{titles}</tr>{rows}</table>"
+        rows = [(r.name, r.text, r.unit, r.bounds, r.meaning) for r in parameter_rows(self)]
+        titles = ("parameter", "value", "unit", "bounds", "meaning")
+        return table_html(repr(self).splitlines()[0], titles, rows)
 
 
 def _names(labels: Sequence[str]) -> str:
@@ -369,6 +364,11 @@ def is_delayed(system: Any) -> bool:
     return bool(getattr(getattr(system, "spec", None), "delayed", False))
 
 
+def sampling_of(system: Any) -> Any:
+    """Return the block with the parameters of a sampled block's sampling; None of any other."""
+    return getattr(system, "sampling", None)
+
+
 def memory_states(spec: Any) -> tuple[str, ...]:
     """Return the names of a record's memory states."""
     return tuple(getattr(spec, "memory", ())) if hasattr(spec, "commit") else ()
@@ -379,7 +379,7 @@ def event_count(made: Block) -> int:
     if not hasattr(made.spec, "corners"):
         return 0
     u = np.full(made.ninputs or 0, 0.25)
-    return len(made.spec.corners(0.0, default_state(made), u, made._current_params))
+    return len(made.spec.corners(0.0, default_state(made), u, current_parameters(made)))
 
 
 def _probe(made: Block) -> None:
@@ -387,7 +387,7 @@ def _probe(made: Block) -> None:
     spec, who = made.spec, f"{type(made.spec).__name__} (block '{made.name}')"
     if is_delayed(made):
         return
-    x, u, p = default_state(made), np.full(made.ninputs or 0, 0.25), made._current_params
+    x, u, p = default_state(made), np.full(made.ninputs or 0, 0.25), current_parameters(made)
     with np.errstate(all="ignore"):
         results = [("output", spec.output, made.noutputs)]
         if made.nstates:

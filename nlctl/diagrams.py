@@ -17,11 +17,13 @@ from .blocks import (
     default_state,
     parameter_rows,
     record_rows,
+    sampling_of,
     within,
 )
 from .errors import DiagramError, ParameterError
 from .names import Parameters, find_name, unknown
 from .params import as_numbers, declared_params
+from .upstream.control_internals import set_parameters
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +36,7 @@ class Place:
     Attributes
     ----------
     path : str
-        Names of the diagrams around it and its own, joined by dots; empty for the outermost
+        Names of the diagrams around it and its own, separated by dots; empty for the outermost
         diagram.
     parameter_path : str
         The same without diagrams that do not put their name in front of their parameters'
@@ -119,7 +121,7 @@ def interconnect(
     inputs : sequence of str, optional
         Signals that come from outside.
     outputs : sequence of str, optional
-        Signals that the diagram delivers; by default every output of every block.
+        Outputs of the diagram; by default every output of every block.
     name : str, optional
         Name of the diagram.
 
@@ -130,11 +132,11 @@ def interconnect(
     Raises
     ------
     DiagramError
-        If two blocks share a name, deliver the same signal, or an input is fed by nothing or
+        If two blocks share a name, have the same output, or an input is fed by nothing or
         twice, if one block stands in the diagram twice, or if a controller is for plants of a
         lower order than the one that it is connected to.
     UnknownNameError
-        If `outputs` names a signal that no block delivers, or `inputs` one that none takes.
+        If `outputs` names a signal that is the output of no block, or `inputs` one that none takes.
 
     Examples
     --------
@@ -201,13 +203,13 @@ def _check_blocks(systems: Sequence[Any]) -> None:
 
 
 def _signal_sources(systems: Sequence[ct.InputOutputSystem]) -> dict[str, str]:
-    """Return ``{signal: name of the block that delivers it}``."""
+    """Return ``{signal: name of the block whose output it is}``."""
     sources: dict[str, str] = {}
     for system in systems:
         for signal in system.output_labels:
             if signal in sources:
                 raise DiagramError(
-                    f"signal '{signal}' is delivered by '{sources[signal]}' and by "
+                    f"signal '{signal}' is an output of '{sources[signal]}' and by "
                     f"'{system.name}'; rename one, or add them in a ct.summing_junction"
                 )
             sources[signal] = system.name
@@ -221,7 +223,7 @@ def _check_inputs(
     for i, signal in enumerate(inputs):
         if signal in sources:
             raise DiagramError(
-                f"signal '{signal}' is an external input and is delivered by "
+                f"signal '{signal}' is an external input and an output of "
                 f"'{sources[signal]}'; rename one"
             )
         if signal in inputs[:i]:
@@ -232,7 +234,9 @@ def _check_inputs(
         for signal in system.input_labels:
             if signal not in sources and signal not in inputs:
                 error = unknown("signal", signal, [*sources, *inputs])
-                raise DiagramError(f"block '{system.name}' takes a signal nobody delivers: {error}")
+                raise DiagramError(
+                    f"block '{system.name}' takes a signal that no block outputs: {error}"
+                )
 
 
 def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str, str]) -> None:
@@ -271,6 +275,16 @@ def known_system(who: str, system: Any) -> Any:
 
 def state_names(system: ct.InputOutputSystem) -> list[str]:
     """Return the qualified names of all states, ``"controller.law.zeta"``, in vector order.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram or a block.
+
+    Returns
+    -------
+    list of str
+        One for each state.
 
     Examples
     --------
@@ -339,12 +353,23 @@ def parameter_names(system: ct.InputOutputSystem) -> list[str]:
 def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
     """Return the parameter table of a diagram, with the values of a run without overrides."""
     if isinstance(system, ct.NonlinearIOSystem):
-        system._update_params(None)
+        set_parameters(system, None)
     rows: list[ParameterRow] = []
     for leaf in leaves(system):
         if isinstance(within(leaf.system), Block):
             rows += parameter_rows(within(leaf.system), f"{leaf.parameter_path}.")
+    for path, owner in samplings(system):
+        rows += parameter_rows(owner, f"{path}.")
     return rows
+
+
+def samplings(system: Any) -> list[tuple[Any, Any]]:
+    """Return what says how blocks are sampled, each once, behind the path of its parameters."""
+    every = [sampling_of(leaf.system) for leaf in leaves(system)]
+    found: dict[int, Any] = {id(made): made for made in every if made is not None}
+    owners = system.params.owners if isinstance(system.params, Parameters) else {}
+    paths = {id(owner): name.rpartition(".")[0] for name, owner in owners.items()}
+    return [(paths.get(key, made.name), made) for key, made in found.items()]
 
 
 def parameters(system: Any) -> pd.DataFrame:

@@ -4,6 +4,11 @@ python-control keeps one flat parameter dict per diagram: of equal names the las
 every block (0.10.2), and unknown names are ignored.  A `Parameters` dict goes through exactly
 those operations (``|``, ``copy``, ``update``) and does the right thing in each, so that an
 ordinary diagram made with ``ct.interconnect`` takes qualified names without being patched.
+
+What is relied on of python-control: a diagram's parameters are those of its parts, taken together
+with ``|`` and copied when they are complete; in a run each part's are copied and updated, first
+with the diagram's, then with what the diagram was given.  How often they are copied makes no
+difference (``tests/diagrams/test_copied_parameters.py``).
 """
 
 from __future__ import annotations
@@ -65,7 +70,7 @@ def find_name(kind: str, name: str, known: Mapping[str, Any], clashes: Iterable[
     if matches[0] in clashes:
         raise AmbiguousNameError(
             f"{kind} '{name}' belongs to two blocks of this diagram with the same name; "
-            "give the blocks different names, or join the inner diagrams with "
+            "give the blocks different names, or connect the inner diagrams with "
             "nlctl.interconnect(..., name=...), which puts their name in front"
         )
     return matches[0]
@@ -85,9 +90,13 @@ class Parameters(dict[str, Any]):
         an override of such a name is refused.
     table : Parameters or None
         The enclosing diagram's parameters, known while python-control hands overrides down.
-    copies : int
-        How often this was copied since it was made.  python-control copies a diagram's
-        parameters once when it makes the diagram, and again whenever it hands them down.
+    complete : bool
+        Whether this is a copy.  What was not copied yet is a block's own values, or a diagram's
+        parameters while python-control still collects them.
+    strays : list of str
+        Names in a plain dict that mean no block here.  In a copy that python-control hands down
+        they are those of blocks elsewhere; in a diagram's own parameters they are misspelt, which
+        shows when a run asks for them.
     """
 
     def __init__(self, values: Mapping[str, Any], block: Any = None) -> None:
@@ -97,7 +106,8 @@ class Parameters(dict[str, Any]):
         self.clashes: set[str] = set()
         self.scope: ct.InputOutputSystem | None = None
         self.table: Parameters | None = None
-        self.copies = 0
+        self.complete = False
+        self.strays: list[str] = []
 
     @property
     def prefix(self) -> str:
@@ -108,7 +118,8 @@ class Parameters(dict[str, Any]):
         """Return a copy (python-control copies defaults before it overrides them)."""
         new = Parameters(self, self.block)
         new.owners, new.clashes = self.owners.copy(), self.clashes.copy()
-        new.scope, new.table, new.copies = self.scope, self.table, self.copies + 1
+        new.scope, new.table = self.scope, self.table
+        new.complete, new.strays = True, self.strays.copy()
         return new
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -121,10 +132,11 @@ class Parameters(dict[str, Any]):
 
     def __or__(self, other: Mapping[str, Any]) -> Parameters:  # type: ignore[override]
         new = self.copy()
-        if self.copies and not isinstance(other, Parameters):
-            new.update(other)  # a user's: a diagram's finished parameters with some changed
+        if self.complete and not isinstance(other, Parameters):
+            for name, value in other.items():  # a user's: a diagram's parameters, some changed
+                new[name] = value
             return new
-        new.scope, new.block, new.copies = None, None, 0
+        new.scope, new.block, new.complete = None, None, False
         new._absorb(other)
         return new
 
@@ -165,10 +177,15 @@ class Parameters(dict[str, Any]):
             self._inherit(other)
             return
         for name, value in {**(other or {}), **kwargs}.items():
-            self._override(name, value)
+            if not self._is_elsewhere(name):
+                self._override(name, value)
 
     def _inherit(self, outer: Parameters) -> None:
         """Take over the values that the enclosing diagram has for these parameters."""
+        if outer.strays and self.table is None:  # the diagram's own; what it was given follows
+            names, _ = outer._known_names()
+            where = "given to params.update (params.strays.clear() forgets it)"
+            raise unknown("parameter", outer.strays[0], names, where)
         self.table = outer
         prefix = self.prefix
         for key in list(self):
@@ -191,8 +208,6 @@ class Parameters(dict[str, Any]):
             return
         base = base_name(name)
         names, clashes = self._known_names()
-        if self._handed_down_by_plain_dict() and not _same_block(base, names):
-            return  # the enclosing diagram has a plain dict, and this one is another block's
         if self.table is None and base in self:
             base = self.prefix + base  # seen from inside the diagram
         full = find_name("parameter", base, names, clashes)
@@ -203,7 +218,7 @@ class Parameters(dict[str, Any]):
         if not index:
             for key in [k for k in self if k != own and base_name(k) == own]:
                 del self[key]  # the whole vector replaces elements set before
-        if self.block is not None and self.copies == 0:
+        if self.block is not None and not self.complete:
             self.block.params = {own + index: value}
         dict.__setitem__(self, own + index, value)
 
@@ -215,9 +230,14 @@ class Parameters(dict[str, Any]):
             self.prefix + k for k in self.clashes
         }
 
-    def _handed_down_by_plain_dict(self) -> bool:
-        """Whether python-control hands this down without having told the diagram's names."""
-        return self.table is None and self.copies >= (2 if self.block is None else 1)
+    def _is_elsewhere(self, name: str) -> bool:
+        """Whether a name may mean a block elsewhere: python-control has not told all names yet."""
+        is_own = self.block is not None and not self.complete
+        known = is_own or self.table is not None or "." not in name
+        if known or _same_block(base_name(name), self._known_names()[0]):
+            return False
+        self.strays.append(name)
+        return True
 
     def _refuse_bare_twin(self, name: str) -> None:
         """A bare name is a third-party block's, unless it looks like one of ours cut short."""

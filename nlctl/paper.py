@@ -216,7 +216,7 @@ def _closed_loop(
     delivered = len([s for s in blocks["reference"].output_labels if s.startswith("yd")])
     if delivered <= order:
         raise ParameterError(
-            f"the reference delivers {delivered - 1} derivatives, a plant of order {order} needs "
+            f"the reference has {delivered - 1} derivatives, a plant of order {order} needs "
             f"{order}: make it with order={order}"
         )
     if sensor is not None:

@@ -107,6 +107,16 @@ def record(cls: type[_T]) -> type[_T]:
     Bounds come from `param`; a method ``check(self)``, where the class has one, looks at rules
     that concern several fields and raises `ParameterError`.
 
+    Parameters
+    ----------
+    cls : type
+        With fields made by `param`.
+
+    Returns
+    -------
+    type
+        The dataclass.
+
     Raises
     ------
     ParameterError
@@ -234,7 +244,7 @@ def _normalised(who: str, name: str, value: Any, ndim: int, kind: Any) -> Any:
         raise ParameterError(f"{who} needs at least one value in {name}, got none")
     if kind in (int, "int"):
         if not (math.isfinite(array) and float(array).is_integer()):
-            raise ParameterError(f"{who} needs a whole number for {name}, got {value!r}")
+            raise ParameterError(f"{who} needs an integer for {name}, got {value!r}")
         return int(array)
     return _nested_tuple(array.tolist())
 
@@ -254,7 +264,7 @@ def whole_number(who: str, name: str, value: Any, at_least: int) -> int:
     Raises
     ------
     ParameterError
-        If it is no whole number, or below `at_least`.
+        If it is not an integer, or below `at_least`.
     """
     is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not (is_whole and value >= at_least):

@@ -1,6 +1,6 @@
 """Desired trajectories with their derivatives, and noise.
 
-Each reference of order n delivers yd and its derivatives yd1, ..., ydn (yd', ..., yd^(n)).
+Each reference of order n outputs yd and its derivatives yd1, ..., ydn (yd', ..., yd^(n)).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def derivative_names(order: int) -> tuple[str, ...]:
 
 
 def _check_order(spec: Any) -> None:
-    """A reference delivers a whole number of derivatives."""
+    """A reference has an integer number of derivatives."""
     order = whole_number(type(spec).__name__, "an order", spec.order, at_least=0)
     object.__setattr__(spec, "order", order)
 
@@ -40,7 +40,7 @@ class SumOfSines:
     Parameters
     ----------
     order : int, optional
-        Number n >= 0 of derivatives delivered.
+        Number n >= 0 of derivatives that are outputs.
     """
 
     order: int = 2
@@ -95,7 +95,7 @@ class FilteredStep:
     Parameters
     ----------
     order : int, optional
-        Number n >= 0 of derivatives delivered.
+        Number n >= 0 of derivatives that are outputs.
     """
 
     order: int = 2
@@ -115,7 +115,7 @@ class FilteredStep:
     vector = True
 
     def check(self) -> None:
-        """A whole number of derivatives."""
+        """An integer number of derivatives."""
         _check_order(self)
 
     def derived(self) -> dict[str, Any]:
@@ -146,7 +146,7 @@ class FunctionReference:
     Parameters
     ----------
     order : int
-        Number of derivatives delivered, n >= 0.
+        Number of derivatives that are outputs, n >= 0.
     function : equation
         ``function(t) -> (yd, yd', ..., yd^(n))``.
 
@@ -166,7 +166,7 @@ class FunctionReference:
     feedthrough = False
 
     def check(self) -> None:
-        """The function must deliver as many derivatives as promised."""
+        """The function must return as many derivatives as promised."""
         _check_order(self)
         got = np.size(self.function(0.0))
         if got != self.order + 1:

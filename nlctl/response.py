@@ -18,7 +18,7 @@ from .responses.arguments import RunArguments, checked_params, unified, with_ali
 from .responses.interpreted import SOLVE_IVP_METHODS, python_control_response
 
 if TYPE_CHECKING:
-    from .native import Compiled
+    from .native import Compiled, Tableau
 
 __all__ = ["EngineWarning", "input_output_response"]
 
@@ -38,7 +38,7 @@ def input_output_response(
     *,
     params: Mapping[str, Any] | None = None,
     engine: str | None = "auto",
-    method: str | None = None,
+    method: str | Tableau | None = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
     evaluation_times: Any = "T",
@@ -85,10 +85,11 @@ def input_output_response(
         an error, and "python-control" is the reference.  What only python-control knows (a
         method of SciPy, keywords of its integrator, the integrator's own times) it computes.  A
         `Compiled` always runs as machine code.
-    method : str, optional
+    method : str or Tableau, optional
         Method of `scipy.integrate.solve_ivp` in python-control, "LSODA" by default.  Machine code
         has "tsit5", an explicit Runge-Kutta pair of orders 5(4), "rodas5p", a stiff method of
-        orders 5(4), and "auto", the default, which takes whichever is faster at each time.
+        orders 5(4), "auto", the default, which takes whichever is faster at each time, and takes
+        an explicit pair of your own as a `nlctl.native.Tableau`.
     rtol, atol : float, optional
         Tolerances of the integrator.
     evaluation_times : array_like of shape (k,), optional

@@ -85,7 +85,7 @@ def repeat_command(
         for name, value in start.items()
     ]
     options = [part for text in (*params, *states) for part in ("--set", text)]
-    return shlex.join(["nlctl", "check", example, "--horizon", f"{horizon:.17g}", *options])
+    return shlex.join(["nlctl", "check", example, "--until", f"{horizon:.17g}", *options])
 
 
 def worst_lines(found: Ledger) -> list[Line]:

@@ -100,6 +100,7 @@ def simulate(
     show_metrics(times, signals)
     if csv is not None:
         _write_csv(csv, times, signals)
+        print(csv)
     if plot is not None:
         from analysis.paper.figures import overview
 
@@ -111,7 +112,9 @@ def simulate(
 def check(
     loop: LoopArgument,
     set_: Set = None,
-    horizon: Annotated[float, typer.Option(help="Length of the runs in s.")] = 20.0,
+    horizon: Annotated[
+        float, typer.Option("--until", "--horizon", help="Horizon of the runs in s.")
+    ] = 20.0,
     ensemble: Annotated[
         int,
         typer.Option(

@@ -158,7 +158,7 @@ def _study(
     if result.complete:
         return result.verdict, page, EXIT_CODES.get(result.answer, 0)
     if study.suffix == ".toml":
-        print("nlctl: incomplete; the same command goes on", file=sys.stderr)
+        print("nlctl: incomplete; the same command resumes", file=sys.stderr)
     return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE
 
 

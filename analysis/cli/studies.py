@@ -183,7 +183,7 @@ def run_folder(study: Path) -> Path:
 def _told_how_to_go_on(
     study: Path, options: list[str], folder: Path, resume: bool, json: bool
 ) -> Iterator[None]:
-    """Print the command that goes on, where a run ends early and may be continued.
+    """Print the command that resumes, where a run ends early and may be continued.
 
     It resumes from the moment on at which the folder holds the study; before, it begins.
     """

@@ -17,7 +17,18 @@ REACH = 1.0  # margins beyond are drawn there
 
 
 def fault_margins(margin: pd.Series) -> Figure:
-    """Least margin that each fault leaves, with its name at the left."""
+    """Least margin that each fault leaves, with its name at the left.
+
+    Parameters
+    ----------
+    margin : pandas.Series
+        Least margin by the name of the fault.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure, ax = number_axes(margin.index)
     value = np.clip(np.nan_to_num(margin.to_numpy(dtype=float), nan=-REACH), -REACH, REACH)
     at, bad = np.arange(len(value)), violates(margin)
@@ -35,6 +46,11 @@ def fault_pairs(margin: pd.DataFrame) -> Figure:
     ----------
     margin : DataFrame
         Square and symmetric, with the names of the faults.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
     """
     count = len(margin)
     figure = Figure(figsize=(WIDTH, 2.2 + 0.22 * count), layout="constrained")

@@ -38,7 +38,18 @@ __all__ = [
 
 
 def burst(run: LongRun) -> Figure:
-    """A long run until its gain loses the sign: zeta and |e|, and the end of both, with r and u."""
+    """A long run until its gain loses the sign: zeta and |e|, and the end of both, with r and u.
+
+    Parameters
+    ----------
+    run : LongRun
+        A run that ends in a burst.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
     (whole, end), (error, signals) = figure.subplots(2, 2, sharex="col", width_ratios=(1.25, 1))
     time, s = run.time, run.signals
@@ -73,7 +84,7 @@ def burst(run: LongRun) -> Figure:
 
 
 def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) -> Figure:
-    """The paper in one picture: the output follows, and zeta creeps until the gain turns round.
+    """The paper in one picture: the output follows, and zeta drifts until N changes its sign.
 
     Parameters
     ----------
@@ -83,6 +94,11 @@ def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) 
         Output and reference.
     run : LongRun or None
         The same loop until its burst; without it only the output is drawn.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
     """
     figure = Figure(figsize=(WIDTH, 2.3 if run is None else 4.2), layout="constrained")
     axes = np.ravel(figure.subplots(1 if run is None else 2, 1))
@@ -121,7 +137,22 @@ def _drifting(ax: Axes, run: LongRun) -> None:
 
 
 def windowed_maximum(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi) -> np.ndarray:
-    """Return the largest value of y in each whole window, at the middle of the windows."""
+    """Return the largest value of y in each whole window, at the middle of the windows.
+
+    Parameters
+    ----------
+    time : ndarray of shape (m,)
+        Times (s).
+    y : ndarray of shape (m,)
+        Samples.
+    window : float, optional
+        Length of a window (s).
+
+    Returns
+    -------
+    ndarray of shape (2, k)
+        Middles of the windows (s), and the largest values.
+    """
     number = np.floor((time - time[0]) / window).astype(int)
     starts = np.flatnonzero(np.diff(number, prepend=-1))
     largest = np.maximum.reduceat(y, starts)
@@ -129,7 +160,18 @@ def windowed_maximum(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi)
 
 
 def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
-    """The Nussbaum argument of long runs that do not burst, and where it is foretold to stop."""
+    """The Nussbaum argument of long runs that do not burst, and where it is predicted to stop.
+
+    Parameters
+    ----------
+    runs : mapping
+        `LongRun` by the name of the loop.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure, (ax,) = stacked_axes()
     for (label, run), (colour, style) in zip(runs.items(), STYLES, strict=False):
         ax.plot(run.time, run.signals["zeta"], style, color=colour, linewidth=1.4, label=label)
@@ -143,7 +185,20 @@ def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
 
 
 def lyapunov_bound(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Figure:
-    """V over time against what bounds it; a bound that is infinite is named in the legend."""
+    """V over time against what bounds it; a bound that is infinite is named in the legend.
+
+    Parameters
+    ----------
+    t : ndarray of shape (m,)
+        Times (s).
+    curves : mapping
+        V and its bounds by name, each of shape (m,).
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure, (ax,) = stacked_axes()
     for (label, y), (colour, style) in zip(curves.items(), STYLES, strict=False):
         named = label if np.any(np.isfinite(y)) else f"{label}: infinite"
@@ -156,7 +211,18 @@ def lyapunov_bound(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Figure:
 
 
 def inequality_margins(margins: Sequence[Margin]) -> Figure:
-    """Margin of each inequality over time, one panel each; a dot where it is least."""
+    """Margin of each inequality over time, one panel each; a dot where it is least.
+
+    Parameters
+    ----------
+    margins : sequence of Margin
+        Those of inequalities, over the samples of one run.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure, axes = _panels(margins)
     for ax, margin in zip(axes, margins, strict=True):
         t, low = _least(margin.t, margin.margin)
@@ -172,7 +238,18 @@ def inequality_margins(margins: Sequence[Margin]) -> Figure:
 
 
 def equality_residuals(margins: Sequence[Margin]) -> Figure:
-    """Distance between the sides of each equation over its size, and the tolerance."""
+    """Distance between the sides of each equation over its size, and the tolerance.
+
+    Parameters
+    ----------
+    margins : sequence of Margin
+        Those of equations, over the samples of one run.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure, axes = _panels(margins, sharey=True)
     for ax, margin in zip(axes, margins, strict=True):
         t, low = _least(margin.t, margin.margin)
@@ -210,6 +287,16 @@ def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
 
     Kinds are "proved", "along this run" and "what happens"; numbers that are not finite are left
     out.
+
+    Parameters
+    ----------
+    values : mapping
+        Number and its kind by name.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
     """
     shown = {name: pair for name, pair in values.items() if np.isfinite(pair[0])}
     numbers = [number for number, _ in shown.values()]

@@ -17,7 +17,18 @@ __all__ = ["paired_differences", "screening", "set_apart", "shares", "violation_
 
 
 def screening(effects: pd.DataFrame) -> Figure:
-    """Mean magnitude of the effects of each quantity with its interval, and their deviation."""
+    """Mean magnitude of the effects of each quantity with its interval, and their deviation.
+
+    Parameters
+    ----------
+    effects : pandas.DataFrame
+        As `elementary_effects` returns it, a row for each quantity.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     effects = effects.sort_values("mu_star", ascending=False, kind="stable")
     figure, ax = number_axes(effects.index)
     _bar(ax, effects, ("mu_star", "low", "high"), BLUE, "$\\mu^*$, mean magnitude")
@@ -29,7 +40,18 @@ def screening(effects: pd.DataFrame) -> Figure:
 
 
 def shares(indices: pd.DataFrame) -> Figure:
-    """Shares of the variance: of each quantity by itself, and with all its interactions."""
+    """Shares of the variance: of each quantity by itself, and with all its interactions.
+
+    Parameters
+    ----------
+    indices : pandas.DataFrame
+        As `sobol_indices` returns them, a row for each quantity.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     indices = indices.sort_values("ST", ascending=False, kind="stable")
     figure, ax = number_axes(indices.index)
     _bar(ax, indices, ("S1", "S1_low", "S1_high"), BLUE, "$S_1$, by itself", -0.18)
@@ -40,7 +62,18 @@ def shares(indices: pd.DataFrame) -> Figure:
 
 
 def set_apart(table: pd.DataFrame) -> Figure:
-    """How far failing runs lie from passing ones in each quantity."""
+    """How far failing runs lie from passing ones in each quantity.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        A row for each quantity, with the column ``statistic``.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     table = table.sort_values("statistic", ascending=False, kind="stable")
     figure, ax = number_axes(table.index)
     ax.barh(np.arange(len(table)), table["statistic"], 0.6, color=BLUE)
@@ -49,7 +82,18 @@ def set_apart(table: pd.DataFrame) -> Figure:
 
 
 def violation_rates(ranking: pd.DataFrame) -> Figure:
-    """Share of violations of each option with its interval."""
+    """Share of violations of each option with its interval.
+
+    Parameters
+    ----------
+    ranking : pandas.DataFrame
+        A row for each option, with its rate and the interval.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure, ax = number_axes(ranking.index)
     _bar(ax, ranking, ("rate", "rate_low", "rate_high"), ORANGE, "", hatch="///")
     ax.set(xlabel="share of runs that violate the spec", xlim=(0.0, 1.02))
@@ -67,6 +111,11 @@ def paired_differences(table: pd.DataFrame, labels: Sequence[str], quantity: str
     labels : sequence of str
     quantity : str
         Name of the axis.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(labels)
     middle, low, high = (table[c].to_numpy() for c in ("median", "median_low", "median_high"))

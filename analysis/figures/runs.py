@@ -22,6 +22,7 @@ from .axes import (
     BLUE,
     GREY,
     ORANGE,
+    PURPLE,
     SHORT_LINE,
     STYLES,
     TIME,
@@ -60,7 +61,18 @@ def clipped_margins(values: object) -> np.ndarray:
 
 
 def margins_figure(values: np.ndarray) -> Figure:
-    """How many runs have which margin, and the share of runs with at most that margin."""
+    """How many runs have which margin, and the share of runs with at most that margin.
+
+    Parameters
+    ----------
+    values : ndarray of shape (runs,)
+        Margins; those of runs that ended early are drawn at the edge.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
     counts, part = figure.subplots(1, 2)
     y = clipped_margins(values)
@@ -105,6 +117,11 @@ def running_estimate(
         Of the claim.
     fixed : tuple of 2 floats, optional
         Exact bounds after the last run, which decide where the number of runs was fixed.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
     n = curve.index.to_numpy()
@@ -158,6 +175,11 @@ def fans(
         By signal, where they are known.
     groups : sequence of str, optional
         The kind of each run.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
     """
     figure, axes = stacked_axes(rows=len(signals), height=1.9 if len(signals) > 1 else 2.6)
     nodes = np.unique(np.linspace(0, time.size - 1, STRETCHES + 1).astype(int))
@@ -174,7 +196,7 @@ def fans(
                 ax.fill_between(
                     time[nodes], *band, color=BLUE, alpha=opacity, linewidth=0, label=inside
                 )
-        ax.plot(time, np.clip(worst[name], low, high), "--", color=ORANGE, label="worst run")
+        ax.plot(time, np.clip(worst[name], low, high), "--", color=PURPLE, label="worst run")
         ax.plot(time, np.clip(nominal[name], low, high), color=GREY, label="nominal")
         for value, start, end in own:
             ax.hlines(value, start, end, color=ORANGE, linewidth=1.6, alpha=0.8, label=LIMIT)
@@ -204,7 +226,18 @@ def _kinds(
 
 
 def most_frequent(groups: Sequence[str]) -> list[str]:
-    """Return the kinds of runs that `fans` shows: at most as many as there are line styles."""
+    """Return the kinds of runs that `fans` shows: at most as many as there are line styles.
+
+    Parameters
+    ----------
+    groups : sequence of str
+        The kind of each run.
+
+    Returns
+    -------
+    list of str
+        The most frequent first.
+    """
     return [name for name, _ in Counter(groups).most_common(len(STYLES))]
 
 
@@ -227,6 +260,20 @@ def quantile(samples: np.ndarray, part: float, missing: float) -> np.ndarray:
     """Return a quantile over the runs (axis 0), one of their values; NaN counts as `missing`.
 
     It is the next value outwards: upwards if `missing` is positive, otherwise downwards.
+
+    Parameters
+    ----------
+    samples : ndarray of shape (runs, ...)
+        One row for each run.
+    part : float
+        Of the runs, between 0 and 1.
+    missing : float
+        What NaN counts as; its sign says which way is outwards.
+
+    Returns
+    -------
+    ndarray of shape (...)
+        In the unit of the samples.
     """
     ordered = np.sort(np.where(np.isnan(samples), missing, samples), axis=0)
     place = part * (len(ordered) - 1)

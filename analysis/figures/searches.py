@@ -25,7 +25,20 @@ COLOURS = ListedColormap(colormaps["PuOr"](np.linspace(0.15, 0.85, 256)))  # MAP
 
 
 def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
-    """Lowest margin found after each run of a search, in the colour of what chose the run."""
+    """Lowest margin found after each run of a search, in the colour of what chose the run.
+
+    Parameters
+    ----------
+    lowest : ndarray of shape (runs,)
+        Lowest margin so far.
+    searchers : sequence of str
+        What chose each run.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure, (ax,) = stacked_axes()
     y, names = clipped_margins(lowest), np.asarray(searchers, dtype=object)
     starts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1), names.size]
@@ -52,6 +65,11 @@ def deviations(table: pd.DataFrame) -> Figure:
     table : DataFrame
         One row per quantity, one column per row of the study; 1 is the upper end of the box, -1
         the lower one.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(table.index)
     height = 0.7 / len(table.columns)
@@ -68,7 +86,22 @@ def deviations(table: pd.DataFrame) -> Figure:
 
 
 def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | None = None) -> Figure:
-    """Share of violations with its interval against the size of the uncertainty."""
+    """Share of violations with its interval against the size of the uncertainty.
+
+    Parameters
+    ----------
+    curve : pandas.DataFrame
+        Columns ``rate``, ``lower``, ``upper``, by the factor of the uncertainty.
+    at : float, optional
+        A factor to be marked.
+    limit : float, optional
+        A rate to be marked.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure, (ax,) = stacked_axes()
     size, rate = curve.index.to_numpy(dtype=float), curve["rate"].to_numpy()
     ax.errorbar(
@@ -85,7 +118,20 @@ def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | Non
 
 
 def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
-    """Lowest margin that was found at each size that was looked at, and the radius."""
+    """Lowest margin that was found at each size that was looked at, and the radius.
+
+    Parameters
+    ----------
+    steps : pandas.DataFrame
+        Sizes that were looked at, with the lowest margin at each.
+    radius : float
+        The robustness radius.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
     figure, (ax,) = stacked_axes()
     margin = clipped_margins(steps["margin"])
     violated = violates(margin)
@@ -128,6 +174,11 @@ def failure_map_figure(
     nominal : tuple of 2 floats, optional
     box : tuple of 2 pairs, optional
         What the study takes to be possible: ends of both quantities.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
     """
     figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
     ax = figure.subplots()

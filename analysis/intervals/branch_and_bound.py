@@ -2,7 +2,7 @@
 
 On a box X with centre m the range of a function is enclosed by its value on X, by the mean-value
 form f(m) + f'(X)(X - m), and by both.  Where a comparison inside the equation stays undecided,
-every branch is followed and the results are joined: no branch is ever picked.
+every branch is followed and the results are united: no branch is ever picked.
 
 What is proved is about the equation with its parameters as doubles; arithmetic between plain
 floats inside it (``2 * np.pi``) is rounded as in every run.
@@ -151,6 +151,11 @@ def prove(
         The claim.
     max_boxes : int, optional
         Number of boxes after which the rest counts as undecided.
+
+    Returns
+    -------
+    Proof
+        Proved, refuted at a point, or undecided.
 
     Raises
     ------

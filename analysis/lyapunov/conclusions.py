@@ -190,11 +190,11 @@ def _slow_drift_line(run: MemberRun) -> Line:
     statement = "the drift of zeta ends before N changes its sign"
     found = _slow_drift_or_reason(run)
     if isinstance(found, str):
-        return Line(key="creep", statement=statement, status="undecided", evidence=found)
-    calm = found.verdict in ("settles", "turned round")
+        return Line(key="slow drift", statement=statement, status="undecided", evidence=found)
+    calm = found.verdict in ("settles", "reversed")
     soon = f"; budget spent by {found.burst:.4g} s or so, then max |r| = {found.peak:.4g}"
     return Line(
-        key="creep",
+        key="slow drift",
         statement=statement,
         status="checked" if calm else "undecided",
         least=1 - found.share,

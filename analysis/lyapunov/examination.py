@@ -89,7 +89,7 @@ def examine(
     Parameters
     ----------
     loop : control.InterconnectedSystem
-        Of the blocks that `nlctl.paper.example_1` joins, with a Nussbaum law.
+        Of the blocks that `nlctl.paper.example_1` connects, with a Nussbaum law.
     run : float, control.TimeResponseData or sequence of them, optional
         Horizon (s), or responses of the loop, which are run again with what the proof needs.
     box : Box, optional

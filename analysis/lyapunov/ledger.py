@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 
 from nlctl.errors import UnknownKeywordError
+from nlctl.host.notebook import table_html
 from nlctl.names import unknown
 
 from ..json_values import as_json
@@ -118,6 +119,12 @@ class Ledger:
             allow_nan=False,
             indent=1,
         )
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: each line with its status."""
+        columns = ("line", "status", "statement", "least margin", "at (s)", "evidence")
+        rows = [(x.key, x.status, x.statement, x.least, x.time, x.evidence) for x in self.lines]
+        return table_html(str(self).splitlines()[0], columns, rows)
 
     def __str__(self) -> str:
         runs = "one run" if self.members == 1 else f"{self.members} runs"

@@ -31,7 +31,14 @@ from nlctl.references import BandLimitedNoise
 from ..metrics import tracking_metrics
 from .tuning import Tuned, tune
 
-__all__ = ["baselines", "compared_controllers", "sensor", "tuned"]
+__all__ = [
+    "baselines",
+    "compared_controllers",
+    "part_of",
+    "published_controller",
+    "sensor",
+    "tuned",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,8 +117,8 @@ def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
     UnknownNameError
         If there is no such example.
     """
-    published, gains = _published(example), GAINS[example]
-    beta = _part(published, "law").spec.beta
+    published, gains = published_controller(example), GAINS[example]
+    beta = part_of(published, "law").spec.beta
     laws = {
         "dead zone in zeta'": DeadZoneNussbaumLaw(beta=beta, r_0=gains.r_0),
         "leakage": LeakyNussbaumLaw(beta=beta),
@@ -123,7 +130,9 @@ def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
         **baselines(example),
         "certified": replaced(
             published,
-            weights=AdaptiveWeights(nodes=_part(published, "weights").spec.nodes, **gains.weights),
+            weights=AdaptiveWeights(
+                nodes=part_of(published, "weights").spec.nodes, **gains.weights
+            ),
             robust=RobustTerm(**gains.robust),
             law=KnownSignLaw(**gains.law),
         ),
@@ -138,7 +147,7 @@ def baselines(example: str) -> dict[str, Any]:
     paper's max |u| in the same noise.  They know the sign of the input gain and have gains made
     for this plant; the paper's controller has neither.
     """
-    surface, gains = _part(_published(example), "filtered_error").spec, GAINS[example]
+    surface, gains = part_of(published_controller(example), "filtered_error").spec, GAINS[example]
     return {
         "PID": PID(**gains.pid, u_max=100.0),
         "sliding mode": sliding_mode(surface, SlidingModeLaw(**gains.sliding)),
@@ -147,7 +156,7 @@ def baselines(example: str) -> dict[str, Any]:
 
 def sensor(example: str, rms: float = 0.01, seed: int = 0) -> BandLimitedNoise:
     """Return measurement noise on all states of an example, 0 to 50 rad/s."""
-    states = _part(_build(example)(), "plant").spec.states
+    states = part_of(_build(example)(), "plant").spec.states
     return BandLimitedNoise(
         takes=states, delivers=tuple(f"{x}_measured" for x in states), rms=rms, seed=seed
     )
@@ -169,7 +178,7 @@ def tuned(example: str, *, generations: int = 40, seed: int = 0) -> dict[str, Tu
     by_key = {m.key: m for m in tracking_metrics(start=10, band=0.15, weights="", gain="")}
     cost, limited = by_key["iae"], by_key["peak_u"]
     published = compiled_loop(build(sensor=sensor(example)))
-    own = {"law.beta": np.array([_part(_published(example), "law").spec.beta])}
+    own = {"law.beta": np.array([part_of(published_controller(example), "law").spec.beta])}
     row = ensemble_response(published, times, params=own, metrics=(limited,)).table.iloc[0]
     limit = float(row[limited.key])
     bounds = {
@@ -194,10 +203,11 @@ def _build(example: str) -> Callable[..., ct.InterconnectedSystem]:
     return paper.EXAMPLES[example]
 
 
-def _published(example: str) -> ct.InterconnectedSystem:
+def published_controller(example: str) -> ct.InterconnectedSystem:
     """Return the paper's controller of an example."""
-    return _part(_build(example)(), "controller")
+    return part_of(_build(example)(), "controller")
 
 
-def _part(diagram: ct.InterconnectedSystem, name: str) -> Any:
+def part_of(diagram: ct.InterconnectedSystem, name: str) -> Any:
+    """Return the system of that name in a diagram."""
     return diagram.syslist[diagram.syslist_index[name]]

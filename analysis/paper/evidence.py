@@ -138,9 +138,9 @@ def known_sign(loop: ct.InterconnectedSystem) -> ct.InterconnectedSystem:
 
 @contextmanager
 def far_runs_in_background(*, whole: bool = False) -> Iterator[Future[dict[str, LongRun]]]:
-    """Run `FAR_HORIZONS` in a thread while the body goes on; an early exit ends the runs.
+    """Run `FAR_HORIZONS` in a thread while the body continues; an early exit ends the runs.
 
-    Example 2 is run as far as its burst is foretold from, and goes on with the record of
+    Example 2 is run as far as its burst is predicted from, and continues the record of
     `analysis.paper.reference_run`; with `whole` it is run to its burst, which takes minutes.
     """
     stop = Event()

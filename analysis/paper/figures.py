@@ -3,26 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from nlctl.functions import nussbaum
 
-from ..figures.axes import BLUE, GREY, TIME, draw_lines, set_style, stacked_axes
+from ..figures.axes import (
+    BLUE,
+    GREY,
+    STYLES,
+    TIME,
+    draw_lines,
+    legend_above,
+    set_style,
+    stacked_axes,
+)
 from . import TAIL, CaseRun
 
 __all__ = [
+    "SAMPLED_CONTROLLERS",
     "actuator_path",
     "adaptation",
     "control_input",
     "error_comparison",
     "nussbaum_gain",
     "overview",
+    "sampling_errors",
     "tracking",
     "tracking_error",
     "upper_states",
 ]
+
+
+SAMPLED_CONTROLLERS = (
+    "paper",
+    "sliding mode",
+    "PID",
+    "certified",
+)  # of the controllers on computers
 
 
 def _one(time: np.ndarray, curves: Mapping[str, np.ndarray], label: str) -> Figure:
@@ -115,4 +136,35 @@ def overview(time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Figure:
     top.set(ylabel="output, error")
     middle.set(ylabel="input")
     bottom.set(xlabel=TIME, ylabel="$\\zeta$, $\\hat\\delta$")
+    return figure
+
+
+def sampling_errors(record: pd.DataFrame, titles: Mapping[str, str], band: float) -> Figure:
+    """Largest late errors against the sampling time, a panel for each example.
+
+    Parameters
+    ----------
+    record : pandas.DataFrame
+        Of `analysis.paper.sampling_limits`.
+    titles : mapping of str to str
+        Of the examples.
+    band : float
+        What is asked of the error.
+    """
+    figure, axes = stacked_axes(rows=len(titles), height=2.2)
+    shown: dict[str, object] = {}
+    for ax, (example, title) in zip(axes, titles.items(), strict=True):
+        part: Any = record[(record["example"] == example) & (record["quantity"] == "dt")]
+        for label, (colour, style) in zip(SAMPLED_CONTROLLERS, STYLES, strict=True):
+            line = part[part["controller"] == label].sort_values("value")
+            good = line["error"].notna().to_numpy()
+            last = int(np.argmin(good)) if not good.all() else good.size
+            x, y = 1e3 * line["value"].to_numpy()[:last], line["error"].to_numpy()[:last]
+            (shown[label],) = ax.plot(x, y, style, color=colour, linewidth=1.4)
+            if 0 < last < good.size:
+                ax.plot(x[-1:], y[-1:], "x", color=colour, markersize=7)
+        ax.axhline(band, color=GREY, linewidth=0.9)
+        ax.set(xscale="log", yscale="log", ylim=(5e-3, 10), ylabel=f"{title}: $|y - y_d|$")
+    axes[-1].set(xlabel="sampling time (ms)")
+    legend_above(axes[0], shown)
     return figure

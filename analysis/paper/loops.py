@@ -15,10 +15,11 @@ from nlctl import paper
 from nlctl.actuators import Backlash, DeadZone, Gain, Saturation, cascade
 from nlctl.diagrams import interconnect
 from nlctl.names import unknown
+from nlctl.sampling import sampled
 
 from .controllers import compared_controllers, sensor
 
-__all__ = ["example_1", "example_2", "true_error"]
+__all__ = ["example_1", "example_2", "on_a_computer", "true_error"]
 
 _WIDE = 1e6  # a saturation beyond every |u| of a run that is worth keeping
 
@@ -95,17 +96,53 @@ def true_error(example: str = "example_1") -> ct.InterconnectedSystem:
     return interconnect([paper.EXAMPLES[example](), difference])
 
 
+def on_a_computer(
+    example: str = "example_1", *, controller: Any = "paper", waiting: int = 20
+) -> ct.InterconnectedSystem:
+    """An example whose controller is a program, every 2 ms by Euler's method, 1 ms late.
+
+    What may be varied are ``sampling.dt``, ``sampling.delay``, ``sampling.jitter``, and, from 0 on,
+    ``sampling.input_quantum`` and ``sampling.output_quantum``.
+
+    Parameters
+    ----------
+    example : {"example_1", "example_2"}, optional
+    controller : str, record or control.InputOutputSystem, optional
+        A label of `controllers.compared_controllers`, or a controller.
+    waiting : int, optional
+        How many sampling times the delay may take at most.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such example or controller.
+    """
+    if example not in paper.EXAMPLES:
+        raise unknown("example", example, paper.EXAMPLES)
+    program = sampled(
+        _controller(example, controller), 0.002, method="euler", delay=0.001, waiting=waiting,
+        input_quantum=0.0, output_quantum=0.0,
+    )  # fmt: skip
+    difference = ct.summing_junction(["y", "-yd"], "error", name="difference")
+    return interconnect([paper.EXAMPLES[example](controller=program), difference])
+
+
+def _controller(example: str, controller: Any) -> Any:
+    """Return the controller of a label; others as they are."""
+    if not isinstance(controller, str):
+        return controller
+    known = compared_controllers(example)
+    if controller not in known:
+        raise unknown("controller", controller, known)
+    return known[controller]
+
+
 def _loop(
     example: str, body: Any, controller: Any, gain: float, limit: float, noise: float | None
 ) -> ct.InterconnectedSystem:
-    if isinstance(controller, str):
-        known = compared_controllers(example)
-        if controller not in known:
-            raise unknown("controller", controller, known)
-        controller = known[controller]
     stages = {"saturation": Saturation(limit=limit), "gain": Gain(k=gain), "body": body}
     return paper.EXAMPLES[example](
-        controller=controller,
+        controller=_controller(example, controller),
         actuator=cascade(stages),
         sensor=None if noise is None else sensor(example, noise),
     )

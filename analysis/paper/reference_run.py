@@ -85,7 +85,7 @@ def read_record(beginning: LongRun, path: Path = RECORD) -> LongRun:
 
 
 def continued(beginning: LongRun, record: LongRun) -> LongRun:
-    """Return a run that goes on with the record where it ends.
+    """Return a run that continues the record where it ends.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def continued(beginning: LongRun, record: LongRun) -> LongRun:
 
 
 def _main() -> None:
-    """Make the record again, the two runs side by side."""
+    """Make the record again, the two runs at the same time."""
     from nlctl import paper
 
     from ..lyapunov.nussbaum.long_run import long_run

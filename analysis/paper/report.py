@@ -34,6 +34,7 @@ from .page.report import paper_report, paper_sections
 from .page.text import PUBLISHED
 from .reproduction import CaseRun, checks, run_all
 from .reproduction import compile_cases_ahead as compile_cases
+from .sampling_limits import checked_record
 
 __all__ = [
     "QUICK",
@@ -204,7 +205,7 @@ def compose(
             advance(1)
             sections = paper_sections(runs, proofs=found, far=far_away)
             drawn = draw_ahead(sections, until=waiting[-1].done)
-            *_, numbers = (task.result() for task in (*ahead, *waiting))
+            *_, record, numbers = (task.result() for task in (*ahead, *waiting))
             advance(1)
     folders = [folder / name for name in studies]
     made = paper_report(
@@ -214,6 +215,7 @@ def compose(
         sections=sections,
         studies=robustness(folders, threads=threads, tell=tell) if folders else (),
         numerics=numbers,
+        sampling=record,
     )
     return Composed(report=made, drawn=drawn, passed=all(c.passed for c in checks(runs)))
 
@@ -242,7 +244,7 @@ def _proved(horizon: float, watch: ProgressWatch) -> dict[int, proofs.Evidence]:
 
 @contextmanager
 def _far_away(far: bool, whole: bool) -> Iterator[Future[dict[str, LongRun]]]:
-    """Run the loops far beyond 20 s while the body goes on, or nothing."""
+    """Run the loops far beyond 20 s while the body continues, or nothing."""
     if far:
         with proofs.far_runs_in_background(whole=whole) as long_runs:
             yield long_runs
@@ -259,12 +261,17 @@ def _runs(
 ) -> tuple[dict[str, CaseRun], list[Future[Any]]]:
     """Run the paper's cases; return them, and what runs in the other process meanwhile.
 
-    That is the studies, and last the numerics.  Both processes need the integrators: where nothing
-    is compiled yet only this one compiles them, while the other does what needs none.
+    That is the studies, lines of the record on sampling, and last the numerics.  Both processes
+    need the integrators: where nothing is compiled yet only this one compiles them, while the
+    other does what needs none.
     """
     with watch("simulating", len(CASES)) as advance:
         runs = run_all(CASES[:1], done=lambda _: advance(1))
-        waiting = [beside.submit(_run_shipped, studies, folder, threads), beside.submit(numerics)]
+        waiting = [
+            beside.submit(_run_shipped, studies, folder, threads),
+            beside.submit(checked_record),
+            beside.submit(numerics),
+        ]
         runs |= run_all(CASES[1:], done=lambda _: advance(1))  # machine code: in this process
     return runs, waiting
 

@@ -38,7 +38,13 @@ class Expectation:
 
 
 def expectations() -> list[Expectation]:
-    """Read the figures to reach; no tolerance is below half a unit of the last printed digit."""
+    """Read the figures to reach; no tolerance is below half a unit of the last printed digit.
+
+    Returns
+    -------
+    list of Expectation
+        As independent computations have found them.
+    """
     text = files("analysis.paper").joinpath("expected.csv").read_text(encoding="utf-8")
     return [
         Expectation(
@@ -88,6 +94,16 @@ def sample_times(horizon: float = HORIZON) -> np.ndarray:
     """Return output times (s): 0.2 ms apart in the first half second, then 5 ms.
 
     The largest control input is a peak of a few milliseconds in the first half second.
+
+    Parameters
+    ----------
+    horizon : float, optional
+        End (s).
+
+    Returns
+    -------
+    ndarray of shape (m,)
+        From 0 to the horizon (s).
     """
     early = np.linspace(0, 0.5, 2501)
     return np.concatenate(
@@ -99,6 +115,15 @@ def run_case(case: Case) -> CaseRun:
     """Simulate a case over the paper's horizon, its diagram compiled to machine code.
 
     The tests compare the published cases with plain python-control.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    CaseRun
+        Signals over the paper's horizon, and metrics.
 
     Raises
     ------
@@ -112,7 +137,20 @@ def run_case(case: Case) -> CaseRun:
 
 
 def measured(case: Case, time: np.ndarray, signals: Mapping[str, np.ndarray]) -> CaseRun:
-    """Return a run with its metrics, whatever simulated it."""
+    """Return a run with its metrics, whatever simulated it.
+
+    Parameters
+    ----------
+    case : Case
+    time : ndarray of shape (m,)
+        Times (s).
+    signals : mapping
+        Samples of shape (m,) by name.
+
+    Returns
+    -------
+    CaseRun
+    """
     metrics = {m.key: m.function(*over(time, signals[m.signal], m.start, m.end)) for m in METRICS}
     return CaseRun(case=case, time=time, signals=signals, metrics=metrics)
 
@@ -123,6 +161,16 @@ def run_all(
     """Simulate cases and return them by key, in order.
 
     `done` is called with each case when it is finished.
+
+    Parameters
+    ----------
+    cases : iterable of Case
+    done : callable, optional
+        See above.
+
+    Returns
+    -------
+    dict of str to CaseRun
     """
     results = {}
     for case in cases:
@@ -133,13 +181,28 @@ def run_all(
 
 
 def compile_cases_ahead(cases: Iterable[Case]) -> None:
-    """Compile the diagrams of cases, which otherwise happens when they are run."""
+    """Compile the diagrams of cases, which otherwise happens when they are run.
+
+    Parameters
+    ----------
+    cases : iterable of Case
+    """
     for case in cases:
         native.compile_ahead(compile(case.diagram))
 
 
 def checks(runs: Mapping[str, CaseRun]) -> list[Check]:
-    """Compare runs with the figures to reach; cases that were not run are left out."""
+    """Compare runs with the figures to reach; cases that were not run are left out.
+
+    Parameters
+    ----------
+    runs : mapping
+        `CaseRun` by the key of the case, as `run_all` returns them.
+
+    Returns
+    -------
+    list of Check
+    """
     by_key = {m.key: m for m in METRICS}
     return [
         Check(

@@ -13,7 +13,7 @@ from nlctl.native import Compiled, ensemble_response
 
 from ..metrics import Metric
 
-__all__ = ["Tuned", "tune"]
+__all__ = ["Tuned", "split_samples", "tune"]
 
 _REFUSED = 1e6  # cost of gains that break the limit, beyond every cost that a run can have
 LOST = 1e3  # what counts as the excess of a run that did not reach its end
@@ -50,8 +50,11 @@ def tune(
     generations: int = 40,
     max_steps: int = 10_000,
     seed: int = 0,
+    samples: Mapping[str, np.ndarray] | None = None,
 ) -> Tuned:
     """Search the gains with the least cost that keep another metric within its limit.
+
+    Of several samples the mean cost counts, and the largest value of the limited metric.
 
     By differential evolution (scipy.optimize.differential_evolution) over the logarithms of the
     gains; each generation is one ensemble.
@@ -71,6 +74,9 @@ def tune(
     max_steps : int, optional
         Steps of a simulation beyond which gains are refused as too stiff.
     seed : int, optional
+    samples : mapping, optional
+        ``{qualified name: values}`` of parameters and, as ``"plant.x1(0)"``, initial states, all of
+        equal length; every candidate is run with each sample.  By default the loop as it is.
 
     Raises
     ------
@@ -81,17 +87,27 @@ def tune(
     for name, (low, high) in bounds.items():
         if not 0 < low < high:
             raise ParameterError(f"tune needs 0 < low < high for '{name}', got {low:g}, {high:g}")
-    runs = 0
+    runs, start, params = 0, *split_samples(samples or {})
+    size = max([np.size(values) for values in (*start.values(), *params.values())], default=1)
+
+    def outcomes(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean cost and largest limited metric of candidates of shape (gains, candidates)."""
+        nonlocal runs
+        gains = dict(zip(names, np.repeat(np.exp(points), size, axis=1), strict=True))
+        times = points.shape[1]
+        table = ensemble_response(
+            loop, timepts, 0.0, {key: np.tile(x0, times) for key, x0 in start.items()},
+            params=gains | {key: np.tile(value, times) for key, value in params.items()},
+            metrics=(cost, limited), max_steps=max_steps,
+        ).table  # fmt: skip
+        runs += len(table)
+        numbers = table[[cost.key, limited.key]].to_numpy().reshape(times, size, 2)
+        return numbers[..., 0].mean(axis=1), numbers[..., 1].max(axis=1)
 
     def costs(points: np.ndarray) -> np.ndarray:
-        nonlocal runs
-        gains = dict(zip(names, np.exp(points), strict=True))
-        table = ensemble_response(
-            loop, timepts, params=gains, metrics=(cost, limited), max_steps=max_steps
-        ).table
-        runs += len(table)
-        excess = np.fmin(np.maximum(table[limited.key].to_numpy() / limit - 1, 0), LOST)
-        return np.where(excess > 0, _REFUSED * (1 + excess), table[cost.key].to_numpy())
+        mean, largest = outcomes(points)
+        excess = np.fmin(np.maximum(largest / limit - 1, 0), LOST)
+        return np.where(excess > 0, _REFUSED * (1 + excess), mean)
 
     found = differential_evolution(
         costs, np.log(np.array(list(bounds.values()))), maxiter=generations, popsize=10, tol=1e-6,
@@ -102,6 +118,13 @@ def tune(
             f"no gains keep {limited.key} <= {limit:g} within these bounds: widen them"
         )
     gains = {name: float(value) for name, value in zip(names, np.exp(found.x), strict=True)}
-    one = {name: np.array([value]) for name, value in gains.items()}
-    last = ensemble_response(loop, timepts, params=one, metrics=(limited,)).table[limited.key]
-    return Tuned(gains=gains, cost=float(found.fun), limited=float(last.to_numpy()[0]), runs=runs)
+    largest = outcomes(found.x[:, None])[1]
+    return Tuned(gains=gains, cost=float(found.fun), limited=float(largest[0]), runs=runs)
+
+
+def split_samples(
+    samples: Mapping[str, np.ndarray],
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Return initial states and parameters of samples, for `nlctl.ensemble_response`."""
+    start = {k.removesuffix("(0)"): v for k, v in samples.items() if k.endswith("(0)")}
+    return start, {k: v for k, v in samples.items() if not k.endswith("(0)")}

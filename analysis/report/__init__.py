@@ -4,7 +4,7 @@ from .browser import write_pdf
 from .compare import compare_contents
 from .document import Claim, Equation, Figure, History, Paragraph, Report, Section, Table
 from .gallery import write_gallery
-from .render import file_hashes, render_html, render_json, write_report
+from .render import file_hashes, framed, render_html, render_json, write_report
 
 __all__ = [
     "Claim",
@@ -17,6 +17,7 @@ __all__ = [
     "Table",
     "compare_contents",
     "file_hashes",
+    "framed",
     "render_html",
     "render_json",
     "write_gallery",

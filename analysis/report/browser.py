@@ -54,6 +54,11 @@ def write_pdf(page: str | os.PathLike[str], path: str | os.PathLike[str]) -> Pat
     path : path
         The PDF; an older one is replaced in one step.
 
+    Returns
+    -------
+    pathlib.Path
+        Of the PDF.
+
     Raises
     ------
     UsageError

@@ -192,7 +192,7 @@ class Report:
     claims : sequence of Claim
     sections : sequence of Section
     command : str
-        Command that makes the report again.
+        Command that makes the report again; empty where there is none.
     provenance : mapping
         Versions of what made it.
     inputs : mapping
@@ -208,6 +208,9 @@ class Report:
         What was asked; it stands before the verdict.
     lead : Figure, optional
         The picture beside the verdict that tells the story.
+    author, revision, date : str
+        Below the title; on paper the first page is then a title page.  They are only what is
+        given: a report that is made twice is the same to the byte.
     """
 
     title: str
@@ -224,6 +227,9 @@ class Report:
     files: Mapping[str, str] = field(default_factory=dict)
     question: str = ""
     lead: Figure | None = None
+    author: str = ""
+    revision: str = ""
+    date: str = ""
 
 
 PACKAGES = ("nlctl", "control", "numpy", "scipy", "pandas", "numba", "matplotlib")

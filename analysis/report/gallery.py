@@ -79,6 +79,11 @@ def write_gallery(folder: str | os.PathLike[str], *, force: bool = False) -> Pat
     force : bool, optional
         Whether an ``index.html`` is replaced that is no gallery.
 
+    Returns
+    -------
+    pathlib.Path
+        Of the page.
+
     Raises
     ------
     UsageError

@@ -36,7 +36,8 @@ __all__ = [
 SHELL = frozenset(
     ["claims", "contents", "provenance", "files", "lead", "lead-title", "lead-desc"]
 )  # anchors of the page itself
-_LONG = 32  # characters of a word that must be broken to fit a column
+_LONG = 36  # characters of a word that must be broken to fit a column
+_NOT_FINITE = {"nan": "NaN", "inf": "∞", "-inf": "−∞"}
 _SHORT = 24  # characters of a text that stays on one line
 
 # Statuses by the look of their badge.  What is proved never looks like what is sampled.
@@ -178,9 +179,8 @@ def is_short(text: str) -> bool:
 
 def _shown(value: Any) -> str:
     """Return a cell's text: numbers with the digits that a reader can use."""
-    if isinstance(value, float | np.floating):
-        return f"{value:.6g}"
-    return "" if value is None else str(value)
+    text = f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
+    return "" if value is None else _NOT_FINITE.get(text, text)
 
 
 def sort_key(value: Any) -> str:

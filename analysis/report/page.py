@@ -129,9 +129,9 @@ def check_report_folder(folder: str | os.PathLike[str]) -> None:
     folder = Path(folder)
     page, content, print_ = (folder / n for n in ("index.html", "report.json", "report.pdf"))
     is_own = _maker(page) == generator("report.html")
-    foreign = [p for p, own in ((page, is_own), (content, _is_report(content))) if not own]
-    foreign += [] if is_own else [print_]
-    _refuse([path for path in foreign if path.exists()], "take another folder with --out")
+    others = [p for p, own in ((page, is_own), (content, _is_report(content))) if not own]
+    others += [] if is_own else [print_]
+    _refuse([path for path in others if path.exists()], "take another folder with --out")
 
 
 def check_gallery_folder(folder: str | os.PathLike[str]) -> None:
@@ -147,10 +147,10 @@ def check_gallery_folder(folder: str | os.PathLike[str]) -> None:
         _refuse([page], "move it away")
 
 
-def _refuse(foreign: Sequence[Path], remedy: str) -> None:
-    if foreign:
+def _refuse(others: Sequence[Path], remedy: str) -> None:
+    if others:
         raise UsageError(
-            f"'{foreign[0]}' would be replaced, and this command has not made it: {remedy}, or "
+            f"'{others[0]}' would be replaced, and this command has not made it: {remedy}, or "
             "replace it with --force"
         )
 

@@ -9,10 +9,12 @@ outside.
 from __future__ import annotations
 
 import hashlib
+import html
 import json
 import os
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +26,9 @@ from .history import chart
 from .outline import evidence_anchors, kind, meanings, place_anchors, summary
 from .page import check_report_folder, fill, to_bytes, write_files
 from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
+from .typography import plain_text
 
-__all__ = ["file_hashes", "render_html", "render_json", "write_report"]
+__all__ = ["Framed", "file_hashes", "framed", "render_html", "render_json", "write_report"]
 
 DRAWN = ("figure", "time", "signals")  # curves are on the page only
 _TITLES = {
@@ -54,6 +57,11 @@ def render_html(
         Processes that help with drawing the figures.
     drawn : mapping, optional
         Figures that are drawn already, see `analysis.report.svg.draw_ahead`.
+
+    Returns
+    -------
+    str
+        The page.
     """
     placed = place_anchors(report)
     light, told = summary(report.claims)
@@ -77,6 +85,7 @@ def render_html(
         interactive=bool(charts),
         charts=charts,
         report=report,
+        byline=_byline(report),
         placed=placed,
         drawings=drawings,
         shapes=shapes_svg(shapes),
@@ -95,16 +104,35 @@ def render_html(
     )
 
 
+def _byline(report: Report) -> str:
+    """Return what stands below the title: who, which revision, when."""
+    revision = f"Revision {report.revision}" if report.revision else ""
+    return ", ".join(filter(None, (report.author, revision, report.date)))
+
+
 def _pairs(caption: str, columns: tuple[str, str], values: Mapping[str, str]) -> Table:
     return Table(caption=caption, columns=columns, rows=list(values.items()))
 
 
 def render_json(report: Report) -> str:
-    """Return every number and table of the report as JSON."""
+    """Return every number and table of the report as JSON.
+
+    Parameters
+    ----------
+    report : Report
+
+    Returns
+    -------
+    str
+        JSON; numbers that are not finite are text.
+    """
     content = {
         "title": report.title,
         "question": report.question,
         "verdict": report.verdict,
+        "author": report.author,
+        "revision": report.revision,
+        "date": report.date,
         "lead": None if report.lead is None else _plain(report.lead),
         "claims": [vars(claim) for claim in report.claims],
         "sections": {
@@ -174,8 +202,58 @@ def write_report(
     return folder / "index.html"
 
 
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Framed:
+    """A page in a frame; a notebook shows it.
+
+    Attributes
+    ----------
+    title : str
+    page : str
+        HTML.
+    """
+
+    title: str
+    page: str
+
+    def __repr__(self) -> str:
+        return f"report '{self.title}', {len(self.page) / 1000:.0f} kB"
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe title="{html.escape(self.title)}" sandbox="allow-scripts" '
+            f'srcdoc="{html.escape(self.page)}" style="width:100%;height:40rem;border:0"></iframe>'
+        )
+
+
+def framed(report: Report) -> Framed:
+    """Return a report as a notebook shows it: the whole page, in a frame.
+
+    The page's content policy holds inside of the frame, and its script reaches nothing outside.
+
+    Parameters
+    ----------
+    report : Report
+
+    Returns
+    -------
+    Framed
+    """
+    return Framed(title=plain_text(report.title), page=render_html(report))
+
+
 def file_hashes(paths: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     """Return name and SHA-256 of data files, for `Report.files`.
+
+    Parameters
+    ----------
+    paths : iterable of path
+        Data files.
+
+    Returns
+    -------
+    dict of str to str
+        Hexadecimal digests by file name.
 
     Raises
     ------

@@ -32,6 +32,7 @@ _UNIT = re.compile(
 )
 _TAIL = re.compile(r"[,.;:)\]]+")
 _RELATED = re.compile(r"(?<=[=<>≤≥±≈]) (?=[−+]?[\d∞])")
+_SYMBOL = re.compile(rf"(?<!\S)(\(?[^\W\d]\S{{0,19}}|\|\S{{1,12}}\|) (?=[=<>≤≥±≈]{NO_BREAK})")
 _PER_CENT = re.compile(r"(?<=\d)(?=%(?![\w%]))")
 _NUMBERED = re.compile(r"\b(Example|Lemma|row|size) (?=\d)")
 _SLASH = re.compile(rf"(?<=\d{NO_BREAK}/) (?=[A-Za-z])")
@@ -51,7 +52,7 @@ def in_print(text: str) -> str:
     """Return plain text with the signs of print; what is no number, power or unit stays.
 
     1e-06 becomes 10⁻⁶, 1/s^4 becomes 1/s⁴, -0.5 has a minus sign, and the spaces of 10 s,
-    99 %, = 3 and Example 1 do not break.
+    99 %, t = 3 and Example 1 do not break.
     """
     text = _POWER_OF_TEN.sub(_scientific, text)
     text = _POWER.sub(lambda found: found[1].translate(RAISED), text)
@@ -62,6 +63,7 @@ def in_print(text: str) -> str:
     text = _SLASH.sub(NO_BREAK, text)
     text = _PER_CENT.sub(NO_BREAK, text)
     text = _RELATED.sub(NO_BREAK, text)
+    text = _SYMBOL.sub(rf"\1{NO_BREAK}", text)
     return _NUMBERED.sub(rf"\1{NO_BREAK}", text)
 
 

@@ -1,4 +1,4 @@
-"""Study files: what is uncertain, what is asked, and everything joined to answer it."""
+"""Study files: what is uncertain, what is asked, and everything connected to answer it."""
 
 from .file.errors import Problem, StudyError
 from .file.parse import StudyFile, read_study

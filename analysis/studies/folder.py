@@ -195,6 +195,11 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
     trust : bool, optional
         As in `read_study`.
 
+    Returns
+    -------
+    Result
+        Rows, and the analyses that are finished.
+
     Raises
     ------
     RunFolderError
@@ -269,6 +274,16 @@ def _space(study: Study, quantities: pd.DataFrame) -> Space:
 def origin_differences(first: Path, second: Path) -> str:
     """Return in words what two runs were computed from that differs; nothing if nothing does.
 
+    Parameters
+    ----------
+    first, second : pathlib.Path
+        Run folders.
+
+    Returns
+    -------
+    str
+        Sentences, or nothing.
+
     Raises
     ------
     RunFolderError
@@ -281,6 +296,16 @@ def origin_differences(first: Path, second: Path) -> str:
 
 def run_differences(first: Path, second: Path) -> list[str]:
     """Return what differs between what two runs have found, one text for each number.
+
+    Parameters
+    ----------
+    first, second : pathlib.Path
+        Run folders.
+
+    Returns
+    -------
+    list of str
+        Empty if nothing differs.
 
     Raises
     ------

@@ -312,6 +312,10 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
     **parts
         Other fields of `Finding`: ``runs``, ``numbers``, ``tables``, and ``answer`` and ``needs``
         where `asked` claims something.
+
+    Returns
+    -------
+    Finding
     """
     parts = {"claim": asked.claim} | parts
     return Finding(key="", kind=asked.kind, title="", sentence=sentence, **parts)

@@ -21,6 +21,7 @@ from .kind import Setup
 
 __all__ = [
     "compared_differences",
+    "diagram_differences",
     "loop_differences",
     "origin_of",
     "plain_study",
@@ -78,6 +79,21 @@ def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared
         "values": {name: loop_values(system, end) for name, system in names.items()},
     }
     return _listed(list(dict.fromkeys(_diagrams(before, from_json(as_json(now))))))
+
+
+def diagram_differences(origin: Mapping[str, Any], diagram: Any) -> str:
+    """Return in words how a diagram differs from those of a record; nothing if it is one of them.
+
+    Parameters
+    ----------
+    origin : mapping
+        Of `origin_of`.
+    diagram : control.InputOutputSystem
+        With the values that it has by itself.
+    """
+    now = from_json(as_json(loop_facts(diagram)))
+    found = [list(_parts(before, now)) for before in origin["diagrams"].values()]
+    return _listed(min(found, key=len, default=["the study kept no record of its loop"]))
 
 
 def plain_study(study: Study) -> dict[str, Any]:

@@ -53,6 +53,18 @@ class Plan:
 def plan(file: StudyFile, threads: int | None = None) -> Plan:
     """Count the runs of a study, and time a few of them.
 
+    Parameters
+    ----------
+    file : StudyFile
+        As `read_study` returns it.
+    threads : int, optional
+        On which it would run; all cores by default.
+
+    Returns
+    -------
+    Plan
+        Numbers of runs, and the expected time (s) and disk (bytes).
+
     Raises
     ------
     UsageError

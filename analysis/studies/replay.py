@@ -90,6 +90,11 @@ def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Re
     trust : bool, optional
         As in `read_study`.
 
+    Returns
+    -------
+    Replay
+        What came out now beside the row of the folder, and what differs.
+
     Raises
     ------
     RunFolderError, StudyError
@@ -158,6 +163,16 @@ def replay_figure(made: Replay) -> Figure:
     """Draw the signals that requirements look at, with their bounds, above the other outputs.
 
     The bounds are drawn over the whole time; when they count, the titles say.
+
+    Parameters
+    ----------
+    made : Replay
+        As `replay` returns it.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
     """
     bounds: dict[str, set[float]] = {}
     texts: dict[str, list[str]] = {}

@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.robustness.runs.sweep import Sweep
+from nlctl.host.notebook import table_html
 from nlctl.names import unknown
 
 from .file.schema import Study, keyed
@@ -108,6 +109,12 @@ class Result:
             if these:
                 told.append(f"{len(these)} of {count} claims {verb} {answer}: {', '.join(names)}.")
         return " ".join(told)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the verdict, and what each analysis found."""
+        rows = [(f.key, f.claim, f.answer, f.sentence) for f in self.findings]
+        heading = f"{self.study.study.title}\n{self.verdict}"
+        return table_html(heading, ("analysis", "claim", "answer", "found"), rows)
 
     def __getitem__(self, key: str) -> Finding:
         """Return the finding with this key.

@@ -78,7 +78,7 @@ def run(
 ) -> Result:
     """Run a study and keep everything in a folder.
 
-    What is done is kept: after Ctrl-C, a kill or a full disk, ``resume=True`` goes on from there
+    What is done is kept: after Ctrl-C, a kill or a full disk, ``resume=True`` resumes from there
     and ends with the same results, bit for bit (the column ``wall_time`` aside).
 
     Parameters
@@ -289,7 +289,7 @@ def _refuse_another_loop(folder: Path, before: Mapping[str, Any], now: Mapping[s
 
 
 def rerun_file(folder: Path, *, trust: bool = False) -> StudyFile:
-    """Return the study of a run folder, held against the loop of today; see `reopened`.
+    """Return the study of a run folder, validated against the loop of today; see `reopened`.
 
     Raises
     ------

@@ -29,7 +29,9 @@ def visit_block(self, node):
 
     latex = node.astext()
     markup = _checked(mathml(Equation(latex=latex)), latex, node)
-    self.body.append(f'<div class="formula">{markup}</div>\n')
+    self.body.append(
+        f'<div class="formula" tabindex="0" role="group" aria-label="formula">{markup}</div>\n'
+    )
     raise SkipNode
 
 

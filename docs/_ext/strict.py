@@ -1,4 +1,4 @@
-"""Warnings in executed pages are errors: a run that fell back to Python is not shown in silence."""
+"""How scripts of executed pages begin: warnings of the engine are errors, labels fit into figures."""
 
 import warnings
 
@@ -8,3 +8,10 @@ def warnings_are_errors(gallery_conf, script):
     from nlctl import EngineWarning
 
     warnings.simplefilter("error", EngineWarning)
+
+
+def labels_fit(gallery_conf, script):
+    """Lay figures out so that nothing is cut off at their edges."""
+    import matplotlib as mpl
+
+    mpl.rcParams["figure.constrained_layout.use"] = True

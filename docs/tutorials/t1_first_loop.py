@@ -16,7 +16,7 @@ assert isinstance(loop, ct.InterconnectedSystem)
 
 # %%
 # It is an ordinary diagram of python-control. Its parameters have units and bounds:
-nlctl.parameters(loop).head(8)
+print(nlctl.parameters(loop).head(8).drop(columns="meaning"))
 
 # %%
 # Simulate it, with another dead zone. Parameters are addressed like signals.

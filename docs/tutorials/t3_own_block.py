@@ -30,18 +30,21 @@ class Lag:
         return (x[0],)
 
 
+# %%
 # Its step response is :math:`1 - e^{-t/T}`.
 t = np.linspace(0, 0.5, 501)
 lag = nlctl.block(Lag(T=0.1), "lag")
 v = nlctl.input_output_response(lag, t, 1.0, rtol=1e-10, atol=1e-12).outputs
 assert np.abs(v - (1 - np.exp(-t / 0.1))).max() < 1e-8
 
+# %%
 # Bounds are held where a value is born, and where one arrives later.
 try:
     Lag(T=-1.0)
 except nlctl.ParameterError as error:
     print(error)
 
+# %%
 # **Memory is a state too**, one that stands still within a step. ``commit`` says what it becomes when a step
 # has been accepted. This block keeps the largest input so far.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 import nlctl
 
+# %%
 # A loop of ``ct.tf`` and ``ct.nlsys``, simulated by either:
 plant = ct.ss(ct.tf(1, [1, 1, 0]))
 plant = ct.ss(plant, name="plant", inputs=["v"], outputs=["y"])

@@ -122,6 +122,11 @@ def relay_grid(levels: Sequence[float]) -> tuple[tuple[float, ...], tuple[float,
         n increasing numbers; they make n (n - 1) / 2 relays, in the order (1, 0), (2, 0), (2, 1),
         (3, 0), ... of the indices of alpha and beta.
 
+    Returns
+    -------
+    alphas, betas : tuple of float
+        Of the n (n - 1) / 2 relays of n levels.
+
     Raises
     ------
     ParameterError

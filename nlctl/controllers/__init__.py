@@ -2,9 +2,11 @@
 
 from .ablations import FixedGainLaw, ablations, replaced
 from .adaptive import Zero, adaptive_neural
+from .adaptive_inverse import AdaptiveDeadZoneInverse
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
 from .nussbaum import NussbaumLaw
+from .performance import FunnelControl, PrescribedPerformance
 from .pid import PID
 from .rbf import (
     AdaptiveWeights,
@@ -19,15 +21,18 @@ from .sliding_mode import SlidingModeLaw, sliding_mode
 
 __all__ = [
     "PID",
+    "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
     "DeadZoneNussbaumLaw",
     "FilteredError",
     "FixedGainLaw",
+    "FunnelControl",
     "GaussianBasis",
     "KnownSignLaw",
     "LeakyNussbaumLaw",
     "MonotoneNussbaumLaw",
     "NussbaumLaw",
+    "PrescribedPerformance",
     "RobustTerm",
     "SlidingModeLaw",
     "Zero",

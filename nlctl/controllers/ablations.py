@@ -50,6 +50,10 @@ def replaced(controller: ct.InterconnectedSystem, **pieces: Any) -> ct.Interconn
     **pieces : record or control.InputOutputSystem
         As for `adaptive_neural`: ``law=``, ``weights=``, ...
 
+    Returns
+    -------
+    control.InterconnectedSystem
+
     Raises
     ------
     ParameterError, DiagramError

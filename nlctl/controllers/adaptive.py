@@ -22,7 +22,7 @@ __all__ = ["Zero", "adaptive_neural"]
 
 @record
 class Zero:
-    """A block that delivers 0: put it in the place of a piece that is to be left out.
+    """A block whose output is 0: put it in the place of a piece that is to be left out.
 
     Parameters
     ----------
@@ -58,11 +58,11 @@ def adaptive_neural(
     law: Any = None,
     name: str = "controller",
 ) -> ct.InterconnectedSystem:
-    """Join the adaptive neural controller of the paper, (14) and (23)-(25).
+    """Connect the adaptive neural controller of the paper, (14) and (23)-(25).
 
         filtered_error -> basis -> weights, robust -> law
 
-    It takes x1, ..., xn and yd, yd1, ..., ydn, and delivers e, r, u, zeta, delta_hat, W_norm;
+    It takes x1, ..., xn and yd, yd1, ..., ydn; its outputs are e, r, u, zeta, delta_hat, W_norm;
     no zeta where the law has none.
     It knows neither the plant nor the actuator: the same controller drives a dead zone and
     backlash.

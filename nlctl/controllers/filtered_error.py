@@ -17,7 +17,18 @@ __all__ = ["FilteredError", "binomial_lambdas"]
 
 
 def binomial_lambdas(order: int) -> tuple[float, ...]:
-    """Return lambda_1, ..., lambda_{n-1} of (s + 1)^(n-1); (2, 1) for order 3."""
+    """Return lambda_1, ..., lambda_{n-1} of (s + 1)^(n-1); (2, 1) for order 3.
+
+    Parameters
+    ----------
+    order : int
+        n, of the plant.
+
+    Returns
+    -------
+    tuple of float
+        n - 1 numbers.
+    """
     return tuple(float(c) for c in np.poly(-np.ones(order - 1))[1:])
 
 

@@ -35,7 +35,7 @@ class KnownSignLaw:
 
     It has the inputs of `NussbaumLaw` and stands in its place in `adaptive_neural`; it has no
     state, and no output ``zeta``.  The sign is that of the paper's plants; for a negative gain
-    turn round the actuator's sign.
+    reverse the actuator's sign.
     """
 
     beta: float = param(2.5, unit="1", meaning="gain of the filtered error", above=0)

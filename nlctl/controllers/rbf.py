@@ -41,6 +41,20 @@ def diagonal_centres(count: int, inputs: int, low: float = -10, high: float = 10
 
     The usual reading of "27 centres evenly distributed in [-10, 10] x [-10, 10]".
 
+    Parameters
+    ----------
+    count : int
+        Number of centres.
+    inputs : int
+        Number of the network's inputs.
+    low, high : float, optional
+        Ends of the diagonal, in the inputs' units.
+
+    Returns
+    -------
+    tuple of tuple of float
+        `count` rows of `inputs` numbers.
+
     Raises
     ------
     ParameterError
@@ -59,6 +73,18 @@ def grid_centres(counts: Sequence[int], low: float = -10, high: float = 10) -> M
     """Return a full grid on [low, high]^n with ``counts[i]`` points along axis i.
 
     The last axis varies fastest.
+
+    Parameters
+    ----------
+    counts : sequence of int
+        Points along each axis.
+    low, high : float, optional
+        Ends of each axis, in the inputs' units.
+
+    Returns
+    -------
+    tuple of tuple of float
+        A row for each point.
 
     Raises
     ------
@@ -80,6 +106,22 @@ def latin_hypercube_centres(
     count: int, inputs: int, low: float = -10, high: float = 10, *, seed: int
 ) -> Matrix:
     """Return `count` centres of a Latin hypercube on [low, high]^inputs (scipy.stats.qmc).
+
+    Parameters
+    ----------
+    count : int
+        Number of centres.
+    inputs : int
+        Number of the network's inputs.
+    low, high : float, optional
+        Ends of each axis, in the inputs' units.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    tuple of tuple of float
+        `count` rows of `inputs` numbers.
 
     Raises
     ------

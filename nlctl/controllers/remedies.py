@@ -80,8 +80,8 @@ class MonotoneNussbaumLaw(NussbaumLaw):
         u     = N(zeta) eta,   eta = beta r + s tanh(r s / b)
         zeta' = r eta >= 0,    s = W_hat^T psi + delta_hat tanh(r/tau) + Y_d,   zeta(0) = 1
 
-    No remedy by itself: zeta creeps on.  But it cannot oscillate, and so cannot pump V under a
-    gain that varies with time; `analysis.lyapunov.nussbaum.energy.safe_horizon` supposes a
+    Not a remedy by itself: zeta still drifts.  But it cannot oscillate, and so cannot pump V
+    under a gain that varies with time; `analysis.lyapunov.nussbaum.energy.safe_horizon` supposes a
     monotone zeta.
     """
 

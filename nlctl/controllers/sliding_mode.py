@@ -53,9 +53,10 @@ class SlidingModeLaw:
 def sliding_mode(
     filtered_error: Any = None, law: Any = None, *, name: str = "controller"
 ) -> ct.InterconnectedSystem:
-    """Join a sliding-mode controller: filtered error (14) -> law.
+    """Connect a sliding-mode controller: filtered error (14) -> law.
 
-    It takes x1, ..., xn and yd, yd1, ..., ydn as the paper's controller does, and delivers e, r, u.
+    It takes x1, ..., xn and yd, yd1, ..., ydn as the paper's controller does; its outputs
+    are e, r, u.
 
     Parameters
     ----------
@@ -64,6 +65,10 @@ def sliding_mode(
     law : record, optional
         `SlidingModeLaw` by default.
     name : str, optional
+
+    Returns
+    -------
+    control.InterconnectedSystem
 
     Raises
     ------

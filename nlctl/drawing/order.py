@@ -21,8 +21,8 @@ class LayoutPlan:
     """All that is decided before the first coordinate.
 
     ``channel[wire, gutter]`` is the channel that brings a wire to a gutter other than the one it
-    starts in, ``spans[wire, channel]`` the gutters it joins, ``lane[wire, channel]`` its place in
-    the channel, 0 nearest to the boxes.  ``inlets[block][wire]`` orders the arrows into a block
+    starts in, ``spans[wire, channel]`` the gutters it connects, ``lane[wire, channel]`` its place
+    in the channel, 0 nearest to the boxes.  ``inlets[block][wire]`` orders the arrows into a block
     from top to bottom; it is (0, 0) for those straight from the column before.
     """
 
@@ -158,7 +158,7 @@ def _channels(wires: Sequence[Wire], places: Sequence[GridCell]) -> dict[tuple[i
 def _spans(
     wires: Sequence[Wire], places: Sequence[GridCell], channel: Mapping[tuple[int, int], int]
 ) -> dict[tuple[int, int], list[int]]:
-    """Gutters, from left to right, that ``[wire, channel]`` joins."""
+    """Gutters, from left to right, that ``[wire, channel]`` connects."""
     joined: dict[tuple[int, int], set[int]] = {}
     for (i, gutter), k in channel.items():
         joined.setdefault((i, k), {places[wires[i].source].column + 1}).add(gutter)

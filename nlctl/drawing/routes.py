@@ -43,7 +43,7 @@ class _Gutter:
 def _joints(
     plan: LayoutPlan, heights: HeightMap, g: int
 ) -> dict[int, tuple[set[float], set[float]]]:
-    """Heights at which each wire joins its lane in gutter `g` from the left and the right."""
+    """Heights at which each wire meets its lane in gutter `g` from the left and the right."""
     joints: dict[int, tuple[set[float], set[float]]] = {}
     for (n, i), y in heights.leave.items():
         if i != EXTERNAL and plan.places[n].column + 1 == g:

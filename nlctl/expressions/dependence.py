@@ -44,7 +44,7 @@ def _of_node(node: Expr, parts: list[np.ndarray], array: str, count: int) -> np.
         _, start, step = node.data
         return np.eye(count, dtype=bool)[start + step * np.arange(node.size or 1)]
     if node.op in _WHOLE:
-        return np.concatenate([nothing, *parts]).any(axis=0)[None]
+        return np.any(np.concatenate([nothing, *parts]), axis=0).reshape(1, count)
     if node.op in ("item", "slice"):
         start, step = (node.data, 1) if node.op == "item" else node.data
         whole = np.broadcast_to(parts[0], (node.args[0].size or 1, count))

@@ -49,7 +49,8 @@ class Expr:
     args : tuple of Expr
     data : object
         What else it needs: a constant, (array, start, step) of a leaf, index or (start, step) of
-        a part, lengths of what is joined, (function, lengths) of a call or of what is solved for.
+        a part, lengths of what is concatenated, (function, lengths) of a call or a
+        solution.
     size : int or None
         Number of elements of a vector, None for a number.
     kind : str

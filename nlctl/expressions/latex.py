@@ -199,12 +199,12 @@ class LatexWriter:
         factors = [f.args[0] if flip else f for f, flip in zip(factors, flipped, strict=True)]
         numbers = [float(f.data) for f in factors if f.op == "const"]
         negative = (sum(flipped) + sum(value < 0 for value in numbers)) % 2
-        texts = [number_text(abs(value)) for value in numbers]
+        texts = [number_text(abs(value)) for value in numbers if abs(value) != 1]
         for factor in dict.fromkeys(f for f in factors if f.op != "const"):
             count = factors.count(factor)
             text = self._held(factor, index, depth, ATOM if count > 1 else FACTOR)
             texts.append(f"{text}^{{{count}}}" if count > 1 else text)
-        return ("-" if negative else "") + _product(texts), TERM
+        return ("-" if negative else "") + _product(texts or ["1"]), TERM
 
     def _factors(self, expr: Expr) -> Iterator[Expr]:
         for arg in expr.args:

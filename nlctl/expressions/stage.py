@@ -15,8 +15,8 @@ from types import BuiltinFunctionType, CellType, CodeType, FunctionType, MethodT
 from typing import Any
 
 import numpy as np
-from numba.core.registry import CPUDispatcher
 
+from ..upstream.numba_internals import CPUDispatcher
 from .arrays import Tracer, concatenated, full, traced
 from .functions import FUNCTIONS, MATH
 from .graph import NUMPY, Graph, Untraceable
@@ -355,7 +355,7 @@ class _Numpy:
     @staticmethod
     def concatenate(graph, parts, axis=0):
         if axis not in (0, -1):
-            raise Untraceable("arrays that are joined along another axis")
+            raise Untraceable("arrays that are concatenated along another axis")
         return concatenated(graph, [traced(graph, p) for p in parts])
 
     @staticmethod

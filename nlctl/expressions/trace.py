@@ -19,7 +19,7 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
     """Run a function on tracers and return its result in one dimension.
 
     A condition that depends on tracers is followed both ways: the function runs again for every
-    way through it, and the results are joined by ``select``, which takes the branch that Python
+    way through it, and the results are combined by ``select``, which takes the branch that Python
     takes, also for NaN.
 
     Parameters

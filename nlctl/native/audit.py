@@ -19,14 +19,16 @@ import numpy as np
 from ..blocks import DelayLine, is_delayed, past
 from ..delays.lines import delayed_blocks
 from ..errors import ParameterError, UsageError
-from ..sampling.system import happening
+from ..sampling.system import Happening, happening
+from ..upstream.control_internals import outputs_now, rates_now, set_parameters
 from .codegen.blocks import equations
 from .codegen.lower import lower
+from .codegen.program import instants_of
 from .compiled import Compiled
+from .diagram.block_inputs import block_inputs
 from .diagram.schedule import Signal, signal_name
 from .machine.evaluations import Machine, prepared_parameters
 from .machine.routine import lowered_code
-from .thirdparty.python_control import block_inputs, block_outputs, block_rates
 
 _POINTS = 5  # of a trajectory, its start and end among them
 _ROUNDING = 1e-10  # relative difference that rounding explains without a closer look
@@ -56,6 +58,8 @@ class Trial:
         The same parameters as python-control takes them.
     width : int
         Members that the machine code of the run takes.
+    meetings : tuple of frozenset
+        What may happen to sampled blocks in that machine code.
     """
 
     time: np.ndarray
@@ -64,6 +68,7 @@ class Trial:
     p: np.ndarray
     params: Mapping[str, Any] | None
     width: int
+    meetings: tuple[Happening, ...] = ()
 
 
 def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
@@ -89,12 +94,13 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
         return
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
         width = trial.width if ct.isctime(compiled.system) else 1
-        code, c = prepared_parameters(compiled, trial.p, width)
+        (due,) = instants_of(compiled.schedule, compiled.program, trial.time, trial.p[:, None])
+        code, c = prepared_parameters(compiled, trial.p, width, due.patterns)
         done = compiled.__dict__.setdefault("_audited", [])
         if wanted is True and any(known is code for known in done):
             return
         done.append(code)
-        evaluated = _evaluated(compiled, code, c)
+        evaluated, trial = _evaluated(compiled, code, c), replace(trial, meetings=code.meetings)
         for point in _points(trial):
             _compare(compiled, trial, evaluated, point)
 
@@ -133,8 +139,8 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
     if not all(np.isfinite(values).all() for values in ours):
         return  # the run says that it diverged
     try:
-        theirs = _by_python_control(compiled, point, trial.params)
-        again = _by_python_control(compiled, point, trial.params)
+        theirs = _by_python_control(compiled, point, trial)
+        again = _by_python_control(compiled, point, trial)
     except RuntimeError as error:
         if "lgebraic loop" not in str(error) or compiled.program.sampled:
             raise
@@ -170,15 +176,15 @@ def _close(a: np.ndarray, b: np.ndarray, relative: float = _ROUNDING, absolute: 
     return (a == b) | (np.abs(a - b) <= relative * np.maximum(np.abs(a), np.abs(b)) + absolute)
 
 
-def _by_python_control(compiled: Compiled, point: Any, params: Any) -> Values:
-    system, given = compiled.system, {"params": dict(params)} if params else {}
+def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> Values:
+    system, given = compiled.system, {"params": dict(trial.params)} if trial.params else {}
     lines, point = _lines(compiled, point)
     with past(lines), happening():
         rates = system.dynamics(*point, **given) if system.nstates else np.empty(0)
         outputs = system.output(*point, **given) if system.noutputs else np.empty(0)
     arriving = [line.arriving for line in lines.values()]
     after, rows = [], list(compiled.program.sampled)
-    for what in compiled.program.meetings:
+    for what in trial.meetings:
         with past(lines), happening(what):
             after.append(system.dynamics(*point, **given)[rows])
     outputs = np.concatenate([np.reshape(outputs, -1), *arriving])
@@ -222,7 +228,7 @@ def _shaken(compiled: Compiled, point: Any, trial: Trial, base: Values) -> Value
     """Return how far python-control's values move from `base` when all is rounded."""
     moved = [np.zeros_like(values) for values in base]
     for near in _near(point, trial):
-        found = _by_python_control(compiled, near, trial.params)
+        found = _by_python_control(compiled, near, trial)
         for total, a, b in zip(moved, base, found, strict=True):
             np.maximum(total, np.abs(a - b), out=total)
     return tuple(moved)
@@ -233,7 +239,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
     t, x, u = point
     nodes = compiled.schedule.nodes
     if compiled.system.nstates:
-        compiled.system._update_params(dict(trial.params) if trial.params else None)
+        set_parameters(compiled.system, dict(trial.params) if trial.params else None)
     y = _signals(compiled, trial, point)
     counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
     outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
@@ -243,10 +249,10 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
         if is_delayed(block):
             continue
         own = slice(node.state_offset, node.state_offset + (block.nstates or 0))
-        pairs = [(outputs[i], block_outputs, block.output_labels)]
-        pairs += [(ours[0][own], block_rates, block.state_labels)] if block.nstates else []
+        pairs = [(outputs[i], outputs_now, block.output_labels)]
+        pairs += [(ours[0][own], rates_now, block.state_labels)] if block.nstates else []
         for a, function, labels in pairs if block.noutputs else pairs[1:]:
-            b = function(block, t, x[own], inputs)
+            b = function(block, t, x[own], inputs).astype(float)
             moved = np.zeros_like(b)
             for near in _near((t, x[own], inputs), trial):
                 np.maximum(moved, np.abs(function(block, *near) - b), out=moved)

@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import CompileError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
+from ..upstream.control_internals import set_parameters
 from .codegen.blocks import Equations, equations
 from .codegen.lower import Lowered, lower
 from .codegen.program import Program, program
@@ -118,8 +119,8 @@ class Compiled:
                 f"and is {_short(other.now)} now: compile again, or make it a parameter"
             )
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks
-            self.system._update_params(params)
-            return packed(self.schedule.nodes, self.program.layout, self.program.fixed)
+            set_parameters(self.system, params)
+            return packed(self.schedule.holders, self.program.layout, self.program.fixed)
 
     def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
         """Return the right-hand side, as ``system.dynamics`` does."""
@@ -283,7 +284,7 @@ def compile(  # noqa: A001 (what it does)
             f"compile needs a diagram or a block, got {type(system).__name__}: nlctl.block makes "
             "a block of a record"
         )
-    system._update_params(checked_params(params))  # type: ignore[attr-defined]
+    set_parameters(system, checked_params(params))
     if algebraic_loops not in LOOPS:
         raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
     read = schedule(system, solve_loops=algebraic_loops == "solve")

@@ -1,4 +1,4 @@
-"""Many runs of one compiled diagram: side by side in SIMD lanes, lanes side by side in threads."""
+"""Many runs of one compiled diagram: batched in SIMD lanes, batches in threads."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import control as ct
 import numpy as np
 
 from ..errors import ParameterError
+from ..host.notebook import table_html
 from ..names import unknown
 from ..params import checked_times, whole_number
 from ..responses.arguments import checked_params, input_array
@@ -31,6 +32,7 @@ from .integrate.driver import (
     prepared,
     trajectory,
 )
+from .integrate.methods.tableau import Tableau
 from .integrate.state import RUNNING, STIFF, Status
 from .machine.ahead import compile_for
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
@@ -81,6 +83,11 @@ class Ensemble:
     time: np.ndarray
     signals: Mapping[str, np.ndarray]
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: how the members ended, and the first of them."""
+        rows = ((n, *row) for n, *row in self.table.head(ROWS).itertuples())
+        return table_html(repr(self).splitlines()[0], ["", *map(str, self.table.columns)], rows)
+
     def __repr__(self) -> str:
         ended = self.table["status"].value_counts() if len(self.table) else {}
         how = ", ".join(f"{count} {status}" for status, count in ended.items()) or "none finished"
@@ -105,7 +112,7 @@ def ensemble_response(
     rtol: float = 1e-6,
     atol: float = 1e-8,
     max_steps: int = 1_000_000,
-    method: str | None = None,
+    method: str | Tableau | None = None,
     progress: Callable[[int], object] | None = None,
     audit: Audit = True,
 ) -> Ensemble:
@@ -139,7 +146,7 @@ def ensemble_response(
     rtol, atol : float, optional
     max_steps : int, optional
         A member that needs more steps ends with the status STEP_LIMIT.
-    method : str, optional
+    method : str or Tableau, optional
         As in `nlctl.input_output_response`.
     progress : callable, optional
         Called with the number of finished members.
@@ -226,7 +233,7 @@ def _group(
     settings: Settings,
     stop: _Stop,
 ) -> Iterator[Trajectory]:
-    """Run up to WIDTH members side by side; yield them in their order."""
+    """Run up to WIDTH members in a batch; yield them in their order."""
     compiled, (x0, p) = every.compiled, every.batch(numbers, ENSEMBLE_WIDTH)
     alone = settings.method == "rodas5p" or not ct.isctime(compiled.system)
     if alone:

@@ -9,9 +9,8 @@ import numpy as np
 
 from ..errors import ParameterError
 from .integrate.delays import POINTS, POWERS, SMOOTH
-from .integrate.inputs import DEGREE
 from .integrate.memory import with_table
-from .integrate.workspace import WORK, Work
+from .integrate.workspace import DEGREE, WORK, Work
 
 if TYPE_CHECKING:
     from .compiled import Compiled

@@ -20,7 +20,9 @@ from ..names import unknown
 from ..params import declared_params, equation_arguments, with_overrides
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
+from ..sampling.system import clocks_of
 from .codegen.blocks import Equations
+from .codegen.lower import DIRECTION
 from .codegen.solver import searched
 from .parameters import length
 
@@ -29,7 +31,6 @@ if TYPE_CHECKING:
     from .diagram.schedule import Node
 
 STEP = 1e-6  # by which a parameter is moved, to see what follows from it
-DIRECTION = "v"  # the array of a direction: of states, then inputs, then what else is varied
 _DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
 
@@ -217,9 +218,15 @@ def over_a_period(compiled: Compiled, found: Mapping[str, np.ndarray]) -> tuple[
         Common period of the clocks (s).
     """
     n, width = found["dx"].shape
-    clocks, meetings = compiled.program.clocks, compiled.program.meetings
-    begin, end, period = common_period(clocks)
+    meetings = compiled.program.meetings
+    clocks = clocks_of(node.sampled for node in compiled.schedule.nodes)
+    begin, end, period = common_period(tuple(clocks.values()))
     due = instants(clocks, begin, end, meetings)
+    if len(due.patterns) > len(meetings):
+        raise UsageError(
+            f"clocks of '{compiled.system.name}' meet otherwise than when it was compiled: compile "
+            "it again with these sampling times"
+        )
     flow = np.zeros((width, width))
     flow[:n] = found["dx"]
     total, shown = np.eye(width), found["y"]
@@ -260,7 +267,7 @@ def parameter_jacobian(
         for slot in own.values():
             for k in range(slot.size if slot.kind == "f" else 0):
                 name = f"{slot.name}[{k}]" if slot.shape else slot.name
-                places[name], owners[name] = slot.offset + k, compiled.schedule.nodes[i]
+                places[name], owners[name] = slot.offset + k, compiled.schedule.holders[i]
     compiled.parameter_vector(params)  # blocks have the run's parameters then
     start = (system.nstates or 0) + (system.ninputs or 0)
     directions = np.zeros((start + length(compiled.program.layout), len(parameters)))

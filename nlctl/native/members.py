@@ -126,7 +126,7 @@ class Members:
         """Blocks whose parameters vary, with their places; None if third-party ones do."""
         self._first_vector  # noqa: B018 (names and fixed values are resolved first)
         known = self.compiled.system.params
-        nodes = [node.system for node in self.compiled.schedule.nodes]
+        nodes = [node.system for node in self.compiled.schedule.holders]
         found: dict[int, dict[str, str]] = {}
         for name, values in self.params.items():
             if not values.shape[:1]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..blocks import Block
 from ..errors import UsageError
+from ..upstream.control_internals import current_parameters
 
 if TYPE_CHECKING:
     from .diagram.schedule import Node
@@ -64,10 +65,10 @@ def current_values(system: Any) -> Mapping[str, Any]:
     they are none of its business.
     """
     if isinstance(system, Block):
-        return system._current_params._asdict()
+        return current_parameters(system)._asdict()
     if isinstance(system, ct.StateSpace):
         return {}
-    params = system._current_params
+    params = current_parameters(system)
     return {k: params[k] for k in params if k in system.params or "." not in str(k)}
 
 
@@ -159,7 +160,7 @@ def filled(p: np.ndarray, slot: Slot, value: Any) -> None:
     Raises
     ------
     UsageError
-        If its shape is another than when the diagram was compiled, or it is no whole number any
+        If its shape is another than when the diagram was compiled, or it is not an integer any
         more.
     """
     array = np.asarray(value) if is_numeric(value) else None
@@ -169,7 +170,7 @@ def filled(p: np.ndarray, slot: Slot, value: Any) -> None:
             f"parameter '{slot.name}' had shape {slot.shape} when the diagram was "
             f"compiled and cannot {now} now: compile again"
         )
-    whole = {"i": "a whole number", "b": "True or False"}.get(slot.kind)
+    whole = {"i": "an integer", "b": "True or False"}.get(slot.kind)
     if whole and not slot.shape and array.dtype.kind == "f" and array != np.trunc(array):
         raise UsageError(
             f"parameter '{slot.name}' was {whole} when the diagram was compiled and cannot be "

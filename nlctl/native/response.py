@@ -64,7 +64,7 @@ def respond(
     compare(compiled, trial, audit)
     run = made.statistics
     if run.status is Status.STOPPED and not ignore_errors:
-        raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error goes on
+        raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error continues
     if run.status is not Status.OK and not ignore_errors:
         raise DivergedError(_message(system, run), run.time)
     shown = np.flatnonzero(np.isin(made.time, wanted))
@@ -84,6 +84,16 @@ def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -
 
 def uninterrupted(response: Any) -> Any:
     """Return a response that was computed with `ignore_errors`, if Ctrl-C has not ended it.
+
+    Parameters
+    ----------
+    response : control.TimeResponseData
+        Of `nlctl.input_output_response`.
+
+    Returns
+    -------
+    control.TimeResponseData
+        The same.
 
     Raises
     ------

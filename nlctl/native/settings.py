@@ -8,6 +8,7 @@ from typing import Any
 from ..errors import ParameterError
 from ..names import unknown
 from .integrate.driver import Settings
+from .integrate.methods.tableau import Tableau
 
 _STIFF = "method='rodas5p' is its stiff method"
 _EXPLICIT = "method='tsit5' is its explicit Runge-Kutta pair of orders 5(4)"
@@ -31,7 +32,7 @@ _REFUSED = {  # of the keywords of `solve_ivp` -> what there is instead
 
 def solver_settings(
     *,
-    method: str | None,
+    method: str | Tableau | None,
     solve_ivp_method: str | None,
     solve_ivp_kwargs: Mapping[str, Any] | None,
     **settings: Any,
@@ -40,7 +41,7 @@ def solver_settings(
 
     Parameters
     ----------
-    method : str or None
+    method : str, Tableau or None
         Of `Settings`.
     solve_ivp_method, solve_ivp_kwargs
         As python-control takes them: of the keywords ``rtol`` and ``atol`` have a meaning here.

@@ -16,11 +16,13 @@ import numpy as np
 
 from ..blocks import Block
 from ..errors import CompileError
-from ..expressions.arrays import Tracer
+from ..expressions.arrays import Tracer, leaf_vector
 from ..expressions.graph import Expr, Graph, needed
 from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol
 from ..params import declared_params
+from ..upstream.control_internals import set_parameters
 from .codegen.blocks import Reader
+from .diagram.feedthrough import feedthrough
 from .diagram.schedule import Node, Schedule, Signal, schedule
 from .parameters import Slot, slots_of
 
@@ -93,7 +95,7 @@ def typeset(
     u = -\\kappa \\left(\\beta r + W_{\\psi} + \\mathrm{robust} + Y_{d}\\right)
     """
     system = ct.ss(system) if isinstance(system, ct.TransferFunction) else system
-    system._update_params(params)
+    set_parameters(system, params)
     read = schedule(system, solve_loops=True)
     return tuple(_block(read, node, values) for node in read.nodes)
 
@@ -103,15 +105,18 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     every = {} if values else slots_of(system, node.path)
     slots = {name: slot for name, slot in every.items() if slot.kind == "f"}  # others steer
     inputs = tuple({Signal(None, j): 1.0} for j in range(len(node.inputs)))
-    alone = replace(node, state_offset=0, inputs=inputs, sampled=None)
+    alone = replace(node, state_offset=0, inputs=inputs, sampled=None, direct=feedthrough(system))
     reader = Reader(graph=Graph(), layout={0: slots}, blocks=[alone])
     with np.errstate(all="ignore"), _local_names() as names:
         found = {"x": reader.derivatives(0), "y": reader.outputs(0, ())}
+        if node.sampled and node.sampled.euler:
+            found["x"] = _euler(reader, node.sampled, slots, values)
     for call in reader.calls.values():
         raise CompileError(f"block '{node.path}' has no formula: {call.reason}")
     leaf = _symbols(system, slots)
     writer = LatexWriter(leaf=leaf, known=_known(found, names, leaf))
-    derivative = _dotted if ct.isctime(system) else (lambda s: rf"{s}^{{+}}")
+    next_value = bool(node.sampled and node.sampled.euler) or not ct.isctime(system)
+    derivative = _next if next_value else _dotted
     lines = [
         *_lines(writer, found["x"], [derivative(s) for s in _names(system.state_labels)]),
         *_lines(writer, found["y"], _names(system.output_labels[: found["y"].size])),
@@ -124,10 +129,27 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     )
 
 
+def _euler(reader: Reader, sampled: Any, slots: dict[str, Slot], values: bool) -> Tracer:
+    """Return the next states x + T_s f of a block in continuous time; T_s joins its slots."""
+    step: Any = sampled.sampling.current_spec.dt
+    if not values:
+        offset = max((slot.offset + slot.size for slot in slots.values()), default=0)
+        slots["T_s"] = Slot(name="T_s", offset=offset, shape=(), kind="f")
+        step = leaf_vector(reader.graph, "p", offset, ())
+    rates = reader.derivatives(0)
+    return leaf_vector(reader.graph, "x", 0, (rates.size,)) + step * rates
+
+
 def _dotted(name: str) -> str:
     """Return the symbol of a derivative: the dot stands on the letter, not on its index."""
     head, _, index = name.partition("_")
     return rf"\dot{{{head}}}_{index}" if index else rf"\dot{{{head}}}"
+
+
+def _next(name: str) -> str:
+    """Return the symbol of a next value: the sign stands on the letter, in front of its index."""
+    head, _, index = name.partition("_")
+    return rf"{head}^{{+}}_{index}" if index else rf"{head}^{{+}}"
 
 
 def _says_nothing(line: str) -> bool:

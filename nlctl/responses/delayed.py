@@ -18,6 +18,7 @@ from numpy.polynomial import chebyshev
 from ..blocks import Block, DelayLine, past
 from ..delays.lines import delayed_blocks
 from ..sampling.system import happening
+from ..upstream.control_internals import set_parameters
 from .arguments import interpolated
 from .time_response import response_of
 
@@ -137,7 +138,7 @@ def by_steps(
     """
     wanted = times if evaluation_times is None else evaluation_times
     form = {name: settings.pop(name, None) for name in ("squeeze", "transpose", "return_states")}
-    system._update_params(params)
+    set_parameters(system, params)
     run = _Run(
         simulate=simulate, known=known, system=system, times=times, inputs=inputs, params=params,
         settings=settings, wanted=wanted, x=np.array(x0, dtype=float),

@@ -9,6 +9,7 @@ from typing import Any
 
 import control as ct
 import numpy as np
+from scipy.integrate import OdeSolver
 
 from ..delays.lines import delayed_blocks
 from ..diagrams import leaves
@@ -55,8 +56,9 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     simulate = _between(simulate, system)
     watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
     method = solver["method"] or solver["solve_ivp_method"] or "LSODA"
-    if isinstance(method, str) and method not in SOLVE_IVP_METHODS:
-        raise unknown("method", method, SOLVE_IVP_METHODS, "of python-control's solve_ivp")
+    scipys = isinstance(method, type) and issubclass(method, OdeSolver)
+    if not scipys and method not in SOLVE_IVP_METHODS:
+        raise unknown("method", str(method), SOLVE_IVP_METHODS, "of python-control's solve_ivp")
     settings = {"rtol": solver["rtol"], "atol": solver["atol"], "events": watch}
     with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
         try:

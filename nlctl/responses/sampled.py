@@ -9,7 +9,8 @@ import numpy as np
 
 from ..diagrams import leaves
 from ..sampling.clock import Instants, instants
-from ..sampling.system import Happening, Sampled, happening
+from ..sampling.system import Happening, Sampled, clocks_of, happening
+from ..upstream.control_internals import set_parameters
 from .arguments import interpolated
 from .time_response import response_of
 
@@ -58,8 +59,8 @@ def from_sample_to_sample(
     """
     wanted = times if evaluation_times is None else evaluation_times
     found = sampled_states(system)
-    clocks = [block.clock for block in found.values()]
-    due = instants(dict.fromkeys(clocks), float(times[0]), float(times[-1]))
+    set_parameters(system, params)
+    due = instants(clocks_of(found.values()), float(times[0]), float(times[-1]))
     x = np.array(x0, dtype=float)
     y = np.full((system.noutputs or 0, wanted.size), np.nan)
     states = np.full((system.nstates or 0, wanted.size), np.nan)

@@ -8,6 +8,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..host.notebook import table_html
+
 _SHOWN = 6  # names that are listed before the rest is only counted
 
 
@@ -40,6 +42,18 @@ class Response(ct.TimeResponseData):
             steps = f"{run.accepted} steps, {run.rejected} rejected, {run.events} events"
             lines.append(f"  run      {run.status.name}, {steps}")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: how the run went, and the range of each output."""
+        y = np.asarray(self.y, dtype=float)
+        ends = (y.min(axis=-1), y.max(axis=-1), y[..., -1])
+        rows = zip(self.output_labels or [], *(_in_text(values) for values in ends), strict=True)
+        return table_html(repr(self), ("output", "least", "largest", "at the end"), rows)
+
+
+def _in_text(values: np.ndarray) -> list[str]:
+    """Return one text for each output; those of several traces in one row."""
+    return [", ".join(f"{v:.6g}" for v in np.ravel(own)) for own in values]
 
 
 def as_response(response: ct.TimeResponseData) -> Response:

@@ -1,11 +1,12 @@
 """Sampled data: controllers on computers, beside plants in continuous time.
 
-`clock` says when a block samples, `system` makes a sampled block of one in discrete time, and
-`discretised` one in discrete time of one in continuous time.
+`clock` says when a block samples, `parameters` what may be varied of that, `system` makes a sampled
+block of one in discrete time, and `discretised` one in discrete time of one in continuous time.
 """
 
 from .clock import Clock
 from .discretised import discretise
+from .parameters import Sampling
 from .system import Sampled, sampled
 
-__all__ = ["Clock", "Sampled", "discretise", "sampled"]
+__all__ = ["Clock", "Sampled", "Sampling", "discretise", "sampled"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import gcd, lcm
@@ -71,29 +71,23 @@ class Clock:
         """How many samples are kept until their outputs follow."""
         return -(-_exact(self.delay) // _exact(self.dt))
 
-    @property
-    def sampling(self) -> Moment:
-        """What happens when it samples: the same for all clocks with these instants."""
-        return Moment(Clock(dt=self.dt, offset=self.offset, jitter=self.jitter, seed=self.seed), 1)
-
-    @property
-    def release(self) -> Moment:
-        """What happens when outputs follow that were delayed."""
-        return Moment(self, 0)
-
 
 class Moment(NamedTuple):
-    """Something that clocks do at certain instants.
+    """Something that a clock does at certain instants.
 
     Attributes
     ----------
-    clock : Clock
+    owner : hashable
+        Whose clock it is: a key of the mapping that says which clock that is.
     samples : int
         1 if it samples, 0 if delayed outputs follow.
     """
 
-    clock: Clock
+    owner: Hashable
     samples: int
+
+
+Clocks = Mapping[Hashable, Clock]
 
 
 class Instants(NamedTuple):
@@ -113,41 +107,43 @@ class Instants(NamedTuple):
     patterns: tuple[frozenset[Moment], ...]
 
 
-def moments(clocks: Iterable[Clock]) -> list[Moment]:
+def moments(clocks: Clocks) -> list[Moment]:
     """Return all that these clocks do."""
-    found: dict[Moment, None] = {}
-    for clock in clocks:
-        found[clock.sampling] = None
-        if clock.delay:
-            found[clock.release] = None
-    return list(found)
+    found = [Moment(owner, 1) for owner in clocks]
+    return found + [Moment(owner, 0) for owner, clock in clocks.items() if clock.delay]
 
 
-def meetings(clocks: Iterable[Clock]) -> list[frozenset[Moment]]:
+def meetings(clocks: Clocks) -> list[frozenset[Moment]]:
     """Return what may happen at one instant: sets of moments whose instants meet."""
-    found: list[frozenset[Moment]] = []
+    alike: dict[_Series, frozenset[Moment]] = {}
     for moment in moments(clocks):
-        joined = [s | {moment} for s in found if all(_meet(moment, other) for other in s)]
-        found += [*joined, frozenset({moment})]
-    return found
+        series = _series(moment, clocks)
+        alike[series] = alike.get(series, frozenset()) | {moment}
+    found: list[tuple[frozenset[Moment], tuple[_Series, ...]]] = []
+    for series, together in alike.items():
+        found += [
+            (what | together, (*others, series))
+            for what, others in found
+            if all(_meet(series, other) for other in others)
+        ] + [(together, (series,))]
+    return [what for what, _ in found]
 
 
-def _meet(one: Moment, other: Moment) -> bool:
-    if one.clock.jitter or other.clock.jitter:
+def _meet(one: _Series, other: _Series) -> bool:
+    if one.jitter or other.jitter:
         return False  # they would by chance, which has the probability 0
-    a, b = one.clock, other.clock
-    apart = _start(one) - _start(other)
-    return apart % _common(_exact(a.dt), _exact(b.dt)) == 0
+    return (one.start - other.start) % _common(one.dt, other.dt) == 0
 
 
 def instants(
-    clocks: Iterable[Clock], begin: float, end: float, known: Sequence[frozenset[Moment]] = ()
+    clocks: Clocks, begin: float, end: float, known: Sequence[frozenset[Moment]] = ()
 ) -> Instants:
     """Return what happens from `begin` on, and before `end`.
 
     Parameters
     ----------
-    clocks : iterable of Clock
+    clocks : mapping
+        Each clock by its owner.
     begin, end : float
         Times of a run (s).  What happens at its end is left to a run that resumes there.
     known : sequence of frozenset, optional
@@ -158,14 +154,22 @@ def instants(
     ParameterError
         If there are too many.
     """
-    each = {moment: _instants_of(moment, begin, end) for moment in moments(clocks)}
-    happening: dict[float, set[Moment]] = {}
-    for moment, times in each.items():
-        for t in times.tolist():
-            happening.setdefault(t, set()).add(moment)
     patterns = {pattern: i for i, pattern in enumerate(known)}
+    alike: dict[_Series, frozenset[Moment]] = {}
+    for moment in moments(clocks):
+        series = _series(moment, clocks)
+        alike[series] = alike.get(series, frozenset()) | {moment}
+    if len(alike) == 1:  # nothing else can happen at these times
+        ((series, together),) = alike.items()
+        times = _times(series, begin, end)
+        which = np.full(times.size, patterns.setdefault(together, len(patterns)), np.int64)
+        return Instants(times, which, tuple(patterns))
+    happening: dict[float, frozenset[Moment]] = {}
+    for series, together in alike.items():
+        for t in _times(series, begin, end).tolist():
+            happening[t] = happening.get(t, frozenset()) | together
     times = sorted(happening)
-    which = [patterns.setdefault(frozenset(happening[t]), len(patterns)) for t in times]
+    which = [patterns.setdefault(happening[t], len(patterns)) for t in times]
     return Instants(np.array(times, float), np.array(which, np.int64), tuple(patterns))
 
 
@@ -196,33 +200,42 @@ def common_period(clocks: Sequence[Clock]) -> tuple[float, float, float]:
     return float(begin), float(begin + period), float(period)  # each rounded once
 
 
-def _instants_of(moment: Moment, begin: float, end: float) -> np.ndarray:
-    clock, start, dt = moment.clock, _start(moment), _exact(moment.clock.dt)
-    late = _exact(clock.jitter)
+class _Series(NamedTuple):
+    """Times at which something happens: start + k dt, each late by a random time."""
+
+    start: Fraction
+    dt: Fraction
+    jitter: float
+    seed: int
+
+
+def _series(moment: Moment, clocks: Clocks) -> _Series:
+    clock = clocks[moment.owner]
+    start = _exact(clock.offset) + (0 if moment.samples else _exact(clock.delay))
+    return _Series(start, _exact(clock.dt), clock.jitter, clock.seed if clock.jitter else 0)
+
+
+def _times(series: _Series, begin: float, end: float) -> np.ndarray:
+    start, dt, late = series.start, series.dt, _exact(series.jitter)
     # one more on either side: which are inside is asked of the rounded times
     first = max(0, -((start + late - _exact(begin)) // dt) - 1)
     last = max(first - 1, -((start - _exact(end)) // dt) + 1)
     if last - first > _MOST:
         raise ParameterError(
-            f"a sampling time of {clock.dt:g} s has more than {_MOST:,} samples from {begin:g} to "
+            f"a sampling time of {float(dt):g} s has more than {_MOST:,} samples from {begin:g} to "
             f"{end:g} s: simulate a shorter time"
         )
     scale = lcm(start.denominator, dt.denominator)
     begins, step = int(start * scale), int(dt * scale)
-    if begins + last * step < 2**53:
+    if begins + last * step < 2**53 and scale < 2**53:
         times = (begins + np.arange(first, last + 1) * step) / scale
     else:
         times = np.array([(begins + k * step) / scale for k in range(first, last + 1)])
     # either way rounded once, so that instants that meet are equal
-    if clock.jitter:
-        random = np.random.Generator(np.random.Philox(clock.seed)).random(last + 1)
-        times = times + clock.jitter * random[first:]
+    if series.jitter:
+        random = np.random.Generator(np.random.Philox(series.seed)).random(last + 1)
+        times = times + series.jitter * random[first:]
     return times[(times >= begin) & (times < end)]
-
-
-def _start(moment: Moment) -> Fraction:
-    clock = moment.clock
-    return _exact(clock.offset) + (0 if moment.samples else _exact(clock.delay))
 
 
 def _exact(value: float) -> Fraction:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -13,8 +13,18 @@ import numpy as np
 from ..arguments import number
 from ..blocks import block, default_state
 from ..errors import ParameterError, UsageError
+from ..names import Parameters
+from ..params import whole_number
+from ..upstream.control_internals import (
+    Around,
+    current_parameters,
+    outputs_now,
+    rates_now,
+    set_parameters,
+)
 from .clock import Clock, Moment
 from .discretised import discretise
+from .parameters import Sampling
 from .rebuilt import rebuilt, staged
 
 Happening = frozenset[Moment]
@@ -37,7 +47,7 @@ def happening(what: Happening = frozenset()) -> Iterator[None]:
         _HAPPENING.reset(token)
 
 
-class Sampled(ct.NonlinearIOSystem):
+class Sampled(Around):
     """A block in discrete time, in a diagram of continuous time; made by `sampled`.
 
     Its states are those of the block, the outputs that are on their way, the first to come last,
@@ -46,19 +56,31 @@ class Sampled(ct.NonlinearIOSystem):
     Attributes
     ----------
     inner : control.InputOutputSystem
-        The block in discrete time.
-    clock : Clock
-    input_quantum, output_quantum : float
-        Steps to which inputs and outputs are rounded; 0 for none.
+        The block that is sampled.
+    sampling : Block
+        When, and with which converters: a `Sampling`, which blocks of one program share.
+    euler : bool
+        Whether the block is in continuous time, and its next states are x + dt f(t, x, u).
+    delays : bool
+        Whether its outputs wait for the delay.
+    converters : tuple of str
+        Which quantum of `sampling` its inputs and its outputs are rounded to; "" for none.
     """
 
     def __init__(
-        self, inner: Any, clock: Clock, *, input_quantum: float = 0.0, output_quantum: float = 0.0
+        self,
+        inner: Any,
+        sampling: Any,
+        *,
+        euler: bool = False,
+        delays: bool = False,
+        converters: tuple[str, str] = ("", ""),
     ) -> None:
-        self.inner, self.clock = inner, clock
-        self.input_quantum, self.output_quantum = input_quantum, output_quantum
+        self.inner, self.sampling = inner, sampling
+        self.euler, self.delays, self.converters = euler, delays, converters
         outputs = list(inner.output_labels)
-        waiting = [f"{y}_pending{i + 1}" for i in range(clock.pending) for y in outputs]
+        self.waiting = sampling.spec.waiting if delays else 0
+        waiting = [f"{y}_pending{i + 1}" for i in range(self.waiting) for y in outputs]
         held = [f"{y}_held" for y in outputs]
         super().__init__(
             None if not outputs and not inner.nstates else _nothing,
@@ -72,19 +94,34 @@ class Sampled(ct.NonlinearIOSystem):
 
     @property
     def params(self) -> Any:
-        """Parameters of the block in discrete time."""
-        return self.inner.params
+        """Parameters of the block that is sampled, and of the sampling."""
+        return self.sampling.params | self.inner.params
 
     @params.setter
     def params(self, values: Any) -> None:
-        if values:
-            self.inner.params = values
+        ours, theirs = self._divided(values or {})
+        if ours:
+            self.sampling.params = ours
+        if theirs:
+            self.inner.params = theirs
+
+    def _divided(self, values: Any) -> tuple[dict[str, Any], Any]:
+        """Return which parameters are the sampling's, and the others."""
+        prefix = f"{self.sampling.name}."
+        ours = {k: v for k, v in values.items() if str(k).startswith(prefix)}
+        theirs = values.copy()
+        for name in ours:
+            dict.pop(theirs, name)
+        return {k.removeprefix(prefix): v for k, v in ours.items()}, theirs
 
     def copy(self, name: str | None = None, use_prefix_suffix: bool = True) -> Sampled:
-        """Return a copy, whose parameters have its name in front."""
+        """Return a copy, whose parameters have its name in front; it has the same clock."""
         inner = self.inner.copy(name=name, use_prefix_suffix=use_prefix_suffix)
+        sampling = self.sampling
+        if sampling.name == _own_name(self.inner.name):  # of this block alone
+            sampling = _alone(sampling.spec, inner)
         return Sampled(
-            inner, self.clock, input_quantum=self.input_quantum, output_quantum=self.output_quantum
+            inner, sampling, euler=self.euler, delays=self.delays, converters=self.converters
         )
 
     def default_state(self) -> np.ndarray:
@@ -99,47 +136,64 @@ class Sampled(ct.NonlinearIOSystem):
 
     def answers(self, now: Happening) -> bool:
         """Whether its outputs are new ones, made of the inputs that it has now."""
-        return self.clock.sampling in now and not self.clock.pending
+        return self.samples(now) and not self.delays
 
-    def _update_params(self, params: Any) -> None:
-        self.inner._update_params(params)
+    def samples(self, now: Happening) -> bool:
+        """Whether it takes a sample."""
+        return Moment(self.sampling, 1) in now
 
-    @property
-    def _current_params(self) -> Any:
-        return self.inner._current_params
+    def acts(self, now: Happening) -> bool:
+        """Whether anything happens to it."""
+        return self.samples(now) or self.releases(now)
 
-    @_current_params.setter
-    def _current_params(self, values: Any) -> None:
-        """Nothing: they are the block's, which python-control has set already."""
+    def releases(self, now: Happening) -> bool:
+        """Whether outputs follow that have waited."""
+        return self.delays and Moment(self.sampling, 0) in now
 
-    def _rhs(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def override(self, params: Any) -> None:
+        """Divide overrides between the sampling and the block that is sampled."""
+        ours, theirs = self._divided(params or {})
+        full = {f"{self.sampling.name}.{name}": value for name, value in ours.items()}
+        set_parameters(self.sampling, Parameters(full) if ours else None)
+        set_parameters(self.inner, theirs)
+
+    def rates(self, t: float, x: Any, u: Any) -> np.ndarray:
+        """Return what becomes of its states; see `happening`."""
         now = _HAPPENING.get()
         if now is None:
             raise UsageError(
-                f"block '{self.name}' is sampled every {self.clock.dt:g} s, and python-control "
-                "would integrate over its samples: use nlctl.input_output_response, which stops "
-                "at each of them (engine='python-control' is the reference)"
+                f"block '{self.name}' is sampled every {self.sampling.current_spec.dt:g} s, and "
+                "python-control would integrate over its samples: use "
+                "nlctl.input_output_response, which stops at each of them "
+                "(engine='python-control' is the reference)"
             )
         x = np.array(x, dtype=float)
         own, _, _ = self.parts(x)
         if not self.acts(now):
             return np.zeros(x.size)
+        p = current_parameters(self.sampling)
 
         def computed() -> tuple[Any, Any]:
-            given = rounded(np.asarray(u, dtype=float), self.input_quantum)
-            following = np.reshape(self.inner._rhs(t, own, given), -1) if own.size else own
-            return following, self._new(t, own, given)
+            given = self.converted(rounded, np.asarray(u, dtype=float), p, 0)
+            following = rates_now(self.inner, t, own, given) if own.size else own
+            if self.euler:
+                following = own + p.dt * following
+            return following, self._new(t, own, given, p)
 
-        return np.concatenate(self.after(now, x, computed))
+        return np.concatenate(self.after(now, x, self.oldest(oldest, x, p), computed))
 
-    def _out(self, t: float, x: Any, u: Any) -> np.ndarray:
-        own, waiting, held = self.parts(np.asarray(x, dtype=float))
-        now = _HAPPENING.get() or frozenset()
+    def answer(self, t: float, x: Any, u: Any) -> np.ndarray:
+        """Return its outputs; see `happening`."""
+        x = np.asarray(x, dtype=float)
+        own, _, held = self.parts(x)
+        now, p = _HAPPENING.get() or frozenset(), current_parameters(self.sampling)
         if self.answers(now):
-            return self._new(t, own, rounded(np.asarray(u, dtype=float), self.input_quantum))
-        return self.shown(now, waiting, held)
+            return self._new(t, own, self.converted(rounded, np.asarray(u, dtype=float), p, 0), p)
+        return self.oldest(oldest, x, p) if self.releases(now) else held
 
-    def after(self, now: Happening, x: Any, computed: Callable[[], tuple[Any, Any]]) -> list[Any]:
+    def after(
+        self, now: Happening, x: Any, due: Any, computed: Callable[[], tuple[Any, Any]]
+    ) -> list[Any]:
         """Return the parts of the states after what happens, one behind the other.
 
         Parameters
@@ -147,33 +201,51 @@ class Sampled(ct.NonlinearIOSystem):
         now : frozenset of Moment
         x : array_like of shape (nstates,)
             Numbers, or what stands for them.
+        due : array_like of shape (noutputs,)
+            Outputs that follow if any do, see `oldest`.
         computed : callable
             Returns what a sample makes: the block's own next states, and its outputs.
         """
         own, waiting, held = self.parts(x)
-        held = self.shown(now, waiting, held)
-        if self.clock.sampling not in now:
+        held = due if self.releases(now) else held
+        if not self.samples(now):
             return [own, waiting, held]
         following, y = computed()
-        if not self.clock.pending:
+        if not self.delays:
             return [following, y]
         return [following, y, waiting[: len(waiting) - len(held)], held]
 
-    def shown(self, now: Happening, waiting: Any, held: Any) -> Any:
-        """Return the outputs that are held, those that have waited if they follow now."""
-        return waiting[len(waiting) - len(held) :] if self.releases(now) else held
+    def oldest(self, function: Any, x: Any, p: Any) -> Any:
+        """Return the outputs that have waited for the delay, by `oldest` or what stands for it."""
+        _, waiting, held = self.parts(x)
+        return function(waiting, len(held), p.pending) if self.waiting else held
 
-    def acts(self, now: Happening) -> bool:
-        """Whether anything happens to it."""
-        return self.clock.sampling in now or self.releases(now)
+    def converted(self, function: Any, values: Any, p: Any, which: int) -> Any:
+        """Return inputs (0) or outputs (1) behind their converter, by `rounded`."""
+        name = self.converters[which]
+        return function(values, getattr(p, name)) if name and len(values) else values
 
-    def releases(self, now: Happening) -> bool:
-        """Whether outputs follow that have waited."""
-        return bool(self.clock.delay) and self.clock.release in now
+    def _new(self, t: float, own: np.ndarray, u: np.ndarray, p: Any) -> np.ndarray:
+        y = outputs_now(self.inner, t, own, u).astype(float)
+        return self.converted(rounded, y, p, 1)
 
-    def _new(self, t: float, own: np.ndarray, u: np.ndarray) -> np.ndarray:
-        y = np.asarray(self.inner._out(t, own, u), dtype=float).reshape(-1)
-        return rounded(y, self.output_quantum)
+
+def clocks_of(blocks: Iterable[Any]) -> dict[Any, Clock]:
+    """Return the clocks of blocks, among them sampled ones, with the parameters of now."""
+    samplings = [made.sampling for made in blocks if isinstance(made, Sampled)]
+    return {sampling: sampling.current_spec.clock for sampling in samplings}
+
+
+def _alone(spec: Sampling, sampled: Any) -> Any:
+    """Return the sampling of a single block, whose parameters have that block's name in front."""
+    made = block(spec, "sampling")
+    made.name = _own_name(sampled.name)  # no diagram has this block, so that it may have a dot
+    return made
+
+
+def _own_name(block_name: str) -> str:
+    """Return what the sampling of a single block is called."""
+    return f"{block_name}.sampling"
 
 
 def _nothing(t: float, x: Any, u: Any, params: Any) -> Any:
@@ -181,9 +253,19 @@ def _nothing(t: float, x: Any, u: Any, params: Any) -> Any:
     raise AssertionError("the equations of a sampled block are those of the block inside")
 
 
-def rounded(values: Any, quantum: float) -> Any:
-    """Round to multiples of a quantum, halves to the even one; 0 for none."""
-    return quantum * np.rint(values / quantum) if quantum else values
+def rounded(values: Any, quantum: Any) -> Any:
+    """Round to multiples of a quantum, halves to the even one; 0 leaves all as it is."""
+    step = np.where(quantum > 0.0, quantum, 1.0)
+    return np.where(quantum > 0.0, step * np.rint(values / step), values)
+
+
+def oldest(waiting: Any, size: int, pending: Any) -> Any:
+    """Return those of the outputs that wait that a number of samples have come after."""
+    count = len(waiting) // size
+    found = waiting[len(waiting) - size :]
+    for i in range(count - 1):
+        found = np.where(pending == i + 1.0, waiting[i * size : (i + 1) * size], found)
+    return found
 
 
 def sampled(
@@ -194,9 +276,10 @@ def sampled(
     delay: float = 0.0,
     jitter: float = 0.0,
     seed: int = 0,
-    input_quantum: float = 0.0,
-    output_quantum: float = 0.0,
+    input_quantum: float | None = None,
+    output_quantum: float | None = None,
     method: str | None = None,
+    waiting: int | None = None,
 ) -> Any:
     """Put a block or diagram in discrete time beside continuous ones: a computer's program.
 
@@ -223,10 +306,13 @@ def sampled(
         Of the random times.
     input_quantum, output_quantum : float, optional
         Steps of the converters: inputs and outputs are rounded to multiples of these, in their
-        own units.
+        own units.  With None there is no converter; 0.0 is one that leaves all as it is.
     method : str, optional
         How one in continuous time becomes one in discrete time, as in `discretise`; by default it
         is refused.
+    waiting : int, optional
+        How many samples may be on their way to the outputs, if the delay is to be varied; by
+        default as many as `delay` needs.
 
     Returns
     -------
@@ -245,6 +331,10 @@ def sampled(
     A run ends before what happens at its last instant: another one that starts from its last
     state resumes there.
 
+    The numbers are parameters, ``"sampling.dt"`` and so on, that runs, ensembles and studies
+    override without compiling again.  Whether there are a delay and converters is part of the
+    diagram, and a block that has a sampling time of its own keeps it.
+
     Examples
     --------
     >>> import control as ct
@@ -256,36 +346,65 @@ def sampled(
     >>> round(float(run.outputs[0, -1]), 6)  # 3 exp(-0.1) - 2
     0.714512
     """
-    for name, value in (("input_quantum", input_quantum), ("output_quantum", output_quantum)):
-        number("sampled", name, value, at_least=0)
     if not isinstance(system, ct.InputOutputSystem):
         is_discrete = getattr(system, "discrete", False)
         system = block(system, "sampled", dt=dt if is_discrete else None)
+    euler = method == "euler" and system.dt in (0, None)
     if method is not None and system.dt in (0, None):
-        system = discretise(system, number("sampled", "dt", dt, above=0), method)
-    period = _sampling_time(system, dt)
-    clock = Clock(dt=period, offset=offset, delay=delay, jitter=jitter, seed=seed)
-    quanta = {"input_quantum": input_quantum, "output_quantum": output_quantum}
+        made = discretise(system, number("sampled", "dt", dt, above=0), method)
+        system = system if euler else made
+    own = _own_time(system, dt, euler)
+    period = number("sampled", "dt", own or dt, above=0)
+    spec = Sampling(
+        dt=period, offset=offset, delay=delay, jitter=jitter, seed=seed,
+        input_quantum=0.0 if input_quantum is None else input_quantum,
+        output_quantum=0.0 if output_quantum is None else output_quantum,
+        waiting=_waiting(dt=period, delay=delay, waiting=waiting), own_time=own,
+        converts_inputs=input_quantum is not None, converts_outputs=output_quantum is not None,
+    )  # fmt: skip
+    return _sampled(system, spec, euler)
+
+
+def _sampled(system: Any, spec: Sampling, euler: bool) -> Any:
+    """Return a system whose blocks are sampled."""
+    before = "input_quantum" if spec.converts_inputs else ""
+    behind = "output_quantum" if spec.converts_outputs else ""
+    delays = spec.waiting > 0
     if not isinstance(system, ct.InterconnectedSystem):
-        return Sampled(_discrete(system), clock, **quanta)
-    made = rebuilt(system, lambda part: Sampled(_discrete(part), clock.sampling.clock), dt=0)
-    first = _through(made.input_labels, "input_stage", clock.sampling.clock, input_quantum)
-    last = _through(made.output_labels, "output_stage", clock, output_quantum)
-    return staged(made, first if input_quantum else None, last if delay or output_quantum else None)
+        sampling = _alone(spec, system)
+        return Sampled(
+            _discrete(system), sampling, euler=euler, delays=delays, converters=(before, behind)
+        )
+    sampling = block(spec, "sampling")
+
+    def each(part: Any) -> Sampled:
+        return Sampled(_discrete(part), sampling, euler=euler and bool(part.nstates))
+
+    made = rebuilt(system, each, dt=0)
+    first = _through(made.input_labels, "input_stage", sampling, before)
+    last = _through(made.output_labels, "output_stage", sampling, behind, delays)
+    return staged(made, first if before else None, last if delays or behind else None)
 
 
-def _through(labels: list[str], name: str, clock: Clock, quantum: float) -> Sampled:
+def _waiting(dt: float, delay: float, waiting: int | None) -> int:
+    """Return how many samples may be on their way."""
+    least = Clock(dt=dt, delay=delay).pending
+    return least if waiting is None else whole_number("sampled", "waiting", waiting, at_least=least)
+
+
+def _through(
+    labels: list[str], name: str, sampling: Any, quantum: str, delays: bool = False
+) -> Sampled:
     """Return a sampled block whose outputs are its inputs, rounded and later."""
     outputs = [f"{label}_{name}" for label in labels]
-    inner = ct.ss(
-        [], [], [], np.eye(len(labels)), clock.dt, inputs=labels, outputs=outputs, name=name
-    )
-    return Sampled(inner, clock, output_quantum=quantum)
+    inner = ct.ss([], [], [], np.eye(len(labels)), None, inputs=labels, outputs=outputs, name=name)
+    return Sampled(inner, sampling, delays=delays, converters=("", quantum))
 
 
-def _sampling_time(system: Any, dt: float | None) -> float:
+def _own_time(system: Any, dt: float | None, euler: bool) -> float:
+    """Return the sampling time that a system has of its own, 0 if it has none."""
     own = system.dt if isinstance(system.dt, int | float) and system.dt is not True else None
-    if own == 0 and (system.nstates or 0) > 0:
+    if own == 0 and (system.nstates or 0) > 0 and not euler:
         raise ParameterError(
             f"'{system.name}' is in continuous time, and a sampled block is in discrete time: "
             f"say how, nlctl.sampled(system, {0.01 if dt is None else dt}, method='euler'), or "
@@ -297,7 +416,7 @@ def _sampling_time(system: Any, dt: float | None) -> float:
         raise ParameterError(
             f"'{system.name}' has a sampling time of {own:g} s and cannot be sampled every {dt} s"
         )
-    return number("sampled", "dt", own if dt is None else dt, above=0)
+    return float(own or 0.0)
 
 
 def _discrete(system: Any) -> Any:

@@ -50,7 +50,7 @@ class Mixed:
     matrix: tuple[tuple[float, ...], ...] = param(
         ((1.0, 2.0), (3.0, 4.0), (5.0, 6.0)), unit="1", meaning="a matrix"
     )
-    count: int = param(3, unit="1", meaning="a whole number", at_least=1)
+    count: int = param(3, unit="1", meaning="an integer", at_least=1)
     flag: bool = param(False, unit="1", meaning="a switch")
     note: str = "no parameter"
 
@@ -109,7 +109,7 @@ class TestBounds:
     )
     def test_nan_and_infinity_are_refused_by_name(self, bad, name, where, make):
         """No bound is needed for a value that is no finite number; the element is named."""
-        with pytest.raises(ParameterError, match=rf"Mixed needs a .*{re.escape(where)}.*{bad}"):
+        with pytest.raises(ParameterError, match=rf"Mixed needs an? .*{re.escape(where)}.*{bad}"):
             Mixed(**{name: make(bad)})
 
 
@@ -125,7 +125,7 @@ class TestKinds:
             ("matrix", np.zeros((0, 2)), "at least one value in matrix"),
             ("matrix", np.zeros((3, 0)), "at least one value in matrix"),
             ("matrix", [[1.0, 2.0], [3.0]], "numbers for matrix"),
-            ("count", 2.5, "a whole number for count, got 2.5"),
+            ("count", 2.5, "an integer for count, got 2.5"),
             ("count", [2], "count to be a number"),
             ("count", 0, "count >= 1, got 0"),
             ("flag", 1, "flag to be True or False, got 1"),

@@ -40,7 +40,7 @@ class TestDeadZone:
         assert N * rate(law, zeta, u) == pytest.approx(d * control, rel=1e-9, abs=1e-9)
 
     def test_zeta_stops_in_the_loop(self):
-        """It grows until |r| fits into the dead zone; the paper's law creeps on."""
+        """It grows until |r| fits into the dead zone; the paper's law drifts on."""
         times = np.linspace(0, 60, 3001)
         grown, largest = {}, {}
         for law in (nlctl.NussbaumLaw(), nlctl.DeadZoneNussbaumLaw(r_0=0.3)):

@@ -65,6 +65,7 @@ def test_simulate_writes_what_was_asked_for(tmp_path):
     assert table["time"].iloc[-1] == 0.5
     assert (tmp_path / "out.svg").read_text().lstrip().startswith("<?xml")
     assert "max |.|" in result.stdout
+    assert result.stdout.split()[-2:] == ["out.csv", "out.svg"]
     inside = table[(table["u"] > 0.5) & (table["u"] < 0.6)]
     np.testing.assert_array_equal(inside["v"], 0.0)  # b_r = 0.6 has reached the actuator
 

@@ -47,7 +47,7 @@ def test_the_published_loop_holds_and_the_paper_does_not():
     assert (done.returncode, content["holds"], content["answer"]) == (5, True, "undecided")
     lines = {line["key"]: line for line in content["lines"]}
     corrected = [line for line in lines.values() if line["reading"] == "corrected"]
-    assert [x["key"] for x in corrected if x["status"] == "undecided"] == ["creep"]
+    assert [x["key"] for x in corrected if x["status"] == "undecided"] == ["slow drift"]
     assert lines["(31)"]["status"] == "checked"
     assert lines["(31) literal"]["status"] == "violated"
     assert 0 < lines["(31) literal"]["time"] < 20
@@ -56,7 +56,7 @@ def test_the_published_loop_holds_and_the_paper_does_not():
 
 def test_a_violation_is_exit_code_1():
     """Without sigma-modification the decay rate of (31) is zero."""
-    code, said, _ = check("example-1", "--set", "robust.sigma_2=0", "--horizon", "5")
+    code, said, _ = check("example-1", "--set", "robust.sigma_2=0", "--until", "5")
     assert code == 1
     assert "violated" in said
 
@@ -121,7 +121,7 @@ def test_replay_keeps_every_digit_and_every_kind_of_parameter():
     typed = ["filtered_error.lambdas=1,2", "plant.integrate_w=true", "plant.x1(0)=9"]
     start = {"plant.x1": np.array([0.1, 1 / 3]), "law.zeta": 1.25}
     parts = shlex.split(repeat_command("example-1", 0.1, typed, start, 1))
-    assert float(parts[parts.index("--horizon") + 1]) == 0.1
+    assert float(parts[parts.index("--until") + 1]) == 0.1
     told = dict(a.split("=") for o, a in itertools.pairwise(parts) if o == "--set")
     assert told["filtered_error.lambdas"] == "1,2"
     assert told["plant.integrate_w"] == "true"
@@ -186,7 +186,7 @@ def test_summary_counts_every_line_once_and_names_what_fails(found):
     counts = said.splitlines()[1].partition(":")[2].split(",")
     assert sum(int(part.split()[0]) for part in counts) == len(found.lines)
     assert "none of the corrected statements" in said
-    assert "undecided: creep (1 s show nothing of it" in said
+    assert "undecided: slow drift (1 s show nothing of it" in said
     assert "Lemma 1" in said.splitlines()[-1]
 
 

@@ -8,18 +8,31 @@ import subprocess
 import sys
 
 import pytest
-from extras import needed
+from extras import needed, needed_program
 from places import ROOT
 from rows import each_row
+
+from analysis.catalogue import block_records
+from analysis.report.browser import BROWSERS
 
 DOCS = ROOT / "docs"
 GALLERY = sorted((DOCS / "gallery").glob("*.py"))
 SCRIPTS = GALLERY + sorted([*DOCS.glob("tutorials/*.py"), *DOCS.glob("how-to/*.py")])
-PUBLIC = ["nlctl", "nlctl.paper", "analysis.lyapunov", "analysis.robustness", "analysis.studies"]
+PUBLIC = [
+    *("nlctl", "nlctl.paper", "analysis.lyapunov", "analysis.robustness", "analysis.studies"),
+    *("analysis.report", "analysis.loop_report"),
+]
 
 
 def text(path):
     return path.read_text(encoding="utf-8")
+
+
+PAGES = (
+    *("index", "auto/tutorials/index", "auto/tutorials/t7_from_simulink", "auto/gallery/index"),
+    *("how-to/index", "explanation/paper", "reference/blocks", "reference/study-files"),
+    *("studies", "glossary"),
+)
 
 
 @each_row("script", [path.name for path in GALLERY])
@@ -30,6 +43,14 @@ def test_a_script_of_the_gallery_is_short_and_asserts(script):
     asserted = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Assert)]
     assert asserted
     assert not any(isinstance(node.test, ast.Constant) for node in asserted)
+
+
+def test_every_block_is_in_the_gallery():
+    """Its characteristic, its step response, or a loop with it; at least 25 scripts in all."""
+    shown = " ".join(map(text, GALLERY))
+    missing = [name for name in block_records() if not re.search(rf"\b{name}\b", shown)]
+    assert missing == []
+    assert len(GALLERY) >= 25
 
 
 def test_every_page_that_is_executed_asserts_something():
@@ -48,14 +69,6 @@ def test_every_public_name_is_in_the_reference(module):
     assert sorted(told) == sorted(importlib.import_module(module).__all__)
 
 
-def test_code_of_the_explanations_runs():
-    """Blocks of Python on pages in Markdown, which assert what the text says."""
-    for path in (DOCS / "explanation").glob("*.md"):
-        for code in re.findall(r"```python\n(.*?)```", text(path), flags=re.DOTALL):
-            assert "assert" in code
-            exec(compile(code, str(path), "exec"), {})
-
-
 def built(folder, *options):
     """Build the site in a folder; return what Sphinx says of it."""
     needed("sphinx_gallery", "docs")
@@ -64,12 +77,39 @@ def built(folder, *options):
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
 
 
-@pytest.mark.docs
-def test_the_site_builds_without_a_warning(tmp_path):
-    """Links, names and formulas; nothing is executed."""
-    said = built(str(tmp_path), "-D", "plot_gallery=0")
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, built without a warning; nothing is executed."""
+    folder = tmp_path_factory.mktemp("site")
+    said = built(str(folder), "-D", "plot_gallery=0")
     assert said.returncode == 0, said.stderr
-    assert "<math" in text(tmp_path / "explanation" / "paper.html")
+    return folder
+
+
+@pytest.mark.docs
+def test_the_site_builds_without_a_warning(site):
+    """Links, names and formulas."""
+    assert "<math" in text(site / "explanation" / "paper.html")
+
+
+@pytest.mark.docs
+@pytest.mark.browser
+def test_axe_finds_nothing_on_ten_pages(site):
+    """Contrast, names, roles, headings, keyboard; of some pages in the dark, too."""
+    axe = needed("axe_playwright_python.sync_playwright", "browser")
+    chromium = needed_program(BROWSERS)
+    found = []
+    with needed("playwright.sync_api", "browser").sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--disable-quic"])
+        looked_at = [(name, "light") for name in PAGES] + [(name, "dark") for name in PAGES[:3]]
+        for name, scheme in looked_at:
+            page = browser.new_page(color_scheme=scheme)
+            page.goto((site / f"{name}.html").as_uri())
+            violations = axe.Axe().run(page).response["violations"]
+            found += [(name, scheme, v["id"], v["nodes"][0]["html"][:200]) for v in violations]
+            page.close()
+        browser.close()
+    assert found == []
 
 
 @pytest.mark.docs

@@ -132,6 +132,9 @@ def test_diagrams_show_what_inputs_are_connected_to():
     assert one.inputs == ("u_{1} = -u + w",)
     assert two.inputs == ("e = 1.5 y_{1}",)
     assert two.equations == ("u = -k e",)
+    signs = ct.summing_junction(["y", "-yd"], "error", name="difference")
+    (difference,) = nlctl.typeset(signs)
+    assert difference.equations == (r"\mathrm{error} = y - y_{d}",)  # no factor 1
     assert two.latex == "\\begin{aligned}\ne &= 1.5 y_{1} \\\\\nu &= -k e\n\\end{aligned}"
 
 

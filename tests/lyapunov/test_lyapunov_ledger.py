@@ -78,7 +78,7 @@ def test_the_examples_hold_as_corrected(number):
     assert statuses["A1"] == "computed"
     assert statuses["(31)"] == statuses["(32)"] == statuses["Lemma 1, horizon"] == "checked"
     assert statuses["(b)"] == "not applicable"  # zeta falls at times
-    assert statuses["creep"] == "undecided"
+    assert statuses["slow drift"] == "undecided"
     assert slow_drift_of(study(number).runs.first) is None
 
 
@@ -247,9 +247,9 @@ def test_a_long_run_tells_where_the_slow_drift_leads():
     found = ledger(example(2), 320.0, box=BOXES[2], W=np.zeros(27), step=0.04)
     assert found.slow_drift is not None
     assert found.slow_drift.burst > 5000
-    line = found["creep"]
+    line = found["slow drift"]
     assert line.status == "undecided"
-    assert line.evidence.startswith("creeps")
+    assert line.evidence.startswith("drifts")
     assert line.least == pytest.approx(1 - found.slow_drift.share)
     assert "budget spent by" in line.evidence
     assert found["(c)"].status == found["Lemma 1, horizon"].status == "checked"

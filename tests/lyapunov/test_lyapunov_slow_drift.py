@@ -108,7 +108,7 @@ class TestSlowDrift:
         found = slow_drift(part(crossing, 80.0), tame, window=4.0)
         assert found.balance.p == pytest.approx(D**2 / BETA, rel=0.02)
         assert abs(found.balance.q) < 0.03 * found.balance.rate(found.lobe.extremum)
-        assert found.verdict == "creeps"
+        assert found.verdict == "drifts"
         assert found.rest is None
 
     def test_the_burst_is_predicted_long_before(self, crossing):
@@ -121,7 +121,7 @@ class TestSlowDrift:
         assert 0.1 < found.share < 0.5
         assert found.burst == pytest.approx(burst, rel=0.03)
         assert found.time < found.burst_range[0] <= found.burst <= found.burst_range[1]
-        assert "creeps" in str(found)
+        assert "drifts" in str(found)
 
     def test_r_that_follows_the_reference_stops_the_drift(self):
         """eta = beta r + Y_d: A' = (d^2/|N| - |Y_d d|)/beta is zero where |N| = |d / Y_d|."""
@@ -139,7 +139,7 @@ class TestSlowDrift:
         run = scalar_loop(tame, -1.0, np.linspace(0, 60, 6001), reference=-0.1, zeta=1.6)
         found = slow_drift(run, tame, window=2.0)
         assert np.all(np.array(found.rates[2:]) < 0)
-        assert found.verdict == "turned round"
+        assert found.verdict == "reversed"
         assert found.burst == np.inf
 
     def test_too_few_windows_are_refused(self, crossing):

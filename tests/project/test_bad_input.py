@@ -106,7 +106,7 @@ class TestJoining:
             ("u>a>m mm>b>y", "u", "y", DiagramError, ["'b'", "'mm'", "nearest: 'm'"]),
             ("u>a>m m>b>y", "u", "yy", UnknownNameError, ["output signal 'yy'", "'y'"]),
             ("u>a>m m>b>y", "u w", "y", UnknownNameError, ["input signal 'w'", "'u'"]),
-            ("u>a>m m>b>y", "", "y", DiagramError, ["'a'", "'u'", "nobody delivers"]),
+            ("u>a>m m>b>y", "", "y", DiagramError, ["'a'", "'u'", "no block outputs"]),
             ("u>a>y u>b>y", "u", "y", DiagramError, ["'y'", "'a'", "'b'", "summing_junction"]),
             ("u>a>m m>a>y", "u", "y", DiagramError, ["two blocks", "'a'"]),
             ("u>a>m m>b>y", "u m", "y", DiagramError, ["'m'", "'a'"]),

@@ -4,14 +4,12 @@ import doctest
 import importlib
 import inspect
 import pkgutil
+import re
 
-import pytest
 from rows import each_row
 
 import analysis
 import nlctl
-
-PACKAGES = ("nlctl", "analysis.lyapunov", "analysis.robustness", "analysis.studies")
 
 
 def modules():
@@ -50,12 +48,40 @@ def test_functions_of_nlctl_have_an_example(name):
     assert shown == (name not in without)
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_a_section_of_parameters_leaves_none_out(package):
-    """Where there is one, it names every argument of the signature."""
-    for name, made in functions(package).items():
-        _, found, told = (inspect.getdoc(made) or "").partition("Parameters\n----------\n")
-        wanted = [each for each in inspect.signature(made).parameters if found]
-        heads = [line for line in told.splitlines() if line and not line.startswith(" ")]
-        told_of = {part.strip(" *") for head in heads for part in head.split(" :")[0].split(",")}
-        assert set(wanted) <= told_of, f"{package}.{name}: {set(wanted) - told_of}"
+def offered():
+    """The public functions of all packages, by the names under which they are offered."""
+    for package in (nlctl, analysis):
+        homes = [package.__name__]
+        walked = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+        homes += [found.name for found in walked if found.ispkg]
+        for home in homes:
+            if hasattr(importlib.import_module(home), "__all__"):
+                for name, made in functions(home).items():
+                    if made.__module__.partition(".")[0] in ("nlctl", "analysis"):
+                        yield f"{home}.{name}", made
+
+
+SECTION = r"^{}\n-+\n((?:.+\n?|\n(?!\w+\n-+\n))*)"
+
+
+def section(made, title):
+    """The lines of a section of a docstring, None without it."""
+    text = f"{inspect.getdoc(made) or ''}\n"
+    found = re.search(SECTION.format(title), text, re.MULTILINE)
+    return found and found[1].splitlines()
+
+
+@each_row(("name", "made"), sorted(dict(offered()).items()))
+def test_public_functions_tell_of_every_argument(name, made):
+    """A section Parameters names each of the signature, and nothing else is in it."""
+    told = section(made, "Parameters") or []
+    heads = [line for line in told if line and not line.startswith(" ")]
+    named = {part.strip(" *") for head in heads for part in head.split(" :")[0].split(",")}
+    assert named == set(inspect.signature(made).parameters), name
+
+
+@each_row(("name", "made"), sorted(dict(offered()).items()))
+def test_public_functions_tell_what_they_return(name, made):
+    """A section Returns or Yields, of all that return something."""
+    returns = inspect.signature(made).return_annotation not in (None, "None")
+    assert returns == any(section(made, title) for title in ("Returns", "Yields")), name

@@ -8,7 +8,7 @@ from graphlib import TopologicalSorter
 from places import ROOT
 
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
-    ["nlctl._version", "nlctl.host"],
+    ["nlctl._version", "nlctl.host", "nlctl.upstream"],
     ["nlctl.errors", "nlctl.names", "nlctl.arguments", "nlctl.params", "nlctl.equations"],
     ["nlctl.blocks", "nlctl.diagrams", "nlctl.functions", "nlctl.drawing", "nlctl.responses"]
     + ["nlctl.sampling", "nlctl.delays"],
@@ -22,6 +22,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["analysis.figures", "analysis.report"],
     ["analysis.studies"],
     ["analysis.paper"],
+    ["analysis.loop_report"],
     ["analysis.cli"],
 ]
 BLOCK_MODULES = LAYERS[3]
@@ -125,6 +126,44 @@ def test_layout_is_independent_of_python_control():
         assert all(within(m, ["nlctl.drawing"]) for m in imports(name))
         assert "import control" not in ast.unparse(MODULES[name])
     assert len(geometry) > 4
+
+
+def imported(name):
+    """Yield the names of all modules that a module imports, with what it takes of them."""
+    for node in ast.walk(MODULES[name]):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+PRIVATE = ("numba.core", "numba.np", "numba.misc", "numba.typed", "numba.cpython")
+
+
+def is_private_of_others(module):
+    """Whether a name of another library is none that it documents."""
+    return within(module, PRIVATE) or ("._" in module and not within(module, ["nlctl", "analysis"]))
+
+
+def test_private_names_of_numba_stand_in_one_module():
+    """Where nobody documents what is relied on there is one place to mend, and a test of each."""
+    found = {name: [m for m in imported(name) if is_private_of_others(m)] for name in MEMBERS}
+    assert {n for n, modules in found.items() if modules} == {"nlctl.upstream.numba_internals"}
+
+
+CONTROL = ("_update_params", "_current_params", "_rhs", "_out")
+
+
+def test_private_names_of_python_control_stand_in_one_module():
+    """Those of `NonlinearIOSystem`, whether read, called or overridden."""
+    found = {}
+    for name, tree in MODULES.items():
+        used = [n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)]
+        used += [n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)]
+        found[name] = set(used) & set(CONTROL)
+    assert {n: names for n, names in found.items() if names} == {
+        "nlctl.upstream.control_internals": set(CONTROL)
+    }
 
 
 def lines_of_functions(path, lines):

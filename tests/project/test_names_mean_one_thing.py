@@ -6,9 +6,6 @@ from collections import defaultdict
 from test_layers import MODULES
 
 EXCEPTIONS = {
-    "A": "Butcher's tableau of each integrator, in the letters of the literature",
-    "C": "Butcher's tableau of each integrator, in the letters of the literature",
-    "STAGES": "the size of each integrator's tableau",
     "AHEAD": "the step from a standstill, of either method; the integrators are compiled from it",
     "interpolate": "what each integrator offers in the place of the other's",
     "evaluate": "rows of an experiment, in README; and a right-hand side within the integrators",

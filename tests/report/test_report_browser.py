@@ -228,7 +228,7 @@ def test_what_is_folded_opens_for_a_link_and_for_paper(visit, scripts):
 
 
 def test_everything_unfolds_at_once_and_folds_again(visit):
-    """One button below the contents."""
+    """One button before the contents."""
     page = visit("paper")
     count = page.locator("details").count()
     for name, wanted in (("Unfold all", count), ("Fold all", 0)):

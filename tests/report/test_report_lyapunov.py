@@ -127,7 +127,7 @@ def test_the_slow_drift_is_that_of_200_seconds_and_of_what_it_says():
     for row, one in zip(table.rows, found().values(), strict=True):
         assert one.slow_drift.time == 200.0
         assert row[3] == one.slow_drift.verdict
-    assert found()[2].slow_drift.verdict == "creeps"
+    assert found()[2].slow_drift.verdict == "drifts"
     assert 7e3 < found()[2].slow_drift.burst < 1.1e4  # within a quarter, a fiftieth of the way
 
 
@@ -247,7 +247,7 @@ def test_ctrl_c_ends_a_long_run():
 
 
 def test_a_run_that_does_not_burst_has_no_time_of_it():
-    """Twenty seconds as published: nothing is lost, and there is nothing to foretell it from."""
+    """Twenty seconds as published: nothing is lost, and there is nothing to predict it from."""
     run = long_run(nlctl.paper.example_2(), 20.0)
     assert np.isnan(run.burst)
     assert run.lost is None
@@ -255,25 +255,25 @@ def test_a_run_that_does_not_burst_has_no_time_of_it():
     assert run.predictions == ()
 
 
-def test_a_long_run_foretells_from_its_beginning_alone():
+def test_a_long_run_predicts_from_its_beginning_alone():
     """From 200 s of a run of 210 s at one tolerance: the same as from 200 s at another."""
     run = long_run(nlctl.paper.example_2(), 210.0, rtol=1e-6)
     (told,) = run.predictions
     wanted = found()[2].slow_drift
     assert told.time == 200.0
-    assert told.verdict == "creeps"
+    assert told.verdict == "drifts"
     assert told.burst == pytest.approx(wanted.burst, rel=1e-3)
     assert run.calm < 0.06
 
 
 def test_the_burst_is_at_the_top_of_the_part():
-    """First the sentence with its time, then the figure with the time and what was foretold."""
+    """First the sentence with its time, then the figure with the time and what was predicted."""
     run = dataclasses.replace(burst(), predictions=(found()[2].slow_drift,) * 2)
     first = lyapunov_sections(found(), {"2": run})[0]
     words, figure, *_ = first.items
     assert isinstance(words, Paragraph)
     assert f"t = {run.burst:.1f} s" in words.text
-    assert f"foretold for {run.predictions[0].burst:.0f} s" in words.text
+    assert f"predicted for {run.predictions[0].burst:.0f} s" in words.text
     assert isinstance(figure, Figure)
     lines = [line.get_xdata() for line in figure.figure.axes[0].lines]
     marks = {float(x[0]) for x in lines if len(x) == 2 and x[0] == x[1]}

@@ -48,6 +48,7 @@ from analysis.report.outline import (
     sort_key,
     summary,
 )
+from analysis.report.outline import cells as cells_of
 from analysis.report.page import fill
 from analysis.report.svg import draw_ahead, shapes_svg, short_path, svg, svg_files
 from analysis.report.typography import pieces
@@ -372,6 +373,13 @@ def test_sort_keys_are_the_numbers_themselves(number):
 def test_what_is_no_number_has_no_sort_key(value):
     """Units, words, truth values."""
     assert sort_key(value) == ""
+
+
+def test_numbers_that_are_not_finite_are_shown_as_such():
+    """Infinity is a sign and NaN a word, also as formatted text; they sort as numbers."""
+    table = Table(caption="", columns=["a", "b"], rows=[(np.nan, "-inf"), (-np.inf, "nan")])
+    shown = [[(cell.text, cell.value) for cell in row] for row in cells_of(table)]
+    assert shown == [[("NaN", "NaN"), ("−∞", "-Infinity")], [("−∞", "-Infinity"), ("NaN", "NaN")]]
 
 
 def test_shares_are_numbers_and_empty_cells_spoil_no_column():

@@ -16,8 +16,9 @@ from analysis.report.typography import FORMULA, NO_BREAK, in_print, pieces, plai
 @each_row(
     ("typed", "printed"),
     [
-        ("for t >= 10 s", "for t ≥_10_s"),
-        ("x1(0) = -0.5 and n < m", "x1(0) =_−0.5 and n < m"),
+        ("for t >= 10 s, |e| = 0.1, (n < 3)", "for t_≥_10_s, |e|_=_0.1, (n_<_3)"),
+        ("of them < 3, speed = 2", "of them_<_3, speed_=_2"),
+        ("x1(0) = -0.5 and n < m", "x1(0)_=_−0.5 and n < m"),
         ("0.0e+00, 2.1e+00, 1e0", "0, 2.1, 1"),
         ("rms (71%), 50% each, a%20b", "rms (71_%), 50_% each, a%20b"),
         ("d per |x|^2, s^-i", "d per |x|², s⁻ⁱ"),

@@ -12,6 +12,7 @@ from nlctl import AlgebraicLoopError, Clock, DivergedError, ParameterError
 from nlctl.errors import UsageError
 from nlctl.native import AuditError
 from nlctl.native.codegen.blocks import Reader
+from nlctl.params import declared_params
 from nlctl.sampling.clock import common_period
 from nlctl.sampling.system import happening
 
@@ -138,15 +139,41 @@ def test_outputs_that_need_each_other_at_one_instant_are_printed():
     np.testing.assert_allclose(run.outputs[1, -1], 2.0, atol=1e-3)  # b = b / 2 + 1
 
 
-def test_a_run_that_resumes_is_the_whole_one():
-    """Also at an instant of a sample: the first run leaves it to the second."""
+@pytest.mark.parametrize("name", [name for name in LOOPS if name not in ("an offset", "jitter")])
+def test_a_run_that_resumes_at_a_sample_is_the_whole_one_to_the_bit(name):
+    """The first run leaves what happens then to the second; no step remembers those before it."""
+    loop = nlctl.compile(LOOPS[name]())
+    x0 = start(loop.system)
+    whole = nlctl.input_output_response(loop, T, 0, x0)
+    first = nlctl.input_output_response(loop, T[:21], 0, x0)
+    second = nlctl.input_output_response(loop, T[20:], 0, first.states[:, -1])
+    np.testing.assert_array_equal(second.states, whole.states[:, 20:])
+
+
+@pytest.mark.parametrize("example", nlctl.paper.EXAMPLES)
+def test_both_examples_resume_to_the_bit(example):
+    """Through the corners of the dead zone, and with the memory of the backlash."""
+    build = nlctl.paper.EXAMPLES[example]
+    parts = build()
+    controller = parts.syslist[parts.syslist_index["controller"]]
+    program = nlctl.sampled(controller, 0.01, method="euler")
+    loop = nlctl.compile(build(controller=program))
+    times = np.arange(0, 4001, 5) / 1000
+    whole = nlctl.input_output_response(loop, times)
+    first = nlctl.input_output_response(loop, times[:501])
+    second = nlctl.input_output_response(loop, times[500:], 0, first.states[:, -1])
+    np.testing.assert_array_equal(second.states, whole.states[:, 500:])
+
+
+def test_a_run_that_resumes_between_samples_is_the_whole_one_to_the_tolerance():
+    """A step ends there that would not."""
     for make in LOOPS.values():
         loop = nlctl.compile(make())
         settings = {"rtol": 1e-11, "atol": 1e-13}
         whole = nlctl.input_output_response(loop, T, 0, start(loop.system), **settings)
-        first = nlctl.input_output_response(loop, T[:21], 0, start(loop.system), **settings)
-        second = nlctl.input_output_response(loop, T[20:], 0, first.states[:, -1], **settings)
-        np.testing.assert_allclose(second.states, whole.states[:, 20:], atol=1e-9)
+        first = nlctl.input_output_response(loop, T[:22], 0, start(loop.system), **settings)
+        second = nlctl.input_output_response(loop, T[21:], 0, first.states[:, -1], **settings)
+        np.testing.assert_allclose(second.states, whole.states[:, 21:], atol=1e-9)
 
 
 def test_members_are_the_single_runs_in_any_company():
@@ -189,8 +216,11 @@ def test_the_papers_controller_on_a_computer_is_the_papers_as_it_gets_faster():
 
 def test_parameters_keep_their_names():
     loop = nlctl.paper.example_1(controller=on_a_computer(0.01, delay=0.004, input_quantum=1e-3))
-    known = nlctl.paper.example_1()
-    assert list(nlctl.parameters(loop).index) == list(nlctl.parameters(known).index)
+    known = list(nlctl.parameters(nlctl.paper.example_1()).index)
+    assert set(nlctl.parameters(loop).index) - set(known) == {
+        f"controller.sampling.{field}" for field in declared_params(nlctl.Sampling)
+    }
+    assert set(known) <= set(nlctl.parameters(loop).index)
     times = np.linspace(0, 0.5, 11)
     runs = [
         nlctl.input_output_response(loop, times, params={"law.beta": 4.0}, engine=engine).outputs
@@ -355,3 +385,124 @@ def test_a_diagram_keeps_the_parameters_that_it_was_given():
     known = nlctl.adaptive_neural(2)
     known.params["law.beta"] = 9.0
     assert nlctl.discretise(known, 0.01).params["law.beta"] == 9.0
+
+
+def test_equations_of_eulers_method_are_steps():
+    """x + T_s f, with all inputs of the outputs."""
+    law = {e.block: e for e in nlctl.typeset(on_a_computer(0.01))}["law"]
+    assert law.equations[0].startswith(r"\zeta^{+} = \zeta + T_{s} ")
+    assert not any("NaN" in line for line in law.equations)
+
+
+SAMPLINGS = {
+    "sampling time": {"dt": 0.02},
+    "offset": {"offset": 0.003},
+    "delay": {"delay": 0.011},
+    "delay of the sampling time": {"delay": 0.01},
+    "jitter": {"jitter": 0.004, "seed": 5},
+    "quanta": {"input_quantum": 0.05, "output_quantum": 0.1},
+}
+
+
+@pytest.fixture(scope="module")
+def variable():
+    """A diagram in which everything may be varied, compiled once."""
+    controller = on_a_computer(
+        0.01, delay=0.004, waiting=2, input_quantum=0.0, output_quantum=0.0
+    )  # fmt: skip
+    return nlctl.compile(nlctl.paper.example_1(controller=controller))
+
+
+@pytest.mark.parametrize("changed", SAMPLINGS.values(), ids=SAMPLINGS)
+def test_a_diagram_with_overrides_is_one_that_was_made_so(variable, changed):
+    times = np.linspace(0, 0.5, 26)
+    given = {"delay": 0.004, "waiting": 2, "input_quantum": 0.0, "output_quantum": 0.0, **changed}
+    made = nlctl.paper.example_1(controller=on_a_computer(given.pop("dt", 0.01), **given))
+    params = {f"sampling.{name}": value for name, value in changed.items()}
+    expected = nlctl.input_output_response(made, times).outputs
+    found = nlctl.input_output_response(variable, times, params=params).outputs
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_members_of_different_clocks_are_the_single_runs(variable):
+    """Side by side in one register, each with its own instants."""
+    times = np.linspace(0, 0.5, 26)
+    names = ("sampling.dt", "sampling.delay", "sampling.output_quantum")
+    columns = [np.linspace(0.004, 0.02, 9), np.linspace(0.002, 0.004, 9), np.linspace(0, 0.1, 9)]
+    params = dict(zip(names, columns, strict=True))
+    made = nlctl.ensemble_response(variable, times, params=params, keep=["y"])
+    for k in (0, 3, 8):
+        one = {name: values[k] for name, values in params.items()}
+        alone = nlctl.ensemble_response(variable, times, params=one, keep=["y"])
+        np.testing.assert_array_equal(made.signals["y"][k], alone.signals["y"][0])
+
+
+def test_clocks_that_are_moved_apart_still_run():
+    """0.3 s is a multiple of 0.1 s, 0.25 s is none: what happens at an instant changes."""
+    loop = nlctl.compile(two_rates())
+    x0 = start(loop.system)
+    params = {"fast.sampling.dt": 0.1, "slow.sampling.offset": 0.13}
+    runs = [
+        nlctl.input_output_response(system, T, 0, x0, params=params, engine=engine).outputs
+        for system, engine in ((loop, "native"), (loop.system, "python-control"))
+    ]
+    np.testing.assert_allclose(*runs, atol=1e-7)
+
+
+@each_row(
+    "given",
+    [
+        ({"dt": 0.0}, "dt > 0, got 0"), ({"dt": -1}, "dt > 0, got -1"), ({"delay": -1}, "delay >="),
+        ({"jitter": 0.02}, "jitter < dt"), ({"input_quantum": -1}, "input_quantum >= 0"),
+        ({"delay": 0}, "delay > 0 where outputs wait"), ({"delay": 0.03}, "give .* waiting=3"),
+        ({"dt": 0.001}, "give .* waiting=4"), ({"seed": 0.5}, "integer for seed"),
+        ({"dtt": 1.0}, "nearest: .*sampling.dt"),
+    ],
+)  # fmt: skip
+def test_impossible_samplings_are_refused(variable, given):
+    """By name, before anything runs, also of one member."""
+    changed, words = given
+    params = {f"sampling.{name}": value for name, value in changed.items()}
+    with pytest.raises(UsageError, match=words):
+        nlctl.input_output_response(variable, T, params=params)
+    every = {name: np.array([0.004, value]) for name, value in params.items()}
+    with pytest.raises(UsageError, match=words):
+        nlctl.ensemble_response(variable, T, params=every)
+
+
+@each_row(
+    "given",
+    [
+        ({}, {"delay": 0.01}, "delay = 0 where no outputs wait"),
+        ({}, {"output_quantum": 0.01}, "where there is no converter"),
+        ({}, {"dt": 0.2}, "dt = 0.1, got 0.2"),
+    ],
+)
+def test_what_a_diagram_was_not_made_for_is_refused(given):
+    made, changed, words = given
+    loop = closed(nlctl.sampled(FIRST, **made))
+    params = {f"law.sampling.{name}": value for name, value in changed.items()}
+    with pytest.raises(ParameterError, match=words):
+        nlctl.input_output_response(loop, T, 0, start(loop), params=params)
+
+
+def test_two_programs_of_one_name_keep_their_own_clocks():
+    """Diagrams without a name in front: what could mean both is refused, nothing is mixed up."""
+
+    def program(k):
+        gain = ct.nlsys(None, lambda t, x, u, params: [u[0] / 2], inputs=[f"a{k}"],
+                        outputs=[f"a{k + 1}"], name=f"gain{k}")  # fmt: skip
+        whole = ct.interconnect([gain], inputs=[f"a{k}"], outputs=[f"a{k + 1}"], name=f"program{k}")
+        return nlctl.sampled(whole, 0.1 * (k + 1))
+
+    loop = ct.interconnect([program(0), program(1)], inputs=["a0"], outputs=["a1", "a2"])
+    times = np.linspace(0, 1, 21)
+    runs = [
+        nlctl.input_output_response(loop, times, times, engine=engine).outputs
+        for engine in ("native", "python-control")
+    ]
+    np.testing.assert_allclose(*runs, atol=1e-12)
+    assert np.unique(runs[0][0, :-1]).size == 10
+    assert np.unique(runs[0][1, :-1]).size == 5
+    with pytest.raises(UsageError, match="two blocks"):
+        nlctl.input_output_response(loop, times, times, params={"sampling.dt": 0.3})

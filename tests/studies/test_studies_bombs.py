@@ -46,7 +46,7 @@ BOMBS = {
     "NUL in a module": (HEAD.replace("loop.py:loop", "os\\u0000path:loop"), "can be printed"),
     "a long path": (HEAD.replace("loop.py:loop", "a" * 5000 + ".py:loop"), "at most 500 char"),
     "a long name": (HEAD.replace('"lag.rate" =', f'"{"a" * 5000}" ='), "unknown parameter"),
-    "a relative module": (HEAD.replace("loop.py:loop", "..lag:loop"), "joined by dots"),
+    "a relative module": (HEAD.replace("loop.py:loop", "..lag:loop"), "separated by dots"),
     "a deep formula": (HEAD.replace("always |z| <= 4", "(" * 5000), "levels"),
     "a Sobol' design": (rows("design = \"Sobol'\"\nsize = 1099511627776"), "at most 10,000,000"),
     "a Latin hypercube": (rows('design = "Latin hypercube"\nsize = 1000000000000'), "at most"),

@@ -1,5 +1,7 @@
 """Faults of a study: a lag whose faulty answers are known in closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rows import each_row
@@ -166,6 +168,14 @@ def test_the_page_has_both_figures_and_the_commands(folder):
     assert "faults-margins" in told
     assert "faults-pairs-1" in told
     assert f"--part {result.findings[0].key}" in told
+
+
+def test_a_study_without_a_claim_tells_what_it_found(folder):
+    """Its findings are the verdict."""
+    result = load_result(folder)
+    (finding,) = result.findings
+    calm = replace(result, findings=(replace(finding, claim="", answer=""),))
+    assert study_report(calm).verdict == finding.sentence
 
 
 @each_row(

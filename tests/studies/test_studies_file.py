@@ -443,6 +443,18 @@ def test_all_mistakes_are_told_at_once(tmp_path):
     assert [m[2] for m in MISTAKES if not any(m[2] in name for name in named)] == []
 
 
+def test_a_wrong_time_hides_no_other_mistake(tmp_path):
+    """Nor does a missing one: names and formulas are looked at all the same."""
+    text = "\n".join((HEAD, ROWS)).replace("on y <= 0.5", "on yy <= 0.5")
+    for before, after in (("end = 2.0", "end = -2.0"), ("step = 0.02", ""), ("end = 2.0", "e = 2")):
+        assert before in text
+        with pytest.raises(StudyError) as told:
+            read_study(write(tmp_path, text.replace(before, after, 1)))
+        named = {place_text(p.place) for p in told.value.problems}
+        assert any(name.startswith("time") for name in named)
+        assert "spec.decays" in named
+
+
 def test_mistakes_of_settings_are_blamed_on_them(tmp_path):
     """Not on a line of the file; where a setting has a part in it, the line is named as well."""
     path = write(tmp_path)

@@ -8,7 +8,7 @@ from nlctl.native.codegen.lower import lower
 from nlctl.native.codegen.program import count_switching_functions, memory
 from nlctl.native.compiled import compile as compile_diagram
 from nlctl.native.machine.routine import plain_functions
-from nlctl.native.thirdparty.python_control import block_outputs, block_rates
+from nlctl.upstream.control_internals import outputs_now, rates_now
 
 
 def interpreted(compiled):
@@ -54,10 +54,10 @@ def by_blocks(compiled, t, x, u):
     for i, unknown in zip(read.order, read.unknown, strict=True):
         node = read.nodes[i]
         missing = unknown if node.direct.any() else range(len(node.inputs))
-        outputs[i] = block_outputs(node.system, t, x[own[i]], inputs_of(node, missing))
+        outputs[i] = outputs_now(node.system, t, x[own[i]], inputs_of(node, missing))
     for node, states in zip(read.nodes, own, strict=True):
         inputs = inputs_of(node)
-        dx[states] = block_rates(node.system, t, x[states], inputs) if node.system.nstates else 0.0
+        dx[states] = rates_now(node.system, t, x[states], inputs) if node.system.nstates else 0.0
         for count, name, target in (
             (count_switching_functions(node), "corners", found),
             (len(memory(node)), "commit", committed),

@@ -31,6 +31,10 @@ def kappa() -> Proof:
 
     By branch and bound on [0, 10].  Beyond, s - s tanh s < 2 s exp(-2 s), which falls for
     s > 1/2 and is below 1e-7 at s = 10.
+
+    Returns
+    -------
+    Proof
     """
     return prove(lambda s: s[0] - s[0] * smooth_sign(s[0], 1.0), Box.of(s=(0, 10)), high=KAPPA)
 
@@ -48,6 +52,11 @@ def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float 
         In s; ``(0, inf)`` bounds d for all time, with the phases at their worst.
     tol : float, optional
         As in `analysis.intervals.branch_and_bound.enclose`.
+
+    Returns
+    -------
+    Range
+        In the unit of d, rounded outwards.
     """
     _, d = plant_terms(plant)
     of_type("disturbance", "box", box, Box, "Box.of(x1=(-1, 1))")

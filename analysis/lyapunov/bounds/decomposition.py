@@ -102,6 +102,16 @@ def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
     It serves numbers, arrays and balls, and leaves the smallest |eps_u| that any split with
     k_1 <= k <= k_2 leaves at (u, v).
 
+    Parameters
+    ----------
+    k_1, k_2 : float
+        Bounds of k.
+
+    Returns
+    -------
+    callable
+        ``part(u, v)`` is k u.
+
     Raises
     ------
     ParameterError

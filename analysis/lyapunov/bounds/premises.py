@@ -81,6 +81,10 @@ def premises(
         Of a member of an ensemble; by default those of the constants.
     split : Decomposition, optional
         By default `sharpest` of the constants' split.
+
+    Returns
+    -------
+    Premises
     """
     parts = constants.parts
     return Premises(
@@ -109,6 +113,11 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
         Their plant and box give d*.
     plant : record, optional
         Of a member of an ensemble, for its forcing.
+
+    Returns
+    -------
+    Premises or None
+        With the printed numbers in the place of the derived ones.
     """
     declared: Any = constants.parts.plant
     plant = declared if plant is None else plant

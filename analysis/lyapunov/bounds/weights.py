@@ -183,6 +183,11 @@ def approximation_error(
     tol, max_boxes
         As in `analysis.intervals.branch_and_bound.enclose`.
 
+    Returns
+    -------
+    Range
+        In the unit of g, rounded outwards.
+
     Raises
     ------
     ParameterError

@@ -153,7 +153,7 @@ def certify(
     Parameters
     ----------
     loop : control.InterconnectedSystem
-        Of the blocks that `nlctl.paper.example_1` joins, with `nlctl.KnownSignLaw` in the place
+        Of the blocks that `nlctl.paper.example_1` connects, with `nlctl.KnownSignLaw` in the place
         of the Nussbaum law and a `nlctl.SumOfSines` reference.
     params : mapping, optional
         Overrides by qualified name, as in a run.

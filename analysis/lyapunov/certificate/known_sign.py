@@ -23,6 +23,7 @@ from nlctl.errors import DiagramError, ParameterError
 from nlctl.names import unknown
 from nlctl.params import as_numbers, equation_arguments
 from nlctl.references import SumOfSines
+from nlctl.upstream.control_internals import set_parameters
 
 from ...intervals.branch_and_bound import upper
 from ..loop.plant_form import Acceleration, acceleration, check_chain
@@ -124,7 +125,7 @@ def read_loop(
     )
     again = joined_again(loop, parts.roles, lambda part, spec, name: block(spec, name))
     check_same(loop, interconnect(again, name=str(loop.name)), points_around(x0), params)
-    loop._update_params(dict(params or {}))
+    set_parameters(loop, dict(params or {}))
     return read
 
 

@@ -121,7 +121,7 @@ def _with_outputs(spec: Any, names: tuple[str, ...] = (), terms: Callable | None
     """Return a record with the same parameters and equations, and with more outputs.
 
     These are the rates of its states, of a record of vectors also the states that it does not
-    deliver, and what `terms` returns.
+    output, and what `terms` returns.
     """
     if not spec.states:
         return spec

@@ -26,6 +26,15 @@ def sharpest(split: Decomposition) -> Decomposition:
 
     Bounds of eps_u that hold for any split with these k_1, k_2 hold for this one, which is the
     one that is looked at along trajectories.  Machine code can call its ``part``.
+
+    Parameters
+    ----------
+    split : Decomposition
+        Any split of the actuator.
+
+    Returns
+    -------
+    Decomposition
     """
     return dataclasses.replace(split, part=clipped_split(split.k_1, split.k_2))
 

@@ -15,6 +15,7 @@ from flint import arb
 from nlctl.diagrams import Place
 from nlctl.errors import DiagramError
 from nlctl.plants import coordinate_names
+from nlctl.upstream.control_internals import current_parameters
 
 from ...intervals.arithmetic import Ball, as_ball
 from ...intervals.paths import Undecided, every_way, on_balls
@@ -44,7 +45,7 @@ def on_intervals(path: str, function: Callable[..., Any]) -> Callable[..., Any]:
 
 def acceleration(plant: Place) -> Acceleration:
     """Return x_n' as ``function(t, x, v)``, from what a run integrates, with its parameters."""
-    update, p = plant.system.updfcn, plant.system._current_params
+    update, p = plant.system.updfcn, current_parameters(plant.system)
 
     def last(t: Any, x: Any, v: Any) -> Any:
         return update(t, _objects(x), _objects((v,)), p)[-1]
@@ -82,7 +83,7 @@ def check_chain(plant: Place) -> None:
 
 def _is_coordinate(plant: Place, function: Any, i: int, k: int) -> bool:
     """Whether result i of a plant's function is x_{k+1}, for all states, inputs and times."""
-    n, p = plant.system.nstates, plant.system._current_params
+    n, p = plant.system.nstates, current_parameters(plant.system)
     called = on_intervals(plant.path, function)
 
     def result(z: list[Ball]) -> Any:

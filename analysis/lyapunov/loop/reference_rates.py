@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from nlctl.diagrams import Place
-from nlctl.native.thirdparty.python_control import block_outputs, block_rates
 from nlctl.references import derivative_names
+from nlctl.upstream.control_internals import outputs_now, rates_now
 
 from .roles import declared
 from .signals import Margin, equality
@@ -57,7 +57,7 @@ def reference_margin(place: Place, time: np.ndarray, states: np.ndarray) -> Marg
     for i in picked:
         shift = 0.0 if block.nstates else SHIFT * (time[i + 1] - time[i])
         t, x = float(time[i] + shift), own[:, i]
-        here, slopes = block_outputs(block, t, x, np.zeros(0))[rows], _slopes(block, t, x, rows)
+        here, slopes = outputs_now(block, t, x, np.zeros(0))[rows], _slopes(block, t, x, rows)
         far = np.abs(slopes - here[1:])
         best = np.argmin(np.where(np.isnan(far), np.inf, far), axis=0)
         times.append(t)
@@ -69,10 +69,10 @@ def reference_margin(place: Place, time: np.ndarray, states: np.ndarray) -> Marg
 def _slopes(block: Any, t: float, x: np.ndarray, rows: list[int]) -> np.ndarray:
     """Return the derivatives of yd, ..., yd^(n-1) by each step, shape (steps, n)."""
     none = np.zeros(0)
-    rate = block_rates(block, t, x, none) if block.nstates else none
+    rate = rates_now(block, t, x, none) if block.nstates else none
 
     def along(s: float) -> np.ndarray:
-        return block_outputs(block, t + s, x + s * rate, none)[rows[:-1]]
+        return outputs_now(block, t + s, x + s * rate, none)[rows[:-1]]
 
     with np.errstate(all="ignore"):
         return np.array([

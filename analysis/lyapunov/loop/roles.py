@@ -21,6 +21,7 @@ from nlctl.errors import CompileError, DiagramError
 from nlctl.native.diagram.wiring import Combination, Signal, Wiring
 from nlctl.native.thirdparty.checks import check_functions, check_sizes
 from nlctl.plants import coordinate_names
+from nlctl.upstream.control_internals import set_parameters
 
 from ..bounds.final_bound import Gains
 
@@ -367,6 +368,11 @@ def read_parts(
     inputs : bool, optional
         Whether external inputs may be added to the plant's v.
 
+    Returns
+    -------
+    Parts
+        The pieces, with their records and initial states.
+
     Raises
     ------
     DiagramError
@@ -379,7 +385,7 @@ def read_parts(
             f"external input {names} is added to the plant's v: the proof needs its bound, and "
             "takes one in certify(loop, inputs={...}) only"
         )
-    loop._update_params(dict(params or {}))
+    set_parameters(loop, dict(params or {}))
     specs = {part: roles.spec(part) for part in roles.places}
     x0 = initial_state(loop, start)
     own = {p: x0[f.state_offset :][: f.system.nstates or 0] for p, f in roles.places.items()}

@@ -15,6 +15,7 @@ from nlctl.diagrams import initial_state
 from nlctl.diagrams import state_names as all_states
 from nlctl.errors import ParameterError
 from nlctl.response import input_output_response
+from nlctl.upstream.control_internals import set_parameters
 
 from ..bounds.decomposition import Decomposition
 from ..bounds.final_bound import Gains, alpha_1
@@ -221,7 +222,7 @@ def _reference(
     params: Mapping[str, Any],
 ) -> Margin | None:
     """Compare the reference's derivatives with those of its own outputs."""
-    loop._update_params(dict(params))
+    set_parameters(loop, dict(params))
     states = np.asarray(response.states)[: loop.nstates or 0]
     whole = np.isfinite(states).all(axis=0)
     place = parts.roles.places["reference"]

@@ -166,6 +166,11 @@ def drift_margin(
     V : ndarray of shape (m,), optional
         V of (21) over time; by default r^2 / 2, which is less.
 
+    Returns
+    -------
+    DriftMargin
+        Right side less left side at each sample, and whether zeta never falls.
+
     Raises
     ------
     ParameterError
@@ -225,6 +230,11 @@ def safe_horizon(
         zeta(0).
     N : callable, optional
         Nussbaum function.
+
+    Returns
+    -------
+    SafeHorizon
+        The time (s), and the end of the lobe.
 
     Raises
     ------

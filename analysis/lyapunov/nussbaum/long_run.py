@@ -1,4 +1,4 @@
-"""A loop far beyond the paper's 20 s: whether its gain loses its sign, and what foretold it."""
+"""A loop far beyond the paper's 20 s: whether its gain loses its sign, and what predicted it."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class LongRun:
             rest = "" if p.rest is None else f", at rest at zeta = {p.rest:.4g}"
             burst = f", burst at {p.burst:.4g} s"
             lines.append(
-                f"foretold after {p.time:g} s: {p.verdict}"
+                f"predicted after {p.time:g} s: {p.verdict}"
                 + (burst if np.isfinite(p.burst) else rest)
             )
         return "\n".join(lines)
@@ -117,7 +117,7 @@ def long_run(
     Parameters
     ----------
     loop : control.InterconnectedSystem
-        Of the blocks that `nlctl.paper.example_1` joins, with a Nussbaum law.
+        Of the blocks that `nlctl.paper.example_1` connects, with a Nussbaum law.
     horizon : float, optional
         In s; the run ends earlier where it diverges.
     rtol : float, optional

@@ -12,8 +12,8 @@ windows it is a balance,
 
 .. math:: \frac{dA}{dt} = p \left\langle \frac1{|N|} \right\rangle - q,
 
-so that the drift stops where |N| = p / q, if the lobe has such a place; otherwise it goes on until
-the budget is spent.  p and q are fitted to a response.
+so that the drift stops where |N| = p / q, if the lobe has such a place; otherwise it continues
+until the budget is spent.  p and q are fitted to a response.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class SlowDrift:
         Mean of A' over each window (1/s), the first windows left out.
     burst, burst_range : float, tuple of float
         Forecast of the time (s) at which the budget is spent, infinite where the drift stops or
-        turns round before; and the earliest and the latest time when mean rate and dependence on
+        reverses before; and the earliest and the latest time when mean rate and dependence on
         1/|N| are moved by two standard errors each, and the time that is left by 5 % more.  It
         is meant to hold the burst in nine of ten loops at least, and has done so in simulated ones
         (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference go on as
@@ -125,15 +125,15 @@ class SlowDrift:
 
     @property
     def verdict(self) -> str:
-        """One of "creeps", "settles", "turned round", "undecided".
+        """One of "drifts", "settles", "reversed", "undecided".
 
-        "turned round": the mean rate of the last windows is not positive; "settles": it is, and
-        in all fits the drift stops in this lobe; "creeps": in none; "undecided" otherwise.
+        "reversed": the mean rate of the last windows is not positive; "settles": it is, and
+        in all fits the drift stops in this lobe; "drifts": in none; "undecided" otherwise.
         """
         if not self.recent.mean() > 0:
-            return "turned round" if self.recent.mean() <= 0 else "undecided"
+            return "reversed" if self.recent.mean() <= 0 else "undecided"
         if self.rest is None:
-            return "creeps" if self.rest_range is None else "undecided"
+            return "drifts" if self.rest_range is None else "undecided"
         return "settles" if self.rest_range and self.rest_range[1] < self.lobe.high else "undecided"
 
     def __str__(self) -> str:
@@ -165,6 +165,18 @@ def burst_peak(lobe: Lobe, kG: float) -> float:
     """Return max |r| = sqrt(2 k G |int N|) of a burst through a lobe of the wrong sign.
 
     r^2/2 grows by int k G N dzeta, against which disturbances and beta r are small.
+
+    Parameters
+    ----------
+    lobe : Lobe
+        Where N has the wrong sign.
+    kG : float
+        Product of actuator gain k and input gain G, > 0.
+
+    Returns
+    -------
+    float
+        In the unit of r.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from . import proof_text as text
 from .notation import formulas
 from .proof_text import LONG_RUN
 
-__all__ = ["LONG_RUN", "Evidence", "evidence", "lyapunov_sections"]
+__all__ = ["LONG_RUN", "Evidence", "evidence", "ledger_tables", "lyapunov_sections"]
 
 _GROUPS = (  # of the ledger's lines, each a table of its own
     (("violated",), "corrected", text.VIOLATED),
@@ -87,7 +87,7 @@ def _burst(far: Mapping[str, LongRun]) -> Iterator[Item]:
 def _far_table(far: Mapping[str, LongRun]) -> Table:
     return Table(
         caption=text.FAR_CAPTION,
-        columns=("loop", "rtol", "runs until (s)", "max |e₁| before", "foretold", "happened"),
+        columns=("loop", "rtol", "runs until (s)", "max |e₁| before", "predicted", "happened"),
         rows=[
             (
                 FAR_HORIZONS[key][0],
@@ -135,7 +135,7 @@ def _example(number: int, one: Evidence) -> list[Section]:
             title=f"Example {number}: the proof line by line",
             level=3,
             folded=True,
-            items=[Paragraph(text=text.ledger_text(one.ledger)), *_ledger_tables(one.ledger.lines)],
+            items=[Paragraph(text=text.ledger_text(one.ledger)), *ledger_tables(one.ledger.lines)],
         ),
         Section(
             key=f"{key}-bound",
@@ -161,7 +161,8 @@ def _example(number: int, one: Evidence) -> list[Section]:
     ]
 
 
-def _ledger_tables(lines: Sequence[Line]) -> Iterator[Table]:
+def ledger_tables(lines: Sequence[Line]) -> Iterator[Table]:
+    """Yield the lines of a ledger as tables, one for each group of statuses."""
     for statuses, reading, caption in _GROUPS:
         group = [x for x in lines if x.status in statuses and reading in (None, x.reading)]
         rows = [_row(line) for line in group]

@@ -24,7 +24,7 @@ COMMANDS = (  # what each one shows
 NO_LONG_RUN = "The runs far beyond 20 s are not part of this report."
 BURST = (
     "Left: ζ, and the largest |e₁| in each period of the reference. Dots: what the prediction was "
-    "made from; lines of the same colour: the burst that it foretold. At ζ = 3, dashed, N(ζ) "
+    "made from; lines of the same colour: the burst that it predicted. At ζ = 3, dashed, N(ζ) "
     "changes its sign. Right: the end of the same run; time runs to the right and is what is left "
     "of the run, on a logarithmic axis. The filtered error r and the input u grow beyond bounds "
     "within milliseconds, before e₁ has time to move."
@@ -32,10 +32,10 @@ BURST = (
 CALM = (
     "Example 1: the Nussbaum argument ζ far beyond 20 s, for both readings of cos(w t). Dashed: "
     "ζ = 3, where N(ζ) changes its sign. Dotted, in the colour of the run: where the drift is "
-    "foretold to stop."
+    "predicted to stop."
 )
 FAR_CAPTION = (
-    "Runs of this report far beyond 20 s. Foretold: from the first 200 s and from the first "
+    "Runs of this report far beyond 20 s. Predicted: from the first 200 s and from the first "
     "1000 s of the same run. max |e₁|: from 200 s on, until a second before the burst. What comes "
     "after 1000 s of Example 2 is a record of the same computation, kept with the program and "
     "continued from where today's run ends, unless the command at the end of this page has "
@@ -43,7 +43,7 @@ FAR_CAPTION = (
 )
 SLOW_DRIFT = (
     "While ζ crosses an interval between two zeros of N, a lobe, it uses up the lobe's budget, the "
-    "integral of |N|. Creeps: by the fitted balance of the drift it goes on until the budget is "
+    "integral of |N|. Drifts: by the fitted balance of the drift it goes on until the budget is "
     "used up, and the gain changes its sign. Settles: by all fits the drift stops before. "
     "Undecided: the fits disagree, or the chirp of Example 1 has not shown enough."
 )
@@ -68,8 +68,8 @@ PROVED = (
     "in closed form."
 )
 CHECKED = (
-    "Only checked: seen to hold at every sample of this run, up to rounding. That is no proof for "
-    "other runs, nor between samples."
+    "Only checked: seen to hold at every sample of this run, up to rounding. That is not a proof "
+    "for other runs, nor between samples."
 )
 VIOLATED = (
     "Violated: statements of the proof in their corrected form that do not hold along this run."
@@ -118,12 +118,12 @@ def burst_text(run: LongRun) -> str:
     return (
         "Example 2 as published does not stay bounded. It tracks calmly for "
         f"{run.burst / 3600:.1f} hours, max |e₁| = {run.calm:.3f} from {min(LOOKS):g} s on; all "
-        f"the while the Nussbaum argument ζ creeps upwards, and at t = {run.burst:.1f} s (relative "
+        f"the while the Nussbaum argument ζ drifts upwards, and at t = {run.burst:.1f} s (relative "
         f"tolerance {run.rtol:g}) it reaches {run.lobe.high:g}, where the gain N(ζ) changes to "
         "the wrong sign: the input and r grow beyond bounds, and the integrator's steps shrink to "
         f"nothing. {sure} So the paper's conclusion, that all signals stay bounded, fails in this "
-        f"run. The drift told so long before: from the first {early.time:g} s the burst is "
-        f"foretold for {early.burst:.0f} s, from the first {late.time:g} s for "
+        f"run. The drift showed it long before: from the first {early.time:g} s the burst is "
+        f"predicted for {early.burst:.0f} s, from the first {late.time:g} s for "
         f"{late.burst:.0f} s."
     )
 
@@ -134,7 +134,7 @@ def calm(run: LongRun) -> str:
 
 
 def prediction_text(run: LongRun) -> tuple[str, str]:
-    """Return what was foretold of a long run, and what happened."""
+    """Return what was predicted of a long run, and what happened."""
     before = [
         f"at rest at ζ = {p.rest:.3f}"
         if p.rest is not None

@@ -21,6 +21,7 @@ from . import text as text
 from .claims import paper_claims, paper_verdict, proof_claims
 from .closing import closing_sections, metric_table
 from .proof import Evidence, lyapunov_sections
+from .sampling import sampling_section
 
 __all__ = ["paper_report", "paper_sections"]
 
@@ -34,6 +35,7 @@ def paper_report(
     far: Mapping[str, LongRun] | None = None,
     studies: Sequence[Section] = (),
     numerics: pd.DataFrame | None = None,
+    sampling: pd.DataFrame | None = None,
     sections: Sequence[Section] | None = None,
 ) -> Report:
     """Compose the reproduction report from the runs of `analysis.paper.CASES`.
@@ -50,6 +52,8 @@ def paper_report(
         The part on robustness, see `analysis.studies.page.report.study_part`.
     numerics : pandas.DataFrame, optional
         Result of `analysis.paper.numerics`.
+    sampling : pandas.DataFrame, optional
+        Result of `analysis.paper.sampling_limits.checked_record`.
     sections : sequence of Section, optional
         What `paper_sections` makes of the same; by default it is made here.
 
@@ -66,7 +70,12 @@ def paper_report(
         verdict=paper_verdict(compared, far or {}),
         lead=_lead(runs, (far or {}).get("2")),
         claims=[*paper_claims(runs, compared), *proof_claims(proofs or {}, far or {})],
-        sections=[*sections, *studies, *closing_sections(runs, numerics)],
+        sections=[
+            *sections,
+            *([] if sampling is None else [sampling_section(sampling)]),
+            *studies,
+            *closing_sections(runs, numerics),
+        ],
         command="nlctl report",
         provenance=versions("python-flint", "cvxpy", "cma"),
         numbers={key: dict(run.metrics) for key, run in runs.items()},
@@ -93,7 +102,7 @@ def paper_sections(
 
 
 def _lead(runs: _Runs, long: LongRun | None) -> Figure:
-    """Return the picture at the top: Example 2 follows its reference, and zeta creeps."""
+    """Return the picture at the top: Example 2 follows its reference, and zeta drifts."""
     run = runs["2"]
     told = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_DRIFT}"
     if long is not None and np.isfinite(long.burst):

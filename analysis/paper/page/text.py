@@ -20,7 +20,7 @@ QUESTION = (
 )
 LEAD = "Example 2, top: the output follows its reference through backlash."
 LEAD_DRIFT = (
-    r"Bottom, the same loop over hours: the argument \(\zeta\) of the Nussbaum gain creeps upwards."
+    r"Bottom, the same loop over hours: the argument \(\zeta\) of the Nussbaum gain drifts upwards."
 )
 LEAD_BURST = (
     "After {hours:.1f} h it reaches 3, where the gain changes to the wrong sign, and the loop "
@@ -28,9 +28,9 @@ LEAD_BURST = (
 )
 
 METHODS_TEXT = (
-    "Plant, actuator, reference and controller are blocks of python-control, joined by their "
+    "Plant, actuator, reference and controller are blocks of python-control, connected by their "
     "signals; each equation is written once, as in the paper, and compiled to machine code. The "
-    "numbers to reach are held against an independent computation, to the "
+    "numbers to reach are validated against an independent computation, to the "
     "tolerances printed there.",
     "The proof is taken as a list of numbered statements. Those about all states of a box are "
     "proved by ball arithmetic on the same equations; those about a run are evaluated along it, "
@@ -143,7 +143,7 @@ PRINTED = {
             "centres",
             "27, evenly in [−10, 10]²",
             "27 on the diagonal",
-            "27 is no square; grids are tried below",
+            "27 is not a square number; grids are tried below",
         ),
         ("λ₁", "1.5", "{filtered_error.lambdas[0]:g}", ""),
         (

@@ -85,6 +85,7 @@ const contents = document.getElementById("contents");
 if (folds.length && contents) {
   const button = make("button", "Unfold all", contents);
   button.className = "unfold";
+  contents.prepend(button); // the list may be longer than the screen
   button.addEventListener("click", () => {
     const open = folds.some((details) => !details.open);
     for (const details of folds) details.open = open;

@@ -138,7 +138,17 @@ class Prepared:
 
 
 def prepare(experiment: Experiment) -> Prepared:
-    """Build and compile every diagram of an experiment, and hold names and values against them.
+    """Build and compile every diagram of an experiment, and validate names and values against them.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        A space, what builds the loop, times, inputs and a spec.
+
+    Returns
+    -------
+    Prepared
+        With every diagram as machine code.
 
     Raises
     ------

@@ -23,7 +23,7 @@ from nlctl.diagrams import all_parameter_rows, initial_state, leaves, places, st
 from nlctl.native.machine.fingerprint import content_key
 from nlctl.params import declared_params
 from nlctl.sampling.clock import moments
-from nlctl.sampling.system import Sampled, happening
+from nlctl.sampling.system import Sampled, clocks_of, happening
 
 __all__ = ["array_text", "loop_facts", "loop_values", "short_key", "values_differ"]
 
@@ -80,8 +80,9 @@ def _block(system: Any) -> str:
     """Return a key of a block's equations; its parameters' values are told by themselves."""
     timebase = repr(system.dt)
     if isinstance(system, Sampled):
-        quanta = (system.input_quantum, system.output_quantum)
-        return short_key(_block(system.inner), repr(system.clock), repr(quanta))
+        spec = system.sampling.spec
+        kind = (system.euler, system.delays, system.converters, spec.waiting, spec.own_time)
+        return short_key(_block(system.inner), repr(kind))
     if isinstance(system, Block):
         spec, known = system.spec, declared_params(system.spec)
         held = {k: v for k, v in getattr(spec, "__dict__", {}).items() if k not in known}
@@ -152,7 +153,7 @@ def loop_values(system: Any, end: float) -> dict[str, float | str]:
     start, width = initial_state(system), system.ninputs or 0
     reach = np.maximum(1.0, abs(start)) / 4
     rates, outputs = np.zeros(start.size), np.zeros(system.noutputs or 0)
-    clocks = [p.system.clock for p in leaves(system) if isinstance(p.system, Sampled)]
+    clocks = clocks_of(place.system for place in leaves(system))
     everything = happening(frozenset(moments(clocks)))  # sampled blocks' next states as well
     with warnings.catch_warnings(), np.errstate(all="ignore"), everything:
         warnings.simplefilter("ignore")

@@ -126,6 +126,11 @@ def until_decided(
         Probability of a violation.
     confidence : float, optional
 
+    Returns
+    -------
+    callable
+        For the argument `stop` of `sweep`.
+
     Raises
     ------
     NoGuaranteeError

@@ -81,6 +81,17 @@ class Sweep:
 def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
     """Return the rows in a folder, finished or not, also while a sweep is working in it.
 
+    Parameters
+    ----------
+    folder : path
+        Of a sweep.
+    design : Design, optional
+        Of the sweep, for what asks for it.
+
+    Returns
+    -------
+    Sweep
+
     Raises
     ------
     StoreError

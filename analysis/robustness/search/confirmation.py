@@ -90,6 +90,11 @@ def confirm(
         Also run it in python-control, at the tighter tolerances: another engine, and other code of
         the diagram.  There memory blocks relax instead of being exact, see `nlctl.Backlash`.
 
+    Returns
+    -------
+    Confirmation
+        Each replay with its margin, and why the violation is not confirmed, if it is not.
+
     Raises
     ------
     UnknownNameError, ParameterError

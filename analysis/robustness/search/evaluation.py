@@ -73,7 +73,7 @@ def towards_nominal(
     row : mapping
     factor : float
     names : collection of str, optional
-        What is moved; by default every quantity.  Whole numbers are rounded, choices stay.
+        What is moved; by default every quantity.  Integers are rounded, choices stay.
 
     Raises
     ------

@@ -94,6 +94,11 @@ def failure_map(
     most : int, optional
         Largest number of runs; the first grid always runs.
 
+    Returns
+    -------
+    FailureMap
+        Points with their margins, and the triangles between them.
+
     Raises
     ------
     UnknownNameError
@@ -219,9 +224,14 @@ def _quarters(cell: _Cell) -> tuple[_Cell, ...]:
 
 
 def boundary(made: FailureMap) -> pd.DataFrame:
-    """Return points on the boundary: where margins joined by lines along the triangles are 0.
+    """Return points on the boundary: where margins connected by lines along the triangles are 0.
 
     Margins beyond +-1 count as +-1.
+
+    Parameters
+    ----------
+    made : FailureMap
+        As `failure_map` returns it.
 
     Returns
     -------

@@ -12,7 +12,7 @@ import control as ct
 
 from nlctl.arguments import number, of_type
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import base_name, unknown
 from nlctl.params import with_overrides
 
 from ..runs.experiment import Prepared
@@ -120,16 +120,17 @@ def _parts(
     """Yield every block with parameters that are uncertain; `names` may be scaled."""
     middle = nominal(space)
     for system in systems:
-        places, fields = {}, {}
+        blocks, fields = {}, {}
         for quantity in space.quantities:
             owner = None if quantity.is_initial else owner_of(system, quantity.name)
-            if owner is not None:  # a foreign block takes what it is given
-                place, key = owner
-                places[place.path] = place
-                fields.setdefault(place.path, {})[quantity.name] = key
+            if owner is not None:  # a third-party block takes what it is given
+                block, key = owner
+                path = base_name(quantity.name).rpartition(".")[0]
+                blocks[path] = block
+                fields.setdefault(path, {})[quantity.name] = key
         for path, keys in fields.items():
             given = {key: middle[name] for name, key in keys.items()}
-            record = with_overrides(places[path].system.current_spec, given, path)
+            record = with_overrides(blocks[path].current_spec, given, path)
             scaled = {name: key for name, key in keys.items() if name in names}
             yield _Part(record=record, path=path, fields=scaled)
 

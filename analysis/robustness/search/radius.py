@@ -158,6 +158,11 @@ def robustness_radius(
     confidence : float, optional
     entropy : int, optional
 
+    Returns
+    -------
+    Radius
+        The factor of the smallest such box that was found, and each step of the search.
+
     Raises
     ------
     ParameterError
@@ -197,7 +202,7 @@ def robustness_radius(
 
 
 class _Search:
-    """The best violation so far, the sizes that were searched, and where bisection goes on."""
+    """The best violation so far, the sizes that were searched, and where bisection resumes."""
 
     def __init__(self, evaluate: Evaluate, space: Space, runs: int, entropy: int) -> None:
         self.evaluate, self.space, self.runs, self.entropy = evaluate, space, runs, entropy
@@ -227,7 +232,7 @@ class _Search:
             self.along_ray(found.witness, found.margin)
         else:
             self.searched = size
-        if self.upper == before:  # nothing, or a whole number that was rounded out of the box
+        if self.upper == before:  # nothing, or an integer that was rounded out of the box
             self.low = size
 
     def along_ray(self, row: dict[str, Any], margin: float) -> None:

@@ -123,10 +123,15 @@ def worst_case(
         The search ends with the first batch that has a margin <= target; 0 ends it with the first
         violation.
 
+    Returns
+    -------
+    WorstCase
+        The row, its margin, and every run of the search.
+
     Raises
     ------
     ParameterError
-        If `runs` is no whole number >= 1, or an option of a choice has weight 0.
+        If `runs` is not an integer >= 1, or an option of a choice has weight 0.
     KeyboardInterrupt
         If Ctrl-C comes before the first batch is done; later it ends the search.
     """

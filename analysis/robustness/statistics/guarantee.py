@@ -146,6 +146,11 @@ def clopper_pearson(
     side : {"upper", "lower", "both"}, optional
         The bound that is left out is 0 or 1.
 
+    Returns
+    -------
+    lower, upper : float
+        0 or 1 where the side is open.
+
     Raises
     ------
     ParameterError
@@ -191,6 +196,20 @@ def runs_needed(probability: float, confidence: float = 0.99, violations: int = 
     The least n with P(at most `violations` in n | probability) <= 1 - confidence: if no more runs
     than that violate, the upper bound of `clopper_pearson` is at most `probability`.  Without
     violations n = log(1 - confidence) / log(1 - probability), rounded up.
+
+    Parameters
+    ----------
+    probability : float
+        To be proved, between 0 and 1.
+    confidence : float, optional
+        Of the statement, between 0 and 1.
+    violations : int, optional
+        How many of the runs may violate.
+
+    Returns
+    -------
+    int
+        Number of runs.
 
     Raises
     ------
@@ -259,6 +278,11 @@ def violation_probability(
         violation.  A Series goes by its index.
     confidence, side
         As in `clopper_pearson`.
+
+    Returns
+    -------
+    Violation
+        Share, bounds, and the sentence with its assumptions.
 
     Raises
     ------

@@ -94,6 +94,20 @@ def wins(
     Rows and columns are controllers; the entry (a, b) counts the rows in which a beats b.  Ties
     count for neither, NaN loses against numbers.  Arguments and errors as in `differences`, but
     any design will do.
+
+    Parameters
+    ----------
+    design : Design
+        Whose rows all controllers have run.
+    outcomes : mapping
+        Numbers of shape (rows,) by controller.
+    better : {"smaller", "larger"}, optional
+        Which number is the better one.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Counts, controllers in rows and columns.
     """
     of_type("a comparison", "outcomes", outcomes, Mapping, "{controller: numbers}")
     names = list(outcomes)
@@ -223,6 +237,16 @@ def holm(p_values: np.ndarray) -> np.ndarray:
 
     Rejecting what is at most a makes any false rejection at all happen with probability at most a,
     whatever the dependence between the tests.  NaN stays NaN and is not counted.
+
+    Parameters
+    ----------
+    p_values : ndarray of shape (m,)
+        Between 0 and 1, or NaN.
+
+    Returns
+    -------
+    ndarray of shape (m,)
+        In the same order.
 
     Raises
     ------

@@ -31,6 +31,11 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
     that its margin is no better than those of the runs that did, so it counts as the least of
     these, and at most as -1, beyond the bound by the bound itself.  The others stay as they are.
 
+    Parameters
+    ----------
+    margins : array_like of shape (rows,)
+        Margins of all rows.
+
     Returns
     -------
     values : ndarray
@@ -69,6 +74,10 @@ def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None
     levels : int, optional
         An even number.
     entropy : int, optional
+
+    Returns
+    -------
+    Design
 
     Raises
     ------
@@ -160,6 +169,10 @@ def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
     size : int
         A power of 2.
     entropy : int, optional
+
+    Returns
+    -------
+    Design
 
     Raises
     ------

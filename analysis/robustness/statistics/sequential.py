@@ -70,6 +70,10 @@ def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tup
         Of the first runs in the order of the design.
     confidence : float, optional
 
+    Returns
+    -------
+    lower, upper : float
+
     Raises
     ------
     ParameterError
@@ -137,6 +141,11 @@ def confidence_sequence(
     confidence : float, optional
         That the bounds hold at every moment of the study.
 
+    Returns
+    -------
+    Violation
+        Bounds that hold at all numbers of runs together.
+
     Raises
     ------
     NoGuaranteeError
@@ -174,6 +183,22 @@ def decide(
     however many rows there are.  Near the threshold it may take any number of runs.
 
     Arguments and errors as in `confidence_sequence`.
+
+    Parameters
+    ----------
+    design : Design
+        Independent draws.
+    margins : array_like of shape (rows,)
+        Of the rows that are done, in their order.
+    threshold : float
+        Probability, between 0 and 1.
+    confidence : float, optional
+        Between 0 and 1.
+
+    Returns
+    -------
+    SequentialTest
+        The decision, and after how many rows.
 
     Raises
     ------

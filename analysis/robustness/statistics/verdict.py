@@ -52,6 +52,11 @@ def bound_verdict(statement: Violation, limit: float) -> Verdict:
         From `guarantee.violation_probability`.
     limit : float
 
+    Returns
+    -------
+    Verdict
+        Shown, refuted, or not shown yet.
+
     Raises
     ------
     ParameterError
@@ -72,7 +77,18 @@ def bound_verdict(statement: Violation, limit: float) -> Verdict:
 
 
 def test_verdict(test: SequentialTest) -> Verdict:
-    """Judge the claim that the probability of a violation is below the threshold of a test."""
+    """Judge the claim that the probability of a violation is below the threshold of a test.
+
+    Parameters
+    ----------
+    test : SequentialTest
+        As `decide` returns it.
+
+    Returns
+    -------
+    Verdict
+        Shown, refuted, or not shown yet.
+    """
     if test.decision != "undecided":
         return Verdict(answer="shown" if test.decision == "below" else "refuted")
     k, n = test.statement.violations, test.statement.runs

@@ -7,8 +7,8 @@
     eventually(a):  max of rho_a over the same
 
 (Donzé, Maler: Robust satisfaction of temporal logic over real-valued signals, FORMATS 2010).
-rho > 0 holds, rho < 0 fails.  Signals are joined by lines between samples, through the parabola's
-vertex at local extrema; on these lines the margins are exact, sliding windows included.
+rho > 0 holds, rho < 0 fails.  Signals are connected by lines between samples, through the
+parabola's vertex at local extrema; on these lines the margins are exact, sliding windows included.
 """
 
 from __future__ import annotations
@@ -147,6 +147,10 @@ def in_band(
         compared.  By default the larger magnitude of the finite bounds, or 1 where that is 0: of
         ``|e| <= 0.15`` a margin of 0.2 means that 20 % of the bound are left.
 
+    Returns
+    -------
+    Band
+
     Raises
     ------
     ParameterError
@@ -172,6 +176,17 @@ def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
 
     An infinite `end` is as far as the requirement looks, its `until`.
 
+    Parameters
+    ----------
+    part : Formula
+        What is required.
+    start, end : float, optional
+        Times from where the formula stands (s).
+
+    Returns
+    -------
+    Always
+
     Raises
     ------
     ParameterError
@@ -182,7 +197,19 @@ def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
 
 
 def eventually(part: Formula, start: float = 0.0, end: float = np.inf) -> Eventually:
-    """Require `part` once between start and end; arguments and errors as in `always`."""
+    """Require `part` once between start and end; arguments and errors as in `always`.
+
+    Parameters
+    ----------
+    part : Formula
+        What is required.
+    start, end : float, optional
+        Times from where the formula stands (s).
+
+    Returns
+    -------
+    Eventually
+    """
     _check_window("eventually", part, start, end)
     return Eventually(part=part, start=float(start), end=float(end))
 

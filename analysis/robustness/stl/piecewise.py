@@ -1,7 +1,7 @@
 """Piecewise linear functions of time, and their least and largest values over sliding windows.
 
-The trace of a formula is one: signals are joined by lines between samples, and minimum, maximum and
-windows of piecewise linear functions are piecewise linear again, so nothing is lost on the way.
+The trace of a formula is one: signals are connected by lines between samples, and minimum, maximum
+and windows of piecewise linear functions are piecewise linear again, so nothing is lost on the way.
 """
 
 from __future__ import annotations

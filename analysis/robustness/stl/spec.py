@@ -113,6 +113,18 @@ def unfinished_margin(time: float, until: float) -> float:
 
     It lies in [-2 FAILED, -FAILED], the lower the earlier the run ended, and below that of every
     run that reached its end; a time that is NaN counts as 0.
+
+    Parameters
+    ----------
+    time : float
+        When the run ended (s), or NaN.
+    until : float
+        When it should have (s).
+
+    Returns
+    -------
+    float
+        Dimensionless, negative.
     """
     reached = np.clip(np.nan_to_num(time / until), 0.0, 1.0) if until > 0 else 0.0
     return float(-FAILED * (2 - reached))
@@ -133,6 +145,11 @@ def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.nda
         Increasing times (s).
     signals : mapping
         Samples of shape (m,) by name.
+
+    Returns
+    -------
+    float
+        Dimensionless.
 
     Raises
     ------
@@ -184,6 +201,20 @@ def margins(spec: Spec, t: np.ndarray, signals: Mapping[str, np.ndarray]) -> dic
     """Return the margin of every requirement by key, and the least of them as ``"spec"``.
 
     Arguments and errors as in `margin`.
+
+    Parameters
+    ----------
+    spec : Spec
+        The requirements.
+    t : ndarray of shape (m,)
+        Increasing times (s).
+    signals : mapping
+        Samples of shape (m,) by name.
+
+    Returns
+    -------
+    dict of str to float
+        Dimensionless.
     """
     values = {r.key: margin(r, t, signals) for r in spec.requirements}
     return values | {"spec": float(min(values.values()))}

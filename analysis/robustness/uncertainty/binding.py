@@ -1,4 +1,4 @@
-"""A space held against the diagrams that it is to be applied to."""
+"""A space validated against the diagrams that it is to be applied to."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from nlctl.arguments import a_function, of_type
 from nlctl.blocks import Block, within
-from nlctl.diagrams import Place, all_parameter_rows, initial_state, leaves, state_names
+from nlctl.diagrams import all_parameter_rows, initial_state, leaves, samplings, state_names
 from nlctl.errors import ParameterError, UsageError
 from nlctl.names import Parameters, base_name, find_name, unknown
 from nlctl.native import Compiled
@@ -32,6 +32,17 @@ def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
     Both ends of every box are tried: a parameter's own bounds refuse them here, not in the middle
     of a study.  (Draws beyond the box of a law with infinite support are refused when they come.)
 
+    Parameters
+    ----------
+    space : Space
+        Quantities with their laws, and choices.
+    diagram : control.InputOutputSystem or Compiled
+        Whose parameters and states it names.
+
+    Returns
+    -------
+    Space
+
     Raises
     ------
     UnknownNameError, AmbiguousNameError
@@ -39,7 +50,7 @@ def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
     ParameterError
         If an end of a box breaks a rule of the block.
     SpaceError
-        If a parameter is no number, is a whole number while its law is not, a name means the same
+        If a parameter is no number, is an integer while its law is not, a name means the same
         as another one, or the diagram's own value lies outside the box.
     """
     system = diagram.system if isinstance(diagram, Compiled) else diagram
@@ -65,9 +76,9 @@ def _parameter(quantity: Uncertain, system: Any) -> Uncertain:
     value, unit = (rows[full].value, rows[full].unit) if full in rows else (known[full], "")
     owner = owner_of(system, full + suffix)
     if owner is not None:
-        leaf, key = owner
+        block, key = owner
         for end in map(np.rint, quantity.box) if quantity.is_whole else quantity.box:
-            with_overrides(within(leaf.system).current_spec, {key: end}, leaf.path)
+            with_overrides(block.current_spec, {key: end}, full.rpartition(".")[0])
         _check_whole(quantity, full in rows and isinstance(value, int))
     if suffix:
         value = np.asarray(value)[tuple(int(k) for k in re.findall(r"\d+", suffix))]
@@ -79,7 +90,7 @@ def _parameter(quantity: Uncertain, system: Any) -> Uncertain:
     return _filled(quantity, full + suffix, float(value), unit)
 
 
-def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Place, str] | None:
+def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Block, str] | None:
     """Return the block of nlctl that a parameter belongs to, and its name there.
 
     Parameters
@@ -90,19 +101,20 @@ def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Place, str] | Non
 
     Returns
     -------
-    (place, ``"lambdas[0]"``), or None for a parameter of a third-party block
+    (block, ``"lambdas[0]"``), or None for a parameter of a third-party block
     """
     path = base_name(name).rpartition(".")[0]
     for leaf in leaves(system):
         if isinstance(within(leaf.system), Block) and leaf.parameter_path == path:
-            return leaf, name.removeprefix(f"{path}.")
-    return None
+            return within(leaf.system), name.removeprefix(f"{path}.")
+    made = dict(samplings(system)).get(path)
+    return None if made is None else (made, name.removeprefix(f"{path}."))
 
 
 def _check_whole(quantity: Uncertain, wanted: bool) -> None:
     if wanted and not quantity.is_whole:
         raise SpaceError(
-            f"'{quantity.name}' is a whole number and needs a law of whole numbers, such as "
+            f"'{quantity.name}' is an integer and needs a law of integers, such as "
             f"scipy.stats.randint(0, 10), got {quantity.law_text}"
         )
 

@@ -90,18 +90,53 @@ def row_seed(design: Design, row: int) -> np.random.SeedSequence:
 
     It depends on the design's entropy and the row's number alone: any row can be run again without
     the others, and a longer design begins with the same rows.
+
+    Parameters
+    ----------
+    design : Design
+        Rows and their seeds.
+    row : int
+        Number of the row.
+
+    Returns
+    -------
+    numpy.random.SeedSequence
     """
     row = whole_number("a design", "row", row, at_least=0)
     return np.random.SeedSequence(design.entropy, spawn_key=(row,))
 
 
 def seed_number(design: Design, row: int) -> int:
-    """Return the row's seed as one number of 64 bits, for the table of results."""
+    """Return the row's seed as one number of 64 bits, for the table of results.
+
+    Parameters
+    ----------
+    design : Design
+        Rows and their seeds.
+    row : int
+        Number of the row.
+
+    Returns
+    -------
+    int
+        Below 2^64.
+    """
     return int(row_seed(design, row).generate_state(1, np.uint64)[0])
 
 
 def rows(design: Design, numbers: range) -> pd.DataFrame:
     """Return some rows, indexed by their numbers; one column for each name of the space.
+
+    Parameters
+    ----------
+    design : Design
+        Rows and their seeds.
+    numbers : range
+        Of the rows.
+
+    Returns
+    -------
+    pandas.DataFrame
 
     Raises
     ------
@@ -145,6 +180,11 @@ def independent(space: Space, size: int, entropy: int | None = None) -> Design:
         Number of rows, see `guarantee.runs_needed`.
     entropy : int, optional
         Fresh by default; the design keeps it.
+
+    Returns
+    -------
+    Design
+        Rows that follow from `entropy` and their numbers alone.
     """
     of_type("a design", "space", space, Space)
     size = whole_number("a design", "size", size, at_least=1)
@@ -189,6 +229,10 @@ def from_table(
         The user's word that rows are independent draws of the space's laws.  Statements about
         probabilities then quote it.
     entropy : int, optional
+
+    Returns
+    -------
+    Design
 
     Raises
     ------
@@ -250,6 +294,19 @@ def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
 
     Arguments as in `independent`.
 
+    Parameters
+    ----------
+    space : Space
+        Quantities with their laws, and choices.
+    size : int
+        Number of rows, a power of 2.
+    entropy : int, optional
+        Of the rows' seeds; drawn if left out.
+
+    Returns
+    -------
+    Design
+
     Raises
     ------
     ParameterError
@@ -276,6 +333,19 @@ def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Desi
     """Fill the space so that each quantity has one value in each of `size` equally likely parts.
 
     Arguments as in `independent`.
+
+    Parameters
+    ----------
+    space : Space
+        Quantities with their laws, and choices.
+    size : int
+        Number of rows.
+    entropy : int, optional
+        Of the rows' seeds; drawn if left out.
+
+    Returns
+    -------
+    Design
     """
     size = whole_number("a Latin hypercube", "size", size, at_least=1)
     affordable("a Latin hypercube", size, len(space.names))
@@ -294,6 +364,10 @@ def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = No
         Number of values per quantity, at least 1; one value is the middle of the box.  A mapping
         names every quantity.
     entropy : int, optional
+
+    Returns
+    -------
+    Design
 
     Raises
     ------
@@ -317,6 +391,17 @@ def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = No
 
 def corners(space: Space, entropy: int | None = None) -> Design:
     """Cross both ends of every box, and all options of every choice: 2^d rows for d quantities.
+
+    Parameters
+    ----------
+    space : Space
+        Quantities with their laws, and choices.
+    entropy : int, optional
+        Of the rows' seeds; drawn if left out.
+
+    Returns
+    -------
+    Design
 
     Raises
     ------
@@ -355,6 +440,10 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
         Number of evenly spaced values per quantity, ends included.
     entropy : int, optional
         Of the rows' seeds, see `row_seed`; drawn afresh if it is left out.
+
+    Returns
+    -------
+    Design
 
     Raises
     ------

@@ -88,7 +88,7 @@ class Uncertain:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the law is one of whole numbers."""
+        """Whether the law is one of integers."""
         return isinstance(self.law.dist, stats.rv_discrete)
 
     @property

@@ -95,6 +95,15 @@ def _nominal_of(quantity: Uncertain) -> float:
 def nominal(space: Space) -> dict[str, Any]:
     """Return ``{name: nominal value or label}``.
 
+    Parameters
+    ----------
+    space : Space
+        Quantities with their laws, and choices.
+
+    Returns
+    -------
+    dict
+
     Raises
     ------
     SpaceError
@@ -105,7 +114,19 @@ def nominal(space: Space) -> dict[str, Any]:
 
 
 def scaled(space: Space, factor: float) -> Space:
-    """Return the space with all deviations from the nominal values multiplied by `factor`."""
+    """Return the space with all deviations from the nominal values multiplied by `factor`.
+
+    Parameters
+    ----------
+    space : Space
+        Quantities with their laws, and choices.
+    factor : float
+        Of the deviations.
+
+    Returns
+    -------
+    Space
+    """
     of_type("a scaled space", "space", space, Space)
     return replace(space, scale=space.scale * number("a scaled space", "factor", factor))
 
@@ -142,7 +163,7 @@ def from_quantiles(space: Space, unit: np.ndarray) -> pd.DataFrame:
 def from_unit_cube(space: Space, unit: np.ndarray) -> pd.DataFrame:
     """Turn points of the unit cube into values, linearly between the ends of each box.
 
-    Arguments and errors as in `sampled`; whole numbers are rounded.
+    Arguments and errors as in `sampled`; integers are rounded.
     """
 
     def between(quantity: Uncertain, u: np.ndarray) -> np.ndarray:
@@ -186,6 +207,18 @@ def arguments(space: Space, table: pd.DataFrame) -> dict[str, dict[str, np.ndarr
     """Return the ``params`` and ``initial_state`` of `nlctl.ensemble_response` for these rows.
 
     Choices are left out: rows with the same labels share a diagram, see `resolve.diagrams`.
+
+    Parameters
+    ----------
+    space : Space
+        Quantities with their laws, and choices.
+    table : pandas.DataFrame
+        Rows of a design, a column for each name.
+
+    Returns
+    -------
+    dict of str to dict
+        Arrays of shape (rows,) by qualified name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""File -> study, held against its loop; every mistake at once."""
+"""File -> study, validated against its loop; every mistake at once."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ from .validate import checked_experiment
 __all__ = ["StudyFile", "read_study"]
 
 _ROUNDS = 5  # mistakes may stand behind mistakes
-NAMELESS = {"title": "a study", "seed": 0}  # while the rest of a mistaken file is looked at
+STAND_INS = {  # while the rest of a mistaken file is looked at
+    "study": {"title": "a study", "seed": 0},
+    "time": {"end": 1e5, "step": 0.1},  # formulas look ahead by less
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,7 +61,7 @@ def read_study(
     folder: Path | None = None,
     trust: bool = False,
 ) -> StudyFile:
-    """Read a study file, and hold every name in it against the loop.
+    """Read a study file, and validate every name in it against the loop.
 
     The files and modules that it names are run, see `trust`.
 
@@ -72,6 +75,11 @@ def read_study(
         What paths in the study are relative to; by default the file's folder.
     trust : bool, optional
         Whether code may be run from outside of that folder and of installed packages.
+
+    Returns
+    -------
+    StudyFile
+        The study, its loop and its experiment.
 
     Raises
     ------
@@ -136,8 +144,9 @@ def _validated(
         problems = told + [p for p in found if not follows(p, told)]
         for problem in reversed(found):
             _remove(rest, problem.place)
-        if any(problem.place[:1] == ("study",) for problem in found):
-            rest["study"] = NAMELESS
+        for name, table in STAND_INS.items():
+            if any(problem.place[:1] == (name,) for problem in found) and name not in rest:
+                rest[name] = table
     return None, problems, entries
 
 

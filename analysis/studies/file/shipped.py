@@ -15,6 +15,15 @@ FOLDERS = (Path(__file__).parents[3] / "reports", Path(__file__).parents[1] / "r
 def shipped(name: str) -> Path:
     """Return the study file of this name, such as ``"example-1-quick"``.
 
+    Parameters
+    ----------
+    name : str
+        Without the ending.
+
+    Returns
+    -------
+    pathlib.Path
+
     Raises
     ------
     UnknownNameError

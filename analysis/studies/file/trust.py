@@ -132,7 +132,7 @@ def check_place(name: str) -> None:
     if source.endswith(".py"):
         return
     if not all(part.isidentifier() for part in source.split(".")):
-        raise ParameterError(f"a module has names joined by dots, got '{source}'")
+        raise ParameterError(f"a module has names separated by dots, got '{source}'")
     if _is_standard(source) or source == "__main__":
         raise ParameterError(
             f"'{source}' is a module of Python's standard library, which makes nothing of a loop"

@@ -1,4 +1,4 @@
-"""A study held against its loop: every name, every formula, every analysis."""
+"""A study validated against its loop: every name, every formula, every analysis."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def checked_experiment(study: Study, folder: Path) -> tuple[Experiment | None, l
 
 
 def _stand_in(study: Study, quantities: Mapping[str, Uncertain | None]) -> Space:
-    """Return a space of the study's size, whatever its mistakes: designs are held against it."""
+    """Return a space of the study's size, whatever its mistakes, to validate designs."""
 
     def some(name: str, quantity: Uncertain | None) -> Uncertain:
         known = quantity if quantity is not None else Uncertain(name=name, bounds=(0.0, 1.0))
@@ -186,7 +186,7 @@ def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputS
 
 
 def _as_it_comes(function: Callable[..., Any] | None) -> list[ct.InputOutputSystem]:
-    """Return the loop without the study's options, so that names can be held against it."""
+    """Return the loop without the study's options, so that names can be validated against it."""
     try:
         return [] if function is None else [_diagram(function, "")]
     except Exception:  # whatever a function of the user's does without what it was to be given

@@ -15,7 +15,17 @@ __all__ = ["from_toml", "to_toml"]
 
 
 def to_toml(study: Study) -> str:
-    """Return the text of a study file with this study; what is left to defaults is left out."""
+    """Return the text of a study file with this study; what is left to defaults is left out.
+
+    Parameters
+    ----------
+    study : Study
+
+    Returns
+    -------
+    str
+        TOML.
+    """
     return tomli_w.dumps(study.model_dump(mode="json", exclude_unset=True, exclude_none=True))
 
 
@@ -27,6 +37,10 @@ def from_toml(text: str, own: Mapping[str, Kind] | None = None) -> Study:
     text : str
     own : mapping of str to Kind, optional
         Kinds of analysis of one's own, as the text calls them.
+
+    Returns
+    -------
+    Study
 
     Raises
     ------

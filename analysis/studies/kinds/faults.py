@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FAULTS"]
 
-TOGETHER = 256  # unfinished runs that are simulated again side by side
+TOGETHER = 256  # unfinished runs that are simulated again in batches
 _MOST = 40  # rows of the table of pairs
 _MARGINS = (
     "Least margin that each fault leaves, worst first, drawn between −1 and 1. Hatched: violated."

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["claims", "refusal", "verdict"]
 
+TOLD_AT_ONCE = 2
+"""So many findings are told at once where nothing is claimed."""
+
 
 def verdict(result: Result) -> str:
     """Return the report's first sentences: what is refuted, what is not shown yet, and the
@@ -35,6 +38,8 @@ def verdict(result: Result) -> str:
         told.append(statements[0])
     elif refused := refusal(result):
         told.append(f"There is no statement about a probability: {refused}.")
+    elif not result.claims and (found := [f for f in result.findings if f.is_answered]):
+        told += [without_assumptions(finding.sentence) for finding in found[:TOLD_AT_ONCE]]
     else:
         told.append("The study asks for no statement about a probability.")
     return " ".join(told)

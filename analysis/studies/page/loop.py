@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,15 @@ from . import text as text
 if TYPE_CHECKING:
     from analysis.studies.result import Result
 
-__all__ = ["Published", "StudyLoop", "loop_of", "loop_sections"]
+__all__ = [
+    "Published",
+    "StudyLoop",
+    "diagram_figures",
+    "equation_items",
+    "loop_of",
+    "loop_sections",
+    "parameter_tables",
+]
 
 _OWN = ("nlctl", "analysis")  # packages whose source comes with nlctl and is not printed
 _LONGEST = 60  # characters of a value
@@ -109,13 +117,17 @@ def loop_sections(loop: StudyLoop, result: Result, prefix: str, level: int) -> I
     yield Section(
         key=f"{prefix}study_loop",
         title="The loop",
-        items=[made, *_picture(loop, prefix), *_parameters(loop, result)],
+        items=[
+            made,
+            *diagram_figures(loop.diagram, prefix),
+            *parameter_tables(loop.diagram, result.quantities["law"].to_dict()),
+        ],
         level=level,
     )
     yield Section(
         key=f"{prefix}study_equations",
         title="The equations of the loop",
-        items=[*_equations(loop)],
+        items=[*equation_items(loop.diagram)],
         level=level + 1,
         folded=True,
     )
@@ -129,40 +141,42 @@ def loop_sections(loop: StudyLoop, result: Result, prefix: str, level: int) -> I
         )
 
 
-def _picture(loop: StudyLoop, prefix: str) -> Iterator[Figure]:
-    """Yield the diagram; a single system is none."""
-    if isinstance(loop.diagram, ct.InterconnectedSystem):
-        blocks = ", ".join(str(system.name) for system in loop.diagram.syslist)
+def diagram_figures(diagram: ct.InputOutputSystem, prefix: str = "") -> Iterator[Figure]:
+    """Yield the block diagram; a single system has none."""
+    if isinstance(diagram, ct.InterconnectedSystem):
+        blocks = ", ".join(str(system.name) for system in diagram.syslist)
         yield Figure(
             key=f"{prefix}study_diagram",
             caption=text.DIAGRAM,
-            description=f"Block diagram of {loop.diagram.name} with the blocks {blocks}.",
-            figure=draw(loop.diagram, expand=True),
+            description=f"Block diagram of {diagram.name} with the blocks {blocks}.",
+            figure=draw(diagram, expand=True),
         )
 
 
-def _parameters(loop: StudyLoop, result: Result) -> Iterator[Item]:
-    """Yield all parameters of the loop, and how each was varied."""
-    laws: dict[Any, str] = result.quantities["law"].to_dict()
-    table: pd.DataFrame = parameters(loop.diagram)
+def parameter_tables(
+    diagram: ct.InputOutputSystem, laws: Mapping[Any, str] | None = None
+) -> Iterator[Table]:
+    """Yield all parameters of a diagram, if it has any; with `laws` also how each was varied."""
+    table: pd.DataFrame = parameters(diagram)
     if not len(table):
         return
-    yield Table(
-        caption=text.PARAMETERS,
-        columns=("parameter", "value", "unit", "varied", "meaning"),
-        rows=[
-            (name, _value(row["value"]), text.unit_text(row["unit"]), laws.get(name, ""),
-             row["meaning"])
-            for name, row in table.iterrows()
-        ],
-        folded=True,
-    )  # fmt: skip
+    columns = ["parameter", "value", "unit", "meaning"]
+    rows = [
+        [name, _value(row["value"]), text.unit_text(row["unit"]), row["meaning"]]
+        for name, row in table.iterrows()
+    ]
+    if laws is not None:
+        columns.insert(3, "varied")
+        for row in rows:
+            row.insert(3, laws.get(row[0], ""))
+    caption = text.ALL_PARAMETERS if laws is None else text.PARAMETERS
+    yield Table(caption=caption, columns=columns, rows=rows, folded=True)
 
 
-def _equations(loop: StudyLoop) -> Iterator[Item]:
+def equation_items(diagram: ct.InputOutputSystem) -> Iterator[Item]:
     """Yield the equations of every block, read from the functions that are run."""
     try:
-        blocks = typeset(loop.diagram)
+        blocks = typeset(diagram)
     except UsageError as refused:  # it was run all the same, by calling a function as it stands
         yield Paragraph(text=f"There are no formulas of this loop: {refused}")
         return

@@ -41,6 +41,7 @@ PART = (
 )
 SAME = "The same in numbers"
 DIAGRAM = "The loop as simulated, with nominal values, and the inside of its nested diagrams."
+ALL_PARAMETERS = "All parameters of the loop, with their values."
 PARAMETERS = (
     "All parameters of the loop, with their values; varied: by which law the study changed them."
 )

@@ -1,6 +1,6 @@
 """The derivative of a right-hand side along directions, as machine code for the stiff method.
 
-Members side by side are directions here: all have the same time, state, inputs and parameters.
+The members of a batch are directions here: all have the same time, state, inputs and parameters.
 So a Jacobian matrix of n states takes n / `DIRECTIONS` evaluations, and the generator of right-hand
 sides serves for it as it is.
 """

@@ -17,7 +17,7 @@ from ...expressions.graph import SMALL, Ambiguous, Expr, Graph, Untraceable, nee
 from ...expressions.operators import elementwise
 from ...expressions.stage import Stage
 from ...expressions.trace import trace
-from ...sampling.system import Happening, rounded
+from ...sampling.system import Happening, Sampled, oldest, rounded
 from ..diagram.feedthrough import feedthrough
 from ..diagram.schedule import (
     AlgebraicLoop,
@@ -96,6 +96,7 @@ def equations(
     sizes = {"t": 1, "x": system.nstates or 0, "u": schedule.ninputs, "p": length(layout)}
     reader = Reader(
         graph=Graph(sizes), layout=layout, blocks=schedule.nodes, p=p,
+        samplings={id(h.system): i for i, h in enumerate(schedule.holders)},
         lines={line: (system.ninputs or 0) + k for k, line in enumerate(schedule.lines)},
     )  # fmt: skip
     with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
@@ -183,6 +184,8 @@ class Reader:
         What happens to sampled blocks.
     lines : mapping
         Outputs of transport delays, and which input stands for each.
+    samplings : mapping
+        Where in the layout the parameters of a sampling are, by its identity.
     """
 
     graph: Graph
@@ -197,6 +200,7 @@ class Reader:
     fixed_points: dict[str, list[Expr]] = field(default_factory=dict)
     what: Happening = frozenset()
     lines: Mapping[Signal, int] = field(default_factory=dict)
+    samplings: Mapping[int, int] = field(default_factory=dict)
 
     def read(self, schedule: Schedule) -> None:
         """Read all blocks in their order, and solve the loops."""
@@ -272,11 +276,11 @@ class Reader:
     def outputs(self, i: int, unknown: Collection[int]) -> Tracer:
         """Return a block's outputs; those that depend on unknown inputs are asked for again."""
         node = self.blocks[i]
+        if node.sampled and not node.sampled.answers(self.what):
+            _, _, held = node.sampled.parts(self._every_state(i))
+            return self._due(i) if node.sampled.releases(self.what) else held
         if node.sampled:
-            if not node.sampled.answers(self.what):
-                _, waiting, held = node.sampled.parts(self._every_state(i))
-                return node.sampled.shown(self.what, waiting, held)
-            return self._rounded(self._own_outputs(i, unknown), node.sampled.output_quantum)
+            return self._converted(node.sampled, self._own_outputs(i, unknown), 1)
         return self._own_outputs(i, unknown)
 
     def _own_outputs(self, i: int, unknown: Collection[int]) -> Tracer:
@@ -295,7 +299,7 @@ class Reader:
             ]
         )
         if node.sampled:
-            inputs = self._rounded(inputs, node.sampled.input_quantum)
+            inputs = self._converted(node.sampled, inputs, 0)
         if linear:
             return self._linear(node, system.C, system.D, inputs)
         return self._function(i, "output", [system.outfcn], inputs, system.noutputs)
@@ -313,16 +317,30 @@ class Reader:
         def computed() -> tuple[Tracer, Tracer]:
             direct = replace(self.blocks[i], direct=feedthrough(self.blocks[i].system))
             reader = replace(self, blocks=[*self.blocks[:i], direct, *self.blocks[i + 1 :]])
-            return self._own_states(i), self._rounded(
-                reader._own_outputs(i, ()), sampled.output_quantum
-            )
+            following = self._own_states(i)
+            if sampled.euler:
+                own, _, _ = sampled.parts(self._every_state(i))
+                following = own + self._sampling(sampled).dt * following
+            return following, self._converted(sampled, reader._own_outputs(i, ()), 1)
 
-        parts = sampled.after(self.what, self._every_state(i), computed)
+        parts = sampled.after(self.what, self._every_state(i), self._due(i), computed)
         return concatenated(self.graph, parts)
 
-    def _rounded(self, values: Tracer, quantum: float) -> Tracer:
-        """Return what converters with steps of a quantum make of values."""
-        return Stage(self.graph).copied(rounded)(values, quantum) if values.size else values
+    def _sampling(self, sampled: Sampled) -> Any:
+        """Return the parameters of a block's sampling."""
+        slots = self.layout[self.samplings[id(sampled.sampling)]]
+        return traced_parameters(self.graph, sampled.sampling, slots, self.p)
+
+    def _due(self, i: int) -> Tracer:
+        """Return the outputs of a sampled block that follow if any do."""
+        sampled: Any = self.blocks[i].sampled
+        function = Stage(self.graph).copied(oldest)
+        return sampled.oldest(function, self._every_state(i), self._sampling(sampled))
+
+    def _converted(self, sampled: Sampled, values: Tracer, which: int) -> Tracer:
+        """Return what the converter of inputs (0) or outputs (1) makes of values."""
+        function = Stage(self.graph).copied(rounded)
+        return sampled.converted(function, values, self._sampling(sampled), which)
 
     def _every_state(self, i: int) -> Tracer:
         """Return a sampled block's own states, and behind them what waits and is held."""
@@ -335,7 +353,7 @@ class Reader:
             return self._states(node)
         inputs = self.wired(node.inputs)
         if node.sampled:
-            inputs = self._rounded(inputs, node.sampled.input_quantum)
+            inputs = self._converted(node.sampled, inputs, 0)
         if isinstance(system, ct.StateSpace):
             return self._linear(node, system.A, system.B, inputs)
         return self._function(i, "update", [system.updfcn], inputs, system.nstates)

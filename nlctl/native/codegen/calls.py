@@ -18,12 +18,12 @@ from typing import Any
 import numba
 import numpy as np
 from numba import carray  # pyright: ignore[reportPrivateImportUsage]
-from numba.core.errors import NumbaWarning
 
 from ...equations import equation
 from ...errors import UsageError
+from ...upstream.numba_internals import NumbaWarning, address_of
 from ..machine.fingerprint import module_key
-from ..machine.machine_code import Wanted, address_of, machine_code_if_taken
+from ..machine.machine_code import Wanted, machine_code_if_taken
 from ..machine.module import loaded
 
 _ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)

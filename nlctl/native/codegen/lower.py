@@ -1,4 +1,4 @@
-"""Lowering: a diagram as a program over members side by side, from the blocks' own functions.
+"""Lowering: a diagram as a program over batched members, from the blocks' own functions.
 
 The functions have been run once on symbols.  What they compute is planned here for any number of
 members at a time: each expression once, whatever depends on parameters alone in advance.  One
@@ -35,7 +35,7 @@ ALONG = {POINT: ("t", "x", "u", "c"), "along": ("t", "x", "u", "c", DIRECTION, "
 
 @dataclass(frozen=True, kw_only=True)
 class Lowered:
-    """A program over members side by side ("lanes").
+    """A program over batched members ("lanes").
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Lowered:
 def lower(
     schedule: Schedule, program: Program, lanes: int = 8, found: Equations | None = None
 ) -> Lowered:
-    """Plan a diagram as a program over members side by side.
+    """Plan a diagram as a program over batched members.
 
     Parameters
     ----------

@@ -153,7 +153,7 @@ class Function:
 
 
 def split(store: Store, known: Collection[Expr] = ()) -> list[Store]:
-    """Divide what is joined into its parts, unless it lies in memory already."""
+    """Divide what is concatenated into its parts, unless it lies in memory already."""
     if store.expr.op != "concat" or store.expr in known:
         return [store]
     parts, row = [], store.row

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import control as ct
+import numpy as np
 
 from ...blocks import Block, event_count, memory_states
 from ...errors import CompileError
-from ...sampling.clock import Clock, meetings
-from ...sampling.system import Happening
+from ...sampling.clock import Clock, Instants, instants, meetings
+from ...sampling.system import Happening, clocks_of
 from ..diagram.schedule import Node, Schedule
 from ..parameters import Slot, current_values, slots
 
@@ -35,8 +36,8 @@ class Program:
         Indices of the memory states.
     sampled : tuple of int
         Indices of the states of sampled blocks.
-    clocks : tuple of Clock
-        Of these blocks.
+    clocks : mapping
+        Of these blocks, as they were when the diagram was compiled, by their owners.
     """
 
     layout: Mapping[int, Mapping[str, Slot]]
@@ -44,11 +45,13 @@ class Program:
     corners: int
     memory: tuple[int, ...]
     sampled: tuple[int, ...] = ()
-    clocks: tuple[Clock, ...] = ()
+    clocks: Mapping[Any, Clock] = field(default_factory=dict)
 
     @cached_property
     def meetings(self) -> tuple[Happening, ...]:
         """What may happen at one instant: there is a function of the program for each.
+
+        Where parameters of clocks are overridden, more may; see `machine.evaluations`.
 
         Raises
         ------
@@ -81,10 +84,10 @@ def program(schedule: Schedule) -> Program:
     """
     for node in schedule.nodes:
         _check_kind(node)
-    layout = slots(schedule.nodes)
+    layout = slots(schedule.holders)
     fixed = {
         i: {k: v for k, v in current_values(node.system).items() if k not in layout[i]}
-        for i, node in enumerate(schedule.nodes)
+        for i, node in enumerate(schedule.holders)
     }
     return Program(
         layout=layout,
@@ -96,8 +99,32 @@ def program(schedule: Schedule) -> Program:
             for node in schedule.nodes
             for i in range(node.size if node.sampled else 0)
         ),
-        clocks=tuple(dict.fromkeys(n.sampled.clock for n in schedule.nodes if n.sampled)),
+        clocks=clocks_of(n.sampled for n in schedule.nodes),
     )
+
+
+def instants_of(
+    schedule: Schedule, program: Program, times: np.ndarray, p: np.ndarray
+) -> list[Instants]:
+    """Return when something happens to sampled blocks, for each column of `p`."""
+    first = len(schedule.nodes)
+    places = [(h.system, program.layout[first + k]) for k, h in enumerate(schedule.samplings)]
+    known: dict[tuple[Clock, ...], Instants] = {}
+    found = []
+    for column in p.T:
+        clocks = {owner: _clock(slots, column) for owner, slots in places}
+        key = tuple(clocks.values())
+        if key not in known:
+            known[key] = instants(clocks, float(times[0]), float(times[-1]), program.meetings)
+        found.append(known[key])
+    return found
+
+
+def _clock(slots: Mapping[str, Slot], p: np.ndarray) -> Clock:
+    """Return the clock that a parameter vector says."""
+    names = ("dt", "offset", "delay", "jitter", "seed")
+    values = {name: p[slots[name].offset].item() for name in names}
+    return Clock(**values | {"seed": int(values["seed"])})
 
 
 def count_switching_functions(node: Node) -> int:

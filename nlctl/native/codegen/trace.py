@@ -13,6 +13,7 @@ from ...expressions.dependence import structure
 from ...expressions.graph import Graph, Untraceable
 from ...expressions.operators import elementwise
 from ...expressions.trace import trace
+from ...upstream.control_internals import current_parameters
 from ..parameters import Slot, current_values
 
 
@@ -32,7 +33,7 @@ def traced_parameters(
         name: _parameter(graph, slots[name], value, p) if name in slots else value
         for name, value in current_values(system).items()
     }
-    return type(system._current_params)(**values) if isinstance(system, Block) else values
+    return type(current_parameters(system))(**values) if isinstance(system, Block) else values
 
 
 def traced_arguments(graph: Graph, system: Any, slots: Mapping[str, Slot]) -> tuple[Any, ...]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...blocks import is_delayed, within
 from ...delays.lines import delayed_blocks
-from ...diagrams import places
+from ...diagrams import places, samplings
 from ...sampling.system import Happening, Sampled
 from ..thirdparty.captured import Captured, noted
 from ..thirdparty.checks import check_functions
@@ -44,7 +44,7 @@ class Node:
     Attributes
     ----------
     path : str
-        Names of the diagrams around it and its own, joined by dots.
+        Names of the diagrams around it and its own, separated by dots.
     system : control.InputOutputSystem
     state_offset : int
         Where its states begin in the diagram's state vector.
@@ -113,6 +113,8 @@ class Schedule:
         Parts of the order that are solved for; empty unless that was asked for.
     captured : tuple of Captured
         What the blocks' functions read from around them.
+    samplings : tuple of Node
+        What says how blocks are sampled: without signals, but with parameters.
     """
 
     system: Any
@@ -122,7 +124,13 @@ class Schedule:
     outputs: tuple[Combination, ...]
     loops: tuple[AlgebraicLoop, ...]
     captured: tuple[Captured, ...]
+    samplings: tuple[Node, ...] = ()
     lines: tuple[Signal, ...] = ()
+
+    @property
+    def holders(self) -> tuple[Node, ...]:
+        """All that has parameters, in their order."""
+        return (*self.nodes, *self.samplings)
 
     @property
     def ninputs(self) -> int:
@@ -188,10 +196,16 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
     return _ordered(
         Schedule(
             system=system, nodes=nodes, order=(), unknown=(), outputs=tuple(outputs), loops=(),
-            captured=tuple(read), lines=lines,
+            captured=tuple(read), samplings=tuple(_samplings(system)), lines=lines,
         ),
         solve_loops,
     )  # fmt: skip
+
+
+def _samplings(system: Any) -> Iterator[Node]:
+    for path, made in samplings(system):
+        none = np.zeros((0, 0), dtype=bool)
+        yield Node(path=path, system=made, state_offset=0, inputs=(), direct=none)
 
 
 def _ordered(read: Schedule, solve_loops: bool) -> Schedule:
@@ -199,7 +213,7 @@ def _ordered(read: Schedule, solve_loops: bool) -> Schedule:
     nodes = read.nodes
     try:
         order = tuple(TopologicalSorter(_blocks_before(nodes)).static_order())
-        return replace(read, order=order, unknown=(frozenset(),) * len(order), loops=())
+        return replace(read, order=order, unknown=_not_yet_known(nodes, order), loops=())
     except CycleError:  # look closer: which output depends on which input
         nodes = tuple(replace(n, direct=closer_feedthrough(n.system, n.direct)) for n in nodes)
         ordering = _Ordering(nodes=nodes)
@@ -247,6 +261,17 @@ def _blocks_before(nodes: tuple[Node, ...]) -> dict[int, set[int]]:
             if node.direct[:, j].any():
                 before[i] |= {s.block for s in combination if s.block is not None}
     return before
+
+
+def _not_yet_known(nodes: tuple[Node, ...], order: Iterable[int]) -> tuple[frozenset[int], ...]:
+    """Return which inputs of each block come later in an order: no output of it needs these."""
+    done: set[int | None] = {None}
+    unknown = []
+    for i in order:
+        inputs = enumerate(nodes[i].inputs)
+        unknown.append(frozenset(j for j, c in inputs if any(s.block not in done for s in c)))
+        done.add(i)
+    return tuple(unknown)
 
 
 @dataclass(kw_only=True)

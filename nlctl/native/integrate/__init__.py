@@ -1,6 +1,6 @@
 """Integrators: two methods that take turns, control of the step, events, memory, samples.
 
-`advance` takes steps of `tsit5` or `stiff` (`rodas5p`) as `control` chooses them, `events` are
-located and `restart` goes on behind them; `memory` is what turns, `state` and `workspace` are what
-a lane has.  `driver` runs it all; `discrete` is discrete time.
+`advance` takes steps of an explicit pair or of `stiff` (`rodas5p`) as `control` chooses them,
+`events` are located and `restart` resumes behind them; `memory` is what turns, `state` and
+`workspace` are what a lane has.  `driver` runs it all; `discrete` is discrete time.
 """

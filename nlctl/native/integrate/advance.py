@@ -1,4 +1,4 @@
-"""Integration of members side by side: step control, events, memory, output samples.
+"""Integration of batched members: step control, events, memory, output samples.
 
 Each round tries one step for every member ("lane") that is still running.  Members have their own
 times and step sizes and never see each other.  A single run is one lane, and may also use the
@@ -11,63 +11,33 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..machine.address import call_rhs
-from .control import choose_method, choose_step, next_step, rejected
+from .control import choose_method, choose_step, next_step, rejected, shorten
 from .delays import is_full, keep, look_within, unresolved
-from .events import AGAIN, CLEAR, EVENT, locate, step_accepted, unforeseen
-from .inputs import inputs_at
-from .methods import rodas5p, tsit5
+from .events import AGAIN, CLEAR, EVENT, locate, step_accepted
+from .excursions import SHORTER, unforeseen, without_excursion
+from .methods import explicit, rodas5p
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
-from .samples import next_stop, take_samples
+from .samples import begin_afresh, next_stop, take_samples
 from .state import DERIVATIVES, INNER, RUNNING
 from .workspace import AUTO, UNKNOWN
 
 
 @numba.njit(**INNER)
-def _explicit_attempt(rhs, task, lanes, w):
-    """Try a step of Tsitouras' pair in all lanes."""
-    x, hh, k, count = w.x_flat, w.hh, w.k_flat, lanes.size
-    for j in range(count):
-        w.h[j] = lanes[j].step
-    for i in range(w.x.shape[0]):
-        for j in range(count):
-            hh[i * count + j] = w.h[j]
-    for s in range(1, tsit5.STAGES):
-        for j in range(count):
-            w.t[j] = lanes[j].t + tsit5.C[s] * w.h[j]
-        if w.u.shape[0]:
-            inputs_at(task, lanes, w)
-        if s < 6:
-            tsit5.combined(x, hh, k, s, w.x_stage_flat)
-            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.g)
-        else:
-            tsit5.combined(x, hh, k, s, w.x_new_flat)
-            call_rhs(rhs, w.t, w.x_new, w.u, task.p, w.k[s], w.g)
-        for i in task.memory:
-            for j in range(count):
-                w.k[s, i, j] = 0.0
-    change, parts = w.dx_ahead_flat, w.x_ahead_flat
-    tsit5.difference(hh, k, change)
-    tsit5.weighed(x, w.x_new_flat, change, task.rtol, task.atol, parts)
-    tsit5.errors(w.x_ahead, w.x_new, w.x_stage, w.k, w.error, w.rate)
-
-
-@numba.njit(**INNER)
-def _sample(lane, j, times, t_new, x, x_new, k, U, states):
+def _sample(lane, j, task, t_new, w):
     """Fill the output samples that the accepted step of a lane has passed."""
-    last = times.size - 1
+    times, x, x_new, last = task.times, w.x, w.x_new, task.times.size - 1
     while lane.segment < last and times[lane.segment + 1] <= t_new:
         lane.segment += 1
         theta = (times[lane.segment] - lane.t) / lane.step
-        target = states[lane.segment]
+        target = w.samples[lane.segment]
         if theta >= 1.0:
             for i in range(x.shape[0]):
                 target[i, j] = x_new[i, j]  # exactly the solution, not its interpolant
         elif lane.stiff:
-            rodas5p.interpolate(theta, x, x_new, U, target)
+            rodas5p.interpolate(theta, x, x_new, w.U, target)
         else:
-            tsit5.interpolate(theta, lane.step, x, k, j, target)
+            explicit.interpolate(theta, lane.step, x, w.k, task.B, j, target)
 
 
 @numba.njit(**INNER)
@@ -83,12 +53,12 @@ def _judge(task, lanes, w, done, passed):
     for j in range(lanes.size):
         lane = lanes[j]
         done[j] = passed[j] = False
-        if lane.status != RUNNING or rejected(lane, w.error[j], task.fixed):
+        if lane.status != RUNNING or rejected(lane, w.error[j], task):
             continue
-        growing = lane.step > 2.0 * lane.last and lane.step > shortest and lane.tries == 0
-        if memories and growing and task.fixed == 0.0 and unforeseen(w, lane.step, j):
-            lane.rejected += 1
-            lane.h = 0.3 * lane.step
+        free = task.fixed == 0.0 and lane.step > shortest
+        growing = lane.step > 2.0 * lane.last and lane.tries == 0
+        if memories and growing and free and unforeseen(w, lane.step, j):
+            shorten(lane, SHORTER)
             continue
         found = CLEAR
         if w.e.shape[0]:
@@ -96,22 +66,27 @@ def _judge(task, lanes, w, done, passed):
         if found == AGAIN:
             lane.rejected += 1
             continue
+        # memories have slopes, and their stages too much noise
+        part = without_excursion(task, w, memories == 0, j) if free and not lane.stiff else 1.0
+        if part < 1.0:
+            shorten(lane, part)
+            continue
         if task.delays.shape[0] and unresolved(task, lane, w, j, found == EVENT):
             continue
         t_new = next_stop(task, lane, w, j) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
-            _sample(lane, j, task.times, t_new, w.x, w.x_new, w.k, w.U, w.samples)
+            _sample(lane, j, task, t_new, w)
         step_accepted(lane, found == EVENT)
         lane.t = t_new
-        next_step(lane, w.error[j], w.rate[j], task.fixed, memories)
+        next_step(lane, w.error[j], w.rate[j], task)
         done[j] = True
-        if memories:  # at a corner of the inputs memories may turn round as well
+        if memories:  # at a corner of the inputs memories may reverse as well
             at_corner = lane.ends and w.u.shape[0] > 0
             passed[j] = at_corner or _began_to_move(corners, w.e_start, w.e, j)
         passed[j] |= found == EVENT
         any_passed |= passed[j]
         if task.method == AUTO:
-            choose_method(lane, task.cost, task.alone)
+            choose_method(lane, task)
     return any_passed
 
 
@@ -127,13 +102,13 @@ def _began_to_move(corners, e_start, e, j):
 @numba.njit(**INNER)
 def _take(task, w, done):
     """Make the ends of the accepted steps the states, and commit the memories."""
-    x, k, corners = w.x, w.k, task.corners
+    x, k, corners, last = w.x, w.k, task.corners, w.k.shape[0] - 1
     for j in range(done.size):
         if not done[j]:
             continue
         for i in range(x.shape[0]):
             x[i, j] = w.x_new[i, j]
-            k[0, i, j] = k[6, i, j]
+            k[0, i, j] = k[last, i, j]
         for i in range(corners):
             w.behind[i, j] = w.e_start[i, j] * w.e[i, j] < 0.0
         for i in range(task.memory.size):
@@ -157,15 +132,13 @@ def advance(rhs, point, along, task, w, rounds):
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     sampled = np.zeros(lanes.size, np.bool_)
     for _ in range(rounds):
-        if is_full(task, lanes, w):
-            return
         running = 0
         for j in range(lanes.size):
             if lanes[j].status == RUNNING:
                 over = lanes[j].segment == task.times.size - 1
                 choose_step(lanes[j], next_stop(task, lanes[j], w, j), over, task.max_steps)
                 running += lanes[j].status == RUNNING
-        if not running:
+        if not running or is_full(task, lanes, w):
             return
         if lanes[0].stiff and task.derivatives == UNKNOWN:
             lanes[0].status = DERIVATIVES
@@ -173,13 +146,13 @@ def advance(rhs, point, along, task, w, rounds):
         if lanes[0].stiff:
             stiff_attempt(rhs, point, along, task, lanes, w)
         else:
-            _explicit_attempt(rhs, task, lanes, w)
+            explicit.explicit_attempt(rhs, task, lanes, w)
         if task.delays.shape[0]:
             look_within(task, lanes, w)
         if task.memory.size:
             for j in range(lanes.size):
                 w.t_end[j] = lanes[j].t + lanes[j].step
-            memory_rates(rhs, task, lanes, w, w.x_new, w.k[6])
+            memory_rates(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1])
         for i in range(task.corners):
             for j in range(lanes.size):
                 w.e[i, j] = w.g[i, j]
@@ -190,6 +163,7 @@ def advance(rhs, point, along, task, w, rounds):
         if task.ticks.size and take_samples(task, lanes, w, sampled):
             for j in range(lanes.size):
                 passed[j] = sampled[j] or (passed[j] and (task.memory.size > 0 or delays))
+            begin_afresh(task, lanes, w, sampled)
             restart(rhs, task, lanes, w, passed)
         elif jumped or (task.memory.size and any_passed):
             restart(rhs, task, lanes, w, passed)

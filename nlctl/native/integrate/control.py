@@ -1,7 +1,8 @@
 """Decisions about one member's steps: how long, accepted or not, by which method.
 
 Each function takes the member's record and a few numbers, never the whole workspace: its arguments
-are all that a decision rests on.
+are all that a decision rests on.  Of the task they take the tolerances and what the explicit pair
+is like: its order and its limit of stability.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .methods import tsit5
+from .methods import rodas5p
 from .state import DIVERGED, FIRST_PATIENCE, INNER, OK, RUNNING, STEP_LIMIT, STEP_TOO_SMALL, STIFF
 
 SMALLEST = 4e-16  # of the time: no shorter step can be told from none
@@ -57,44 +58,53 @@ def memory_error(task, x, g, g_other, j):
 
 
 @numba.njit(**INNER)
-def rejected(lane, error, fixed):
+def rejected(lane, error, task):
     """Whether the error of a step is too large; if so, propose a shorter one."""
     finite = np.isfinite(error)
-    if error <= 1.0 or (fixed > 0.0 and finite):
+    if error <= 1.0 or (task.fixed > 0.0 and finite):
         return False
     lane.rejected += 1
     lane.tries = 0
-    lane.h = lane.step * (max(0.2, 0.9 * error**-0.2) if finite else 0.1)
-    if fixed > 0.0 or not (finite or lane.h > SMALLEST * abs(lane.t)):
+    order = rodas5p.ORDER if lane.stiff else task.pair_order
+    lane.h = lane.step * (max(0.2, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
+    if task.fixed > 0.0 or not (finite or lane.h > SMALLEST * abs(lane.t)):
         lane.status = DIVERGED
     return True
 
 
 @numba.njit(**INNER)
-def next_step(lane, error, rate, fixed, memories):
+def shorten(lane, part):
+    """Have part of the step just tried be tried instead, whatever was located in it."""
+    lane.rejected += 1
+    lane.tries = 0
+    lane.h = part * lane.step
+
+
+@numba.njit(**INNER)
+def next_step(lane, error, rate, task):
     """Propose the next step after an accepted one: PI control, and stability."""
-    log_error = np.log(max(error, 1e-10))
+    log_error, memories, slower = np.log(max(error, 1e-10)), task.memory.size, 5.0 / task.pair_order
     # at equilibrium the error is 0.17 of its tolerance; of the stiff method, whose steps cost
     # more and do not end at a limit of stability, 0.44
-    now, before = (0.17, 0.04) if lane.stiff else (0.14, 0.08)
+    now, before = (0.17, 0.04) if lane.stiff else (0.14 * slower, 0.08 * slower)
     factor = 0.9 * np.exp(before * lane.log_error_before - now * log_error)
     h = lane.step * min(10.0, max(0.2, factor))
     cut_short = lane.step < lane.h  # by an event or the end: no reason for a smaller one
     lane.h = max(h, lane.h) if cut_short else h
     lane.log_error_before = log_error
     lane.rate = rate
-    if fixed > 0.0:
-        lane.h = fixed
+    if task.fixed > 0.0:
+        lane.h = task.fixed
     elif not lane.stiff:
         # at the limit of stability the rates of memories are noise
-        limit = 2.0 if memories else 0.8 * tsit5.STABLE
+        limit = min(2.0, 0.8 * task.stable) if memories else 0.8 * task.stable
         lane.slow = lane.slow + 1 if lane.h * rate > limit else 0
         if memories and lane.slow:
             lane.h = limit / rate
 
 
 @numba.njit(**INNER)
-def choose_method(lane, cost, alone):
+def choose_method(lane, task):
     """Go over to the stiff method where stability limits the step, and back where it does not pay.
 
     The stiff method is first tried; it stays while it gets further with a step tried than the
@@ -102,16 +112,16 @@ def choose_method(lane, cost, alone):
     """
     tried = lane.accepted + lane.rejected
     if not lane.stiff:
-        if lane.slow >= lane.patience * (1 if alone else 100):
+        if lane.slow >= lane.patience * (1 if task.alone else 100):
             lane.slow = 0
-            lane.stiff = 1 if alone else 0
-            lane.status = RUNNING if alone else STIFF
+            lane.stiff = 1 if task.alone else 0
+            lane.status = RUNNING if task.alone else STIFF
             lane.judged_at, lane.judged_after = lane.t, tried
         return
     lane.stiff += 1
     if lane.stiff % TRIAL == 0:
-        limit = tsit5.STABLE / max(lane.rate, 1e-300)
-        pays = lane.t - lane.judged_at > cost * limit * (tried - lane.judged_after)
+        limit = task.stable / max(lane.rate, 1e-300)
+        pays = lane.t - lane.judged_at > task.cost * limit * (tried - lane.judged_after)
         lane.judged_at, lane.judged_after = lane.t, tried
         if lane.stiff == TRIAL:
             lane.patience = FIRST_PATIENCE if pays else min(2 * lane.patience, MAX_PATIENCE)

@@ -20,9 +20,9 @@ import numpy as np
 
 from ..machine.address import call_out
 from .control import rejected
-from .inputs import DEGREE, inputs_at, past_value
-from .methods import tsit5
+from .methods import explicit
 from .state import INNER, RUNNING
+from .workspace import DEGREE, inputs_at, past_value
 
 SMOOTH = 6  # level that a method of order 5 takes for smooth
 POINTS = 0.5 - 0.5 * np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
@@ -61,7 +61,7 @@ def look_within(task, lanes, w):
         for j in range(lanes.size):
             w.t[j] = lanes[j].t + POINTS[s] * lanes[j].step
             w.since[j], w.missed[j], w.missed_at_end[j] = lanes[j].t, 0.0, 0.0
-            tsit5.interpolate(POINTS[s], lanes[j].step, w.x, w.k, j, w.x_stage)
+            explicit.interpolate(POINTS[s], lanes[j].step, w.x, w.k, task.B, j, w.x_stage)
         inputs_at(task, lanes, w)
         call_out(task.signals[0], w.t, w.x_stage, w.u, task.p, w.seen[s])
     for j in range(lanes.size):
@@ -115,7 +115,7 @@ def unresolved(task, lane, w, j, event):
         for i in range(task.delays.shape[0]):
             w.fresh[i, j] = 0
         return False
-    if rejected(lane, w.missed[j], task.fixed):
+    if rejected(lane, w.missed[j], task):
         return True
     w.error[j] = max(w.error[j], w.missed[j])
     return False
@@ -137,7 +137,7 @@ def keep(task, lanes, w, done, passed):
         broke = 0 if passed[j] or w.missed[j] < 0.0 else SMOOTH
         if lanes[j].t == task.times[lanes[j].segment] and _has_kink(task, lanes[j].segment):
             broke = min(broke, 1)
-        if lanes[j].tick < task.ticks.size and task.ticks[lanes[j].tick] <= lanes[j].t:
+        if lanes[j].tick < task.ticks.shape[1] and task.ticks[j, lanes[j].tick] <= lanes[j].t:
             broke = 0
         for i in range(task.delays.shape[0]):
             w.fresh[i, j] = broke

@@ -12,15 +12,19 @@ import numpy as np
 
 from ...errors import ParameterError
 from ...names import unknown
-from ...sampling.clock import instants
+from ...sampling.clock import Instants
 from ..codegen.along import Along, derivatives
+from ..codegen.program import instants_of
 from ..compiled import Compiled
 from ..histories import lines_of, with_past, with_room
 from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
 from .discrete import simulate_discrete
 from .memory import with_table
+from .methods import EXPLICIT_PAIRS
 from .methods.lu import WHOLE, Elimination, cost
+from .methods.tableau import Tableau
+from .methods.tsit5 import TSIT5
 from .state import DERIVATIVES, RUNNING, Status
 from .workspace import (
     AUTO,
@@ -34,7 +38,7 @@ from .workspace import (
     new_work,
 )
 
-METHODS = {"auto": AUTO, "tsit5": EXPLICIT, "rodas5p": IMPLICIT}
+METHODS = {"auto": AUTO, **dict.fromkeys(EXPLICIT_PAIRS, EXPLICIT), "rodas5p": IMPLICIT}
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
 
 
@@ -48,8 +52,9 @@ class Settings:
         Tolerances; the error of a step is weighed with atol + rtol |x|.
     max_steps : int
         Attempted steps after which a run ends as STEP_LIMIT.
-    method : {"auto", "tsit5", "rodas5p"}
-        Explicit pair of orders 5(4), stiff method of orders 5(4), or whichever is faster.
+    method : {"auto", "tsit5", "rodas5p"} or Tableau
+        Explicit pair of orders 5(4), stiff method of orders 5(4), or whichever is faster; an
+        explicit pair of your own as its tableau.
     step : float
         Fixed step (s) instead of error control; 0 for error control.
     """
@@ -57,11 +62,20 @@ class Settings:
     rtol: float = 1e-8
     atol: float = 1e-10
     max_steps: int = 10_000_000_000
-    method: str = "auto"
+    method: str | Tableau = "auto"
     step: float = 0.0
 
+    @property
+    def pair(self) -> Tableau:
+        """The explicit pair that is used, alone or in turn with the stiff method."""
+        return (
+            self.method
+            if isinstance(self.method, Tableau)
+            else EXPLICIT_PAIRS.get(self.method, TSIT5)
+        )
+
     def __post_init__(self) -> None:
-        if self.method not in METHODS:
+        if not isinstance(self.method, Tableau) and self.method not in METHODS:
             raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
         for name in ("rtol", "atol", "step", "max_steps"):
             if not isinstance(getattr(self, name), Real):
@@ -161,7 +175,7 @@ def _sampled(
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """Members that are integrated side by side, and all arrays that this needs.
+    """Members that are integrated in a batch, and all arrays that this needs.
 
     Attributes
     ----------
@@ -232,7 +246,8 @@ def prepared(
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, count, read = compiled.program, x0.shape[1], compiled.schedule
     method = _method(compiled, settings)
-    code = machine(compiled, p, count)
+    due = instants_of(compiled.schedule, program, times, p)
+    code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     c = np.zeros((code.rows, count))
     code.prepare(np.ascontiguousarray(p), c)
     task = with_table(
@@ -247,9 +262,12 @@ def prepared(
         atol=float(settings.atol),
         fixed=float(settings.step),
         max_steps=int(settings.max_steps),
-        method=METHODS[method],
+        method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
+        pair_order=float(settings.pair.order),
+        stable=float(settings.pair.stable),
+        **settings.pair.arrays(),
         alone=int(count == 1),
-        **_instants(compiled, code, times),
+        **_instants(compiled, code, due),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
         **lines_of(compiled, p),
@@ -259,21 +277,21 @@ def prepared(
     )
     work = new_work(
         x0, times, inputs.shape[0] + len(read.lines), program.events, len(read.outputs),
-        len(program.sampled), len(read.lines),
+        len(program.sampled), len(read.lines), settings.pair.stages,
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"
     work = with_past(compiled, task, work, p)
     return Run(machine=code, task=task, work=work)
 
 
-def _method(compiled: Compiled, settings: Settings) -> str:
+def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
     """Return the method of a run; what has delays is for the explicit one."""
     if not compiled.schedule.lines:
         return settings.method
-    if settings.method == "rodas5p":
+    if settings.method not in ("auto", "tsit5"):
         raise ParameterError(
             f"'{compiled.system.name}' has transport delays, which method='tsit5' integrates, got "
-            "method='rodas5p'"
+            f"method={settings.method!r}"
         )
     return "tsit5"
 
@@ -283,18 +301,23 @@ def _linear_equations(n: int, order: Elimination) -> dict[str, Any]:
     return {**vars(order), "cost": cost(n, order)}
 
 
-def _instants(compiled: Compiled, code: Machine, times: np.ndarray) -> dict[str, np.ndarray]:
-    """Return when something happens to sampled blocks, and what."""
-    program = compiled.program
-    due = instants(program.clocks, float(times[0]), float(times[-1]), program.meetings)
-    written = np.zeros((max(len(due.patterns), 1), len(program.sampled)), dtype=np.int64)
+def _instants(compiled: Compiled, code: Machine, due: list[Instants]) -> dict[str, np.ndarray]:
+    """Return when something happens to sampled blocks of each lane, and what."""
+    sampled, places = compiled.program.sampled, {what: k for k, what in enumerate(code.meetings)}
+    ticks = np.full((len(due), max(one.times.size for one in due)), np.inf)
+    which = np.zeros(ticks.shape, dtype=np.int64)
+    for lane, one in enumerate(due):
+        functions = np.array([places[what] for what in one.patterns], dtype=np.int64)
+        ticks[lane, : one.times.size] = one.times
+        which[lane, : one.times.size] = functions[one.which] if one.times.size else 0
+    written = np.zeros((max(len(code.samples), 1), len(sampled)), dtype=np.int64)
     for k in range(len(code.samples)):
         for store in code.lowered.functions[f"sample{k}"].plan.stores:
             if store.array == "s":
                 written[k, store.row : store.row + store.size] = 1
     return {
-        "ticks": due.times, "which": due.which, "samples": code.sample_entries, "due": written,
-        "sampled": np.array(program.sampled, dtype=np.int64),
+        "ticks": ticks, "which": which, "samples": code.sample_entries, "due": written,
+        "sampled": np.array(sampled, dtype=np.int64),
     }  # fmt: skip
 
 

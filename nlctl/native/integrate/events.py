@@ -1,6 +1,6 @@
-"""Events inside a step: corners, and memories that turn round.
+"""Events inside a step: corners, and memories that reverse.
 
-A switching function that changes its sign marks a corner; a memory turns round where the rate at
+A switching function that changes its sign marks a corner; a memory reverses where the rate at
 which it would be carried along changes its sign or becomes zero.  In both cases the step is
 repeated, shorter each time, until it ends right behind the event: all stages but a negligible
 rest then lie on one side, and what the rest costs is below one local error.  Regula falsi with the
@@ -32,23 +32,6 @@ def triggered(start, end, is_memory, behind):
     if is_memory:
         return start != 0.0 and not start * end > 0.0
     return start * end < 0.0 and not (behind and abs(start) <= STARTS_BEHIND * abs(end))
-
-
-@numba.njit(**INNER)
-def unforeseen(w, h, j):
-    """Whether an event function has changed over a step otherwise than its slopes say.
-
-    Error control sees the states only.  Where what drives a memory is no state, a step may grow
-    until it passes over turns that both ends know nothing of.
-    """
-    for i in range(w.g.shape[0]):
-        change = w.g[i, j] - w.g_start[i, j]
-        before, after = h * w.slope_start[i, j], h * w.slope[i, j]
-        scale = abs(change) + abs(before) + abs(after)
-        noise = 1e-12 * abs(w.g[i, j])
-        if abs(change - 0.5 * (before + after)) > 0.2 * scale + noise:
-            return True
-    return False
 
 
 @numba.njit(**INNER)

@@ -14,11 +14,15 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import lower_getattr_generic, models, register_model
-from numba.np.arrayobj import populate_array
-from numba.np.numpy_support import as_dtype
+
+from ...upstream.numba_internals import (
+    AttributeTemplate,
+    as_dtype,
+    infer_getattr,
+    pack_array,
+    populate_array,
+)
 
 _INT = ir.IntType(64)
 _ENTRY = 5  # numbers in the table for each field: a number, or an address and up to four lengths
@@ -128,8 +132,8 @@ def _field(context, builder, kind, pointer, name):
     populate_array(
         array,
         data=builder.inttoptr(number(0), array.data.type),
-        shape=cgutils.pack_array(builder, shape),
-        strides=cgutils.pack_array(builder, strides),
+        shape=pack_array(builder, shape),
+        strides=pack_array(builder, strides),
         itemsize=_INT(itemsize),
         meminfo=None,  # the caller's record owns the memory
     )

@@ -1,11 +1,11 @@
-"""Where a run begins or goes on behind an event: memories are committed, or locked far behind."""
+"""Where a run begins or resumes behind an event: memories are committed, or locked far behind."""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
 
-from .samples import take_samples
+from .samples import begin_afresh, take_samples
 from .state import INNER
 from .workspace import evaluate
 
@@ -110,7 +110,7 @@ def _lock(rhs, task, lanes, w, chosen):
 
     The stages of a step are approximations: with the memory right behind, one that falls back a
     little would see it standing still, and the step would not be smooth.  Only where the memory
-    turns round does its value count again, and there it is committed.
+    reverses does its value count again, and there it is committed.
 
     A memory that counts wherever it stands, a relay's, is not carried but about to jump.  It
     keeps its value up to the corner where it jumps; at that corner already, it jumps.
@@ -211,7 +211,8 @@ def _first_step(rhs, task, lanes, w):
     for j in range(lanes.size):
         h0 = lanes[j].h
         largest = max(np.sqrt(d1[j]), np.sqrt(d2[j]) / h0)
-        h1 = max(1e-6, h0 * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** 0.2
+        power = 1.0 / task.pair_order
+        h1 = max(1e-6, h0 * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** power
         h = min(100 * h0, h1, span)
         lanes[j].h = task.fixed if task.fixed > 0.0 else (h if np.isfinite(h) else h0)
 
@@ -220,8 +221,10 @@ def start(rhs, task, w):
     """Begin at the initial states in w.x: commit the memories, propose first steps."""
     lanes = w.lanes
     everyone = np.ones(lanes.size, np.bool_)
+    sampled = np.zeros(lanes.size, np.bool_)
     if task.ticks.size:
-        take_samples(task, lanes, w, np.zeros(lanes.size, np.bool_))
+        take_samples(task, lanes, w, sampled)
     restart(rhs, task, lanes, w, everyone)
     _first_step(rhs, task, lanes, w)
+    begin_afresh(task, lanes, w, sampled)
     restart(rhs, task, lanes, w, everyone)

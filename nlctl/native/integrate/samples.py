@@ -7,8 +7,8 @@ import numpy as np
 
 from ..machine.address import call_out
 from .delays import next_break
-from .inputs import inputs_at
 from .state import INNER, RUNNING
+from .workspace import inputs_at
 
 
 @numba.njit(**INNER)
@@ -18,12 +18,12 @@ def next_stop(task, lane, w, j):
     That is when something happens to sampled blocks, with inputs at their next corner, where a
     break leaves a transport delay, and at the last time.
     """
-    times, ticks = task.times, task.ticks
+    times = task.times
     stop = times[-1]
     if task.inputs.shape[0] and lane.segment < times.size - 1:
         stop = times[lane.segment + 1]
-    if lane.tick < ticks.size:
-        stop = min(stop, ticks[lane.tick])
+    if lane.tick < task.ticks.shape[1]:
+        stop = min(stop, task.ticks[j, lane.tick])
     return next_break(task, w, lane, j, stop) if task.delays.shape[0] else stop
 
 
@@ -35,20 +35,20 @@ def take_samples(task, lanes, w, sampled):
     """
     found = False
     for j in range(lanes.size):
-        sampled[j] = _is_due(task, lanes[j])
+        sampled[j] = _is_due(task, lanes[j], j)
         found |= sampled[j]
     for k in range(task.samples.size if found else 0):
         wanted = False
         for j in range(lanes.size):
             w.t[j] = lanes[j].t
-            wanted |= sampled[j] and task.which[lanes[j].tick] == k
+            wanted |= sampled[j] and task.which[j, lanes[j].tick] == k
         if not wanted:
             continue
         if w.u.shape[0]:
             inputs_at(task, lanes, w)
         call_out(task.samples[k], w.t, w.x, w.u, task.p, w.s)
         for j in range(lanes.size):
-            if sampled[j] and task.which[lanes[j].tick] == k:
+            if sampled[j] and task.which[j, lanes[j].tick] == k:
                 _take(task, lanes[j], w, j, k)
     for j in range(lanes.size):
         if sampled[j]:
@@ -57,9 +57,25 @@ def take_samples(task, lanes, w, sampled):
 
 
 @numba.njit(**INNER)
-def _is_due(task, lane):
+def begin_afresh(task, lanes, w, sampled):
+    """Forget what was known of steps where a sample is taken: a run that resumes there knows none.
+
+    The first step tried is the time to what comes next.
+    """
+    for j in range(lanes.size):
+        lane = lanes[j]
+        if not sampled[j]:
+            continue
+        gap = next_stop(task, lane, w, j) - lane.t
+        lane.h = task.fixed if task.fixed > 0.0 else max(gap, 1e-12 * abs(lane.t))
+        lane.log_error_before = lane.last = lane.low = lane.high = 0.0
+        lane.tries = lane.same_side = lane.short = lane.quiet = lane.slow = 0
+
+
+@numba.njit(**INNER)
+def _is_due(task, lane, j):
     running = lane.status == RUNNING
-    return running and lane.tick < task.ticks.size and task.ticks[lane.tick] <= lane.t
+    return running and lane.tick < task.ticks.shape[1] and task.ticks[j, lane.tick] <= lane.t
 
 
 @numba.njit(**INNER)

@@ -13,13 +13,13 @@ import numba
 import numpy as np
 
 from ..machine.address import call_out, call_rhs
-from .inputs import DEGREE, inputs_at
 from .memory import type_of, with_table
-from .methods import rodas5p, tsit5
+from .methods import rodas5p
 from .state import DIRECTIONS, INNER, new_lanes
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
 UNKNOWN, DIFFERENCES, EXACT = 0, 1, 2  # where the stiff method has its Jacobian from
+DEGREE = 5  # of the polynomials that delayed signals are kept as
 
 
 class Task(NamedTuple):
@@ -35,9 +35,15 @@ class Task(NamedTuple):
     fixed: float  # step size, 0 if it is to be chosen
     max_steps: int
     method: int
+    pair_order: float  # of the explicit pair
+    stable: float  # h |lambda| up to which its steps are
+    A: np.ndarray  # and its tableau, see `Tableau.arrays`
+    B: np.ndarray
+    C: np.ndarray
+    E: np.ndarray
     alone: int  # whether this is a single run
-    ticks: np.ndarray  # times at which something happens to sampled blocks
-    which: np.ndarray  # which of the functions then
+    ticks: np.ndarray  # (lanes, instants): when something happens to sampled blocks, then inf
+    which: np.ndarray  # (lanes, instants): which of the functions then
     samples: np.ndarray  # these functions
     due: np.ndarray  # (functions, sampled states): whether it makes the next state
     sampled: np.ndarray  # indices of these states
@@ -59,7 +65,7 @@ class Task(NamedTuple):
 
 
 class Work(NamedTuple):
-    """The arrays for integrating members side by side: (states, lanes), (events, lanes), ..."""
+    """The arrays for integrating batched members: (states, lanes), (events, lanes), ..."""
 
     lanes: np.ndarray  # a record for each member, see `_lane`
     samples: np.ndarray  # the states at the task's times: (times, states, lanes)
@@ -76,6 +82,7 @@ class Work(NamedTuple):
     k: np.ndarray  # derivatives at the stages
     g: np.ndarray  # switching functions, and what memories would become
     g_start: np.ndarray
+    g_inside: np.ndarray  # inside the step being tried, see `excursions`; the last is scratch
     e: np.ndarray  # event functions: those of corners, and the rates of memories
     e_start: np.ndarray
     e_low: np.ndarray  # at the ends of the bracket in which an event is located
@@ -135,6 +142,7 @@ def new_work(
     outputs: int,
     sampled: int = 0,
     lines: int = 0,
+    stages: int = 3,
 ) -> Work:
     """Return the arrays for integrating members from `x0` (states, lanes) on.
 
@@ -147,8 +155,9 @@ def new_work(
         **dict.fromkeys(("g", "g_ahead", "g_start", "slope", "slope_start"), (events, lanes)),
         **dict.fromkeys(("e", "e_start", "e_low", "e_high", "behind"), (events, lanes)),
         **dict.fromkeys(("t", "h", "error", "rate", "t_end"), (lanes,)),
+        "g_inside": (4, events, lanes),
         "hh": (n * lanes,),
-        "k": (tsit5.STAGES, n, lanes),
+        "k": (stages, n, lanes),
         "u": (inputs, lanes),
         "s": (sampled, lanes),
         "jacobian": (stiff // DIRECTIONS + 1, stiff, DIRECTIONS),
@@ -168,7 +177,7 @@ def new_work(
     flat = {f"{x}_flat": arrays[x].reshape(-1) for x in _STATES}
     flat["jacobian_flat"] = arrays["jacobian"].reshape(-1)
     arrays["v"] = directions(stiff, inputs)
-    k_flat = arrays["k"].reshape(tsit5.STAGES, n * lanes)
+    k_flat = arrays["k"].reshape(stages, n * lanes)
     pivots = np.zeros(stiff, dtype=np.int64)
     records = new_lanes(times, lanes)
     return with_table(Work, lanes=records, **arrays, **flat, k_flat=k_flat, pivots=pivots)
@@ -202,17 +211,61 @@ def directions(n: int, inputs: int) -> np.ndarray:
 
 
 _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
+_PLACES = np.zeros((1, 1), dtype=np.int64)
 TASK = type_of(  # only the types of these matter
     with_table(
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
-        fixed=0.0, max_steps=0, method=0, alone=0, ticks=_LINE, which=_NONE, samples=_NONE,
-        due=np.zeros((1, 1), dtype=np.int64), sampled=_NONE, derivatives=0, c_along=_GRID,
-        delays=_GRID, direct=np.zeros((1, 1), dtype=np.int64), signals=_NONE, outputs=0,
+        fixed=0.0, max_steps=0, method=0, pair_order=0.0, stable=0.0, A=_GRID, B=_GRID,
+        C=_LINE, E=_LINE, alone=0, ticks=_GRID, which=_PLACES, samples=_NONE,
+        due=_PLACES, sampled=_NONE, derivatives=0, c_along=_GRID,
+        delays=_GRID, direct=_PLACES, signals=_NONE, outputs=0,
         cost=0.0, order=_NONE, below=_NONE, below_start=_NONE, right=_NONE, right_start=_NONE,
         source=_NONE, target=_NONE,
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
+
+
+@numba.njit(**INNER)
+def inputs_at(task, lanes, w):
+    """Fill w.u with the inputs at the times w.t: linear within a segment of the time grid.
+
+    What leaves transport delays then follows behind them.
+    """
+    t, times, inputs, u = w.t, task.times, task.inputs, w.u
+    for j in range(lanes.size):
+        m = min(lanes[j].segment, times.size - 2)  # a lane that has finished is not moved on
+        share = (t[j] - times[m]) / (times[m + 1] - times[m])
+        for i in range(inputs.shape[0]):
+            first, last = inputs[i, m], inputs[i, m + 1]  # exact at both, and where they are equal
+            u[i, j] = last if share == 1.0 else first + share * (last - first)
+    for i in range(task.delays.shape[0]):
+        for j in range(lanes.size):
+            u[inputs.shape[0] + i, j] = past_value(task, w, i, j, t[j])
+
+
+@numba.njit(**INNER)
+def past_value(task, w, i, j, t):
+    """Return what leaves line `i` of a lane at time t.
+
+    Of the polynomials between two breaks only, so that rounding never reads the other side.
+    """
+    s = t - task.delays[i, j]
+    low, high = w.first[i, j], w.kept[j] - 1
+    if w.next[i, j] >= 0:
+        high = w.next[i, j] - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if w.past_t[middle, j] <= s:
+            low = middle
+        else:
+            high = middle - 1
+    z = 2.0 * (s - w.past_t[low, j]) / w.past_h[low, j] - 1.0
+    z = min(max(z, -1.0 - 1e-6), 1.0 + 1e-6)  # what looks ahead of a step sees it standing still
+    value = w.past[low, i, DEGREE, j]
+    for n in range(DEGREE - 1, -1, -1):
+        value = value * z + w.past[low, i, n, j]
+    return value
 
 
 @numba.njit(**INNER)

@@ -6,7 +6,8 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core.typing.templates import infer_global, make_intrinsic_template
+
+from ...upstream.numba_internals import infer_global, make_intrinsic_template
 
 
 def call_rhs(rhs, t, x, u, p, dx, g):

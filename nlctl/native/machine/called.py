@@ -16,14 +16,21 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core.registry import CPUDispatcher
 
 from ...blocks import Block
 from ...errors import CompileError
+from ...upstream.control_internals import current_parameters
+from ...upstream.numba_internals import CPUDispatcher
 from ..codegen.calls import Call, Source
 from ..parameters import Slot, current_values
 from ..thirdparty import dicts, vectors
-from ..thirdparty.dicts import callable_constant, make_callable, params_record, unpacked_arguments
+from ..thirdparty.dicts import (
+    callable_constant,
+    make_callable,
+    params_record,
+    read_by_keys,
+    unpacked_arguments,
+)
 from ..thirdparty.objects import frozen
 from ..thirdparty.vectors import as_vector
 
@@ -59,7 +66,7 @@ def call_of(
         functions=tuple(functions),
         template=dict(current_values(node.system)),
         slots=slots,
-        record=type(node.system._current_params) if isinstance(node.system, Block) else None,
+        record=type(current_parameters(node.system)) if isinstance(node.system, Block) else None,
         lengths=(1, node.system.nstates or 0, len(node.inputs), size, count),
     )
     # a name without a value is an error in Python, and 0 in numba's machine code
@@ -157,10 +164,11 @@ def _source(name: str, stands: _AsItStands, system: Any) -> Source:
     is_block = isinstance(system, Block)
     record = stands.record or params_record(stands.path, list(stands.template))
     filler = [] if values or is_block else ["0.0"]
+    made = f"record({', '.join(values or filler)})"
     lines = [
         f"def {name}(given, y):",
         f"    t, p = given[0], given[{third}:{third + p}]",
-        f"    params = record({', '.join(values or filler)})",
+        f"    params = {made if is_block else f'read_by_keys({made})'}",
     ]
     counts = _counts(stands, count)
     at = 0
@@ -171,7 +179,7 @@ def _source(name: str, stands: _AsItStands, system: Any) -> Source:
         lines += [f"    values = as_vector({call}, {counts[k]})"]
         lines += [f"    y[{at + j}] = values[{j}]" for j in range(counts[k])]
         at += counts[k]
-    names = {"record": record, "as_vector": as_vector}
+    names = {"record": record, "as_vector": as_vector, "read_by_keys": read_by_keys}
     names |= {f"fixed{i}": callable_constant(stands.template[k]) for i, k in enumerate(fixed)}
     names |= {f"function{k}": _jitted(frozen(f)) for k, f in enumerate(stands.functions)}
     return Source(source="\n".join([*lines, ""]), names=names, taught=TAUGHT)

@@ -1,13 +1,14 @@
-"""A program's machine code for members side by side, whichever way it can be had."""
+"""A program's machine code for batched members, whichever way it can be had."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...sampling.system import Happening
 from ..codegen.blocks import equations
 from ..codegen.lower import Lowered, lower
 from .routine import called_back, entry, lowered_code, raise_failures
@@ -15,7 +16,7 @@ from .routine import called_back, entry, lowered_code, raise_failures
 if TYPE_CHECKING:
     from ..compiled import Compiled
 
-ENSEMBLE_WIDTH = 8  # members side by side in ensembles: one AVX-512 register
+ENSEMBLE_WIDTH = 8  # members of a batch in ensembles: one AVX-512 register
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +34,8 @@ class Machine:
         ``rhs(t, x, u, c, dx, g)`` and ``out(t, x, u, c, y)``.
     samples : tuple of callable
         ``sample(t, x, u, c, s)`` for each meeting: the next states of sampled blocks.
+    meetings : tuple of frozenset
+        What happens to them there.
     """
 
     width: int
@@ -41,6 +44,7 @@ class Machine:
     rhs: Any
     out: Any
     samples: tuple[Any, ...] = ()
+    meetings: tuple[Happening, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -75,26 +79,40 @@ class Machine:
         raise_failures((self.rhs, self.out, *self.samples), c)
 
 
-def machine(compiled: Compiled, p: np.ndarray, width: int = 1) -> Machine:
+def machine(
+    compiled: Compiled, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
+) -> Machine:
     """Return machine code that holds for parameter vectors `p` of shape (parameters, members).
+
+    It has functions for all that happens to sampled blocks; where clocks with other parameters
+    meet as they do not in the diagram as it stands, these are made.
 
     Where an integer that steers an equation has another value, the blocks' functions are read
     once more.  The first member's values decide: `fitting` says for which members they hold.
     """
     known: list[Machine] = compiled.__dict__.setdefault("_machines", [])
+    asked = set(happening)
     for made in known:
-        if made.width == width and made.lowered.holds_for(p):
+        if made.width == width and asked <= set(made.meetings) and made.lowered.holds_for(p):
             return made
     found, schedule, program = compiled.equations, compiled.schedule, compiled.program
-    if not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
-        found = equations(schedule, program.layout, p[:, 0], program.meetings)
+    extra = [what for what in happening if what not in program.meetings]
+    meetings = (*program.meetings, *dict.fromkeys(extra))
+    if extra or not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
+        found = equations(schedule, program.layout, p[:, 0], meetings)
     lowered = lower(schedule, program, width, found)
     if not lowered.holds_for(p):
         raise ValueError("members whose integers differ have no machine code in common")
     prepare, rhs, out, *samples = lowered_code(lowered)
     known.append(
         Machine(
-            width=width, lowered=lowered, prepare=prepare, rhs=rhs, out=out, samples=tuple(samples)
+            width=width,
+            lowered=lowered,
+            prepare=prepare,
+            rhs=rhs,
+            out=out,
+            samples=tuple(samples),
+            meetings=meetings,
         )
     )
     return known[-1]
@@ -122,11 +140,11 @@ def evaluations(compiled: Compiled) -> tuple[Callable[..., None], Callable[..., 
 
 
 def prepared_parameters(
-    compiled: Compiled, p: np.ndarray, width: int = 1
+    compiled: Compiled, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
 ) -> tuple[Machine, np.ndarray]:
     """Return machine code for a parameter vector, and what its functions take of that."""
     each = np.repeat(p[:, None], width, axis=1)
-    code = machine(compiled, each, width)
+    code = machine(compiled, each, width, happening)
     c = np.zeros((code.rows, width))
     code.prepare(each, c)
     return code, c

@@ -4,12 +4,10 @@ numba optimises and emits each function with all that it calls, and again for ea
 its IR is taken before that, linked once, and simplified as far as no processor matters: function
 by function, without vectorisation and inlining.  `finish` does the rest, in a tenth of the time.
 
-Relied on in numba, and held by a test each:
+Relied on in the IR that numba makes, and held by a test each:
 
-- `CPUCodeLibrary.add_ir_module` is given each function's own IR, and ``_linking_libraries`` are
-  the libraries that it calls;
-- ``fndesc.llvm_func_name`` takes pointers for the result and for an exception, then the arguments,
-  and returns `_RETURNED` or `NONE`, or the number of an exception;
+- a function takes pointers for the result and for an exception, then the arguments, and returns
+  `_RETURNED` or `NONE`, or the number of an exception;
 - memory of arrays is asked for by ``NRT_MemInfo_alloc_aligned`` and given back by
   ``NRT_MemInfo_call_dtor``; `_MEMORY` has both in terms of the C library, with numba's layout.
 """
@@ -18,16 +16,13 @@ from __future__ import annotations
 
 import lzma
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import llvmlite.binding as llvm
 import numba
-from numba.core import cgutils
-from numba.core.codegen import CPUCodeLibrary
-from numba.core.compiler_lock import global_compiler_lock
 
+from ...upstream.numba_internals import called_libraries, name_and_library, own_ir
 from .machine_code import Wanted
 
 _RETURNED, NONE = 0, -2
@@ -75,12 +70,12 @@ def exported(wanted: Sequence[Wanted]) -> bytes:
         If a function cannot be compiled.
     """
     names, libraries = {}, []
-    with _own_ir() as texts:
+    with own_ir() as texts:
         for each in wanted:
             code: Any = numba.njit(each.signature, **each.options)(each.function)
-            (made,) = code.overloads.values()
-            names[made.fndesc.llvm_func_name] = each.function.__name__
-            libraries.append(made.library)
+            name, library = name_and_library(code)
+            names[name] = each.function.__name__
+            libraries.append(library)
     found: dict[int, Any] = {}
     for library in libraries:
         _reach(library, found)
@@ -93,29 +88,11 @@ def exported(wanted: Sequence[Wanted]) -> bytes:
     return lzma.compress(_apart(module, names.values()).as_bitcode(), preset=9)
 
 
-@contextmanager
-def _own_ir() -> Iterator[dict[int, list[str]]]:
-    """Keep the IR of each function that is compiled inside, by the identity of its library."""
-    texts: dict[int, list[str]] = {}
-    add = CPUCodeLibrary.add_ir_module
-
-    def keep(self: Any, module: Any) -> None:
-        texts.setdefault(id(self), []).append(cgutils.normalize_ir_text(str(module)))
-        add(self, module)
-
-    with global_compiler_lock:  # nobody else compiles
-        CPUCodeLibrary.add_ir_module = keep  # type: ignore[method-assign]
-        try:
-            yield texts
-        finally:
-            CPUCodeLibrary.add_ir_module = add  # type: ignore[method-assign]
-
-
 def _reach(library: Any, found: dict[int, Any]) -> None:
     """Add a library and all that it calls."""
     if id(library) not in found:
         found[id(library)] = library
-        for other in library._linking_libraries:
+        for other in called_libraries(library):
             _reach(other, found)
 
 

@@ -18,8 +18,8 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numba
-from numba.core import config
 
+from ...upstream.numba_internals import checks_indices, is_jit_disabled
 from ..integrate import advance, restart, workspace
 from ..integrate.workspace import TASK, WORK
 from . import address, store
@@ -55,7 +55,7 @@ def integrators() -> dict[str, Callable[..., None]]:
 @functools.cache
 def _integrators() -> dict[str, Callable[..., None]]:
     functions = {each.function.__name__: each for each in WANTED}
-    if getattr(config, "DISABLE_JIT", False):
+    if is_jit_disabled():
         return {name: each.function for name, each in functions.items()}
     loaded = finished(shipped_bitcode() or _made_anew(), functions)
     return {
@@ -90,8 +90,8 @@ def shipped_bitcode() -> bytes | None:
         return None
     fits = fits and header["code"] == hashlib.sha256(code).hexdigest()
     readable = list(llvm.llvm_version_info) >= header["llvm"]  # old LLVM does not read new code
-    checked = getattr(config, "BOUNDSCHECK", False)  # indices are to be checked: not in this code
-    return code if fits and readable and not checked else None
+    # where indices are to be checked: they are not in this code
+    return code if fits and readable and not checks_indices() else None
 
 
 def sources_key(files: list[str]) -> str:

@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba.core import config
 
+from ...upstream.numba_internals import is_jit_disabled
 from ..codegen.calls import CALL_FAILED, Call, Native, native_calls, plain_calls
 from ..codegen.interpret import interpreted_function
 from ..codegen.lower import Lowered
@@ -106,7 +106,7 @@ def lowered_code(lowered: Lowered) -> tuple[Runnable, ...]:
     CompileError
         If the C library lacks a function.
     """
-    if getattr(config, "DISABLE_JIT", False):
+    if is_jit_disabled():
         return plain_functions(lowered)
     native = native_calls(lowered.calls, lowered.lanes)
     loaded = finished(lowered.text, lowered.functions, native.symbols, native.owners)

@@ -11,6 +11,7 @@ import numpy as np
 from ...blocks import Block, is_delayed
 from ...errors import CompileError
 from ...params import as_numbers
+from ...upstream.control_internals import current_parameters, outputs_now, rates_now, set_parameters
 from ..parameters import current_values
 from .purity import Reading, check_pure
 from .values import FRESH, VECTOR, Impure, captured
@@ -56,7 +57,7 @@ def check_functions(path: str, system: Any) -> Reading:
     """
     is_block, found = isinstance(system, Block), []
     for what, function in _functions(system):
-        values = system._current_params if is_block else current_values(system)
+        values = current_parameters(system) if is_block else current_values(system)
         try:
             found.append(check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)]))
         except Impure as error:
@@ -89,14 +90,14 @@ def _functions(system: Any) -> Iterator[tuple[str, Any]]:
 
 def _check_counts(path: str, system: Any) -> None:
     """Call a block's functions once: as many values must come back as there are signals."""
-    calls = [("update", system._rhs, system.nstates, "states")] if system.nstates else []
+    calls = [("update", rates_now, system.nstates, "states")] if system.nstates else []
     if system.outfcn is not None and system.noutputs:
-        calls.append(("output", system._out, system.noutputs, "outputs"))
+        calls.append(("output", outputs_now, system.noutputs, "outputs"))
     x, u = np.zeros(system.nstates or 0), np.zeros(system.ninputs or 0)
     for what, function, wanted, kind in calls:
         try:
             with np.errstate(all="ignore"):
-                got = np.size(function(0.0, x, u))
+                got = np.size(function(system, 0.0, x, u))
         except IndexError as error:
             raise CompileError(
                 f"block '{path}' reads beyond an array in its {what} function: {error}"
@@ -149,7 +150,7 @@ def _with(system: Any, states: int, inputs: int, outputs: int | None) -> Any:
         system.updfcn, system.outfcn, states=states, inputs=inputs, outputs=outputs,
         dt=system.dt, params=system.params, name=system.name,
     )  # fmt: skip
-    made._update_params(None)
+    set_parameters(made, None)
     return made
 
 
@@ -157,4 +158,4 @@ def _output_size(system: Any, states: int, inputs: int) -> int:
     """Return how many outputs there are, of a function that is known to remember nothing."""
     asked = _with(system, states, inputs, None)
     check_functions(system.name, asked)
-    return int(np.size(asked._out(0.0, np.zeros(states), np.zeros(inputs))))
+    return int(np.size(outputs_now(asked, 0.0, np.zeros(states), np.zeros(inputs))))

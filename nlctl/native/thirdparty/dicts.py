@@ -1,9 +1,10 @@
 """Other people's functions, as they stand: dict parameters and unpacked arguments.
 
 A function of python-control takes ``params``, a dict, and ``x`` and ``u``, arrays of a size that
-is only known when it runs.  In machine code the parameters become a record of named fields, and
-this module teaches numba to read such a record as a dict is read; an argument that the function
-takes apart (``x1, x2 = x``) becomes a tuple.
+is only known when it runs.  In machine code the parameters become a type of their own, made of a
+named tuple, that numba is taught here to read as a dict is read; what named tuples mean in a user's
+own numba code stays as it is.  An argument that the function takes apart (``x1, x2 = x``) becomes a
+tuple.
 """
 
 from __future__ import annotations
@@ -20,13 +21,19 @@ from typing import Any
 import numba
 import numpy as np
 from numba import types
-from numba.extending import overload, overload_method, register_jitable
+from numba.extending import (
+    intrinsic,
+    models,
+    overload,
+    overload_method,
+    register_jitable,
+    register_model,
+)
 
 from ...errors import UsageError
 from .source import Unreadable, definition
 from .values import python_function
 
-RECORDS = (types.NamedTuple, types.NamedUniTuple)
 FILLER = "no_parameters"  # numba cannot call methods of a record without fields
 _LIBRARIES = ("numpy", "scipy", "numba")  # numba has its own versions of their functions
 
@@ -102,31 +109,75 @@ def callable_constant(value: Any) -> Any:
     return value
 
 
-def _field(record: Any, key: Any) -> int | None:
-    """Return the position of a field, None if there is none; the key must be written out."""
-    if not (isinstance(record, RECORDS) and isinstance(key, types.StringLiteral)):
-        return None
-    fields = record.fields
-    return fields.index(key.literal_value) if key.literal_value in fields else None
+class Params(types.Type):
+    """Type of a parameter dict in machine code: a named tuple, read by keys."""
+
+    def __init__(self, values: Any) -> None:
+        self.values = values
+        super().__init__(name=f"Params({values})")
+
+    @property
+    def key(self) -> Any:
+        """What tells it from other types: names may be alike."""
+        return self.values
+
+    def field(self, key: Any) -> int | None:
+        """Return the position of a field, None if there is none; the key must be written out."""
+        if not isinstance(key, types.StringLiteral) or key.literal_value not in self.values.fields:
+            return None
+        return self.values.fields.index(key.literal_value)
+
+
+@register_model(Params)
+class _ParamsModel(models.StructModel):
+    def __init__(self, manager, fe_type):
+        super().__init__(manager, fe_type, [("values", fe_type.values)])
+
+
+@intrinsic
+def read_by_keys(typing_context, values):
+    """Return a named tuple as a parameter dict."""
+
+    def generate(context, builder, sig, args):
+        made = context.make_helper(builder, sig.return_type)
+        made.values = args[0]
+        context.nrt.incref(builder, sig.args[0], args[0])
+        return made._getvalue()
+
+    return Params(values)(values), generate
+
+
+@intrinsic
+def _values(typing_context, params):
+    """Return the named tuple of a parameter dict."""
+
+    def generate(context, builder, sig, args):
+        values = context.make_helper(builder, sig.args[0], args[0]).values
+        context.nrt.incref(builder, sig.return_type, values)
+        return values
+
+    return params.values(params), generate
 
 
 @overload(operator.getitem, prefer_literal=True)
-def _getitem(record, key):
-    index = _field(record, key)
-    return None if index is None else (lambda record, key: record[index])
+def _getitem(params, key):
+    index = params.field(key) if isinstance(params, Params) else None
+    return None if index is None else (lambda params, key: _values(params)[index])  # pyright: ignore[reportCallIssue]
 
 
 @overload(operator.contains, prefer_literal=True)
-def _contains(record, key):
-    if not (isinstance(record, RECORDS) and isinstance(key, types.StringLiteral)):
+def _contains(params, key):
+    if not (isinstance(params, Params) and isinstance(key, types.StringLiteral)):
         return None
-    found = _field(record, key) is not None
-    return lambda record, key: found
+    found = params.field(key) is not None
+    return lambda params, key: found
 
 
-@overload_method(types.BaseNamedTuple, "get", prefer_literal=True)
-def _get(record, key, default=None):
-    index = _field(record, key)
+@overload_method(Params, "get", prefer_literal=True)
+def _get(params, key, default=None):
+    if not isinstance(key, types.StringLiteral):
+        return None
+    index = params.field(key)
     if index is None:
-        return lambda record, key, default=None: default
-    return lambda record, key, default=None: record[index]
+        return lambda params, key, default=None: default
+    return lambda params, key, default=None: _values(params)[index]  # pyright: ignore[reportCallIssue]

@@ -16,8 +16,8 @@ from types import CellType, CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
-from numba.core.registry import CPUDispatcher
 
+from ...upstream.numba_internals import CPUDispatcher
 from .source import Definition, Unreadable, definition
 
 # what machine code takes as a constant, or can call

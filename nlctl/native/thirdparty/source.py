@@ -2,7 +2,8 @@
 
 A file may have been edited since it was imported, a function may have been made by ``exec`` or
 rewritten by a tool.  So the text is compiled once more, and the function's code must be in what
-comes out.  Nothing here depends on the names of bytecode instructions.
+comes out: the text as a whole, or, as notebooks and galleries do it, its statements cell by cell.
+Nothing here depends on the names of bytecode instructions.
 """
 
 from __future__ import annotations
@@ -48,10 +49,11 @@ def definition(function: FunctionType) -> Definition:
     if not text:
         raise Unreadable("its source cannot be found: define it in a file or a notebook")
     try:
-        places, codes = _compiled(text, code.co_filename, code.co_flags & _FUTURES)
+        module = text, code.co_filename, code.co_flags & _FUTURES
+        places, codes = _compiled(*module)
     except (SyntaxError, ValueError) as error:
         raise Unreadable(f"its source cannot be parsed ({error})") from error
-    if code not in codes:
+    if code not in codes and code not in _by_cells(*module, code.co_firstlineno):
         raise Unreadable("its source is not what it was made of: was the file edited since?")
     found = [node for node in _candidates(places, code) if _contains(node, code)]
     if not found or len({ast.dump(node) for node in found}) > 1:
@@ -69,9 +71,48 @@ def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeT
     places: Places = {}
     for node in ast.walk(tree):
         if isinstance(node, Definition):
-            first = min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
-            places.setdefault((_name(node), first), []).append(node)
+            places.setdefault((_name(node), _first_line(node)), []).append(node)
     return places, frozenset(_inside(module))
+
+
+@functools.lru_cache(maxsize=128)
+def _by_cells(text: str, file: str, flags: int, line: int) -> frozenset[CodeType]:
+    """Return all code of the statements on a line, however the text was divided into cells.
+
+    The code of a statement depends on its neighbours in one thing: attributes of names that the
+    same cell imports are read by another instruction.  So it is compiled with each run of imports
+    that could stand in its cell.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        body = ast.parse(text, file).body
+        found: set[CodeType] = set()
+        for place, statement in enumerate(body):
+            if _first_line(statement) <= line <= (statement.end_lineno or line):
+                for neighbours in _runs(body[:place], body[place + 1 :]):
+                    cell = ast.Module([*neighbours, statement], type_ignores=[])
+                    made = compile(cell, file, "exec", flags=flags, dont_inherit=True)
+                    found |= set(_inside(made))
+    return frozenset(found)
+
+
+def _runs(before: list[ast.stmt], after: list[ast.stmt]) -> Iterator[list[ast.stmt]]:
+    """Yield the statements with imports that share a cell: the last before, the first after."""
+    before, after = ([s for s in part if _imports(s)] for part in (before, after))
+    for first in range(len(before) + 1):
+        for last in range(len(after) + 1):
+            yield [*before[first:], *after[:last]]
+
+
+def _imports(statement: ast.stmt) -> bool:
+    if isinstance(statement, ast.ImportFrom) and statement.module == "__future__":
+        return False  # it is among the flags, and must stand first
+    return any(isinstance(node, ast.Import | ast.ImportFrom) for node in ast.walk(statement))
+
+
+def _first_line(node: ast.stmt | ast.expr) -> int:
+    """Return the line on which a statement or function begins, with its decorators."""
+    return min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
 
 
 def _inside(code: CodeType) -> Iterator[CodeType]:

@@ -9,7 +9,8 @@ from types import FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
-from numba.core.registry import CPUDispatcher
+
+from ...upstream.numba_internals import CPUDispatcher
 
 
 class Unknown:

@@ -4,11 +4,14 @@ import ctypes
 import importlib.util
 import pickle
 import threading
+from collections import namedtuple
 
 import control as ct
+import numba
 import numpy as np
 import pytest
 from numba.core import config
+from numba.core.errors import NumbaError
 from scipy.interpolate import CubicSpline, RegularGridInterpolator
 from scipy.special import erfcx
 
@@ -293,3 +296,44 @@ def test_members_whose_integers_differ(wrapped):
         assert samples[-1] == pytest.approx(exact[power], rel=1e-7)
         alone = nlctl.ensemble_response(compiled, times, params={"n": power}, **given)
         np.testing.assert_array_equal(samples, alone.signals["y[0]"][0])
+
+
+def reads(t, x, u, params):
+    """Every way to read a parameter; the loop keeps it from being traced."""
+    total = params["k"] * x[0]
+    while total > 1e3:
+        total -= 1.0
+    total += params.get("absent", 0.5) + params.get("k") + params["rows"][1]
+    if "get" in params and "other" not in params:
+        total += params["get"]
+    return [total, params["names"][0] * x[1]]
+
+
+@needs_jit
+def test_numba_reads_parameters_as_a_dict_is_read():
+    """By keys, with `get` and `in`; a parameter may be named ``get``; nothing calls back."""
+    system = ct.nlsys(
+        reads, None, inputs=["u"], outputs=2, states=2, name="p",
+        params={"k": 1.5, "rows": np.array([1.0, 2.0]), "get": 4.0, "names": (3.0, 5)},
+    )  # fmt: skip
+    compiled = nlctl.compile(system)
+    for x in ([0.5, -1.0], [2e3, np.pi]):
+        np.testing.assert_array_equal(compiled.dynamics(0, x, [1.0]), system.dynamics(0, x, [1.0]))
+    response = nlctl.input_output_response(compiled, [0.0, 0.01], 1.0, [0.5, -1.0])
+    assert np.isfinite(response.states).all()
+    assert "in machine code of numba" in str(compiled)
+
+
+Reading = namedtuple("Reading", ["get", "k", "text"])
+
+
+@needs_jit
+def test_what_named_tuples_mean_in_other_machine_code_stays_as_it_is():
+    """Fields, membership and refusals are numba's own beside nlctl."""
+    reading = Reading(2.0, 3.0, "k")
+    assert numba.njit(lambda r: r.get + r.k)(reading) == 5.0
+    assert numba.njit(lambda r: 4.0 in (r.get, r.k))(reading) is False
+    with pytest.raises(NumbaError):
+        numba.njit(lambda r: r["k"])(reading)
+    with pytest.raises(NumbaError):  # numba compares no text with numbers; never: a field's name
+        numba.njit(lambda r: "k" in r)(reading)

@@ -158,7 +158,7 @@ class TestBacklashInAStiffLoop:
 
     @pytest.mark.slow
     def test_the_drift_of_zeta_is_the_same_by_all_methods(self, example_2):
-        """Over 100 s: zeta creeps by 1.1e-2, and all agree to a thousandth of that and better."""
+        """Over 100 s: zeta drifts by 1.1e-2, and all agree to a thousandth of that and better."""
         exact, rows = from_2_5(example_2, [0, 100.0], "tsit5", 1e-9), {}
         i = exact.output_labels.index("zeta")
         for method, rtol in (("rodas5p", 1e-6), ("auto", 1e-6), ("rodas5p", 1e-8), ("auto", 1e-8)):

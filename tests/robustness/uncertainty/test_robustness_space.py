@@ -75,9 +75,7 @@ def test_what_does_not_fit_the_diagram_is_refused(loop, quantity, error, message
 def test_a_whole_number_needs_a_law_of_whole_numbers():
     """The seed of a noise: uniform is refused, randint gives integers that reach the block."""
     noise = nlctl.block(nlctl.BandLimitedNoise(), "sensor")
-    with pytest.raises(
-        SpaceError, match=r"sensor.seed' is a whole number.*got uniform on \[0, 9\]"
-    ):
+    with pytest.raises(SpaceError, match=r"sensor.seed' is an integer.*got uniform on \[0, 9\]"):
         resolved(Space(quantities=(Uncertain(name="sensor.seed", bounds=(0, 9)),)), noise)
     space = Space(quantities=(Uncertain(name="sensor.seed", law=stats.randint(0, 10)),))
     space = resolved(space, noise)

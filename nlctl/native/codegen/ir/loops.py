@@ -13,7 +13,7 @@ from .memory import entry_address, load_value, store
 from .numbers import Writer, one_line
 from .text import Value, constant, float_text
 
-_WIDE = 4  # elements of one member side by side
+_WIDE = 4  # elements of one member together
 PER_ROUND = 3  # elements of several members in a round
 _STRAIGHT = 16  # turns of one member up to which they are written one after the other
 

@@ -13,7 +13,7 @@ from .text import Body, Value, constant
 
 _COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
-PACKED = 4  # numbers of one member whose sines, powers, ... are computed side by side
+PACKED = 4  # numbers of one member whose sines, powers, ... are computed together
 
 
 class Writer:
@@ -104,7 +104,7 @@ class Writer:
             self.pairs[x.text] = sin_cos(self.b, x, {"sin", "cos"})
         return self.pairs[x.text][name]
 
-    # -- functions of several numbers side by side
+    # -- functions of several numbers together
 
     def numbers(self, nodes: tuple[Expr, ...]) -> None:
         """Compute the numbers of a level; those of one member four at a time where that pays."""

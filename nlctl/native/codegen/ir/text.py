@@ -1,7 +1,7 @@
 """LLVM IR as text: values with their types, and the instructions that make new ones.
 
 Every number of a diagram is one value: a ``double``, or a vector of as many as there are members
-side by side or elements in a turn of a loop.  Text is written directly: objects for each
+of a batch or elements in a turn of a loop.  Text is written directly: objects for each
 instruction would take ten times as long as all the rest.
 """
 

@@ -1,1 +1,9 @@
-"""Methods of integration: an explicit pair and a Rosenbrock method, both of orders 5(4)."""
+"""Methods of integration: explicit pairs, each a `tableau`, and a stiff one, a Rosenbrock method.
+
+A new explicit pair is one module with its `Tableau` and its place in `EXPLICIT_PAIRS`.
+"""
+
+from .tableau import Tableau
+from .tsit5 import TSIT5
+
+EXPLICIT_PAIRS: dict[str, Tableau] = {pair.name: pair for pair in (TSIT5,)}

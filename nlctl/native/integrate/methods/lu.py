@@ -16,7 +16,9 @@ import numpy as np
 
 from ..state import DIRECTIONS, INNER
 
-SMALLEST = 1e-3  # pivot, of the entries below it; as in KLU (Davis and Natarajan, TOMS 907, 2010)
+LEAST_PIVOT = (
+    1e-3  # pivot, of the entries below it; as in KLU (Davis and Natarajan, TOMS 907, 2010)
+)
 SPARSE = 0.3  # of all entries; with more of them loops over all are faster
 
 
@@ -172,7 +174,7 @@ def _factorise_entries(task, diagonal, jacobian, factors):
         last = middle + right[k + 1] - right[k]
         for a in range(first, middle):
             largest = max(largest, abs(factors[a]))
-        if not (abs(factors[pivot]) > SMALLEST * largest):  # NaN is not
+        if not (abs(factors[pivot]) > LEAST_PIVOT * largest):  # NaN is not
             return False
         inverse = 1.0 / factors[pivot]
         factors[pivot] = inverse

@@ -7,9 +7,8 @@ import numpy as np
 
 from ...machine.address import call_along, call_point
 from ..control import TRIAL, memory_error
-from ..inputs import inputs_at
 from ..state import INNER
-from ..workspace import DIFFERENCES, evaluate
+from ..workspace import DIFFERENCES, evaluate, inputs_at
 from . import lu, rodas5p
 from .lu import place
 
@@ -120,7 +119,7 @@ def _memory_error(rhs, task, lanes, w, only_entries):
     error = w.x_stage_flat  # not needed any more
     rodas5p.end_slope(lanes[0].step, w.x_flat, w.x_new_flat, w.U, error)
     for i in range(error.size):
-        error[i] = w.k[6, i, 0] - error[i]
+        error[i] = w.k[w.k.shape[0] - 1, i, 0] - error[i]
     lu.solve(task, only_entries, w, error)
     for i in range(error.size):
         w.x_ahead[i, 0] = w.x_new[i, 0] + error[i]
@@ -150,7 +149,7 @@ def stiff_attempt(rhs, point, along, task, lanes, w):
     for i in range(n):
         w.x_new[i, 0] = w.x_stage[i, 0] + w.U[7, i]
     w.t[0] = lane.t + h
-    evaluate(rhs, task, lanes, w, w.x_new, w.k[6], w.g)
+    evaluate(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1], w.g)
     w.error[0] = rodas5p.error_norm(w.x, w.x_new, w.U, task.rtol, task.atol)
     if task.memory.size:
         error = _memory_error(rhs, task, lanes, w, only_entries)

@@ -1,10 +1,4 @@
-"""What is read of python-control besides its documented interface, and where that is relied on.
-
-* ``InterconnectedSystem.connect_map, input_map, output_map, input_offset, output_offset,
-  state_offset``: the wires of a diagram.
-* ``NonlinearIOSystem._out(t, x, u)`` and ``_rhs(t, x, u)``: the equations of one block with the
-  parameters of the latest ``_update_params(params)``, which ``dynamics`` calls first.
-"""
+"""The inputs of every block of a python-control diagram, by its own wires."""
 
 from __future__ import annotations
 
@@ -13,16 +7,6 @@ from typing import Any
 
 import control as ct
 import numpy as np
-
-
-def block_outputs(block: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Return a block's outputs with the parameters that it has now."""
-    return np.asarray(block._out(t, x, u), dtype=float).reshape(-1)
-
-
-def block_rates(block: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Return a block's derivatives, or next states, with the parameters that it has now."""
-    return np.asarray(block._rhs(t, x, u), dtype=float).reshape(-1)
 
 
 def block_inputs(

@@ -1,0 +1,315 @@
+"""The paper's controller and its rivals, with gains found by one budget on the same samples.
+
+`rival_loop` is for the studies ``reports/rivals-1.toml`` and ``rivals-2.toml``, which compare the
+controllers on fresh samples behind one actuator after the other; `tuned_rivals` finds the gains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl.actuators import Backlash, DeadZone, Gain, Saturation
+from nlctl.controllers import (
+    PID,
+    AdaptiveWeights,
+    FunnelControl,
+    NussbaumLaw,
+    PrescribedPerformance,
+    RobustTerm,
+    SlidingModeLaw,
+    replaced,
+    sliding_mode,
+)
+from nlctl.names import unknown
+from nlctl.native import compile as compiled_loop
+from nlctl.native import ensemble_response
+
+from ..metrics import tracking_metrics
+from ..robustness import independent
+from . import loops
+from .controllers import part_of, published_controller
+from .tuning import Tuned, split_samples, tune
+
+__all__ = ["KNOWLEDGE", "behind", "rival_actuators", "rival_controllers", "rival_loop"]
+__all__ += ["rival_searches", "tuned_rivals"]
+
+KNOWLEDGE = {
+    "paper": "states, n derivatives of the reference",
+    "paper, tuned": "states, n derivatives of the reference; gains for this plant",
+    "PID": "sign of the gain, e and e', gains for this plant",
+    "sliding mode": "sign of the gain, states, n - 1 derivatives of the reference, a bound of "
+    "what disturbs",
+    "prescribed performance": "sign of the gain, states, a bound of the initial errors",
+    "funnel": "sign of the gain, states, n - 1 derivatives of the reference, a bound of the "
+    "initial errors",
+}
+"""What each controller has to know."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Rival:
+    """A controller to be tuned.
+
+    Attributes
+    ----------
+    make : callable
+        Makes it from gains by qualified name.
+    bounds : dict
+        Where each gain is searched.
+    """
+
+    make: Callable[[str, Mapping[str, float]], Any]
+    bounds: dict[str, tuple[float, float]]
+
+
+def _tuple(gains: Mapping[str, float], name: str) -> tuple[float, ...]:
+    """Return the elements ``name[0]``, ``name[1]``, ... of a vector."""
+    return tuple(value for key, value in gains.items() if key.startswith(f"{name}["))
+
+
+def _paper(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
+    published = published_controller(example)
+    old = {key: part_of(published, key).spec for key in ("weights", "robust")}
+    return replaced(
+        published,
+        weights=AdaptiveWeights(
+            nodes=old["weights"].nodes,
+            sigma_1=old["weights"].sigma_1,
+            Gamma=gains["weights.Gamma"],
+        ),
+        robust=RobustTerm(
+            gamma=gains["robust.gamma"], sigma_2=old["robust"].sigma_2, tau=old["robust"].tau
+        ),
+        law=NussbaumLaw(beta=gains["law.beta"]),
+    )
+
+
+def _pid(example: str, gains: Mapping[str, float]) -> PID:
+    return PID(
+        **{key.removeprefix("controller."): value for key, value in gains.items()}, u_max=100
+    )
+
+
+def _sliding(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
+    surface = part_of(published_controller(example), "filtered_error").spec
+    return sliding_mode(surface, SlidingModeLaw(K=gains["law.K"], phi=gains["law.phi"]))
+
+
+def _prescribed(example: str, gains: Mapping[str, float]) -> PrescribedPerformance:
+    k, rho_inf = _tuple(gains, "controller.k"), _tuple(gains, "controller.rho_inf")
+    rho_0, decay = (3.0, 6.0, 12.0)[: len(k)], (gains["controller.decay[0]"], 0.7, 0.7)[: len(k)]
+    return PrescribedPerformance(k=k, rho_0=rho_0, rho_inf=rho_inf, decay=decay)
+
+
+def _order(example: str) -> int:
+    return part_of(published_controller(example), "filtered_error").spec.plant_order
+
+
+def _funnel(example: str, gains: Mapping[str, float]) -> FunnelControl:
+    order = _order(example)
+    own = {key.removeprefix("controller."): value for key, value in gains.items()}
+    return FunnelControl(order=order, rho_0=5.0, **own)
+
+
+_WIDTHS = ((0.05, 0.4), (0.3, 3.0), (1.0, 6.0))  # where the bounds at last are searched
+_DECAY = (0.3, 3.0)
+_OWN = {"example_1": "dead zone", "example_2": "backlash"}  # the actuator of the training
+
+
+def _rivals(example: str) -> dict[str, _Rival]:
+    """Return what is tuned, by label."""
+    order = _order(example)
+    adaptation = ("law.beta", "weights.Gamma", "robust.gamma")
+    return {
+        "paper, tuned": _Rival(make=_paper, bounds=dict.fromkeys(adaptation, (0.1, 50.0))),
+        "PID": _Rival(
+            make=_pid,
+            bounds={f"controller.{k}": (0.01, 1000.0) for k in ("k_p", "k_i", "k_d")}
+            | {"controller.T_f": (0.005, 0.5)},
+        ),
+        "sliding mode": _Rival(
+            make=_sliding, bounds={"law.K": (0.5, 30.0), "law.phi": (0.01, 1.0)}
+        ),
+        "prescribed performance": _Rival(
+            make=_prescribed,
+            bounds={f"controller.k[{i}]": (0.2, 20.0) for i in range(order)}
+            | {f"controller.rho_inf[{i}]": _WIDTHS[i] for i in range(order)}
+            | {"controller.decay[0]": _DECAY},
+        ),
+        "funnel": _Rival(
+            make=_funnel,
+            bounds={"controller.k": (0.2, 50.0), "controller.rho_inf": _WIDTHS[0]}
+            | {"controller.decay": _DECAY},
+        ),
+    }
+
+
+RIVAL_GAINS: dict[str, dict[str, dict[str, float]]] = {
+    "example_1": {
+        "paper, tuned": {"law.beta": 49.3, "weights.Gamma": 25.0, "robust.gamma": 0.797},
+        "PID": {
+            "controller.k_p": 19.3,
+            "controller.k_i": 226.0,
+            "controller.k_d": 29.4,
+            "controller.T_f": 0.00501,
+        },
+        "sliding mode": {"law.K": 9.47, "law.phi": 0.0265},
+        "prescribed performance": {
+            "controller.k[0]": 1.57,
+            "controller.k[1]": 13.9,
+            "controller.rho_inf[0]": 0.173,
+            "controller.rho_inf[1]": 1.17,
+            "controller.decay[0]": 2.11,
+        },
+        "funnel": {"controller.k": 32.2, "controller.rho_inf": 0.0835, "controller.decay": 2.78},
+    },
+    "example_2": {
+        "paper, tuned": {"law.beta": 4.16, "weights.Gamma": 5.96, "robust.gamma": 0.148},
+        "PID": {
+            "controller.k_p": 0.658,
+            "controller.k_i": 0.0477,
+            "controller.k_d": 4.9,
+            "controller.T_f": 0.0102,
+        },
+        "sliding mode": {"law.K": 2.15, "law.phi": 0.0327},
+        "prescribed performance": {
+            "controller.k[0]": 0.501,
+            "controller.k[1]": 0.574,
+            "controller.k[2]": 2.78,
+            "controller.rho_inf[0]": 0.163,
+            "controller.rho_inf[1]": 0.308,
+            "controller.rho_inf[2]": 1.72,
+            "controller.decay[0]": 0.342,
+        },
+        "funnel": {"controller.k": 15.8, "controller.rho_inf": 0.245, "controller.decay": 2.44},
+    },
+}
+"""Gains by example and label, found by `tuned_rivals`."""
+
+
+def rival_controllers(example: str) -> dict[str, Any]:
+    """Return the controllers of an example by label, the paper's as printed first.
+
+    Parameters
+    ----------
+    example : {"example_1", "example_2"}
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such example.
+    """
+    if example not in RIVAL_GAINS:
+        raise unknown("example", example, RIVAL_GAINS)
+    tuned = {
+        label: r.make(example, RIVAL_GAINS[example][label]) for label, r in _rivals(example).items()
+    }
+    return {"paper": published_controller(example), **tuned}
+
+
+def rival_searches(
+    example: str,
+) -> dict[str, tuple[dict[str, float], dict[str, tuple[float, float]]]]:
+    """Return the gains that were found and the bounds of their search, by label."""
+    return {key: (RIVAL_GAINS[example][key], r.bounds) for key, r in _rivals(example).items()}
+
+
+def rival_actuators(example: str) -> dict[str, Any]:
+    """Return the actuators by label; the saturation leaves about half of what the paper uses."""
+    limit = {"example_1": 6.0, "example_2": 3.0}[example]
+    return {
+        "ideal": Gain(k=1.0),
+        "dead zone": DeadZone(),
+        "backlash": Backlash(),
+        "saturation": Saturation(limit=limit),
+    }
+
+
+def behind(example: str, actuator: str) -> dict[str, str]:
+    """Return ``{controller: pair}`` for one actuator: the options of a comparison."""
+    if actuator not in rival_actuators(example):
+        raise unknown("actuator", actuator, rival_actuators(example))
+    return {label: f"{label} / {actuator}" for label in ("paper", *_rivals(example))}
+
+
+def rival_loop(
+    example: str = "example_1", pair: str = "paper / dead zone", noise: float = 0.0
+) -> ct.InterconnectedSystem:
+    """An example with one controller behind one actuator.
+
+    Parameters
+    ----------
+    example : {"example_1", "example_2"}, optional
+    pair : str, optional
+        ``"controller / actuator"``, see `rival_controllers` and `rival_actuators`.
+    noise : float, optional
+        RMS of the measurement noise.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such example, controller or actuator.
+    """
+    label, _, actuator = pair.partition(" / ")
+    controllers, actuators = rival_controllers(example), rival_actuators(example)
+    if label not in controllers:
+        raise unknown("controller", label, controllers)
+    if actuator not in actuators:
+        raise unknown("actuator", actuator, actuators)
+    return _with(example, controllers[label], actuators[actuator], noise)
+
+
+def _with(example: str, controller: Any, actuator: Any, noise: float) -> ct.InterconnectedSystem:
+    make = {"example_1": loops.example_1, "example_2": loops.example_2}[example]
+    return make(controller=controller, actuator=actuator, noise=noise)
+
+
+def tuned_rivals(
+    example: str, *, size: int = 4, candidates: int = 240, seed: int = 0
+) -> dict[str, Tuned]:
+    """Tune every controller with the same budget on the same samples of the study's own space.
+
+    The least mean IAE over `size` samples with the example's actuator, for max |u| at most that of
+    the paper's controller as printed in the worst of these samples.
+
+    Parameters
+    ----------
+    example : {"example_1", "example_2"}
+    size : int, optional
+        Training samples; the study draws others.
+    candidates : int, optional
+        Sets of gains that are tried for each controller, to the nearest generation.
+    seed : int, optional
+
+    Returns
+    -------
+    dict
+        `Tuned` by label; some minutes of computing.
+    """
+    from ..studies import read_study, shipped
+
+    space = read_study(shipped(f"rivals-{example[-1]}")).experiment.space
+    drawn = independent(space, size, seed).table
+    samples = {str(key): column.to_numpy() for key, column in drawn.items()}
+    times = np.linspace(0, 20, 2001)
+    by_key = {m.key: m for m in tracking_metrics(start=10, band=0.15, weights="", gain="")}
+    cost, limited = by_key["iae"], by_key["peak_u"]
+    actuator = rival_actuators(example)[_OWN[example]]
+    start, params = split_samples(samples)
+    printed = compiled_loop(_with(example, published_controller(example), actuator, 0.0))
+    table = ensemble_response(printed, times, 0.0, start, params=params, metrics=(limited,)).table
+    found = {}
+    for label, rival in _rivals(example).items():
+        middle = {key: float(np.sqrt(low * high)) for key, (low, high) in rival.bounds.items()}
+        loop = compiled_loop(_with(example, rival.make(example, middle), actuator, 0.0))
+        found[label] = tune(
+            loop, rival.bounds, times, cost,
+            limited=limited, limit=float(table[limited.key].to_numpy().max()), samples=samples,
+            generations=max(1, round(candidates / (10 * len(rival.bounds))) - 1), seed=seed,
+        )  # fmt: skip
+    return found

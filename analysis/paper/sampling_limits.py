@@ -1,0 +1,250 @@
+"""Where the examples stop meeting their spec on a computer: a kept record, and how it is made.
+
+``python -m analysis.paper.sampling_limits`` makes it again, in two minutes: every controller of
+`controllers.compared_controllers` by Euler's method, over the sampling time, the delay and the
+steps of both converters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl import paper
+from nlctl.native import Compiled, ensemble_response
+from nlctl.native import compile as compiled_loop
+from nlctl.sampling import sampled
+
+from .cases import HORIZON, TAIL
+from .controllers import compared_controllers
+
+__all__ = [
+    "BAND",
+    "PEAK",
+    "QUANTITIES",
+    "SAMPLING_RECORD",
+    "Quantity",
+    "checked_record",
+    "controller_program",
+    "sampling_runs",
+    "spec_ends",
+    "where_it_ends",
+]
+
+SAMPLING_RECORD = Path(__file__).with_name("sampling-limits.csv")
+BAND, PEAK = 0.15, 15.0  # the spec of reports/example-1.toml: |y - yd| from 10 s on, and |u|
+_STEP = 0.002  # s: sampling time where something else is varied
+_WAITING = 20  # sampling times that the longest delay takes
+_COARSE, _FINE = 13, 8  # values over the whole range, and between the last good and the first bad
+_LOOK = 1e-3  # s: nothing that is held is missed
+_EFFORT = 60_000  # steps of a run; one at 1 ms takes 20,000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """Something of the computer that is varied.
+
+    Attributes
+    ----------
+    key : str
+        Name of the parameter, behind ``"sampling."``.
+    title, unit : str
+    factor : float
+        From the parameter's unit to `unit`.
+    low, high : float
+        Range, in the parameter's unit.
+    """
+
+    key: str
+    title: str
+    unit: str
+    factor: float
+    low: float
+    high: float
+
+    @property
+    def values(self) -> np.ndarray:
+        """What is tried first."""
+        return np.geomspace(self.low, self.high, _COARSE)
+
+
+QUANTITIES = (
+    Quantity(key="dt", title="sampling time", unit="ms", factor=1e3, low=1e-3, high=0.1),
+    Quantity(key="delay", title="delay", unit="ms", factor=1e3, low=1e-3, high=_WAITING * _STEP),
+    Quantity(
+        key="input_quantum",
+        title="step of the measurements",
+        unit="1",
+        factor=1.0,
+        low=1e-3,
+        high=1.0,
+    ),
+    Quantity(
+        key="output_quantum", title="step of the input u", unit="1", factor=1.0, low=0.01, high=10.0
+    ),
+)
+
+
+def controller_program(controller: Any, *, delays: bool = False) -> Any:
+    """Return a controller as a program with Euler's method, of which `QUANTITIES` may be varied.
+
+    Parameters
+    ----------
+    controller : control.InputOutputSystem or record
+    delays : bool, optional
+        Whether its outputs wait; otherwise there are converters.
+    """
+    if delays:
+        return sampled(controller, _STEP, method="euler", delay=_STEP, waiting=_WAITING)
+    return sampled(controller, _STEP, method="euler", input_quantum=0.0, output_quantum=0.0)
+
+
+def sampling_runs(
+    example: str, label: str, wanted: Mapping[str, np.ndarray] | None = None
+) -> pd.DataFrame:
+    """Run an example with one controller on a computer.
+
+    Parameters
+    ----------
+    example : {"example_1", "example_2"}
+    label : str
+        Of `controllers.compared_controllers`.
+    wanted : mapping, optional
+        Values by key of the quantity; by default those of `QUANTITIES`, and finer ones where the
+        spec ends.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns example, controller, quantity, value, error (largest abs(y - yd) from 10 s on), peak
+        (largest abs(u)); both are NaN where a run does not end well.
+    """
+    controller = compared_controllers(example)[label]
+    loops: dict[bool, Compiled] = {}
+    tables = []
+    for quantity in QUANTITIES:
+        delays = quantity.key == "delay"
+        if delays not in loops and (wanted is None or quantity.key in wanted):
+            program = controller_program(controller, delays=delays)
+            loops[delays] = compiled_loop(paper.EXAMPLES[example](controller=program))
+        if wanted is None:
+            run = _runner(loops[delays], quantity)
+            table = run(quantity.values)
+            good, bad = where_it_ends(table)
+            if np.isfinite(good) and np.isfinite(bad):
+                between = np.geomspace(good, bad, _FINE + 2)[1:-1]
+                table = pd.concat([table, run(between)]).sort_values("value")
+        elif quantity.key not in wanted:
+            continue
+        else:
+            table = _runner(loops[delays], quantity)(np.asarray(wanted[quantity.key], dtype=float))
+        tables.append(table.assign(quantity=quantity.key))
+    made = pd.concat(tables, ignore_index=True).assign(example=example, controller=label)
+    return made.reindex(columns=["example", "controller", "quantity", "value", "error", "peak"])
+
+
+def _runner(loop: Compiled, quantity: Quantity) -> Callable[[np.ndarray], pd.DataFrame]:
+    """Return what runs a loop over values of a quantity."""
+    times = np.linspace(0, HORIZON, round(HORIZON / _LOOK) + 1)
+
+    def run(values: np.ndarray) -> pd.DataFrame:
+        made = ensemble_response(
+            loop, times, params={f"sampling.{quantity.key}": values}, keep=("y", "yd", "u"),
+            max_steps=_EFFORT,
+        )  # fmt: skip
+        late = times >= TAIL
+        error = np.abs(made.signals["y"] - made.signals["yd"])[:, late].max(axis=1)
+        peak = np.abs(made.signals["u"]).max(axis=1)
+        return pd.DataFrame({"value": values, "error": error, "peak": peak})
+
+    return run
+
+
+def meets_the_spec(table: pd.DataFrame) -> np.ndarray:
+    """Return which runs keep abs(y - yd) <= 0.15 from 10 s on and abs(u) <= 15; NaN does not."""
+    return ((table["error"] <= BAND) & (table["peak"] <= PEAK)).to_numpy()
+
+
+def where_it_ends(table: pd.DataFrame) -> tuple[float, float]:
+    """Return up to which value all runs meet the spec, and the next one, which does not.
+
+    NaN where there is none: the first value violates, or all are good.
+    """
+    ordered = table.sort_values("value")
+    bad, values = np.flatnonzero(~meets_the_spec(ordered)), ordered["value"].to_numpy()
+    if not bad.size:
+        return float(values[-1]), np.nan
+    return (float(values[bad[0] - 1]) if bad[0] else np.nan), float(values[bad[0]])
+
+
+def spec_ends(record: pd.DataFrame) -> pd.DataFrame:
+    """Return where each controller's spec ends.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Index example and controller, in the record's order; for each quantity two columns,
+        ``(key, "good")`` and ``(key, "bad")``, see `where_it_ends`.
+    """
+    rows: dict[Any, dict[tuple[str, str], float]] = {}
+    for place, part in record.groupby(["example", "controller"], sort=False):
+        rows[place] = {}
+        for quantity in QUANTITIES:
+            good, bad = where_it_ends(part.query("quantity == @quantity.key"))
+            rows[place] |= {(quantity.key, "good"): good, (quantity.key, "bad"): bad}
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def checked_record(path: Path = SAMPLING_RECORD) -> pd.DataFrame:
+    """Return the record, if the paper's own loops are those of which it was made.
+
+    Raises
+    ------
+    ValueError
+        If a run of today differs from its line: the record is of other equations.
+    """
+    record = pd.read_csv(path)
+    for example in paper.EXAMPLES:
+        own = (record["example"] == example) & (record["controller"] == "paper")
+        one = record[own & (record["quantity"] == "dt")].iloc[[_COARSE // 2]]
+        check_lines(one, sampling_runs(example, "paper", {"dt": one["value"].to_numpy()}))
+    return record
+
+
+def check_lines(kept: pd.DataFrame, today: pd.DataFrame) -> None:
+    """Compare lines of the record with runs of today, to 1e-3.
+
+    Raises
+    ------
+    ValueError
+        If they differ.
+    """
+    columns = ["error", "peak"]
+    a, b = (table[columns].to_numpy() for table in (kept, today))
+    if not np.allclose(a, b, rtol=1e-3, atol=0, equal_nan=True):
+        line = kept.iloc[0]
+        raise ValueError(
+            f"the record of '{line['example']}' with the controller '{line['controller']}' has "
+            f"{a.ravel()} at {line['quantity']} = {line['value']:g}, a run of today {b.ravel()}: "
+            "make it again with 'python -m analysis.paper.sampling_limits'"
+        )
+
+
+def _main() -> None:
+    """Make the record again."""
+    made = pd.concat(
+        sampling_runs(example, label)
+        for example in paper.EXAMPLES
+        for label in compared_controllers(example)
+    )
+    made.to_csv(SAMPLING_RECORD, index=False, float_format="%.6g")
+    print(spec_ends(made).to_string())
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,0 +1,83 @@
+"""Prescribed performance without approximation, for pure-feedback plants."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...equations import equation
+from ...errors import ParameterError
+from ...params import param, record
+from ...plants import coordinate_names
+from .bound import performance_bound
+
+__all__ = ["PrescribedPerformance"]
+
+
+@equation
+def transformed_error(xi):
+    """Transformed error ln((1 + xi) / (1 - xi)); NaN at the bound and beyond it."""
+    if -1 < xi < 1:
+        return np.log((1 + xi) / (1 - xi))
+    return np.nan
+
+
+@record
+class PrescribedPerformance:
+    """Prescribed performance control of pure-feedback plants, without approximation.
+
+        a_0 = yd,   xi_i = (x_i - a_{i-1}) / rho_i(t),   i = 1, ..., n
+        a_i = -k_i ln((1 + xi_i) / (1 - xi_i)),   u = a_n
+        rho_i(t) = (rho_0[i] - rho_inf[i]) exp(-decay[i] t) + rho_inf[i]
+
+    (Bechlioulis, Rovithakis, Automatica 50, 2014, p. 1217.)  It is made for the paper's plant
+    class: |x1 - yd| < rho_1(t) for all t if |x_i - a_{i-1}| < rho_i at t = 0 and each x_i' grows
+    with x_{i+1}, the last one with u.  It needs neither the plant nor a network nor a derivative
+    of the reference; it needs the states and the sign of the input gain, which is positive here.
+    Where an error is at its bound or beyond it, u is NaN: there is no law.
+
+    Bounds of x_{i+1} - a_i that are wide against k_i make xi_i come close to 1 before x_i turns
+    round, where a double has no room: 1 - xi is at least 1e-16, so that |a_i| < 38 k_i.
+    """
+
+    k: tuple[float, ...] = param((1.0, 8.0), unit="1", meaning="gains k_i", above=0)
+    rho_0: tuple[float, ...] = param((3.0, 6.0), unit="1", meaning="bounds at t = 0", above=0)
+    rho_inf: tuple[float, ...] = param((0.1, 1.0), unit="1", meaning="bounds at last", above=0)
+    decay: tuple[float, ...] = param(
+        (1.0, 1.0), unit="1/s", meaning="rates of decay of the bounds", at_least=0, symbol="l"
+    )
+
+    outputs = ("e", "u", "rho")
+    states = ()
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """As many bounds as gains."""
+        sizes = {key: len(getattr(self, key)) for key in ("k", "rho_0", "rho_inf", "decay")}
+        if len(set(sizes.values())) > 1 or not self.k:
+            told = ", ".join(f"{n} of {key}" for key, n in sizes.items())
+            raise ParameterError(
+                "PrescribedPerformance needs k, rho_0, rho_inf and decay of equal length, one "
+                f"value for each state of the plant, got {told}"
+            )
+
+    @property
+    def plant_order(self) -> int:
+        """Order n of the plants that it is made for."""
+        return len(self.k)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names x1, ..., xn, yd."""
+        return (*coordinate_names(len(self.k)), "yd")
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The error, the control input, and the bound of the error."""
+        yd = u[-1]
+        wanted = yd  # a_{i-1}
+        for i in range(p.k.size):
+            rho = performance_bound(t, p.rho_0[i], p.rho_inf[i], p.decay[i])
+            wanted = -p.k[i] * transformed_error((u[i] - wanted) / rho)
+        return u[0] - yd, wanted, performance_bound(t, p.rho_0[0], p.rho_inf[0], p.decay[0])

@@ -1,0 +1,30 @@
+"""What notebooks show: a heading and a table, in which everything that is given is text."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Sequence
+
+__all__ = ["table_html"]
+
+
+def table_html(heading: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a heading and a table as HTML; every text is escaped.
+
+    Parameters
+    ----------
+    heading : str
+        Line breaks stay.
+    columns : sequence of str
+    rows : iterable of sequences
+        Floats are shown with six digits.
+    """
+    told = "".join(f"<p>{html.escape(line)}</p>" for line in heading.splitlines())
+    titles = "".join(f"<th>{html.escape(title)}</th>" for title in columns)
+    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
+    return f"{told}<table><tr>{titles}</tr>{body}</table>"
+
+
+def _cell(value: object) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"<td>{html.escape(text)}</td>"

@@ -1,0 +1,88 @@
+"""python-control's private names; ``tests/upstream/test_control_internals.py`` has a test of each.
+
+- ``NonlinearIOSystem._update_params(params)``: takes the overrides of a run; a diagram hands them
+  to its parts.  ``dynamics`` and ``output`` call it first.
+- ``NonlinearIOSystem._current_params``: what the equations get from then on.
+- ``NonlinearIOSystem._rhs(t, x, u)`` and ``_out(t, x, u)``: the equations with these parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import control as ct
+import numpy as np
+
+
+def set_parameters(system: Any, params: Mapping[str, Any] | None) -> None:
+    """Let a system's equations have these overrides from now on; None for its own values."""
+    system._update_params(params)
+
+
+def current_parameters(system: Any) -> Any:
+    """Return the parameters that a block's equations have now."""
+    return system._current_params
+
+
+def rates_now(system: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return derivatives, or next states, with the parameters that a system has now."""
+    return np.asarray(system._rhs(t, x, u)).reshape(-1)
+
+
+def outputs_now(system: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return outputs with the parameters that a system has now."""
+    return np.asarray(system._out(t, x, u)).reshape(-1)
+
+
+class OwnParameters(ct.NonlinearIOSystem):
+    """A system that makes what its equations get of the overrides that python-control has."""
+
+    def taken(self, params: Mapping[str, Any]) -> Any:
+        """Return what the equations get, of the overrides of a run."""
+        raise NotImplementedError
+
+    def answer(self, t: float, x: Any, u: Any) -> Any:
+        """Return its outputs, with the parameters that it has now."""
+        return super()._out(t, x, u)
+
+    def _update_params(self, params: Mapping[str, Any] | None) -> None:
+        self._current_params = self.taken(params or {})
+
+    def _out(self, t: float, x: Any, u: Any) -> Any:
+        return self.answer(t, x, u)
+
+
+class Around(ct.NonlinearIOSystem):
+    """A system around another one, ``inner``, with its parameters and equations of its own."""
+
+    inner: Any
+
+    def rates(self, t: float, x: Any, u: Any) -> np.ndarray:
+        """Return its derivatives."""
+        raise NotImplementedError
+
+    def answer(self, t: float, x: Any, u: Any) -> np.ndarray:
+        """Return its outputs."""
+        raise NotImplementedError
+
+    def override(self, params: Mapping[str, Any] | None) -> None:
+        """Let the system inside have these overrides from now on."""
+        set_parameters(self.inner, params)
+
+    def _update_params(self, params: Mapping[str, Any] | None) -> None:
+        self.override(params)
+
+    @property
+    def _current_params(self) -> Any:
+        return current_parameters(self.inner)
+
+    @_current_params.setter
+    def _current_params(self, values: Any) -> None:
+        """Nothing: they are those of the system inside, which has them already."""
+
+    def _rhs(self, t: float, x: Any, u: Any) -> np.ndarray:
+        return self.rates(t, x, u)
+
+    def _out(self, t: float, x: Any, u: Any) -> np.ndarray:
+        return self.answer(t, x, u)

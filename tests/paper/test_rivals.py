@@ -1,0 +1,115 @@
+"""The comparison of the paper's controller with its rivals: what is tuned, and on what."""
+
+import numpy as np
+import pytest
+from places import ROOT
+
+import nlctl
+from analysis.metrics import Metric, absolute_integral, peak
+from analysis.paper.rivals import (
+    KNOWLEDGE,
+    behind,
+    rival_actuators,
+    rival_controllers,
+    rival_loop,
+    rival_searches,
+)
+from analysis.paper.tuning import tune
+from analysis.studies import read_study, shipped
+
+EXAMPLES = sorted(nlctl.paper.EXAMPLES)
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_every_controller_has_gains_from_its_search_and_says_what_it_knows(example):
+    """None is compared with gains from elsewhere."""
+    labels = list(rival_controllers(example))
+    assert labels == list(KNOWLEDGE)
+    for gains, bounds in rival_searches(example).values():
+        assert set(gains) == set(bounds)
+        assert all(low <= gains[key] <= high for key, (low, high) in bounds.items())
+    for label, row in _knowledge_of_the_page().items():
+        assert KNOWLEDGE[label] == row
+
+
+def _knowledge_of_the_page():
+    """Return the table of the page by controller."""
+    page = (ROOT / "docs/explanation/rivals.md").read_text(encoding="utf-8")
+    part = page.partition("## What each has to know")[2].partition("## ")[0]
+    rows = [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("|")]
+    table = dict(rows[2:])
+    assert set(table) == set(KNOWLEDGE)
+    return table
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_the_gains_reach_the_loop(example):
+    """The override that was searched is the parameter of the controller that is compared."""
+    for label, (gains, _) in rival_searches(example).items():
+        known = nlctl.parameters(rival_loop(example, f"{label} / ideal"))["value"]
+        for key, value in gains.items():
+            base, _, index = key.partition("[")
+            (own,) = [v for name, v in known.items() if name == base or name.endswith(f".{base}")]
+            assert (own[int(index[:-1])] if index else own) == value
+
+
+def test_each_actuator_has_the_same_controllers_on_the_same_samples():
+    """The study files differ in the pairs alone."""
+    for number, example in zip("12", EXAMPLES, strict=True):
+        study = read_study(shipped(f"rivals-{number}")).study
+        asked = [analysis.options for analysis in study.analysis]
+        assert [options["actuator"] for options in asked] == list(rival_actuators(example))
+        assert {options["example"] for options in asked} == {example}
+        assert len({analysis.runs for analysis in study.analysis}) == 1
+    assert behind("example_1", "backlash")["PID"] == "PID / backlash"
+
+
+@pytest.mark.parametrize(
+    ("pair", "told"),
+    [("PDI / ideal", "PID"), ("PID / deadzone", "dead zone"), ("PID", "actuator")],
+)
+def test_an_unknown_pair_is_refused(pair, told):
+    """With the nearest name."""
+    with pytest.raises(nlctl.UnknownNameError, match=told):
+        rival_loop("example_1", pair)
+
+
+def test_of_several_samples_the_mean_cost_and_the_worst_limit_count():
+    """x' = u = -k x from x_0: IAE = |x_0| / k, max |u| = k |x_0|; so k = limit / max |x_0|."""
+
+    @nlctl.equation
+    def f(x, v):
+        return v
+
+    @nlctl.record
+    class Proportional:
+        """A proportional law.
+
+        u = -k e,   e = x1 - yd
+        """
+
+        k: float = nlctl.param(1.0, unit="1", meaning="gain", above=0)
+        inputs, outputs, states, feedthrough = ("x1", "yd"), ("e", "u"), (), True
+
+        @staticmethod
+        @nlctl.equation
+        def output(t, x, u, p):
+            return u[0] - u[1], -p.k * (u[0] - u[1])
+
+    still = nlctl.SumOfSines(order=1, amplitudes=0.0, frequencies=1.0, phases=0.0)
+    blocks = {"r": still, "plant": nlctl.PureFeedback(order=1, f=f), "p": Proportional()}
+    loop = nlctl.interconnect(blocks | {"actuator": nlctl.Gain()}, outputs=["e", "u"])
+    starts = np.array([0.5, -2.0, 1.0])
+    found = tune(
+        nlctl.compile(loop),
+        {"p.k": (0.1, 100.0)},
+        np.linspace(0, 20, 2001),
+        Metric(key="iae", signal="e", unit="s", meaning="", function=absolute_integral),
+        limited=Metric(key="peak", signal="u", unit="1", meaning="", function=peak),
+        limit=6.0,
+        samples={"plant.x1(0)": starts, "actuator.k": np.ones(3)},
+    )
+    assert found.gains["p.k"] == pytest.approx(3.0, rel=1e-3)
+    assert found.cost == pytest.approx(np.abs(starts).mean() / 3.0, rel=1e-3)
+    assert found.limited <= 6.0
+    assert found.runs % 3 == 0

@@ -1,0 +1,74 @@
+"""Text uses the field's terms: comments, docstrings, messages and pages of the documentation."""
+
+import io
+import re
+import tokenize
+
+import pytest
+from places import ROOT
+
+TERMS = {  # what is not said -> what is
+    r"\bdelivers\b(?! : |=)|\bdelivered\b": "outputs, is an output of",
+    r"\bwhole numbers?\b": "integer",
+    r"\bforeign\b": "third-party",
+    r"\bside by side\b": "batched, together",
+    r"\bturn(s|ed)? round\b": "reverses",
+    r"\bforetold\b": "predicted",
+    r"\bheld against\b": "validated against",
+    r"\bcontenders?\b": "controllers",
+    r"\bgoes on (with|behind|from)\b": "resumes",
+    r"\bring of signals\b": "algebraic loop",
+    r"\b(blocks?|diagrams?) (is|are) joined\b|\bjoined by dots\b": "connected",
+}
+ALLOWED = ('"delivers"', '"turned round"', "as in delivers, got ")  # names that are kept
+# whose text belongs to the pages
+ELSEWHERE = ("analysis/report", "analysis/studies/page", "analysis/paper/page")
+
+
+def told(path):
+    """The comments and strings of a module, with their lines; a page's own lines."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".py":
+        return list(enumerate(text.splitlines(), start=1))
+    kinds = {tokenize.COMMENT, tokenize.STRING, getattr(tokenize, "FSTRING_MIDDLE", -1)}
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    return [(token.start[0], token.string) for token in tokens if token.type in kinds]
+
+
+def texts():
+    """All that is read by others than the interpreter."""
+    places = [p for package in ("nlctl", "analysis") for p in (ROOT / package).rglob("*.py")]
+    places += [ROOT / "README.md", ROOT / "ARCHITECTURE.md", *(ROOT / "docs").rglob("*.md")]
+    for path in sorted(places):
+        name = path.relative_to(ROOT).as_posix()
+        if not name.startswith(ELSEWHERE):
+            yield from ((f"{name}:{line}", text) for line, text in told(path))
+
+
+@pytest.fixture(scope="module")
+def everything():
+    return list(texts())
+
+
+@pytest.mark.parametrize(("term", "instead"), TERMS.items(), ids=TERMS.values())
+def test_the_fields_terms_are_used(everything, term, instead):
+    """Each of these words has one that the field uses."""
+    found = [
+        (place, text)
+        for place, text in everything
+        if re.search(term, re.sub(r"\{[^}]*\}", "", text))
+        and not any(name in text for name in ALLOWED)
+    ]
+    assert [place for place, _ in found] == [], f"say {instead}: {found}"
+
+
+def test_there_is_text_to_look_at(everything):
+    """Comments, docstrings, messages and pages."""
+    whole = "\n".join(text for _, text in everything)
+    for part in (
+        "# nobody else compiles",
+        "Return the outputs",
+        "needs an integer for",
+        "## The paper",
+    ):
+        assert part in whole

@@ -1,0 +1,176 @@
+"""A page about a loop of one's own: what is given stands on it as text, of that loop alone."""
+
+import html.parser
+import json
+import re
+
+import control as ct
+import numpy as np
+import pytest
+import studies_example
+from matplotlib.figure import Figure as Picture
+from rows import each_row
+
+import nlctl
+from analysis.loop_report import loop_report
+from analysis.report import (
+    Claim,
+    Figure,
+    Paragraph,
+    Section,
+    Table,
+    framed,
+    render_html,
+    write_report,
+)
+from analysis.studies import read_study, run
+
+TIMES = np.linspace(0, 2, 41)
+EVIL = '<script>alert("x")</script><b onload=y>&amp;'
+
+
+def decay(rate=1.0, name="decay"):
+    plant = ct.nlsys(
+        lambda t, x, u, params: -params["rate"] * x,
+        None,
+        states=["x"],
+        inputs=["u"],
+        params={"rate": rate},
+        name="plant",
+    )
+    scale = ct.ss([], [], [], [[2.0]], inputs=["x"], outputs=["y"], name="scale")
+    return ct.interconnect(
+        [plant, scale], connections=[["scale.x", "plant.x"]], inplist=["plant.u"],
+        outlist=["plant.x", "scale.y"], outputs=["x", "y"], inputs=["u"], name=name,
+    )  # fmt: skip
+
+
+LOOP = decay()
+RESPONSE = nlctl.input_output_response(LOOP, TIMES, 0, [1.0])
+
+
+class Page(html.parser.HTMLParser):
+    """Tags and text of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.text, self.now = [], {}, ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        self.now = tag
+
+    def handle_data(self, data):
+        self.text.setdefault(self.now, []).append(data)
+
+
+def test_what_was_computed_is_on_the_page_and_in_the_file(tmp_path):
+    """x = exp(-t) from 1, y = 2 x: the table has the closed form's ends."""
+    made = loop_report(LOOP, title="Decay", response=RESPONSE, author="A. B.", revision="C")
+    page = write_report(made, tmp_path)
+    kept = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert kept["numbers"]["run"]["y"]["last"] == pytest.approx(2 * np.exp(-2), rel=1e-5)
+    assert kept["numbers"]["run"]["x"]["largest"] == 1.0
+    text = page.read_text(encoding="utf-8")
+    shown = Page(text)
+    assert "".join(shown.text["h1"]).strip() == "Decay"
+    assert re.search(r'<p class="byline">A. B., Revision C</p>', text)
+    assert [part["title"] for part in kept["sections"].values()][:2] == [
+        "The loop", "The equations of the loop",
+    ]  # fmt: skip
+
+
+def test_nothing_that_is_given_is_markup():
+    """Title, author, revision, sections, tables, claims, figures; also in a notebook's frame."""
+    own = Section(
+        key=EVIL,
+        title=EVIL,
+        items=[
+            Paragraph(text=EVIL, code=EVIL),
+            Table(caption=EVIL, columns=[EVIL], rows=[[EVIL]], status=EVIL),
+            Figure(key=EVIL, caption=EVIL, description=EVIL, figure=Picture()),
+        ],
+    )
+    claim = Claim(text=EVIL, measured=EVIL, limit=EVIL, holds=True, evidence=EVIL, status=EVIL)
+    made = loop_report(
+        decay(name="of <b>"), title=EVIL, sections=[own], claims=[claim], author=EVIL,
+        revision=EVIL, date=EVIL, question=EVIL, verdict=EVIL, references=[EVIL], command=EVIL,
+    )  # fmt: skip
+    tags = Page(render_html(made)).tags
+    assert [name for name, _ in tags].count("script") == 1
+    assert not any(key.startswith("on") for _, attrs in tags for key in attrs)
+    frame = Page(framed(made)._repr_html_()).tags
+    assert [name for name, _ in frame] == ["iframe"]
+    assert frame[0][1]["sandbox"] == "allow-scripts"
+    assert frame[0][1]["srcdoc"] == render_html(made)
+
+
+def test_a_report_without_author_has_no_title_page():
+    """Nor a line of nothing below its title; and without a command it says so."""
+    plain = render_html(loop_report(LOOP, title="Decay"))
+    assert 'class="titled"' not in plain
+    assert 'class="byline"' not in plain
+    assert "no command was given" in plain
+
+
+def test_the_same_report_is_the_same_to_the_byte():
+    """No time and no place is in it."""
+    once, again = (
+        render_html(loop_report(LOOP, title="Decay", response=RESPONSE, revision="1"))
+        for _ in range(2)
+    )
+    assert once == again
+
+
+@each_row(
+    ("given", "words"),
+    [
+        (
+            {"response": nlctl.input_output_response(nlctl.paper.example_1(), TIMES)},
+            "has 2 st|1 st",
+        ),
+        ({"response": RESPONSE, "signals": ["z"]}, "unknown output 'z'"),
+        ({"study": "study"}, "another loop than 'decay'"),
+        ({"ledger": "ledger"}, "the ledger is of 'example_1'"),
+    ],
+)
+def test_what_is_of_another_loop_is_refused(given, words, tmp_path_factory):
+    """By name, with what differs."""
+    if "study" in given:
+        given = {"study": studied(tmp_path_factory.mktemp("study"))}
+    if "ledger" in given:
+        from analysis.lyapunov import ledger
+
+        given = {"ledger": ledger(nlctl.paper.example_1(), 1.0)}
+    with pytest.raises(
+        nlctl.DiagramError if "signals" not in given else nlctl.UnknownNameError
+    ) as e:
+        loop_report(LOOP, title="Decay", **given)
+    assert re.search(words, str(e.value))
+
+
+def test_a_response_with_other_parameters_needs_them():
+    """An output that reads a parameter shows it: the run's own outputs are not the loop's."""
+    loop = nlctl.paper.example_1()
+    response = nlctl.input_output_response(loop, TIMES, params={"law.beta": 3.0})
+    with pytest.raises(nlctl.DiagramError, match=r"params=\{...\}"):
+        loop_report(loop, title="Decay", response=response)
+    made = loop_report(loop, title="Decay", response=response, params={"law.beta": 3.0})
+    assert set(made.numbers["run"]) == set(loop.output_labels)
+
+
+def studied(folder):
+    return run(read_study(studies_example.write(folder)), folder / "run")
+
+
+def test_a_study_of_the_loop_is_a_part_of_its_page(tmp_path):
+    """Its claims have their evidence on the page."""
+    result = studied(tmp_path)
+    loop = read_study(tmp_path / "study.toml").experiment.build()
+    made = loop_report(loop, title="Decay", study=result)
+    page = render_html(made)
+    links = re.findall(r'<a href="#([^"]+)" aria-label="evidence', page)
+    assert links
+    assert all(f'id="{link}"' in page for link in links)
+    assert [claim.text for claim in made.claims] == [f.claim for f in result.claims]

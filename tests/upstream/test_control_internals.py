@@ -1,0 +1,87 @@
+"""What is relied on of python-control although it does not document it: one test for each name."""
+
+import control as ct
+import numpy as np
+import pytest
+
+from nlctl.upstream import control_internals as internals
+
+
+def lag(name, **more):
+    """x' = -k x + u, y = k x."""
+    return ct.nlsys(
+        lambda t, x, u, p: [-p["k"] * x[0] + u[0]], lambda t, x, u, p: [p["k"] * x[0]],
+        inputs=["u"], outputs=["y"], states=1, name=name, params={"k": 2.0}, **more,
+    )  # fmt: skip
+
+
+def both():
+    """Two lags one after the other."""
+    parts = [lag("first"), lag("second")]
+    diagram = ct.interconnect(
+        parts, [["second.u", "first.y"]], inplist=["first.u"], outlist=["second.y"], name="both"
+    )
+    return diagram, parts
+
+
+def test_overrides_reach_every_part_and_go_with_the_next():
+    """``_update_params`` and ``_current_params``, of a diagram and of its parts."""
+    diagram, parts = both()
+    for params, k in (({"k": 3.0}, 3.0), (None, 2.0)):
+        internals.set_parameters(diagram, params)
+        assert [internals.current_parameters(part)["k"] for part in parts] == [k, k]
+
+
+def test_equations_have_the_parameters_of_now():
+    """``_rhs`` and ``_out``: equal to ``dynamics`` and ``output`` with the same parameters."""
+    diagram, parts = both()
+    x, u = np.array([0.5, -1.0]), np.array([2.0])
+    for params in ({"k": 3.0}, None):
+        internals.set_parameters(diagram, params)
+        rates = [internals.rates_now(p, 0.0, x[:1], u) for p in parts]
+        outputs = [internals.outputs_now(p, 0.0, x[:1], u) for p in parts]
+        for part, rate, output in zip(parts, rates, outputs, strict=True):
+            np.testing.assert_array_equal(rate, part.dynamics(0.0, x[:1], u, params))
+            np.testing.assert_array_equal(output, part.output(0.0, x[:1], u, params))
+
+
+class Doubled(internals.OwnParameters):
+    """Its equations get twice what python-control has."""
+
+    def taken(self, params):
+        return {"k": 2.0 * params.get("k", 1.0)}
+
+
+class Opposite(internals.Around):
+    """Another system with its signs changed."""
+
+    def __init__(self, inner):
+        self.inner = inner
+        super().__init__(inner.updfcn, inner.outfcn, inputs=1, outputs=1, states=1, name=inner.name)
+
+    def rates(self, t, x, u):
+        return -internals.rates_now(self.inner, t, x, u)
+
+    def answer(self, t, x, u):
+        return -internals.outputs_now(self.inner, t, x, u)
+
+
+@pytest.mark.parametrize("params", [None, {"k": 3.0}])
+@pytest.mark.parametrize("nested", [False, True])
+def test_python_control_asks_what_is_overridden(params, nested):
+    """Both classes, alone and inside of a diagram, in each of its calls."""
+    made = lag("p")
+    doubled = Doubled(made.updfcn, made.outfcn, inputs=1, outputs=1, states=1, name="doubled")
+    opposite = Opposite(lag("opposite"))
+    k = 1.0 if params is None else params["k"]
+    inner = 2.0 if params is None else params["k"]
+    for system, rate, output in (
+        (doubled, -2 * k * 0.5 + 1.0, 2 * k * 0.5),
+        (opposite, inner * 0.5 - 1.0, -inner * 0.5),
+    ):
+        asked = ct.interconnect([system], inplist=[(0, 0)], outlist=[(0, 0)]) if nested else system
+        assert asked.dynamics(0.0, [0.5], [1.0], params) == pytest.approx(rate)
+        assert asked.output(0.0, [0.5], [1.0], params) == pytest.approx(output)
+        run = ct.input_output_response(asked, [0.0, 1e-6], 1.0, 0.5, params=params)
+        assert run.outputs[0] == pytest.approx(output)
+        assert (run.states[0, 1] - 0.5) / 1e-6 == pytest.approx(rate, rel=1e-4)
