@@ -52,6 +52,7 @@ from .controllers import (
     replaced,
     sliding_mode,
 )
+from .delays import TransportDelay
 from .diagrams import initial_state, interconnect, parameters, state_names
 from .drawing.picture import draw
 from .equations import equation
@@ -144,6 +145,7 @@ __all__ = [
     "Stop",
     "Stribeck",
     "SumOfSines",
+    "TransportDelay",
     "UnknownNameError",
     "Zero",
     "ablations",

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import control as ct
 import numpy as np
 
-from .errors import BlockError, ParameterError
+from .errors import BlockError, ParameterError, UsageError
 from .host.notebook import table_html
 from .names import Parameters, base_name, unknown
 from .params import declared_params, ensure_checked, equation_arguments, is_checked, with_overrides
@@ -54,6 +56,9 @@ class Spec(Protocol):
         ``check(self)`` raises `nlctl.ParameterError` where several fields contradict each other.
     plant_order : int, optional
         Of a controller: the order of the plants that it is made for.
+    delayed : bool, optional
+        True of `nlctl.TransportDelay`, whose outputs are its inputs at earlier times: they follow
+        from a run, not from `output`.
 
     Notes
     -----
@@ -94,6 +99,39 @@ class ParameterRow:
         return str(self.value) if isinstance(self.value, bool) else f"{self.value:g}"
 
 
+@dataclass(kw_only=True)
+class DelayLine:
+    """What leaves a transport delay at an instant, and what arrives there then.
+
+    Attributes
+    ----------
+    leaving : callable
+        What leaves at a time, of shape (signals,).
+    arriving : ndarray of shape (signals,)
+        What has arrived when it was last asked.
+    """
+
+    leaving: Callable[[float], np.ndarray]
+    arriving: np.ndarray
+
+
+_PAST: ContextVar[Mapping[int, DelayLine] | None] = ContextVar("nlctl_past", default=None)
+
+
+@contextmanager
+def past(lines: Mapping[Any, DelayLine]) -> Iterator[None]:
+    """Say what leaves transport delays at the instant at which a diagram is evaluated.
+
+    Python-control then finds the signals of the present, and what arrives at the delays is left in
+    `lines`, which goes by block.
+    """
+    token = _PAST.set({id(made): line for made, line in lines.items()})
+    try:
+        yield
+    finally:
+        _PAST.reset(token)
+
+
 class Block(OwnParameters):
     """A python-control system made from a record; see `block`.
 
@@ -131,6 +169,20 @@ class Block(OwnParameters):
         if values:
             self.spec = self._resolved(values)
             set_parameters(self, None)
+
+    def answer(self, t: float, x: Any, u: Any) -> Any:
+        """Return its outputs; of a transport delay what `past` says, see there."""
+        if not is_delayed(self):
+            return super().answer(t, x, u)
+        line = (_PAST.get() or {}).get(id(self))
+        if line is None:
+            raise UsageError(
+                f"block '{self.name}' delays its signals, and python-control does not keep the "
+                "past: use nlctl.input_output_response (engine='python-control' is the reference); "
+                "to linearize, put ct.ss(ct.tf(*ct.pade(delay, n))) in its place"
+            )
+        line.arriving = np.array(u, dtype=float).reshape(-1)
+        return line.leaving(float(t))
 
     def _own(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return the overrides among `params` that are this block's, by field name."""
@@ -268,6 +320,11 @@ def _check_timebase(spec: Any, name: str, dt: Any) -> None:
     is_number = isinstance(dt, int | float | np.number)
     if not (dt is None or dt is True or (is_number and 0 <= dt < np.inf and dt is not False)):
         raise ParameterError(f"{who} needs dt >= 0 in s, True or None, got {dt!r}")
+    if getattr(spec, "delayed", False) and dt not in (None, 0):
+        raise ParameterError(
+            f"{who} is in continuous time, got dt={dt}: in discrete time k samples late is "
+            "ct.tf(1, [1] + [0] * k, dt), and nlctl.sampled has delay=..."
+        )
     if not spec.states:
         return
     is_discrete, sampled = bool(getattr(spec, "discrete", False)), dt is True or bool(dt)
@@ -302,6 +359,11 @@ def within(system: Any) -> Any:
     return getattr(system, "inner", system)
 
 
+def is_delayed(system: Any) -> bool:
+    """Whether a block's outputs are its inputs at earlier times."""
+    return bool(getattr(getattr(system, "spec", None), "delayed", False))
+
+
 def sampling_of(system: Any) -> Any:
     """Return the block with the parameters of a sampled block's sampling; None of any other."""
     return getattr(system, "sampling", None)
@@ -323,6 +385,8 @@ def event_count(made: Block) -> int:
 def _probe(made: Block) -> None:
     """Call the equations once: sizes must match, and feedthrough must be declared truly."""
     spec, who = made.spec, f"{type(made.spec).__name__} (block '{made.name}')"
+    if is_delayed(made):
+        return
     x, u, p = default_state(made), np.full(made.ninputs or 0, 0.25), current_parameters(made)
     with np.errstate(all="ignore"):
         results = [("output", spec.output, made.noutputs)]

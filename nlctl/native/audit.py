@@ -16,6 +16,8 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
+from ..blocks import DelayLine, is_delayed, past
+from ..delays.lines import delayed_blocks
 from ..errors import ParameterError, UsageError
 from ..sampling.system import Happening, happening
 from ..upstream.control_internals import outputs_now, rates_now, set_parameters
@@ -24,7 +26,7 @@ from .codegen.lower import lower
 from .codegen.program import instants_of
 from .compiled import Compiled
 from .diagram.block_inputs import block_inputs
-from .diagram.schedule import Signal
+from .diagram.schedule import Signal, signal_name
 from .machine.evaluations import Machine, prepared_parameters
 from .machine.routine import lowered_code
 
@@ -112,12 +114,12 @@ def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
 
 def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
     """Return what machine code computes at a point."""
-    system, events = compiled.system, compiled.program.events
+    events = compiled.program.events
     rows = np.array(compiled.program.sampled, dtype=int)
 
     def several(t: float, x: np.ndarray, u: np.ndarray) -> Values:
         tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), code.width, axis=1) for v in (t, x, u))
-        dx, y = np.empty_like(xx), np.empty((system.noutputs or 0, code.width))
+        dx, y = np.empty_like(xx), np.empty((len(compiled.schedule.outputs), code.width))
         code.rhs(tt[0].copy(), xx, uu, c, dx, np.empty((events, code.width)))
         code.out(tt[0].copy(), xx, uu, c, y)
         found = [dx[:, -1], y[:, -1]]
@@ -159,7 +161,8 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
         return
     shaken = _shaken(compiled, point, trial, theirs)
     after = [system.state_labels[i] for i in compiled.program.sampled]
-    names = [system.state_labels, system.output_labels, *[after] * (len(ours) - 2)]
+    arrivals = [signal_name(compiled.schedule.nodes, s) for s in compiled.schedule.lines]
+    names = [system.state_labels, [*system.output_labels, *arrivals], *[after] * (len(ours) - 2)]
     for labels, a, b, moved in zip(names, ours, theirs, shaken, strict=True):
         wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
         if wrong.size:
@@ -175,14 +178,30 @@ def _close(a: np.ndarray, b: np.ndarray, relative: float = _ROUNDING, absolute: 
 
 def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> Values:
     system, given = compiled.system, {"params": dict(trial.params)} if trial.params else {}
-    with happening():
+    lines, point = _lines(compiled, point)
+    with past(lines), happening():
         rates = system.dynamics(*point, **given) if system.nstates else np.empty(0)
         outputs = system.output(*point, **given) if system.noutputs else np.empty(0)
+    arriving = [line.arriving for line in lines.values()]
     after, rows = [], list(compiled.program.sampled)
     for what in trial.meetings:
-        with happening(what):
+        with past(lines), happening(what):
             after.append(system.dynamics(*point, **given)[rows])
+    outputs = np.concatenate([np.reshape(outputs, -1), *arriving])
     return tuple(np.asarray(v, dtype=float).reshape(-1) for v in (rates, outputs, *after))
+
+
+def _lines(compiled: Compiled, point: Any) -> tuple[dict[Any, DelayLine], Any]:
+    """Return what leaves transport delays, and the point with the diagram's own inputs."""
+    t, x, u = point
+    own, lines = compiled.system.ninputs or 0, {}
+    at = own
+    for made in delayed_blocks(compiled.system) if compiled.schedule.lines else ():
+        count = made.noutputs or 0
+        values = u[at : at + count]
+        line = DelayLine(leaving=lambda t, values=values: values, arriving=np.full(count, np.nan))
+        lines[made], at = line, at + count
+    return lines, (t, x, u[:own])
 
 
 def _rounded(t: float, trial: Trial) -> float:
@@ -224,9 +243,11 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
     y = _signals(compiled, trial, point)
     counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
     outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
-    given = list(block_inputs(compiled.system, u, outputs))
+    given = list(block_inputs(compiled.system, u[: compiled.system.ninputs or 0], outputs))
     for i in dict.fromkeys((*compiled.schedule.order, *range(len(nodes)))):
         node, (block, inputs) = nodes[i], given[i]
+        if is_delayed(block):
+            continue
         own = slice(node.state_offset, node.state_offset + (block.nstates or 0))
         pairs = [(outputs[i], outputs_now, block.output_labels)]
         pairs += [(ours[0][own], rates_now, block.state_labels)] if block.nstates else []

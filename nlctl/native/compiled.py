@@ -204,6 +204,11 @@ class Compiled:
     def _call(
         self, function: Rhs, size: int | None, t: float, x: Any, u: Any, params: Any, *more: Any
     ):
+        if self.schedule.lines:
+            raise UsageError(
+                f"'{self.system.name}' has transport delays: what it does depends on the past, "
+                "which only a run knows"
+            )
         x, u = (np.array(v, dtype=float).reshape(-1) for v in (x, u))
         for what, given, wanted in (("x", x, self.system.nstates), ("u", u, self.system.ninputs)):
             if given.size != (wanted or 0):

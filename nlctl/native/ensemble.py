@@ -202,18 +202,18 @@ def ensemble_response(
                 samples[number, : run.time.size] = run.outputs[labels.index(signal)]
             rows[number] = _row(run, labels, metrics)
             if number in audited:
-                _audit(every, number, run, u, audit)
+                _audit(every, number, run, audit)
         return rows
 
     rows = _run(one, every.size, threads or cores(), progress)
     return Ensemble(table=_table(every, rows), time=times, signals=kept)
 
 
-def _audit(every: Members, number: int, run: Trajectory, u: np.ndarray, wanted: Audit) -> None:
+def _audit(every: Members, number: int, run: Trajectory, wanted: Audit) -> None:
     """Compare one member with python-control."""
     _, p = every.batch(range(number, number + 1), 1)
     trial = Trial(
-        time=run.time, states=run.states, inputs=u, p=p[:, 0], params=every.given(number),
+        time=run.time, states=run.states, inputs=run.inputs, p=p[:, 0], params=every.given(number),
         width=ENSEMBLE_WIDTH,
     )  # fmt: skip
     compare(every.compiled, trial, wanted)
@@ -271,7 +271,7 @@ def _ran(
         run = prepared(compiled, times, inputs, *members, settings)
         begin(run)
         while stop.wanted and np.any(run.lanes["status"] == RUNNING):
-            go_on(run)
+            run = go_on(run)
         return run, finish(run)
 
 

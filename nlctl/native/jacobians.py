@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 from scipy.linalg import expm
 
+from ..delays.lines import delayed_blocks
 from ..errors import CompileError, ParameterError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
@@ -67,9 +68,15 @@ def tangent(compiled: Compiled) -> Tangent:
     Raises
     ------
     CompileError
-        If a function is opaque.
+        If a function is opaque, or there are transport delays.
     """
     found = compiled.equations
+    if compiled.schedule.lines:
+        delays = ", ".join(f"'{b.name}'" for b in delayed_blocks(compiled.system))
+        raise CompileError(
+            f"'{compiled.system.name}' has the transport delays {delays}, and so no finite state: "
+            "put ct.ss(ct.tf(*ct.pade(delay, n))) in the place of each"
+        )
     names = ("dx", "y", *(name for name in found.results if name.startswith("sample")))
     why = inexact(compiled, names)
     if why is not None:
@@ -77,7 +84,7 @@ def tangent(compiled: Compiled) -> Tangent:
             f"'{compiled.system.name}' has no exact derivatives, since {why}: use "
             "ct.linearize(diagram), which takes differences"
         )
-    n, m = compiled.system.nstates or 0, compiled.system.ninputs or 0
+    n, m = compiled.system.nstates or 0, compiled.schedule.ninputs
     starts = {"x": 0, "u": n, "p": n + m}
     rows = {name: along(found, name, starts) for name in names}
     return Tangent(rows=rows, assumed=dict(found.graph.assumptions))

@@ -58,7 +58,9 @@ def respond(
         u = interpolated(u, times, grid)
     p = compiled.parameter_vector(params)
     made = trajectory(compiled, grid, u, x0, p, settings, progress)
-    trial = Trial(time=made.time, states=made.states, inputs=u, p=p, params=params, width=1)
+    trial = Trial(
+        time=made.time, states=made.states, inputs=made.inputs, p=p, params=params, width=1
+    )
     compare(compiled, trial, audit)
     run = made.statistics
     if run.status is Status.STOPPED and not ignore_errors:

@@ -11,11 +11,13 @@ import control as ct
 import numpy as np
 from scipy.integrate import OdeSolver
 
+from ..delays.lines import delayed_blocks
 from ..diagrams import leaves
 from ..errors import DivergedError, ParameterError
 from ..names import unknown
 from ..sampling.system import Sampled
 from .arguments import RunArguments, evaluation_array, input_array, state_array
+from .delayed import Past, by_steps, with_delays
 from .sampled import from_sample_to_sample
 from .time_response import as_response
 
@@ -51,8 +53,7 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
         if wanted.size == 1 and system.isdtime(strict=True):
             raise ParameterError("evaluation_times of a sampled system needs two times, got one")
     simulate: Any = ct.input_output_response  # its types are those of the defaults
-    if any(isinstance(leaf.system, Sampled) for leaf in leaves(system)):
-        simulate = partial(from_sample_to_sample, simulate)
+    simulate = _between(simulate, system)
     watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
     method = solver["method"] or solver["solve_ivp_method"] or "LSODA"
     scipys = isinstance(method, type) and issubclass(method, OdeSolver)
@@ -81,6 +82,19 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     if not np.all(np.isfinite(response.y)):
         raise _diverged(system, watch.reached)
     return as_response(response)
+
+
+def _between(simulate: Any, system: Any) -> Any:
+    """Return what simulates between samples, and by steps where signals are delayed."""
+    is_sampled = any(isinstance(leaf.system, Sampled) for leaf in leaves(system))
+    if not delayed_blocks(system):
+        return partial(from_sample_to_sample, simulate) if is_sampled else simulate
+
+    def with_known(known: Past, *given: Any, **settings: Any) -> Any:
+        steps = partial(by_steps, simulate, known)
+        return (partial(from_sample_to_sample, steps) if is_sampled else steps)(*given, **settings)
+
+    return partial(with_delays, with_known)
 
 
 @dataclass

@@ -42,8 +42,15 @@ class OwnParameters(ct.NonlinearIOSystem):
         """Return what the equations get, of the overrides of a run."""
         raise NotImplementedError
 
+    def answer(self, t: float, x: Any, u: Any) -> Any:
+        """Return its outputs, with the parameters that it has now."""
+        return super()._out(t, x, u)
+
     def _update_params(self, params: Mapping[str, Any] | None) -> None:
         self._current_params = self.taken(params or {})
+
+    def _out(self, t: float, x: Any, u: Any) -> Any:
+        return self.answer(t, x, u)
 
 
 class Around(ct.NonlinearIOSystem):

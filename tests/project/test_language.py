@@ -8,7 +8,7 @@ import pytest
 from places import ROOT
 
 TERMS = {  # what is not said -> what is
-    r"\bdelivers\b(?! : )|\bdelivered\b": "outputs, is an output of",
+    r"\bdelivers\b(?! : |=)|\bdelivered\b": "outputs, is an output of",
     r"\bwhole numbers?\b": "integer",
     r"\bforeign\b": "third-party",
     r"\bside by side\b": "batched, together",

@@ -75,7 +75,7 @@ def _made(compiled: Compiled) -> Any:
     equations = compiled.equations
     if inexact(compiled) is not None:
         return None
-    n, m = compiled.system.nstates or 0, compiled.system.ninputs or 0
+    n, m = compiled.system.nstates or 0, compiled.schedule.ninputs
     rows = along(equations, "dx", {"x": 0, "u": n, "t": n + m})
     lowered = lower_along(compiled.schedule, compiled.program, equations, rows, DIRECTIONS)
     pieces = [piece for _, array in equations.results["dx"] for piece in array.pieces()]

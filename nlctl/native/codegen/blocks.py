@@ -93,11 +93,12 @@ def equations(
         loop is opaque.
     """
     system = schedule.system
-    sizes = {"t": 1, "x": system.nstates or 0, "u": system.ninputs or 0, "p": length(layout)}
-    samplings = {id(h.system): i for i, h in enumerate(schedule.holders)}
+    sizes = {"t": 1, "x": system.nstates or 0, "u": schedule.ninputs, "p": length(layout)}
     reader = Reader(
-        graph=Graph(sizes), layout=layout, blocks=schedule.nodes, p=p, samplings=samplings
-    )
+        graph=Graph(sizes), layout=layout, blocks=schedule.nodes, p=p,
+        samplings={id(h.system): i for i, h in enumerate(schedule.holders)},
+        lines={line: (system.ninputs or 0) + k for k, line in enumerate(schedule.lines)},
+    )  # fmt: skip
     with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
         reader.read(schedule)
         results = {
@@ -181,6 +182,8 @@ class Reader:
         By name.
     what : frozenset of Moment
         What happens to sampled blocks.
+    lines : mapping
+        Outputs of transport delays, and which input stands for each.
     samplings : mapping
         Where in the layout the parameters of a sampling are, by its identity.
     """
@@ -196,6 +199,7 @@ class Reader:
     solvers: dict[str, Solver] = field(default_factory=dict)
     fixed_points: dict[str, list[Expr]] = field(default_factory=dict)
     what: Happening = frozenset()
+    lines: Mapping[Signal, int] = field(default_factory=dict)
     samplings: Mapping[int, int] = field(default_factory=dict)
 
     def read(self, schedule: Schedule) -> None:
@@ -281,6 +285,8 @@ class Reader:
 
     def _own_outputs(self, i: int, unknown: Collection[int]) -> Tracer:
         node, system = self.blocks[i], self.blocks[i].system
+        if Signal(i, 0) in self.lines:
+            return leaf_vector(self.graph, "u", self.lines[Signal(i, 0)], (system.noutputs,))
         linear = isinstance(system, ct.StateSpace)
         if not linear and (system.outfcn is None or not system.noutputs):
             return self._states(node)[: system.noutputs or 0]

@@ -170,7 +170,7 @@ def _lowered(
     stores, exact = rewritten(found.graph, wanted)
     parameters = length(program.layout)
     functions, size = _planned(stores, arguments, parameters)
-    n, m = schedule.system.nstates or 0, schedule.system.ninputs or 0
+    n, m = schedule.system.nstates or 0, schedule.ninputs
     rows = {
         "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n, "g": program.events,
         "y": len(schedule.outputs), "v": n + m + 1, "s": len(program.sampled),

@@ -16,7 +16,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...blocks import within
+from ...blocks import is_delayed, within
+from ...delays.lines import delayed_blocks
 from ...diagrams import places, samplings
 from ...sampling.system import Happening, Sampled
 from ..thirdparty.captured import Captured, noted
@@ -104,7 +105,10 @@ class Schedule:
     unknown : tuple of frozenset of int
         For every entry of `order` the inputs of the block that are not known yet.
     outputs : tuple of mappings
-        Linear combination of signals that makes each output of the diagram.
+        Linear combination of signals that makes each output of the diagram, and then of what
+        arrives at each line.
+    lines : tuple of Signal
+        Outputs of transport delays.  A run gives them as further inputs.
     loops : tuple of Loop
         Parts of the order that are solved for; empty unless that was asked for.
     captured : tuple of Captured
@@ -121,11 +125,17 @@ class Schedule:
     loops: tuple[AlgebraicLoop, ...]
     captured: tuple[Captured, ...]
     samplings: tuple[Node, ...] = ()
+    lines: tuple[Signal, ...] = ()
 
     @property
     def holders(self) -> tuple[Node, ...]:
         """All that has parameters, in their order."""
         return (*self.nodes, *self.samplings)
+
+    @property
+    def ninputs(self) -> int:
+        """Number of inputs: those of the diagram, then a line for each delayed signal."""
+        return (self.system.ninputs or 0) + len(self.lines)
 
     @property
     def simple(self) -> bool:
@@ -174,11 +184,19 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
         )
         for place, one, reading in zip(wiring.blocks, blocks, readings, strict=True)
     )
-    outputs = tuple(wiring.output(wiring.top, i) for i in range(system.noutputs or 0))
+    delayed_blocks(system)  # whether each can be
+    lines = tuple(
+        Signal(i, k)
+        for i, node in enumerate(nodes)
+        if is_delayed(node.system)
+        for k in range(node.system.noutputs or 0)
+    )
+    outputs = [wiring.output(wiring.top, i) for i in range(system.noutputs or 0)]
+    outputs += [nodes[line.block or 0].inputs[line.index] for line in lines]
     return _ordered(
         Schedule(
-            system=system, nodes=nodes, order=(), unknown=(), outputs=outputs, loops=(),
-            captured=tuple(read), samplings=tuple(_samplings(system)),
+            system=system, nodes=nodes, order=(), unknown=(), outputs=tuple(outputs), loops=(),
+            captured=tuple(read), samplings=tuple(_samplings(system)), lines=lines,
         ),
         solve_loops,
     )  # fmt: skip

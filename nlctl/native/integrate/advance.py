@@ -12,6 +12,7 @@ import numba
 import numpy as np
 
 from .control import choose_method, choose_step, next_step, rejected, shorten
+from .delays import is_full, keep, look_within, unresolved
 from .events import AGAIN, CLEAR, EVENT, locate, step_accepted
 from .excursions import SHORTER, unforeseen, without_excursion
 from .methods import explicit, rodas5p
@@ -65,13 +66,14 @@ def _judge(task, lanes, w, done, passed):
         if found == AGAIN:
             lane.rejected += 1
             continue
-        part = 1.0
-        if free and not lane.stiff:  # memories have slopes, and their stages too much noise
-            part = without_excursion(task, w, memories == 0, j)
+        # memories have slopes, and their stages too much noise
+        part = without_excursion(task, w, memories == 0, j) if free and not lane.stiff else 1.0
         if part < 1.0:
             shorten(lane, part)
             continue
-        t_new = next_stop(task, lane, j, w.u) if lane.ends else lane.t + lane.step
+        if task.delays.shape[0] and unresolved(task, lane, w, j, found == EVENT):
+            continue
+        t_new = next_stop(task, lane, w, j) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
             _sample(lane, j, task, t_new, w)
         step_accepted(lane, found == EVENT)
@@ -134,9 +136,9 @@ def advance(rhs, point, along, task, w, rounds):
         for j in range(lanes.size):
             if lanes[j].status == RUNNING:
                 over = lanes[j].segment == task.times.size - 1
-                choose_step(lanes[j], next_stop(task, lanes[j], j, w.u), over, task.max_steps)
+                choose_step(lanes[j], next_stop(task, lanes[j], w, j), over, task.max_steps)
                 running += lanes[j].status == RUNNING
-        if not running:
+        if not running or is_full(task, lanes, w):
             return
         if lanes[0].stiff and task.derivatives == UNKNOWN:
             lanes[0].status = DERIVATIVES
@@ -145,6 +147,8 @@ def advance(rhs, point, along, task, w, rounds):
             stiff_attempt(rhs, point, along, task, lanes, w)
         else:
             explicit.explicit_attempt(rhs, task, lanes, w)
+        if task.delays.shape[0]:
+            look_within(task, lanes, w)
         if task.memory.size:
             for j in range(lanes.size):
                 w.t_end[j] = lanes[j].t + lanes[j].step
@@ -154,10 +158,12 @@ def advance(rhs, point, along, task, w, rounds):
                 w.e[i, j] = w.g[i, j]
         any_passed = _judge(task, lanes, w, done, passed)
         _take(task, w, done)
+        delays = task.delays.shape[0] > 0
+        jumped = delays and keep(task, lanes, w, done, passed)
         if task.ticks.size and take_samples(task, lanes, w, sampled):
             for j in range(lanes.size):
-                passed[j] = sampled[j] or (passed[j] and task.memory.size > 0)
+                passed[j] = sampled[j] or (passed[j] and (task.memory.size > 0 or delays))
             begin_afresh(task, lanes, w, sampled)
             restart(rhs, task, lanes, w, passed)
-        elif task.memory.size and any_passed:
+        elif jumped or (task.memory.size and any_passed):
             restart(rhs, task, lanes, w, passed)

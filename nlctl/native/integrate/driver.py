@@ -16,6 +16,7 @@ from ...sampling.clock import Instants
 from ..codegen.along import Along, derivatives
 from ..codegen.program import instants_of
 from ..compiled import Compiled
+from ..histories import lines_of, with_past, with_room
 from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
 from .discrete import simulate_discrete
@@ -115,12 +116,13 @@ class Statistics:
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory:
-    """One run: times that were reached, outputs (outputs, m), states (states, m)."""
+    """One run: times that were reached, outputs (outputs, m), states (states, m), inputs."""
 
     time: np.ndarray
     outputs: np.ndarray
     states: np.ndarray
     statistics: Statistics
+    inputs: np.ndarray  # and what leaves transport delays, (inputs, m)
 
 
 def trajectory(
@@ -140,7 +142,7 @@ def trajectory(
         try:
             begin(run)
             while run.lanes["status"][0] == RUNNING:
-                go_on(run)
+                run = go_on(run)
                 run = differentiated(compiled, run, p)
                 if progress is not None:
                     progress(float(run.lanes["t"][0]))
@@ -162,7 +164,13 @@ def _sampled(
         accepted=done,
         rejected=0,
     )
-    return Trajectory(time=times[:done], outputs=outputs, states=states, statistics=run)
+    return Trajectory(
+        time=times[:done],
+        outputs=outputs,
+        states=states,
+        statistics=run,
+        inputs=inputs[:, :done],
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,12 +205,14 @@ def begin(run: Run) -> None:
     run.work.samples[0] = run.work.x
 
 
-def go_on(run: Run, rounds: int = ROUNDS) -> None:
+def go_on(run: Run, rounds: int = ROUNDS) -> Run:
     """Try up to `rounds` steps in every lane that is still running."""
+    run = replace(run, work=with_room(run.task, run.work))
     rhs, _ = run.machine.entries
     point, along = (0, 0) if run.along is None else run.along.entries
     integrators()["advance"](rhs, point, along, run.task, run.work, rounds)
     run.machine.check(run.task.p)
+    return run
 
 
 def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
@@ -222,7 +232,7 @@ def finish(run: Run) -> np.ndarray:
     """Return the outputs, shape (m, outputs, members); memories get their values in the samples."""
     integrators()["outputs"](*run.machine.entries, run.task, run.work)
     run.machine.check(run.task.p)
-    return run.work.y
+    return np.ascontiguousarray(run.work.y[:, : run.task.outputs])
 
 
 def prepared(
@@ -234,7 +244,8 @@ def prepared(
     settings: Settings,
 ) -> Run:
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
-    program, count = compiled.program, x0.shape[1]
+    program, count, read = compiled.program, x0.shape[1], compiled.schedule
+    method = _method(compiled, settings)
     due = instants_of(compiled.schedule, program, times, p)
     code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     c = np.zeros((code.rows, count))
@@ -251,7 +262,7 @@ def prepared(
         atol=float(settings.atol),
         fixed=float(settings.step),
         max_steps=int(settings.max_steps),
-        method=EXPLICIT if isinstance(settings.method, Tableau) else METHODS[settings.method],
+        method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
         pair_order=float(settings.pair.order),
         stable=float(settings.pair.stable),
         **settings.pair.arrays(),
@@ -259,15 +270,30 @@ def prepared(
         **_instants(compiled, code, due),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
+        **lines_of(compiled, p),
+        signals=code.signal_entry,
+        outputs=compiled.system.noutputs or 0,
         **_linear_equations(len(x0), WHOLE),
     )
-    signals = compiled.system.noutputs or 0
     work = new_work(
-        x0, times, inputs.shape[0], program.events, signals, len(program.sampled),
-        settings.pair.stages,
+        x0, times, inputs.shape[0] + len(read.lines), program.events, len(read.outputs),
+        len(program.sampled), len(read.lines), settings.pair.stages,
     )  # fmt: skip
-    work.lanes["stiff"] = settings.method == "rodas5p"
+    work.lanes["stiff"] = method == "rodas5p"
+    work = with_past(compiled, task, work, p)
     return Run(machine=code, task=task, work=work)
+
+
+def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
+    """Return the method of a run; what has delays is for the explicit one."""
+    if not compiled.schedule.lines:
+        return settings.method
+    if settings.method not in ("auto", "tsit5"):
+        raise ParameterError(
+            f"'{compiled.system.name}' has transport delays, which method='tsit5' integrates, got "
+            f"method={settings.method!r}"
+        )
+    return "tsit5"
 
 
 def _linear_equations(n: int, order: Elimination) -> dict[str, Any]:
@@ -316,5 +342,9 @@ def made(run: Run, outputs: np.ndarray, j: int) -> Trajectory:
         stiff=bool(lane["stiff"]),
     )
     return Trajectory(
-        time=times[:done], outputs=outputs[:done].T, states=states[:done].T, statistics=statistics
+        time=times[:done],
+        outputs=outputs[:done].T,
+        states=states[:done].T,
+        statistics=statistics,
+        inputs=np.concatenate([run.task.inputs[:, :done], run.work.shown[:done, :, j].T]),
     )

@@ -25,7 +25,7 @@ from ...upstream.numba_internals import (
 )
 
 _INT = ir.IntType(64)
-_ENTRY = 4  # numbers in the table for each field: a number, or an address and up to three lengths
+_ENTRY = 5  # numbers in the table for each field: a number, or an address and up to four lengths
 
 
 class Pointed(types.Type):

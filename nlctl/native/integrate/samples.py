@@ -6,22 +6,25 @@ import numba
 import numpy as np
 
 from ..machine.address import call_out
+from .delays import next_break
 from .state import INNER, RUNNING
 from .workspace import inputs_at
 
 
 @numba.njit(**INNER)
-def next_stop(task, lane, j, u):
+def next_stop(task, lane, w, j):
     """Return where a step must end.
 
-    That is when something happens to sampled blocks, with inputs at their next corner, and at the
-    last time.
+    That is when something happens to sampled blocks, with inputs at their next corner, where a
+    break leaves a transport delay, and at the last time.
     """
     times = task.times
     stop = times[-1]
-    if u.shape[0] and lane.segment < times.size - 1:
+    if task.inputs.shape[0] and lane.segment < times.size - 1:
         stop = times[lane.segment + 1]
-    return min(stop, task.ticks[j, lane.tick]) if lane.tick < task.ticks.shape[1] else stop
+    if lane.tick < task.ticks.shape[1]:
+        stop = min(stop, task.ticks[j, lane.tick])
+    return next_break(task, w, lane, j, stop) if task.delays.shape[0] else stop
 
 
 @numba.njit(**INNER)
@@ -42,7 +45,7 @@ def take_samples(task, lanes, w, sampled):
         if not wanted:
             continue
         if w.u.shape[0]:
-            inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+            inputs_at(task, lanes, w)
         call_out(task.samples[k], w.t, w.x, w.u, task.p, w.s)
         for j in range(lanes.size):
             if sampled[j] and task.which[j, lanes[j].tick] == k:
@@ -63,7 +66,7 @@ def begin_afresh(task, lanes, w, sampled):
         lane = lanes[j]
         if not sampled[j]:
             continue
-        gap = next_stop(task, lane, j, w.u) - lane.t
+        gap = next_stop(task, lane, w, j) - lane.t
         lane.h = task.fixed if task.fixed > 0.0 else max(gap, 1e-12 * abs(lane.t))
         lane.log_error_before = lane.last = lane.low = lane.high = 0.0
         lane.tries = lane.same_side = lane.short = lane.quiet = lane.slow = 0

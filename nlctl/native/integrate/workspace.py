@@ -19,6 +19,7 @@ from .state import DIRECTIONS, INNER, new_lanes
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
 UNKNOWN, DIFFERENCES, EXACT = 0, 1, 2  # where the stiff method has its Jacobian from
+DEGREE = 5  # of the polynomials that delayed signals are kept as
 
 
 class Task(NamedTuple):
@@ -48,6 +49,10 @@ class Task(NamedTuple):
     sampled: np.ndarray  # indices of these states
     derivatives: int  # UNKNOWN until the stiff method asks for them
     c_along: np.ndarray  # what exact ones read besides their arguments
+    delays: np.ndarray  # (lines, lanes) in s
+    direct: np.ndarray  # (lines, lines): whether what arrives at one is what leaves the other
+    signals: np.ndarray  # the function that fills the outputs, and then what arrives at the lines
+    outputs: int  # number of the outputs
     cost: float  # of a step of the stiff method, in explicit ones
     order: np.ndarray  # of pivots, and where their entries are: see `lu.Elimination`
     below: np.ndarray
@@ -108,6 +113,21 @@ class Work(NamedTuple):
     u_along: np.ndarray
     v: np.ndarray  # the directions
     finite: np.ndarray
+    past: np.ndarray  # polynomials of the lines' signals: (steps, lines, powers, lanes)
+    past_t: np.ndarray  # when these steps began
+    past_h: np.ndarray  # and how long they were
+    level: np.ndarray  # (steps, lines, lanes): which derivative jumps at their beginnings
+    kept: np.ndarray  # how many there are
+    first: np.ndarray  # (lines, lanes): the break that has arrived last
+    next: np.ndarray  # and that will arrive next, -1 if none is known
+    fresh: np.ndarray  # which derivative jumps now
+    since: np.ndarray  # when the step being tried began
+    seen: np.ndarray  # outputs and signals at nodes of that step
+    tried: np.ndarray  # its polynomials
+    missed: np.ndarray  # what these miss, over its tolerance; -1 where it is a jump
+    missed_at_end: np.ndarray
+    shown: np.ndarray  # what leaves the lines at the task's times: (times, lines, lanes)
+    shown_to: np.ndarray  # up to which of these
     table: np.ndarray
 
 
@@ -121,9 +141,13 @@ def new_work(
     events: int,
     outputs: int,
     sampled: int = 0,
+    lines: int = 0,
     stages: int = 3,
 ) -> Work:
-    """Return the arrays for integrating members from `x0` (states, lanes) on."""
+    """Return the arrays for integrating members from `x0` (states, lanes) on.
+
+    The inputs include the lines, and so do the outputs what arrives there.
+    """
     n, lanes = x0.shape
     stiff = n if lanes == 1 else 0  # the stiff method is for single runs
     shapes: dict[str, tuple[int, ...]] = {
@@ -146,6 +170,7 @@ def new_work(
         "u_along": (inputs, DIRECTIONS),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    arrays |= _past(times.size, outputs, lines, lanes)
     arrays["x"][:] = x0
     for name, rows in (("samples", n), ("y", outputs)):
         arrays[name] = np.full((times.size, rows, lanes), np.nan)
@@ -156,6 +181,25 @@ def new_work(
     pivots = np.zeros(stiff, dtype=np.int64)
     records = new_lanes(times, lanes)
     return with_table(Work, lanes=records, **arrays, **flat, k_flat=k_flat, pivots=pivots)
+
+
+def _past(times: int, outputs: int, lines: int, lanes: int) -> dict[str, np.ndarray]:
+    """Return the arrays for delayed signals; there is no place for a step yet."""
+    shapes: dict[str, tuple[int, ...]] = {
+        "past": (0, lines, DEGREE + 1, lanes),
+        **dict.fromkeys(("past_t", "past_h"), (0, lanes)),
+        **dict.fromkeys(("since", "missed", "missed_at_end"), (lanes,)),
+        "seen": (DEGREE + 3 if lines else 0, outputs, lanes),
+        "tried": (lines, DEGREE + 1, lanes),
+        "shown": (times, lines, lanes),
+    }
+    counts: dict[str, tuple[int, ...]] = {
+        "level": (0, lines, lanes),
+        **dict.fromkeys(("first", "next", "fresh"), (lines, lanes)),
+        **dict.fromkeys(("kept", "shown_to"), (lanes,)),
+    }
+    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    return arrays | {name: np.zeros(shape, dtype=np.int64) for name, shape in counts.items()}
 
 
 def directions(n: int, inputs: int) -> np.ndarray:
@@ -174,6 +218,7 @@ TASK = type_of(  # only the types of these matter
         fixed=0.0, max_steps=0, method=0, pair_order=0.0, stable=0.0, A=_GRID, B=_GRID,
         C=_LINE, E=_LINE, alone=0, ticks=_GRID, which=_PLACES, samples=_NONE,
         due=_PLACES, sampled=_NONE, derivatives=0, c_along=_GRID,
+        delays=_GRID, direct=_PLACES, signals=_NONE, outputs=0,
         cost=0.0, order=_NONE, below=_NONE, below_start=_NONE, right=_NONE, right_start=_NONE,
         source=_NONE, target=_NONE,
     )
@@ -182,21 +227,52 @@ WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
 
 
 @numba.njit(**INNER)
-def inputs_at(t, times, inputs, lanes, u):
-    """Fill `u` with the inputs at each lane's time: linear within a segment of the time grid."""
+def inputs_at(task, lanes, w):
+    """Fill w.u with the inputs at the times w.t: linear within a segment of the time grid.
+
+    What leaves transport delays then follows behind them.
+    """
+    t, times, inputs, u = w.t, task.times, task.inputs, w.u
     for j in range(lanes.size):
         m = min(lanes[j].segment, times.size - 2)  # a lane that has finished is not moved on
         share = (t[j] - times[m]) / (times[m + 1] - times[m])
-        for i in range(u.shape[0]):
+        for i in range(inputs.shape[0]):
             first, last = inputs[i, m], inputs[i, m + 1]  # exact at both, and where they are equal
             u[i, j] = last if share == 1.0 else first + share * (last - first)
+    for i in range(task.delays.shape[0]):
+        for j in range(lanes.size):
+            u[inputs.shape[0] + i, j] = past_value(task, w, i, j, t[j])
+
+
+@numba.njit(**INNER)
+def past_value(task, w, i, j, t):
+    """Return what leaves line `i` of a lane at time t.
+
+    Of the polynomials between two breaks only, so that rounding never reads the other side.
+    """
+    s = t - task.delays[i, j]
+    low, high = w.first[i, j], w.kept[j] - 1
+    if w.next[i, j] >= 0:
+        high = w.next[i, j] - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if w.past_t[middle, j] <= s:
+            low = middle
+        else:
+            high = middle - 1
+    z = 2.0 * (s - w.past_t[low, j]) / w.past_h[low, j] - 1.0
+    z = min(max(z, -1.0 - 1e-6), 1.0 + 1e-6)  # what looks ahead of a step sees it standing still
+    value = w.past[low, i, DEGREE, j]
+    for n in range(DEGREE - 1, -1, -1):
+        value = value * z + w.past[low, i, n, j]
+    return value
 
 
 @numba.njit(**INNER)
 def evaluate(rhs, task, lanes, w, x, dx, g):
     """Evaluate the right-hand side at the times w.t; memory stands still within a step."""
     if w.u.shape[0]:
-        inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+        inputs_at(task, lanes, w)
     call_rhs(rhs, w.t, x, w.u, task.p, dx, g)
     for i in task.memory:
         for j in range(lanes.size):
@@ -212,8 +288,10 @@ def outputs(rhs, out, task, w):
     for m in range(task.times.size):
         for j in range(w.t.size):
             w.t[j] = task.times[m]
-            for i in range(w.u.shape[0]):
+            for i in range(task.inputs.shape[0]):
                 w.u[i, j] = task.inputs[i, m]
+            for i in range(task.delays.shape[0]):
+                w.u[task.inputs.shape[0] + i, j] = w.shown[m, i, j]
         if task.memory.size:
             call_rhs(rhs, w.t, states[m], w.u, task.p, w.dx_ahead, w.g)
             for i in range(task.memory.size):

@@ -68,6 +68,12 @@ class Machine:
         plain = any(callable(each) for each in found)
         return np.array(found, dtype=object if plain else np.int64)
 
+    @property
+    def signal_entry(self) -> np.ndarray:
+        """What integrators take of `out` to look at delayed signals."""
+        found = entry(self.out)
+        return np.array([found], dtype=object if callable(found) else np.int64)
+
     def check(self, c: np.ndarray) -> None:
         """Raise what an opaque function has raised, with `c` as the parameters."""
         raise_failures((self.rhs, self.out, *self.samples), c)

@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...blocks import Block
+from ...blocks import Block, is_delayed
 from ...errors import CompileError
 from ...params import as_numbers
 from ...upstream.control_internals import current_parameters, outputs_now, rates_now, set_parameters
@@ -80,7 +80,7 @@ def _functions(system: Any) -> Iterator[tuple[str, Any]]:
         return
     if system.nstates:
         yield "update", system.updfcn
-    if system.noutputs != 0 and system.outfcn is not None:
+    if system.noutputs != 0 and system.outfcn is not None and not is_delayed(system):
         yield "output", system.outfcn
     if isinstance(system, Block):
         for name in ("corners", "commit"):

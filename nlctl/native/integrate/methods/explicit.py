@@ -28,7 +28,7 @@ def explicit_attempt(rhs, task, lanes, w):
         for j in range(count):
             w.t[j] = lanes[j].t + task.C[s] * w.h[j]
         if w.u.shape[0]:
-            inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+            inputs_at(task, lanes, w)
         if s < last:
             combined(x, hh, task.A, k, s, w.x_stage_flat)
             call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.g_inside[min(s, 4) - 1])

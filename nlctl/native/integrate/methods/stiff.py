@@ -37,7 +37,7 @@ def _exact(point, along, task, lanes, w):
     n, m, lane = w.x.shape[0], w.u.shape[0], lanes[0]
     wide, last = w.finite.size, n // w.finite.size
     if m:
-        inputs_at(w.t, task.times, task.inputs, lanes, w.u)
+        inputs_at(task, lanes, w)
     for j in range(wide):
         w.t_along[j], w.finite[j] = w.t[0], 0.0
         for i in range(n):

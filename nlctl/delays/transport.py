@@ -1,0 +1,107 @@
+"""The block whose outputs are its inputs at an earlier time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParameterError, UsageError
+from ..params import param, record
+
+
+@record
+class TransportDelay:
+    """Transport delay (dead time) of signals.
+
+        y_i(t) = u_i(t - delay)
+
+    A run knows its signals from its first time t_0 on; earlier they are `before`, or what
+    `history` says.  The delay breaks algebraic loops.  It has no finite state: to linearize, put
+    `control.pade` in its place; a run cannot be resumed from its last state alone.
+
+    Parameters
+    ----------
+    takes, delivers : tuple of str
+        Names of the signals before and after, pairwise.
+    history : callable, optional
+        ``history(t)`` for t <= t_0 instead of `before`: a number, or one for each signal.  It is
+        called in Python, before the run.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> wire = nlctl.block(nlctl.TransportDelay(takes=("x",), delivers=("y",), delay=1.0), "wire")
+    >>> plant = ct.ss(0, -1, 1, 0, inputs="y", outputs="x", name="plant")
+    >>> loop = ct.interconnect([wire, plant], inputs=[], outputs=["x"], inplist=[])
+    >>> run = nlctl.input_output_response(loop, [0, 1, 2], 0, {"plant.x[0]": 1.0})
+    >>> [round(float(x), 6) for x in run.outputs[0]]  # x' = -x(t - 1), and 0 before t = 0
+    [1.0, 1.0, 0.0]
+    """
+
+    takes: tuple[str, ...] = ("u",)
+    delivers: tuple[str, ...] = ("y",)
+    delay: float = param(0.1, unit="s", meaning="time from input to output", above=0, symbol="tau")
+    before: float = param(0.0, unit="1", meaning="signals before the run")
+    history: Callable[[float], Any] | None = None
+
+    states = ()
+    feedthrough = False
+    delayed = True
+
+    def check(self) -> None:
+        """Signals come in pairs; a history is a function."""
+        if len(self.takes) != len(self.delivers) or not self.takes:
+            raise ParameterError(
+                "TransportDelay needs as many signals in takes as in delivers, got "
+                f"{self.takes} and {self.delivers}"
+            )
+        if self.history is not None and not callable(self.history):
+            raise ParameterError(
+                "TransportDelay needs a function of time for history, got "
+                f"{self.history!r}: a constant is called before"
+            )
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The signals before the delay."""
+        return self.takes
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The signals after it."""
+        return self.delivers
+
+    def earlier(self, t: float) -> np.ndarray:
+        """Return the signals at a time before the run.
+
+        Raises
+        ------
+        ParameterError
+            If `history` does not return a finite number, or one for each signal.
+        """
+        count = len(self.takes)
+        if self.history is None:
+            return np.full(count, self.before)
+        try:
+            found = np.asarray(self.history(float(t)), dtype=float).reshape(-1)
+        except Exception as error:
+            raise ParameterError(
+                f"TransportDelay needs a history that is known at t = {t:g} s, but it raises "
+                f"{type(error).__name__}: {error}"
+            ) from error
+        if found.size not in (1, count) or not np.all(np.isfinite(found)):
+            raise ParameterError(
+                f"TransportDelay needs a history that returns {count} finite numbers, got "
+                f"{found.tolist()} at t = {t:g} s"
+            )
+        return np.broadcast_to(found, (count,)).astype(float)
+
+    @staticmethod
+    def output(t: float, x: Any, u: Any, p: Any) -> Any:
+        """Not a function of the present: only a run knows it."""
+        raise UsageError(
+            "a TransportDelay has no output that follows from the present: "
+            "nlctl.input_output_response keeps the past"
+        )

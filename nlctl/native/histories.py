@@ -1,0 +1,174 @@
+"""What a run keeps of signals that are delayed: before it begins, and while it goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ParameterError
+from .integrate.delays import POINTS, POWERS, SMOOTH
+from .integrate.memory import with_table
+from .integrate.workspace import DEGREE, WORK, Work
+
+if TYPE_CHECKING:
+    from .compiled import Compiled
+    from .diagram.schedule import Schedule
+
+_ROOM = 256  # steps that are kept at first
+_NODES = 2 * POINTS - 1
+_BETWEEN = 0.5 * (_NODES[1:] + _NODES[:-1])
+_MISSED = 1e-13  # of a history's largest value
+_HALVINGS = 40
+_KEPT = ("past", "past_t", "past_h", "level")
+
+
+def lines_of(compiled: Compiled, p: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the delays of all lines (lines, lanes), and what acts directly on what."""
+    read = compiled.schedule
+    delays = np.zeros((len(read.lines), p.shape[1]))
+    for row, line in enumerate(read.lines):
+        delays[row] = p[compiled.program.layout[line.block or 0]["delay"].offset]
+    return {"delays": delays, "direct": _direct(read).astype(np.int64)}
+
+
+def with_past(compiled: Compiled, task: Any, work: Any, p: np.ndarray) -> Any:
+    """Return the workspace of a run that begins with what signals were before it."""
+    lines, lanes = task.delays.shape
+    if not lines:
+        return work
+    begin = float(task.times[0])
+    pieces = list(_pieces(_before(compiled), begin, task.delays.max(axis=1)))
+    work = _with_capacity(work, max(_ROOM, 2 * len(pieces)))
+    for k, (start, length, values, jumps) in enumerate(pieces):
+        work.past_t[k], work.past_h[k] = start, length
+        work.past[k] = (values @ POWERS.T)[:, :, None]
+        work.level[k] = 0 if jumps else SMOOTH
+    for row, line in enumerate(read := compiled.schedule.lines):
+        if compiled.schedule.nodes[line.block or 0].system.spec.history is None:
+            slot = compiled.program.layout[line.block or 0]["before"]
+            work.past[: len(pieces), row] = 0.0
+            work.past[: len(pieces), row, 0] = p[slot.offset]
+            work.level[: len(pieces), row] = SMOOTH
+    work.kept[:], work.shown_to[:] = len(pieces), -1
+    for row in range(len(read)):
+        for j in range(lanes):
+            starts = work.past_t[: len(pieces), j]
+            first = int(np.searchsorted(starts, begin - task.delays[row, j], "right")) - 1
+            breaks = np.flatnonzero(work.level[: len(pieces), row, j] < SMOOTH)
+            later = breaks[breaks > max(first, 0)]
+            work.first[row, j] = max(first, 0)
+            work.next[row, j] = later[0] if later.size else -1
+    return work
+
+
+def with_room(task: Any, work: Any) -> Any:
+    """Return the workspace with places for more steps, where there are none.
+
+    What no delay reaches back to is forgotten; if that is less than half, there is more room.
+    """
+    room = work.past_t.shape[0]
+    if not task.delays.size or work.kept.max() < room:
+        return work
+    for j in range(task.delays.shape[1]):
+        kept = work.kept[j]
+        oldest = work.lanes["t"][j] - task.delays[:, j].max()
+        gone = int(np.searchsorted(work.past_t[:kept, j], oldest, "right")) - 1
+        gone = min(max(gone, 0), int(work.first[:, j].max()))
+        gone = max(0, min(gone, *(i - 1 for i in work.next[:, j] if i >= 0), kept - 1))
+        for name in _KEPT:
+            array = getattr(work, name)
+            array[: kept - gone, ..., j] = array[gone:kept, ..., j].copy()
+        work.kept[j] = kept - gone
+        work.first[:, j] = np.maximum(work.first[:, j] - gone, 0)
+        work.next[:, j] = np.where(work.next[:, j] >= 0, work.next[:, j] - gone, -1)
+    return work if work.kept.max() <= room // 2 else _with_capacity(work, 2 * room)
+
+
+def _with_capacity(work: Any, room: int) -> Any:
+    """Return a workspace with places for so many steps."""
+    given = work._asdict()
+    del given["table"]
+    for name in _KEPT:
+        before = given[name]
+        given[name] = np.zeros((room, *before.shape[1:]), dtype=before.dtype)
+        given[name][: before.shape[0]] = before
+    return with_table(Work, like=WORK, **given)
+
+
+def _direct(read: Schedule) -> np.ndarray:
+    """Return which lines' arriving signals depend at once on what leaves which lines."""
+    leaving = {line: i for i, line in enumerate(read.lines)}
+    found: dict[Any, frozenset[int]] = {}
+
+    def reached(combination: Any) -> frozenset[int]:
+        return frozenset().union(*(from_signal(s) for s in combination if s.block is not None))
+
+    def from_signal(signal: Any) -> frozenset[int]:
+        if signal in leaving:
+            return frozenset([leaving[signal]])
+        if signal not in found:
+            found[signal] = frozenset(range(len(leaving)))  # of a loop that is solved: all
+            node = read.nodes[signal.block]
+            given = np.flatnonzero(node.direct[signal.index])
+            found[signal] = frozenset().union(*(reached(node.inputs[int(j)]) for j in given))
+        return found[signal]
+
+    direct = np.zeros((len(leaving), len(leaving)), dtype=bool)
+    for i, arriving in enumerate(read.outputs[len(read.outputs) - len(leaving) :]):
+        direct[i, list(reached(arriving))] = True
+    return direct
+
+
+# -- before the run --------------------------------------------------------------------------------
+
+
+def _before(compiled: Compiled) -> Callable[[float, np.ndarray], np.ndarray]:
+    """Return the signals of all lines at a time, no earlier than their delays reach back to."""
+    nodes = compiled.schedule.nodes
+    blocks = {line.block or 0: None for line in compiled.schedule.lines}
+
+    def values(t: float, earliest: np.ndarray) -> np.ndarray:
+        found, row = [], 0
+        for i in blocks:
+            spec = nodes[i].system.current_spec
+            try:
+                found.append(spec.earlier(max(t, float(earliest[row]))))
+            except ParameterError as error:
+                raise ParameterError(f"{error} (block '{nodes[i].path}')") from None
+            row += len(spec.takes)
+        return np.concatenate(found)
+
+    return values
+
+
+def _pieces(
+    before: Callable[[float, np.ndarray], np.ndarray], begin: float, longest: np.ndarray
+) -> Iterator[tuple[float, float, np.ndarray, bool]]:
+    """Yield when pieces of the past begin, their lengths, values (lines, nodes), and jumps there.
+
+    A piece is halved until a polynomial of its values is its signal; where none is, that jumps.
+    """
+    earliest = begin - longest
+    scale = np.zeros(longest.size)
+    left = [(float(earliest.min()), begin, 0)]
+    jumps = False
+    while left:
+        a, b, halvings = left.pop()
+
+        def at(z: np.ndarray, a: float = a, b: float = b) -> np.ndarray:
+            times = 0.5 * ((b - a) * z + (a + b))
+            return np.array([before(float(t), earliest) for t in times]).T
+
+        values, between = at(_NODES), at(_BETWEEN)
+        powers = values @ POWERS.T
+        guessed = powers @ np.vander(_BETWEEN, DEGREE + 1, increasing=True).T
+        scale = np.maximum(scale, np.abs(values).max(axis=1))
+        fits = np.all(np.abs(guessed - between) <= _MISSED * scale[:, None])
+        if not fits and halvings < _HALVINGS:
+            middle = 0.5 * (a + b)
+            left += [(middle, b, halvings + 1), (a, middle, halvings + 1)]
+            continue
+        yield a, b - a, values, jumps or not fits
+        jumps = not fits

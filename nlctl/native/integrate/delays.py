@@ -1,0 +1,210 @@
+"""Transport delays in a run: what delayed signals were, step by step, and when breaks arrive.
+
+A diagram with delays is integrated by the method of steps: no step is longer than the shortest
+delay, so that what leaves a delay is the past of what arrived there.  That is kept as one
+polynomial of degree 5 for each step, through the signal at Chebyshev points of the dense output;
+how large its last coefficient is belongs to the error of the step.  These points are inside of the
+step: at its end a signal may have jumped already.
+
+Where the derivative of order `level` of a signal jumps, a step ends when that arrives: behind the
+delay the same derivative jumps, and one behind an integrator the next one.  What is smoother than
+the integrator notices is forgotten.  Between breaks a polynomial of one side alone is read.
+
+Arrays have the member ("lane") as their last index, as everywhere here.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from ..machine.address import call_out
+from .control import rejected
+from .methods import explicit
+from .state import INNER, RUNNING
+from .workspace import DEGREE, inputs_at, past_value
+
+SMOOTH = 6  # level that a method of order 5 takes for smooth
+POINTS = 0.5 - 0.5 * np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+# values at the nodes -> coefficients of powers of z = 2 theta - 1
+POWERS = np.ascontiguousarray(np.linalg.inv(np.vander(2 * POINTS - 1, increasing=True)))
+IN_CHEBYSHEV = 2.0 ** (1 - DEGREE)  # of a power of z in the Chebyshev polynomial of the same degree
+JUMP = 1e-10  # of the time: a step so short that its signals still bend in has a jump inside
+ROUNDING = 1e-15  # of the time: two breaks so close are one
+
+
+@numba.njit(**INNER)
+def next_break(task, w, lane, j, stop):
+    """Return where a step must end for the delays of a lane, at `stop` at the latest."""
+    first = stop
+    for i in range(task.delays.shape[0]):
+        tau = task.delays[i, j]
+        first = min(first, lane.t + tau)
+        if w.next[i, j] >= 0:
+            first = min(first, w.past_t[w.next[i, j], j] + tau)
+    return stop if stop - first <= ROUNDING * abs(stop) else first
+
+
+@numba.njit(**INNER)
+def is_full(task, lanes, w):
+    """Whether there is no place for another step in a lane that is running."""
+    for j in range(lanes.size if task.delays.shape[0] else 0):
+        if lanes[j].status == RUNNING and w.kept[j] == w.past_t.shape[0]:
+            return True
+    return False
+
+
+@numba.njit(**INNER)
+def look_within(task, lanes, w):
+    """Look at the signals within the step just tried; and at what polynomials miss of them."""
+    for s in range(DEGREE + 1):
+        for j in range(lanes.size):
+            w.t[j] = lanes[j].t + POINTS[s] * lanes[j].step
+            w.since[j], w.missed[j], w.missed_at_end[j] = lanes[j].t, 0.0, 0.0
+            explicit.interpolate(POINTS[s], lanes[j].step, w.x, w.k, task.B, j, w.x_stage)
+        inputs_at(task, lanes, w)
+        call_out(task.signals[0], w.t, w.x_stage, w.u, task.p, w.seen[s])
+    for j in range(lanes.size):
+        w.t[j] = lanes[j].t
+    inputs_at(task, lanes, w)
+    call_out(task.signals[0], w.t, w.x, w.u, task.p, w.seen[DEGREE + 1])
+    for j in range(lanes.size):
+        w.t[j] = lanes[j].t + lanes[j].step
+    inputs_at(task, lanes, w)
+    call_out(task.signals[0], w.t, w.x_new, w.u, task.p, w.seen[DEGREE + 2])
+    for j in range(lanes.size):
+        _fit(task, w, j)
+
+
+@numba.njit(**INNER)
+def _fit(task, w, j):
+    """Make a lane's polynomials, and compare them with what they do not go through."""
+    own = task.outputs
+    for i in range(task.delays.shape[0]):
+        largest, begin, end, sign = 0.0, 0.0, 0.0, 1.0
+        for n in range(DEGREE + 1):
+            total = 0.0
+            for s in range(DEGREE + 1):
+                total += POWERS[n, s] * w.seen[s, own + i, j]
+            w.tried[i, n, j] = total
+            begin, end, sign = begin + sign * total, end + total, -sign
+            size = abs(w.seen[n, own + i, j])
+            largest = size if size > largest else largest
+        tolerance = task.atol + task.rtol * largest
+        last = IN_CHEBYSHEV * abs(w.tried[i, DEGREE, j]) / tolerance
+        missed = max(last, abs(begin - w.seen[DEGREE + 1, own + i, j]) / tolerance)
+        if missed > w.missed[j] or last != last:  # what is NaN stays so
+            w.missed[j] = missed + 0.0 * last
+        missed = abs(end - w.seen[DEGREE + 2, own + i, j]) / tolerance
+        if missed > w.missed_at_end[j] or missed != missed:
+            w.missed_at_end[j] = missed
+
+
+@numba.njit(**INNER)
+def unresolved(task, lane, w, j, event):
+    """Whether polynomials miss too much of a step in which nothing else is wrong.
+
+    A jump that no switching function tells of is driven into a very short step, and accepted.
+    Right behind an event the signal at the end says nothing of the step.
+    """
+    if not event and not w.missed_at_end[j] <= w.missed[j]:
+        w.missed[j] = w.missed_at_end[j]
+    short = lane.step <= JUMP * max(abs(lane.t), task.delays[0, j])
+    if short and w.missed[j] > 1.0:
+        w.missed[j] = -1.0
+        for i in range(task.delays.shape[0]):
+            w.fresh[i, j] = 0
+        return False
+    if rejected(lane, w.missed[j], task):
+        return True
+    w.error[j] = max(w.error[j], w.missed[j])
+    return False
+
+
+@numba.njit(**INNER)
+def keep(task, lanes, w, done, passed):
+    """Keep the signals of the accepted steps, and let arrive what arrives at their ends.
+
+    ``passed`` becomes where derivatives are to be evaluated anew: at a jump that arrives, and at
+    events if there are memories.  Return whether a jump arrives in any lane.
+    """
+    jumped = False
+    for j in range(lanes.size):
+        if not done[j]:
+            continue
+        _append(task, lanes[j], w, j)
+        _show(task, lanes[j], w, j, False)
+        broke = 0 if passed[j] or w.missed[j] < 0.0 else SMOOTH
+        if lanes[j].t == task.times[lanes[j].segment] and _has_kink(task, lanes[j].segment):
+            broke = min(broke, 1)
+        if lanes[j].tick < task.ticks.shape[1] and task.ticks[j, lanes[j].tick] <= lanes[j].t:
+            broke = 0
+        for i in range(task.delays.shape[0]):
+            w.fresh[i, j] = broke
+        jumps = _arrive(task, lanes[j], w, j)
+        jumped |= jumps
+        passed[j] = jumps or (passed[j] and task.memory.size > 0)
+        _show(task, lanes[j], w, j, True)
+    return jumped
+
+
+@numba.njit(**INNER)
+def _append(task, lane, w, j):
+    k = w.kept[j]
+    w.past_t[k, j], w.past_h[k, j] = w.since[j], lane.t - w.since[j]
+    for i in range(task.delays.shape[0]):
+        for n in range(DEGREE + 1):
+            w.past[k, i, n, j] = w.tried[i, n, j]
+        w.level[k, i, j] = w.fresh[i, j]
+        if w.fresh[i, j] < SMOOTH and w.next[i, j] < 0:
+            w.next[i, j] = k
+    w.kept[j] = k + 1
+
+
+@numba.njit(**INNER)
+def _has_kink(task, m):
+    """Whether an input has a corner at the time m of the grid."""
+    if m == 0 or m >= task.times.size - 1:
+        return False
+    before, after = task.times[m] - task.times[m - 1], task.times[m + 1] - task.times[m]
+    for i in range(task.inputs.shape[0]):
+        rise, next_rise = (
+            task.inputs[i, m] - task.inputs[i, m - 1],
+            (task.inputs[i, m + 1] - task.inputs[i, m]),
+        )
+        if rise * after != next_rise * before:
+            return True
+    return False
+
+
+@numba.njit(**INNER)
+def _arrive(task, lane, w, j):
+    """Go behind the breaks that arrive now; return whether a signal jumps."""
+    jumps = False
+    for i in range(task.delays.shape[0]):
+        while w.next[i, j] >= 0:
+            k = w.next[i, j]
+            if w.past_t[k, j] + task.delays[i, j] > lane.t + ROUNDING * abs(lane.t):
+                break
+            level = w.level[k, i, j]
+            jumps |= level == 0
+            for other in range(task.delays.shape[0]):
+                behind = level if task.direct[other, i] else level + 1
+                w.fresh[other, j] = min(w.fresh[other, j], behind)
+            w.first[i, j], w.next[i, j] = k, -1
+            for later in range(k + 1, w.kept[j]):
+                if w.level[later, i, j] < SMOOTH:
+                    w.next[i, j] = later
+                    break
+    return jumps
+
+
+@numba.njit(**INNER)
+def _show(task, lane, w, j, ends):
+    """Fill what leaves the delays at the output samples that were passed, or at the last one."""
+    m = w.shown_to[j] + 1
+    while m < task.times.size and (task.times[m] < lane.t or (ends and task.times[m] == lane.t)):
+        for i in range(task.delays.shape[0]):
+            w.shown[m, i, j] = past_value(task, w, i, j, task.times[m])
+        w.shown_to[j] = m
+        m += 1
