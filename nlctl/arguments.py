@@ -21,6 +21,7 @@ __all__ = [
     "number",
     "of_type",
     "one_of",
+    "pairs",
     "text",
     "tuple_of",
     "vector",
@@ -46,6 +47,20 @@ def one_of(who: str, name: str, value: Any, options: Iterable[str]) -> Any:
     hint = f"; nearest: '{near[0]}'" if near else ""
     rule = " or ".join(f"'{option}'" for option in options)
     raise ParameterError(f"{who} needs {name} to be {rule}, got {value!r}{hint}")
+
+
+def pairs(who: str, takes: tuple[str, ...], delivers: tuple[str, ...]) -> None:
+    """Check that a block's signals come in pairs, one before it for each behind it.
+
+    Raises
+    ------
+    ParameterError
+        If they do not, or there are none.
+    """
+    if len(takes) != len(delivers) or not takes:
+        raise ParameterError(
+            f"{who} needs as many signals in takes as in delivers, got {takes} and {delivers}"
+        )
 
 
 def number(

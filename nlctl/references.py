@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .arguments import pairs
 from .equations import equation
 from .errors import ParameterError
 from .functions import noise_spectrum, noise_value
@@ -222,11 +223,7 @@ class BandLimitedNoise:
 
     def check(self) -> None:
         """Signals come in pairs; a band has two ends."""
-        if len(self.takes) != len(self.delivers) or not self.takes:
-            raise ParameterError(
-                "BandLimitedNoise needs as many signals in takes as in delivers, got "
-                f"{self.takes} and {self.delivers}"
-            )
+        pairs("BandLimitedNoise", self.takes, self.delivers)
         if not self.low < self.high:
             raise ParameterError(
                 f"BandLimitedNoise needs low < high, got {self.low:g} and {self.high:g}"

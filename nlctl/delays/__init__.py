@@ -1,7 +1,7 @@
 """Transport delays: signals that arrive later than they were sent.
 
-`transport` is the block, `lines` finds the delays of a diagram and cuts it there, and `history`
-holds what a signal was before a run.
+`transport` is the block, and `lines` finds those of a diagram.  What runs keep of the signals is in
+`nlctl.native.histories` and `nlctl.responses.delayed`.
 """
 
 from .transport import TransportDelay

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import pairs
 from ..errors import ParameterError, UsageError
 from ..params import param, record
 
@@ -52,11 +53,7 @@ class TransportDelay:
 
     def check(self) -> None:
         """Signals come in pairs; a history is a function."""
-        if len(self.takes) != len(self.delivers) or not self.takes:
-            raise ParameterError(
-                "TransportDelay needs as many signals in takes as in delivers, got "
-                f"{self.takes} and {self.delivers}"
-            )
+        pairs("TransportDelay", self.takes, self.delivers)
         if self.history is not None and not callable(self.history):
             raise ParameterError(
                 "TransportDelay needs a function of time for history, got "

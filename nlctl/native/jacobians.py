@@ -54,7 +54,7 @@ class Tangent:
 def inexact(compiled: Compiled, results: Sequence[str] = ("dx",)) -> str | None:
     """Return why there are no exact derivatives of a diagram's results, None if there are."""
     found = compiled.equations
-    parts = [e for name in results for _, array in found.results[name] for e, _ in array.pieces()]
+    parts = [expr for name in results for expr, _ in found.pieces(name)]
     for node in needed(parts):
         if node.op == "call":
             call = found.calls[node.data[0]]
@@ -114,7 +114,7 @@ def along(
         If a function is opaque.
     """
     graph = equations.graph
-    pieces = [piece for _, array in equations.results[name] for piece in array.pieces()]
+    pieces = equations.pieces(name)
 
     def seed(leaf: Expr) -> Expr | None:
         array, start, step = leaf.data

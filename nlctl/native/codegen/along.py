@@ -78,6 +78,5 @@ def _made(compiled: Compiled) -> Any:
     n, m = compiled.system.nstates or 0, compiled.schedule.ninputs
     rows = along(equations, "dx", {"x": 0, "u": n, "t": n + m})
     lowered = lower_along(compiled.schedule, compiled.program, equations, rows, DIRECTIONS)
-    pieces = [piece for _, array in equations.results["dx"] for piece in array.pieces()]
-    order = elimination(structure(pieces, "x", n))
+    order = elimination(structure(equations.pieces("dx"), "x", n))
     return lowered, *lowered_code(lowered), order

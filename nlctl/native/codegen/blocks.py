@@ -62,6 +62,10 @@ class Equations:
     solvers: dict[str, Solver]
     fixed_points: dict[str, list[Expr]]
 
+    def pieces(self, name: str) -> list[tuple[Expr, int]]:
+        """Return the expressions of some results, row by row, each with its length."""
+        return [piece for _, array in self.results[name] for piece in array.pieces()]
+
 
 def equations(
     schedule: Schedule,

@@ -1,5 +1,7 @@
 """Linear equations of the stiff method: their structure is sound, their solution LAPACK's."""
 
+from collections import namedtuple
+from dataclasses import fields
 from typing import NamedTuple
 
 import control as ct
@@ -15,6 +17,7 @@ from nlctl.expressions.dependence import structure
 from nlctl.native.codegen.along import derivatives
 from nlctl.native.integrate.methods.lu import (
     WHOLE,
+    Elimination,
     cost,
     elimination,
     factorise,
@@ -33,16 +36,8 @@ class Work(NamedTuple):
     pivots: np.ndarray
 
 
-class Order(NamedTuple):
-    """An `Elimination`, as machine code takes it here."""
-
-    order: np.ndarray
-    below: np.ndarray
-    below_start: np.ndarray
-    right: np.ndarray
-    right_start: np.ndarray
-    source: np.ndarray
-    target: np.ndarray
+# an `Elimination`, as machine code takes it here
+Order = namedtuple("Order", [field.name for field in fields(Elimination)])
 
 
 @numba.njit(error_model="numpy")
@@ -177,8 +172,7 @@ class TestStructure:
             system = nlctl.paper.EXAMPLES[name]()
         compiled = nlctl.compile(system)
         n, m = compiled.system.nstates, compiled.system.ninputs
-        pieces = [p for _, array in compiled.equations.results["dx"] for p in array.pieces()]
-        where = structure(pieces, "x", n)
+        where = structure(compiled.equations.pieces("dx"), "x", n)
         rng = np.random.default_rng(0)
         for _ in range(20):
             x, u = rng.normal(size=n), rng.normal(size=m) if m else None
@@ -196,8 +190,7 @@ class TestStructure:
         compiled = nlctl.compile(
             ct.nlsys(update, lambda t, x, u, p: x, states=10, inputs=0, outputs=10)
         )
-        pieces = [p for _, array in compiled.equations.results["dx"] for p in array.pieces()]
-        assert structure(pieces, "x", 10).all()
+        assert structure(compiled.equations.pieces("dx"), "x", 10).all()
 
 
 def test_steps_are_those_of_elimination_as_a_whole():
