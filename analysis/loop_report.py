@@ -6,7 +6,10 @@
     page = write_report(made, "reports/pendulum")             # of analysis.report
     write_pdf(page, "reports/pendulum.pdf")
 
-Nothing is said of another loop: a response, a ledger or a study of another one is refused.
+What is seen to be of another loop is refused: a response whose samples are not the loop's outputs
+of its states, a study whose record is of other equations, parameters or wires, a ledger of another
+name.  That a response's states follow from the loop's equations, and that a ledger is of this very
+loop and not of a namesake, is not checked.
 """
 
 from __future__ import annotations
@@ -112,7 +115,7 @@ def loop_report(
     Raises
     ------
     DiagramError
-        If the response, the ledger or the study is of another loop.
+        If the response, the ledger or the study is seen to be of another loop.
     UnknownNameError
         If the loop has no output that `signals` names.
     """
