@@ -85,8 +85,8 @@ print(f"decays with {rate:.3f} 1/s")
 assert abs(rate - 2) < 0.05
 
 # %%
-# What is seen to be of another loop is refused. A response is compared with the loop's own outputs, a study with the record of
-# what it was run with:
+# What is seen to be of another loop is refused. A response is compared with the loop's own outputs, a study with the
+# record of what it was run with:
 try:
     loop_report(nlctl.paper.example_1(), title="Another loop", response=response)
 except nlctl.DiagramError as error:
