@@ -23,7 +23,7 @@ from .blocks import (
 from .errors import DiagramError, ParameterError
 from .names import Parameters, find_name, unknown
 from .params import as_numbers, declared_params
-from .upstream.control_internals import set_parameters
+from .upstream.control_internals import StandIn, is_system, set_parameters
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,9 +94,17 @@ def _is_scoped(diagram: ct.InterconnectedSystem) -> bool:
 
 def as_system(thing: Any, name: str) -> ct.InputOutputSystem:
     """Return a record as a block called `name`; a python-control system under that name."""
-    if isinstance(thing, ct.InputOutputSystem):
+    _check_not_compiled(thing, name)
+    if is_system(thing):
         return thing if thing.name == name else thing.copy(name=name)
     return block(thing, name)
+
+
+def _check_not_compiled(thing: Any, name: str) -> None:
+    if isinstance(thing, StandIn):
+        raise DiagramError(
+            f"'{name}' is compiled already: connect its diagram, .system, and compile the whole"
+        )
 
 
 def interconnect(
@@ -183,7 +191,8 @@ def _check_blocks(systems: Sequence[Any]) -> None:
     names: set[str] = set()
     places: dict[int, str] = {}
     for system in systems:
-        if not isinstance(system, ct.InputOutputSystem):
+        _check_not_compiled(system, getattr(system, "name", ""))
+        if not is_system(system):
             raise DiagramError(
                 f"interconnect needs systems in a list, got a {type(system).__name__}; give "
                 "records with their names: {'plant': ...}"

@@ -16,6 +16,7 @@ from .names import unknown
 from .params import checked_times
 from .responses.arguments import RunArguments, checked_params, unified, with_aliases
 from .responses.interpreted import SOLVE_IVP_METHODS, python_control_response
+from .upstream.control_internals import is_system
 
 if TYPE_CHECKING:
     from .native import Compiled, Tableau
@@ -187,7 +188,7 @@ def input_output_response(
 
 
 def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
-    interpretable = isinstance(run.system, ct.InputOutputSystem)
+    interpretable = is_system(run.system)
     if not _takes_machine_code(run, engine, interpretable):
         for name in NATIVE_ONLY:
             if run.solver[name] is not None:
@@ -239,7 +240,7 @@ def _native(run: RunArguments) -> ct.TimeResponseData:
 
     settings = solver_settings(**run.solver)
     compiled = run.system
-    if isinstance(compiled, ct.InputOutputSystem):
+    if is_system(compiled):
         compiled = sized(compiled, run.inputs, run.initial_state)
         compiled = compile_diagram(compiled, params=run.params)
     return respond(

@@ -14,11 +14,13 @@ from rich.text import Text
 from nlctl.diagrams import initial_state, state_names
 from nlctl.errors import ParameterError
 from nlctl.names import find_name
+from nlctl.response import input_output_response
 
 if TYPE_CHECKING:
     from analysis.lyapunov.ledger import Ledger, Line
 
 STATUSES = ("proved", "computed", "checked", "undecided", "not applicable", "violated")
+_STEP = 4e-3  # s, sampling interval of the runs of the ledger
 _STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
 
 
@@ -61,6 +63,46 @@ def random_start(
         if name.startswith("plant.")
     }
     return {**full, **drawn}
+
+
+def interpreted_runs(
+    diagram: Any, horizon: float, start: Mapping[str, Any], params: Mapping[str, Any]
+) -> list[Any]:
+    """Return runs of python-control, one for each member of an ensemble.
+
+    Parameters
+    ----------
+    diagram : control.InterconnectedSystem
+    horizon : float
+        In s.
+    start : mapping
+        Initial states: a number, or an array with one entry per run.
+    params : mapping
+
+    Returns
+    -------
+    list of control.TimeResponseData
+
+    Raises
+    ------
+    ParameterError, UnknownNameError
+        If a value or a name is refused.
+    """
+    count = max((np.size(value) for value in start.values()), default=1)
+    times = np.linspace(0.0, horizon, round(horizon / _STEP) + 1)
+    return [
+        input_output_response(
+            diagram,
+            times,
+            0,
+            {name: np.broadcast_to(value, count)[i] for name, value in start.items()},
+            params=params,
+            engine="python-control",
+            rtol=1e-8,
+            atol=1e-10,
+        )
+        for i in range(count)
+    ]
 
 
 def repeat_command(

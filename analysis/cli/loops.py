@@ -25,7 +25,7 @@ def named_loop(name: str) -> Any:
     UsageError
         If there is no such loop, or the function returns no diagram.
     """
-    import control as ct
+    from nlctl.upstream.control_internals import is_system
 
     if ":" in name:
         from analysis.studies.file.resolve import named_function  # takes a second
@@ -38,7 +38,7 @@ def named_loop(name: str) -> Any:
             made = named_example(name)()
         except UsageError as error:
             raise ParameterError(f"{error}; {_OWN}") from None
-    if not isinstance(made, ct.InputOutputSystem):
+    if not is_system(made):
         raise ParameterError(f"{name} needs to return a diagram, it returned {type(made).__name__}")
     return made
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -125,6 +125,13 @@ def check(
     ] = 0,
     spread: Annotated[float, typer.Option(help="Largest distance of an initial state.")] = 0.1,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random initial states.")] = 0,
+    engine: Annotated[
+        str,
+        typer.Option(
+            help="python-control: runs of python-control, which machine code, of which the proof "
+            "takes more signals, must reproduce. native, auto: machine code alone."
+        ),
+    ] = "auto",
     json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
     """Check the assumptions and inequalities of the paper's proof, line by line.
@@ -135,9 +142,18 @@ def check(
     from rich.console import Console
 
     from analysis.lyapunov.ledger import ledger
+    from nlctl.arguments import one_of
     from nlctl.errors import ParameterError
+    from nlctl.response import ENGINES
 
-    from .check import ledger_summary, random_start, repeat_command, show_ledger, worst_lines
+    from .check import (
+        interpreted_runs,
+        ledger_summary,
+        random_start,
+        repeat_command,
+        show_ledger,
+        worst_lines,
+    )
     from .loops import assignments, named_loop
 
     if not 0 < horizon < float("inf"):
@@ -147,7 +163,12 @@ def check(
     if ensemble:
         start = random_start(diagram, start, ensemble, spread, seed)
     steps = round(20_000 * max(horizon, 10))  # several times what a run that ends well takes
-    found = ledger(diagram, horizon, start=start, params=params, max_steps=steps)
+    one_of("check", "--engine", engine, ENGINES)
+    settings = {"start": start, "params": params}
+    run: Any = horizon
+    if engine == "python-control":
+        run, settings = interpreted_runs(diagram, horizon, start, params), {}
+    found = ledger(diagram, run, **settings, max_steps=steps)
     if json:
         print(found.to_json())
     else:

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import CompileError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
-from ..upstream.control_internals import set_parameters
+from ..upstream.control_internals import StandIn, is_system, set_parameters
 from .codegen.blocks import Equations, equations
 from .codegen.lower import Lowered, lower
 from .codegen.program import Program, program
@@ -33,8 +33,8 @@ LOOPS = ("error", "solve")  # what may be done with algebraic loops
 Rhs = Callable[..., None]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Compiled:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Compiled(StandIn):
     """A diagram as machine code; made by `compile`.
 
     Attributes
@@ -46,9 +46,9 @@ class Compiled:
 
     Notes
     -----
-    It is not a python-control system: `nlctl.input_output_response` and `nlctl.ensemble_response`
-    run it, and ``compiled.linearize(x0)`` linearizes it with exact derivatives, in the place of
-    ``ct.linearize``.  Every other function of python-control takes ``compiled.system``.
+    `nlctl.input_output_response` and `nlctl.ensemble_response` run it; ``compiled.linearize(x0)``
+    linearizes it with exact derivatives, and so does ``ct.linearize(compiled, x0)``.  Every other
+    function of python-control takes ``compiled.system``.
 
     The stiff method's Jacobian is exact too.  Where a function is opaque it is taken by
     differences; the printed form says so, and why.
@@ -137,7 +137,14 @@ class Compiled:
         return tangent(self)
 
     def linearize(
-        self, x0: Any, u0: Any = None, t: float = 0.0, params: Mapping[str, Any] | None = None
+        self,
+        x0: Any,
+        u0: Any = None,
+        t: float = 0.0,
+        params: Mapping[str, Any] | None = None,
+        *,
+        copy_names: bool = True,
+        **names: Any,
     ) -> ct.StateSpace:
         """Return the linearization at a point, with exact derivatives.
 
@@ -151,11 +158,16 @@ class Compiled:
             Time in s.
         params : mapping, optional
             Parameters that are overridden.
+        copy_names : bool, optional
+            Whether it gets the diagram's names of states, inputs and outputs, or python-control's
+            generic ones.
+        **names
+            Other names: `name`, `inputs`, `outputs` and `states` of ``ct.ss``.
 
         Returns
         -------
         control.StateSpace
-            With the diagram's names.  At a kink it has the slopes of the side that the point
+            At a kink it has the slopes of the side that the point
             belongs to.
 
         Raises
@@ -169,7 +181,7 @@ class Compiled:
         -----
         Forward mode on the expressions, so nothing is lost to a step width.
         """
-        return linearize(self, x0, u0, t, params)
+        return linearize(self, x0, u0, t, params, names=names, copy_names=copy_names)
 
     def parameter_jacobian(
         self,
@@ -219,6 +231,8 @@ class Compiled:
 
     def __repr__(self) -> str:
         return described(self)
+
+    __str__ = __repr__
 
 
 def compile(  # noqa: A001 (what it does)
@@ -279,7 +293,11 @@ def compile(  # noqa: A001 (what it does)
     """
     if isinstance(system, ct.TransferFunction):
         system = ct.ss(system)
-    if not isinstance(system, ct.InputOutputSystem):
+    if isinstance(system, Compiled):
+        raise CompileError(
+            f"'{system.name}' is compiled already: give its diagram, .system, to compile it anew"
+        )
+    if not is_system(system):
         raise CompileError(
             f"compile needs a diagram or a block, got {type(system).__name__}: nlctl.block makes "
             "a block of a record"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 USE = (
     "nlctl.input_output_response, nlctl.ensemble_response, .linearize(x0, u0); "
-    "python-control's functions take .system"
+    "python-control's other functions take .system"
 )
 _SHOWN = 8  # names that are listed before the rest is only counted
 

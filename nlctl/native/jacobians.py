@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .compiled import Compiled
     from .diagram.schedule import Node
 
+_NAMED = ("name", "inputs", "outputs", "states")  # of ct.ss
 STEP = 1e-6  # by which a parameter is moved, to see what follows from it
 _DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
@@ -180,9 +181,19 @@ def _inputs(system: Any, u0: Any) -> np.ndarray:
 
 
 def linearize(
-    compiled: Compiled, x0: Any, u0: Any = None, t: float = 0.0, params: Any = None
+    compiled: Compiled,
+    x0: Any,
+    u0: Any = None,
+    t: float = 0.0,
+    params: Any = None,
+    *,
+    names: Mapping[str, Any] | None = None,
+    copy_names: bool = True,
 ) -> ct.StateSpace:
     """Linearize a compiled diagram with exact derivatives; see `Compiled.linearize`."""
+    for name in names or {}:
+        if name not in _NAMED:
+            raise unknown("argument", name, ("copy_names", *_NAMED), "of linearize")
     if isinstance(x0, ct.OperatingPoint):
         x0, u0 = x0.states, x0.inputs if u0 is None else u0
     system = compiled.system
@@ -197,11 +208,15 @@ def linearize(
     rates, outputs, dt = found["dx"], found["y"], system.dt
     if compiled.program.sampled:
         rates, outputs, dt = over_a_period(compiled, found)
-    names = {"states": system.state_labels, "inputs": system.input_labels}
+    own = {
+        "name": f"{system.name}$linearized",
+        "inputs": system.input_labels,
+        "outputs": system.output_labels,
+        "states": system.state_labels,
+    }
     return ct.StateSpace(
         rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:], dt,
-        outputs=system.output_labels, name=f"{system.name}$linearized",
-        remove_useless_states=False, **names,
+        remove_useless_states=False, **({**own, **(names or {})} if copy_names else names or {}),
     )  # fmt: skip
 
 

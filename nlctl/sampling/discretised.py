@@ -9,6 +9,7 @@ import control as ct
 from ..arguments import number, one_of
 from ..blocks import memory_states
 from ..errors import ParameterError
+from ..upstream.control_internals import is_system
 from .rebuilt import rebuilt
 
 _METHODS = ("euler", "tustin", "zoh")
@@ -46,7 +47,7 @@ def discretise(system: Any, dt: float, method: str = "euler") -> Any:
     """
     number("discretise", "dt", dt, above=0)
     one_of("discretise", "method", method, _METHODS)
-    if not isinstance(system, ct.InputOutputSystem):
+    if not is_system(system):
         raise ParameterError(
             f"discretise needs a block or diagram, got {type(system).__name__}: nlctl.block makes "
             "a block of a record"

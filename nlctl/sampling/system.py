@@ -18,6 +18,7 @@ from ..params import whole_number
 from ..upstream.control_internals import (
     Around,
     current_parameters,
+    is_system,
     outputs_now,
     rates_now,
     set_parameters,
@@ -346,7 +347,7 @@ def sampled(
     >>> round(float(run.outputs[0, -1]), 6)  # 3 exp(-0.1) - 2
     0.714512
     """
-    if not isinstance(system, ct.InputOutputSystem):
+    if not is_system(system):
         is_discrete = getattr(system, "discrete", False)
         system = block(system, "sampled", dt=dt if is_discrete else None)
     euler = method == "euler" and system.dt in (0, None)

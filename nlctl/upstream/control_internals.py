@@ -4,6 +4,8 @@
   to its parts.  ``dynamics`` and ``output`` call it first.
 - ``NonlinearIOSystem._current_params``: what the equations get from then on.
 - ``NonlinearIOSystem._rhs(t, x, u)`` and ``_out(t, x, u)``: the equations with these parameters.
+- ``InputOutputSystem`` reads its own ``name``, ``dt``, sizes and ``*_index`` and writes them in its
+  ``__init__`` only: a subclass can have them as properties.
 """
 
 from __future__ import annotations
@@ -86,3 +88,35 @@ class Around(ct.NonlinearIOSystem):
 
     def _out(self, t: float, x: Any, u: Any) -> np.ndarray:
         return self.answer(t, x, u)
+
+
+class StandIn(ct.InputOutputSystem):
+    """What python-control takes for another system: with its names, sizes and equations.
+
+    ``ct.linearize`` asks for the type before it asks the system.
+    """
+
+    system: Any
+    name = property(lambda self: self.system.name)
+    dt = property(lambda self: self.system.dt)
+    params = property(lambda self: self.system.params)
+    ninputs = property(lambda self: self.system.ninputs)
+    noutputs = property(lambda self: self.system.noutputs)
+    nstates = property(lambda self: self.system.nstates)
+    input_index = property(lambda self: self.system.input_index)
+    output_index = property(lambda self: self.system.output_index)
+    state_index = property(lambda self: self.system.state_index)
+
+    def _update_params(self, params: Mapping[str, Any] | None) -> None:
+        set_parameters(self.system, params)
+
+    def _rhs(self, t: float, x: Any, u: Any) -> np.ndarray:
+        return rates_now(self.system, t, x, u)
+
+    def _out(self, t: float, x: Any, u: Any) -> np.ndarray:
+        return outputs_now(self.system, t, x, u)
+
+
+def is_system(thing: Any) -> bool:
+    """Whether a thing is a system itself, and does not stand for one."""
+    return isinstance(thing, ct.InputOutputSystem) and not isinstance(thing, StandIn)

@@ -54,6 +54,23 @@ def test_the_published_loop_holds_and_the_paper_does_not():
     assert lines["(29)"]["status"] == "proved"
 
 
+def test_runs_of_python_control_are_reproduced_and_give_the_same_ledger():
+    """Two engines, one loop: the same statuses, and margins that agree to the runs' tolerance."""
+    arguments = ("example-1", "--until", "0.5", "--json", "--set", "actuator.b_r=0.4")
+    ledgers = [
+        {line["key"]: line for line in json.loads(check(*arguments, *more)[1])["lines"]}
+        for more in ((), ("--engine", "python-control"))
+    ]
+    native, interpreted = ledgers
+    assert native.keys() == interpreted.keys()
+    for key, line in native.items():
+        assert line["status"] == interpreted[key]["status"], key
+        if line["least"] is not None:
+            assert line["least"] == pytest.approx(interpreted[key]["least"], rel=1e-3, abs=1e-6)
+    code, _, said = check("example-1", "--engine", "pyton-control")
+    assert (code, "nearest: 'python-control'" in said) == (2, True)
+
+
 def test_a_violation_is_exit_code_1():
     """Without sigma-modification the decay rate of (31) is zero."""
     code, said, _ = check("example-1", "--set", "robust.sigma_2=0", "--until", "5")

@@ -31,7 +31,7 @@ numbers = st.floats(-3, 3)
 
 def simulate(system, *arguments: Any, **how: Any) -> Any:
     """Run a compiled diagram as it is, any other in python-control by default."""
-    if isinstance(system, ct.InputOutputSystem):
+    if not isinstance(system, nlctl.Compiled | list):
         how = {"engine": "python-control"} | how
     return nlctl.input_output_response(system, *arguments, **how)
 

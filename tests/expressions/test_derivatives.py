@@ -183,14 +183,40 @@ def test_linear_systems_are_their_own_linearization():
 
 
 def test_what_python_control_takes_instead_of_a_compiled_diagram():
-    """It is printed with the diagram, and differences agree with the exact derivatives."""
+    """It linearizes it itself, exactly; differences agree, and what else it takes is printed."""
     loop = nlctl.paper.example_1()
     compiled, x = nlctl.compile(loop), 0.3 * np.random.default_rng(4).normal(size=loop.nstates)
-    assert ".linearize(x0, u0); python-control's functions take .system" in str(compiled)
+    assert ".linearize(x0, u0); python-control's other functions take .system" in str(compiled)
     near = ct.linearize(compiled.system, x, t=0.7)
     exact = compiled.linearize(x, t=0.7)
     for name in "AC":
         np.testing.assert_allclose(getattr(near, name), getattr(exact, name), rtol=1e-4, atol=1e-4)
+        np.testing.assert_array_equal(
+            getattr(ct.linearize(compiled, x, t=0.7), name), getattr(exact, name)
+        )
+    assert exact.state_labels == loop.state_labels
+    renamed = ct.linearize(compiled, x, copy_names=False, name="near", outputs=loop.output_labels)
+    assert (renamed.name, renamed.state_labels[1]) == ("near", "x[1]")
+    assert renamed.output_labels == loop.output_labels
+
+
+COMPILED_ALREADY = {
+    "compile": nlctl.compile,
+    "interconnect, a list": lambda made: nlctl.interconnect([made]),
+    "interconnect, by name": lambda made: nlctl.interconnect({"lag": made}),
+    "compile, in a diagram of python-control": lambda made: nlctl.compile(
+        ct.interconnect([made], inplist=["lag.u"], outlist=["lag.y"])
+    ),
+    "linearize, with a step width": lambda made: ct.linearize(made, [0.0], eps=1e-3),
+}
+
+
+@pytest.mark.parametrize("what", COMPILED_ALREADY)
+def test_what_is_compiled_is_compiled_once(what):
+    """Where a diagram is needed, or differences are asked for, one sentence says what to give."""
+    lag = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="lag")
+    with pytest.raises(UsageError, match=r"compiled already: .*\.system|argument 'eps'"):
+        COMPILED_ALREADY[what](nlctl.compile(lag))
 
 
 def test_what_has_no_exact_derivatives_is_refused():

@@ -45,6 +45,40 @@ def test_equations_have_the_parameters_of_now():
             np.testing.assert_array_equal(output, part.output(0.0, x[:1], u, params))
 
 
+class SameAs(internals.StandIn):
+    """Nothing but the system that it stands for."""
+
+    def __init__(self, system):
+        self.system = system
+
+
+def test_a_system_that_stands_for_another_one_is_taken_for_it():
+    """Names, sizes, timebase and equations, in a diagram."""
+    for dt in (0, 0.1, True):
+        first, second = lag("first", dt=dt), lag("second", dt=dt)
+        stand_in = SameAs(first)
+        assert internals.is_system(first)
+        assert not internals.is_system(stand_in)
+        for name in (
+            "name",
+            "dt",
+            "ninputs",
+            "noutputs",
+            "nstates",
+            "input_labels",
+            "state_labels",
+        ):
+            assert getattr(stand_in, name) == getattr(first, name)
+        loops = [
+            ct.interconnect([part, second], connections=[["second.u", "-" + part.name + ".y"]],
+                            inplist=["first.u"], outlist=["second.y"])
+            for part in (first, stand_in)
+        ]  # fmt: skip
+        at = (0.3, [0.5, -1.0], [2.0], {"k": 3.0})
+        np.testing.assert_array_equal(loops[1].dynamics(*at), loops[0].dynamics(*at))
+        np.testing.assert_array_equal(loops[1].output(*at), loops[0].output(*at))
+
+
 class Doubled(internals.OwnParameters):
     """Its equations get twice what python-control has."""
 

@@ -19,6 +19,7 @@ from nlctl.errors import ParameterError, UsageError
 from nlctl.names import Parameters, base_name, find_name, unknown
 from nlctl.native import Compiled
 from nlctl.params import with_overrides
+from nlctl.upstream.control_internals import is_system
 
 from .quantity import SpaceError, Uncertain
 from .space import Space, combinations
@@ -171,7 +172,7 @@ def diagrams(
     built = []
     for labels in combinations(space):
         diagram = build(**{name: options[name][label] for name, label in labels.items()})
-        if not isinstance(diagram, ct.InputOutputSystem):
+        if not is_system(diagram):
             raise ParameterError(
                 f"build needs to return a diagram, {getattr(build, '__name__', 'it')} returned "
                 f"{type(diagram).__name__} (with {_text(labels)})"

@@ -28,7 +28,9 @@ _ROUNDS = 5  # mistakes may stand behind mistakes
 STAND_INS = {  # while the rest of a mistaken file is looked at
     "study": {"title": "a study", "seed": 0},
     "time": {"end": 1e5, "step": 0.1},  # formulas look ahead by less
+    "spec": {},
 }
+_SPOKEN_OF = ("spec", "space", "runs")  # tables whose entries other parts of a study name
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,7 +109,9 @@ def read_study(
     if study is not None:
         more = [] if trust else untrusted(study, folder)
         if not more:
-            experiment, more = checked_experiment(study, folder)
+            tables = {name: data[name] for name in _SPOKEN_OF if name in data}
+            named = {k: list(v) if isinstance(v, dict) else [] for k, v in tables.items()}
+            experiment, more = checked_experiment(study, folder, named)
         more = [replace(p, place=_original(p.place, entries)) for p in more]
         problems += [p for p in more if not follows(p, problems)]
     if problems or study is None or experiment is None:

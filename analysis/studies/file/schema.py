@@ -154,7 +154,8 @@ class Study(Strict):
         {}, description="Signal of the loop -> kinds of faults, for the analysis 'faults'."
     )
     spec: dict[str, Annotated[Rule, BeforeValidator(_rule)]] = Field(
-        min_length=1, description="Name -> requirement."
+        description="Name -> requirement.",
+        json_schema_extra={"minProperties": 1},  # `checked_experiment` says so, with all else
     )
     time: Times
     metrics: Measured | None = Field(None, description="Without it only margins are taken.")

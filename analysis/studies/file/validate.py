@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,7 @@ from analysis.robustness.uncertainty.space import combinations
 from nlctl.errors import ParameterError, UsageError
 from nlctl.faults import with_faults
 from nlctl.names import unknown
+from nlctl.upstream.control_internals import is_system
 
 from ..build import (
     SIGNALS,
@@ -63,13 +64,19 @@ class _Notes:
             return None
 
 
-def checked_experiment(study: Study, folder: Path) -> tuple[Experiment | None, list[Problem]]:
+def checked_experiment(
+    study: Study, folder: Path, named: Mapping[str, Collection[str]] | None = None
+) -> tuple[Experiment | None, list[Problem]]:
     """Return the experiment of a study, and all mistakes; None if there are any.
+
+    `named` are the names in the tables of the file, those of mistaken entries too, which the
+    study lacks: what speaks of them is no mistake of its own.
 
     Errors of another kind than `UsageError` come from the user's own functions and pass.
     """
     notes = _Notes()
-    notes.attempt(("time",), times, study)
+    known = {"spec": study.spec, "space": study.space} | dict(named or {})
+    _check_tables(study, known, notes)
     requirements = [
         made
         for key in study.spec
@@ -89,7 +96,7 @@ def checked_experiment(study: Study, folder: Path) -> tuple[Experiment | None, l
     large = _too_large(study, notes)
     metrics = notes.attempt(("metrics",), metrics_of, study, folder, signals) if diagrams else None
     inputs = notes.attempt(("inputs",), inputs_of, study, diagrams) if diagrams else None
-    _check_analyses(study, metrics, notes)
+    _check_analyses(study, known, metrics, notes)
     made = None
     if diagrams and not notes.problems:
         made = notes.attempt((), experiment, study, folder, signals, inputs or ())
@@ -109,6 +116,14 @@ def checked_experiment(study: Study, folder: Path) -> tuple[Experiment | None, l
     return made, _unique(notes.problems)
 
 
+def _check_tables(study: Study, known: Mapping[str, Collection[str]], notes: _Notes) -> None:
+    if not known["spec"]:
+        notes.add(("spec",), "needs at least one requirement")
+    if not (known["space"] or study.choices):
+        notes.add(("space",), "needs at least one quantity, if there are no choices")
+    notes.attempt(("time",), times, study)
+
+
 def _stand_in(study: Study, quantities: Mapping[str, Uncertain | None]) -> Space:
     """Return a space of the study's size, whatever its mistakes, to validate designs."""
 
@@ -118,7 +133,7 @@ def _stand_in(study: Study, quantities: Mapping[str, Uncertain | None]) -> Space
         return replace(known, nominal=middle)
 
     return Space(
-        quantities=tuple(some(name, quantity) for name, quantity in quantities.items()),
+        quantities=tuple(some(*one) for one in (quantities or {"any": None}).items()),
         choices=tuple(
             Choice(name=name, options=dict.fromkeys(map(str, asked.options)) or {"": None})
             for name, asked in study.choices.items()
@@ -202,7 +217,7 @@ def _diagram(build: Callable[[], Any], name: str) -> ct.InputOutputSystem:
         If it returns something else.
     """
     made = build()
-    if not isinstance(made, ct.InputOutputSystem):
+    if not is_system(made):
         raise ParameterError(f"'{name}' returns {type(made).__name__}, and not a diagram")
     return made
 
@@ -238,23 +253,29 @@ def _check_faults(diagram: ct.InputOutputSystem, signal: str, faulty: Faulty) ->
     with_faults(diagram, *made.values())
 
 
-def _check_analyses(study: Study, metrics: Sequence[Metric] | None, notes: _Notes) -> None:
+def _check_analyses(
+    study: Study,
+    known: Mapping[str, Collection[str]],
+    metrics: Sequence[Metric] | None,
+    notes: _Notes,
+) -> None:
     """Look at what can be said without the loop; `metrics` are None if they are not known."""
-    columns = ("spec", *study.spec, *(metric.key for metric in metrics or ()))
+    columns = ("spec", *known["spec"], *(metric.key for metric in metrics or ()))
     seen = set(RESERVED)
     for i, asked in enumerate(study.analysis):
         if asked.key in seen:
             notes.add(("analysis", i, "key"), f"needs a key of its own, '{asked.key}' is taken")
         seen |= {asked.key} - {""}
-        if asked.definition.needs_rows and study.runs is None:
+        if asked.definition.needs_rows and study.runs is None and "runs" not in known:
             notes.add(("analysis", i), f"'{asked.kind}' looks at the main table: add [runs]")
-        named = _named(asked, asked.definition.columns) if metrics is not None else []
+        certain = known["spec"] and metrics is not None
+        named = _named(asked, asked.definition.columns) if certain else []
         for key, name in named:
             if name not in columns:
                 notes.add(("analysis", i, key), str(unknown("column", name, columns)))
         for key, name in _named(asked, asked.definition.quantities):
-            if name not in study.space:
-                notes.add(("analysis", i, key), str(unknown("quantity", name, study.space)))
+            if known["space"] and name not in known["space"]:
+                notes.add(("analysis", i, key), str(unknown("quantity", name, known["space"])))
 
 
 def _too_large(study: Study, notes: _Notes) -> set[KeyPath]:

@@ -14,6 +14,7 @@ from ...blocks import Block, event_count, memory_states
 from ...errors import CompileError
 from ...sampling.clock import Clock, Instants, instants, meetings
 from ...sampling.system import Happening, clocks_of
+from ...upstream.control_internals import StandIn
 from ..diagram.schedule import Node, Schedule
 from ..parameters import Slot, current_values, slots
 
@@ -148,6 +149,11 @@ def _check_kind(node: Node) -> None:
                 f"block '{node.path}' does not say how many {kind} it has: give {kind}=... to "
                 "ct.nlsys"
             )
+    if isinstance(system, StandIn):
+        raise CompileError(
+            f"block '{node.path}' is compiled already: connect the diagram, its .system, and "
+            "compile the whole"
+        )
     if not isinstance(system, ct.StateSpace | ct.NonlinearIOSystem):
         raise CompileError(
             f"block '{node.path}' is a {type(system).__name__}; only nonlinear and state-space "
