@@ -33,7 +33,7 @@ def sampling_section(record: pd.DataFrame) -> Section:
             *(Paragraph(text=_sentence(found, example)) for example in _TITLES),
             Figure(
                 key="sampling-errors",
-                caption=f"Largest |y − yd| for t ≥ {TAIL:g} s against the sampling time, by "
+                caption=f"Largest |e₁| for t ≥ {TAIL:g} s against the sampling time, by "
                 "Euler's method; a cross is the last run that ends well, the line what is asked.",
                 description=" ".join(_sentence(found, example) for example in _TITLES),
                 figure=sampling_errors(record, _TITLES, BAND),
@@ -53,13 +53,13 @@ def _sentence(found: pd.DataFrame, example: str) -> str:
     own: Any = found.loc[(example, "paper")]
     dt_text, delay, measured, given = (_text(own, quantity) for quantity in QUANTITIES)
     rivals = [
-        f"'{r}' {_text(found.loc[(example, r)], QUANTITIES[0])}" for r in SAMPLED_CONTROLLERS[1:]
+        f"{r} {_text(found.loc[(example, r)], QUANTITIES[0])}" for r in SAMPLED_CONTROLLERS[1:]
     ]
     return (
-        f"{_TITLES[example]} with the paper's controller keeps |y − yd| ≤ {BAND:g} for "
-        f"t ≥ {TAIL:g} s and |u| ≤ {PEAK:g} up to a sampling time of {dt_text}; at 2 ms a delay of "
-        f"{delay}, or measurements in steps of {measured}, or u in steps of {given}; times "
-        f"between samples that its rivals bear are {', '.join(rivals)}."
+        f"{_TITLES[example]} with the paper's controller: |e₁| ≤ {BAND:g} for t ≥ {TAIL:g} s and "
+        f"|u| ≤ {PEAK:g} hold up to a sampling time of {dt_text}. Sampled every 2 ms, they hold "
+        f"with a delay of {delay}, or with measurements in steps of {measured}, or with u in steps "
+        f"of {given}. Longest sampling times of its rivals: {', '.join(rivals)}."
     )
 
 
@@ -68,15 +68,15 @@ def _text(row: Any, quantity: Quantity) -> str:
     good, bad = row[(quantity.key, "good")], row[(quantity.key, "bad")]
     unit = "" if quantity.unit == "1" else f" {quantity.unit}"
     if not np.isfinite(good):
-        return f"not {quantity.factor * bad:.3g}{unit}"
+        return f"less than {quantity.factor * bad:.3g}{unit}"
     more = "" if np.isfinite(bad) else " or more"
     return f"{quantity.factor * good:.3g}{unit}{more}"
 
 
 def _table(found: pd.DataFrame) -> Table:
     return Table(
-        caption='Up to where each controller meets what is asked, to 4 to 7 %: "not" before a '
-        "value means that the least value that was tried violates it already, as it may in "
+        caption='Up to where each controller meets what is asked, to 4 to 7 %: "less than" '
+        "means that the least value that was tried violates it already, as it may in "
         'continuous time, "or more" that none did. Delay and converters: sampled every 2 ms. A '
         "run that diverges, or takes more than 60,000 steps, violates.",
         columns=("example", "controller", *(q.title for q in QUANTITIES)),
