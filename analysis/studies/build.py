@@ -254,6 +254,19 @@ def faults_of(signal: str, faulty: Faulty) -> dict[str, Fault]:
     return found
 
 
+_SIZED = {"i.i.d.": independent, "Sobol'": sobol, "Latin hypercube": latin_hypercube}
+
+
+def size_mistakes(rows: Rows) -> dict[str, str]:
+    """Return which of `size` and `levels` a design lacks or does not take, and the sentence."""
+    takes = "size" if rows.design in _SIZED else "levels" if rows.design == "grid" else ""
+    return {
+        key: f"a design of kind '{rows.design}' {'needs' if key == takes else 'takes no'} {key}"
+        for key in ("size", "levels")
+        if (getattr(rows, key) is None) == (key == takes)
+    }
+
+
 def main_design(rows: Rows, space: Space, seed: int) -> Design:
     """Return the rows of the main table.
 
@@ -262,14 +275,10 @@ def main_design(rows: Rows, space: Space, seed: int) -> Design:
     ParameterError
         If a size is missing, or one is given that the design does not take.
     """
-    sized = {"i.i.d.": independent, "Sobol'": sobol, "Latin hypercube": latin_hypercube}
-    takes = "size" if rows.design in sized else "levels" if rows.design == "grid" else ""
-    for key in ("size", "levels"):
-        if (getattr(rows, key) is None) == (key == takes):
-            verb = "needs" if key == takes else "takes no"
-            raise ParameterError(f"a design of kind '{rows.design}' {verb} {key}")
+    for mistake in size_mistakes(rows).values():
+        raise ParameterError(mistake)
     if rows.size is not None:
-        return sized[rows.design](space, rows.size, seed)
+        return _SIZED[rows.design](space, rows.size, seed)
     if rows.levels is not None:
         return grid(space, rows.levels, seed)
     return corners(space, seed) if rows.design == "corners" else one_at_a_time(space, entropy=seed)

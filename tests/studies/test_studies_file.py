@@ -145,7 +145,7 @@ kind = "regional"
         ),
         ("nominal = 1.0", "nominal = 3.0", 'space."lag.x(0)"', "nominal value in its box"),
         ("size = 200", 'size = 200\ndesign = "Sobol\'"', "runs", "power of 2 as its size, got 200"),
-        ("size = 200", 'size = 200\ndesign = "corners"', "runs", "takes no size"),
+        ("size = 200", 'size = 200\ndesign = "corners"', "runs.size", "takes no size"),
         (
             "size = 200",
             'size = 256\ndesign = "Sobol\'"',

@@ -32,6 +32,7 @@ from ..build import (
     main_design,
     metrics_of,
     requirement,
+    size_mistakes,
     times,
 )
 from ..kind import Asked, Setup
@@ -304,7 +305,11 @@ def _count(rows: int) -> str:
 def _check_designs(study: Study, space: Space, large: set[KeyPath], notes: _Notes) -> None:
     """Make designs that are known in advance, unless too large; hold the analyses against them."""
     if study.runs is not None and ("runs",) not in large:
-        notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
+        mistakes = size_mistakes(study.runs)
+        for key, mistake in mistakes.items():
+            notes.add(("runs", key), mistake)
+        if not mistakes:
+            notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
     for i, asked in enumerate(study.analysis):
         if asked.definition.is_statement and study.runs is not None:
             kind = study.runs.design
