@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from analysis.lyapunov.ledger import Ledger, Line
 
 STATUSES = ("proved", "computed", "checked", "undecided", "not applicable", "violated")
-_STEP = 4e-3  # s, sampling interval of the runs of the ledger
 _STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
 
 
@@ -88,25 +87,30 @@ def interpreted_runs(
     ParameterError, UnknownNameError
         If a value or a name is refused.
     """
-    count = max((np.size(value) for value in start.values()), default=1)
-    times = np.linspace(0.0, horizon, round(horizon / _STEP) + 1)
+    from analysis.lyapunov.loop.simulation import SAMPLING_INTERVAL, members_of  # takes a second
+
     return [
         input_output_response(
             diagram,
-            times,
+            member.times,
             0,
-            {name: np.broadcast_to(value, count)[i] for name, value in start.items()},
-            params=params,
+            member.start,
+            params=member.params,
             engine="python-control",
             rtol=1e-8,
             atol=1e-10,
         )
-        for i in range(count)
+        for member in members_of(diagram, horizon, SAMPLING_INTERVAL, start, params)
     ]
 
 
 def repeat_command(
-    example: str, horizon: float, settings: Sequence[str], start: Mapping[str, Any], member: int
+    example: str,
+    horizon: float,
+    settings: Sequence[str],
+    start: Mapping[str, Any],
+    member: int,
+    engine: str = "auto",
 ) -> str:
     """Return the command that repeats one run of an ensemble, to the last digit.
 
@@ -120,6 +124,7 @@ def repeat_command(
     start : mapping
         Initial states: a number, or an array with one entry per run.
     member : int
+    engine : str, optional
     """
     params = [text for text in settings if not text.partition("=")[0].strip().endswith("(0)")]
     states = [
@@ -127,6 +132,7 @@ def repeat_command(
         for name, value in start.items()
     ]
     options = [part for text in (*params, *states) for part in ("--set", text)]
+    options += [] if engine == "auto" else ["--engine", engine]
     return shlex.join(["nlctl", "check", example, "--until", f"{horizon:.17g}", *options])
 
 

@@ -129,7 +129,8 @@ def check(
         str,
         typer.Option(
             help="python-control: runs of python-control, which machine code, of which the proof "
-            "takes more signals, must reproduce. native, auto: machine code alone."
+            "takes more signals, must reproduce; where a loop diverges it may not end. native, "
+            "auto: machine code alone."
         ),
     ] = "auto",
     json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
@@ -158,12 +159,12 @@ def check(
 
     if not 0 < horizon < float("inf"):
         raise ParameterError(f"check needs a horizon > 0, got {horizon:g}")
+    one_of("check", "--engine", engine, ENGINES)
     diagram = named_loop(loop)
     params, start = assignments(diagram, set_ or [])
     if ensemble:
         start = random_start(diagram, start, ensemble, spread, seed)
     steps = round(20_000 * max(horizon, 10))  # several times what a run that ends well takes
-    one_of("check", "--engine", engine, ENGINES)
     settings = {"start": start, "params": params}
     run: Any = horizon
     if engine == "python-control":
@@ -176,7 +177,7 @@ def check(
         print(ledger_summary(found))
         for line in worst_lines(found) if ensemble else ():
             print(f"run {line.member}, worst in {line.key}, again (with constants of its own):")
-            print(f"  {repeat_command(loop, horizon, set_ or [], start, line.member)}")
+            print(f"  {repeat_command(loop, horizon, set_ or [], start, line.member, engine)}")
     if found.answer in UNPROVED:
         raise typer.Exit(UNPROVED[found.answer])
 

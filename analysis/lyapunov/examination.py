@@ -19,7 +19,14 @@ from .bounds.decomposition import Decomposition, decompose
 from .bounds.provenance import Constants
 from .loop.integral import sharpest
 from .loop.roles import read_parts
-from .loop.simulation import Member, MemberRun, members_of, observe, observed_loop
+from .loop.simulation import (
+    SAMPLING_INTERVAL,
+    Member,
+    MemberRun,
+    members_of,
+    observe,
+    observed_loop,
+)
 
 __all__ = ["U_MAX", "Examination", "_Runs", "compile_examination_ahead", "examine"]
 
@@ -81,7 +88,7 @@ def examine(
     k: tuple[float, float] | None = None,
     start: Mapping[str, Any] | None = None,
     params: Mapping[str, Any] | None = None,
-    step: float = 4e-3,
+    step: float = SAMPLING_INTERVAL,
     max_steps: int = 2_000_000,
 ) -> Examination:
     """Run a loop, observed, and find the constants of the proof.

@@ -29,6 +29,7 @@ from .loop.instrumented import observed
 from .loop.integral import sharpest
 from .loop.roles import Parts, read_parts
 from .loop.signals import signals_of
+from .loop.simulation import SAMPLING_INTERVAL
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -169,7 +170,7 @@ def tighten(
         compiled=native.compile(observed(loop, parts, split, alpha_1(parts.gains))),
         parts=parts,
         split=split,
-        times=np.linspace(0.0, horizon, round(horizon / 4e-3) + 1),
+        times=np.linspace(0.0, horizon, round(horizon / SAMPLING_INTERVAL) + 1),
         max_steps=max_steps,
     )
     trials: list[TrialBound] = []

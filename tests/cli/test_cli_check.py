@@ -67,6 +67,9 @@ def test_runs_of_python_control_are_reproduced_and_give_the_same_ledger():
         assert line["status"] == interpreted[key]["status"], key
         if line["least"] is not None:
             assert line["least"] == pytest.approx(interpreted[key]["least"], rel=1e-3, abs=1e-6)
+    engines = (("--engine", engine) for engine in ("native", "python-control"))
+    refused = {check("example-1", "--until", "0.002", *engine) for engine in engines}
+    assert refused == {(2, "", "nlctl: ledger needs 0 < step < horizon, got 0.004 and 0.002\n")}
     code, _, said = check("example-1", "--engine", "pyton-control")
     assert (code, "nearest: 'python-control'" in said) == (2, True)
 
@@ -144,6 +147,9 @@ def test_replay_keeps_every_digit_and_every_kind_of_parameter():
     assert told["plant.integrate_w"] == "true"
     assert float(told["plant.x1(0)"]) == 1 / 3
     assert float(told["law.zeta(0)"]) == 1.25
+    assert "--engine" not in parts
+    again = shlex.split(repeat_command("example-1", 0.1, typed, start, 1, "python-control"))
+    assert again == [*parts, "--engine", "python-control"]
 
 
 def test_worst_lines_hold_every_run_that_violates_something(found):
