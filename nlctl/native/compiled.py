@@ -167,21 +167,20 @@ class Compiled(StandIn):
         Returns
         -------
         control.StateSpace
-            At a kink it has the slopes of the side that the point
-            belongs to.
+            At a kink it has the slopes of the side that the point belongs to.
 
         Raises
         ------
         CompileError
             If a function is called as it stands.
-        ParameterError, UsageError
+        ParameterError, UnknownKeywordError, UsageError
             If an argument is refused.
 
         Notes
         -----
         Forward mode on the expressions, so nothing is lost to a step width.
         """
-        return linearize(self, x0, u0, t, params, names=names, copy_names=copy_names)
+        return linearize(self, x0, u0, t, params, copy_names=copy_names, names=names)
 
     def parameter_jacobian(
         self,

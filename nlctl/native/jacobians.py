@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from ..delays.lines import delayed_blocks
-from ..errors import CompileError, ParameterError, UsageError
+from ..errors import CompileError, ParameterError, UnknownKeywordError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Untraceable, needed
@@ -183,17 +183,18 @@ def _inputs(system: Any, u0: Any) -> np.ndarray:
 def linearize(
     compiled: Compiled,
     x0: Any,
-    u0: Any = None,
-    t: float = 0.0,
-    params: Any = None,
+    u0: Any,
+    t: float,
+    params: Any,
     *,
-    names: Mapping[str, Any] | None = None,
-    copy_names: bool = True,
+    copy_names: bool,
+    names: Mapping[str, Any],
 ) -> ct.StateSpace:
     """Linearize a compiled diagram with exact derivatives; see `Compiled.linearize`."""
-    for name in names or {}:
+    for name in names:
         if name not in _NAMED:
-            raise unknown("argument", name, ("copy_names", *_NAMED), "of linearize")
+            known = ("copy_names", *_NAMED)
+            raise unknown("argument", name, known, "of linearize", UnknownKeywordError)
     if isinstance(x0, ct.OperatingPoint):
         x0, u0 = x0.states, x0.inputs if u0 is None else u0
     system = compiled.system
@@ -216,7 +217,7 @@ def linearize(
     }
     return ct.StateSpace(
         rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:], dt,
-        remove_useless_states=False, **({**own, **(names or {})} if copy_names else names or {}),
+        remove_useless_states=False, **(own if copy_names else {}) | dict(names),
     )  # fmt: skip
 
 
