@@ -14,6 +14,8 @@ from ..sampling_limits import BAND, PEAK, QUANTITIES, Quantity, spec_ends
 
 __all__ = ["sampling_section"]
 
+# of the plant: e₁ is what the controller sees, in steps of the measurement
+_ERROR = r"\(|y - y_d|\)"
 _TITLES = {"example_1": "Example 1", "example_2": "Example 2"}
 
 
@@ -30,12 +32,12 @@ def sampling_section(record: pd.DataFrame) -> Section:
         key="sampling",
         title="On a computer",
         items=[
-            *(Paragraph(text=_sentence(found, example)) for example in _TITLES),
+            *(Paragraph(text=_sentence(found, example, _ERROR)) for example in _TITLES),
             Figure(
                 key="sampling-errors",
-                caption=f"Largest |e₁| for t ≥ {TAIL:g} s against the sampling time, by "
+                caption=f"Largest {_ERROR} for t ≥ {TAIL:g} s against the sampling time, by "
                 "Euler's method; a cross is the last run that ends well, the line what is asked.",
-                description=" ".join(_sentence(found, example) for example in _TITLES),
+                description=" ".join(_sentence(found, example, "|y − yd|") for example in _TITLES),
                 figure=sampling_errors(record, _TITLES, BAND),
             ),
             _table(found),
@@ -48,7 +50,7 @@ def sampling_section(record: pd.DataFrame) -> Section:
     )
 
 
-def _sentence(found: pd.DataFrame, example: str) -> str:
+def _sentence(found: pd.DataFrame, example: str, error: str) -> str:
     """Say how far the paper's controller goes, and its rivals of the figure."""
     own: Any = found.loc[(example, "paper")]
     dt_text, delay, measured, given = (_text(own, quantity) for quantity in QUANTITIES)
@@ -56,10 +58,10 @@ def _sentence(found: pd.DataFrame, example: str) -> str:
         f"{r} {_text(found.loc[(example, r)], QUANTITIES[0])}" for r in SAMPLED_CONTROLLERS[1:]
     ]
     return (
-        f"{_TITLES[example]} with the paper's controller: |e₁| ≤ {BAND:g} for t ≥ {TAIL:g} s and "
-        f"|u| ≤ {PEAK:g} hold up to a sampling time of {dt_text}. Sampled every 2 ms, they hold "
-        f"with a delay of {delay}, or with measurements in steps of {measured}, or with u in steps "
-        f"of {given}. Longest sampling times of its rivals: {', '.join(rivals)}."
+        f"{_TITLES[example]} with the paper's controller: {error} ≤ {BAND:g} for t ≥ {TAIL:g} s "
+        f"and |u| ≤ {PEAK:g} hold up to a sampling time of {dt_text}. Sampled every 2 ms, they "
+        f"hold with a delay of {delay}, or with measurements in steps of {measured}, or with u in "
+        f"steps of {given}. Longest sampling times of its rivals: {', '.join(rivals)}."
     )
 
 
