@@ -113,7 +113,7 @@ def _known(task, lane, w, i, j, row):
     w.floor[j] = max(w.narrow[j] ** 2 * extent, task.atol if values[0] == 0.0 else 0.0)
     if not carried:
         longer = (0.1 * extent / max(wrong, 1e-300)) ** (1 / 3)
-        if task.memory.size:
+        if task.memory.size and row != _DENSE:
             longer = max(longer, _DOUBLE)  # stages may be less accurate than what follows from them
         w.resolved[j] = min(w.resolved[j], longer * lane.step)
     if wrong > _FOLLOWED * extent:
@@ -232,12 +232,13 @@ def _standing(task, w, i, j, row):
 def _go_on(task, lane, w, found, j, first):
     """Go on to the next event function that is to be looked at, from `first` on."""
     w.sought[j] = -1
-    free = task.fixed == 0.0 and (task.memory.size == 0 or lane.step > _DOUBLE * lane.last)
+    free = task.fixed == 0.0 and lane.tries == 0
     for i in range(first, w.e.shape[0]):
         if (lane.quiet > 0) if i >= task.corners else _is_far(w, i, j):
             continue
         known, x = _known(task, lane, w, i, j, _DENSE)
-        if known == _UNRESOLVED and free and lane.tries == 0:
+        growing = i < task.corners or lane.step > _DOUBLE * lane.last  # a memory's rate has noise
+        if known == _UNRESOLVED and free and growing:
             shorten(lane, _SHORTER)
             found[j] = AGAIN
             return
