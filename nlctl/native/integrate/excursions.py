@@ -109,6 +109,8 @@ def _known(task, lane, w, i, j, row):
     least = min(values[0], values[1], values[2], values[3], values[4])
     most = max(values[0], values[1], values[2], values[3], values[4])
     extent, wrong = most if carried else most - least, w.wrong[j]
+    if extent <= _still(task, w, j):
+        return _CLEAR, 0.0
     w.narrow[j] = _TOUCHING if values[0] == 0.0 else _NARROW
     w.floor[j] = max(w.narrow[j] ** 2 * extent, task.atol if values[0] == 0.0 else 0.0)
     if not carried:
@@ -149,6 +151,15 @@ def _follow(task, lane, w, i, j, at):
         for n in range(3):
             values[n + 1] = slope_at(newton, at, at[n]) + offset
     return offset
+
+
+@numba.njit(**INNER)
+def _still(task, w, j):
+    """Return what a function changes by that stands still: rounding, of memories for instance."""
+    largest = 0.0
+    for i in range(task.corners, w.g.shape[0]):
+        largest = max(largest, abs(w.g[i, j]))
+    return 0.01 * task.atol + 1e-14 * largest
 
 
 @numba.njit(**INNER)
