@@ -14,7 +14,7 @@ import numpy as np
 from .control import choose_method, choose_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
 from .events import AGAIN, CLEAR, EVENT, REFUSED, locate, step_accepted
-from .excursions import look_between
+from .excursions import look_before, look_between
 from .methods import explicit, rodas5p
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
@@ -164,6 +164,8 @@ def advance(rhs, point, along, task, w, rounds):
         _judge(task, lanes, w, found)
         if w.e.shape[0]:
             look_between(rhs, task, lanes, w, found)
+        if task.memory.size:
+            look_before(rhs, task, lanes, w, found)
         any_passed = _accept(task, lanes, w, found, done, passed)
         _take(task, w, done)
         delays = task.delays.shape[0] > 0

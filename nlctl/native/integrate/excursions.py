@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from .control import shorten
-from .events import AGAIN, STARTS_BEHIND
+from .events import AGAIN, EVENT, STARTS_BEHIND
 from .methods import explicit, rodas5p
 from .methods.quartic import doubt, least_value, quartic, slope_at
 from .state import INNER
@@ -77,6 +77,55 @@ def look_between(rhs, task, lanes, w, found):
             if w.sought[j] >= 0:
                 _narrow(task, lanes[j], w, found, j)
             seeking |= w.sought[j] >= 0
+
+
+@numba.njit(**INNER)
+def look_before(rhs, task, lanes, w, found):
+    """Make memories in w.g what they are just before the corner at which a step ends.
+
+    Behind it, what carries a memory along may have jumped back: it keeps what it was before.
+    """
+    wanted, any_wanted, nearer = w.wanted, False, w.g_inside[3]
+    back = 2.5 * min(10.0 * task.rtol, 1e-4)  # see `locate`: the corner is not so far back
+    for j in range(lanes.size):
+        wanted[j] = found[j] == EVENT and _crosses(task, w, w.e, j)
+        any_wanted |= wanted[j]
+    if not any_wanted:
+        return
+    for j in range(lanes.size):
+        w.part[j] = 1.0 - back
+    _inside(rhs, task, lanes, w, nearer)
+    for j in range(lanes.size):
+        w.part[j] = 1.0 - 2.0 * back
+        if _crosses(task, w, nearer, j):
+            w.part[j] = lanes[j].low / lanes[j].step
+    _inside(rhs, task, lanes, w, w.g_ahead)
+    for j in range(lanes.size):
+        far = _crosses(task, w, nearer, j)
+        ahead = 0.0 if far else 1.0 + _until_corner(task, w, nearer, j)
+        for i in range(task.corners, w.g.shape[0]):
+            if wanted[j] and w.e_start[i, j] != 0.0:
+                change = 0.0 if far else nearer[i, j] - w.g_ahead[i, j]
+                w.g[i, j] = w.g_ahead[i, j] + ahead * change
+
+
+@numba.njit(**INNER)
+def _until_corner(task, w, nearer, j):
+    """Return how far it is to the first corner, in distances between the last two looks."""
+    first = np.inf
+    for i in range(task.corners):
+        if w.e_start[i, j] * w.e[i, j] < 0.0:
+            first = min(first, nearer[i, j] / (w.g_ahead[i, j] - nearer[i, j]))
+    return min(max(first, 0.0), 1.0)
+
+
+@numba.njit(**INNER)
+def _crosses(task, w, e, j):
+    """Whether a switching function has another sign than at the start of a step."""
+    for i in range(task.corners):  # noqa: SIM110 (no generators in machine code)
+        if w.e_start[i, j] * e[i, j] < 0.0:
+            return True
+    return False
 
 
 @numba.njit(**INNER)
