@@ -59,6 +59,7 @@ from .equations import equation
 from .errors import (
     AmbiguousNameError,
     BlockError,
+    ChatteringError,
     DiagramError,
     DivergedError,
     ParameterError,
@@ -96,6 +97,7 @@ __all__ = [
     "BlockError",
     "BoucWen",
     "CacheWarning",
+    "ChatteringError",
     "Clock",
     "CompileError",
     "Compiled",

@@ -30,7 +30,7 @@ class BlockError(DiagramError, TypeError):
 
 
 class DivergedError(RuntimeError):
-    """A run whose state left the finite numbers.
+    """A run that did not reach its last time: its state left the finite numbers, for instance.
 
     Attributes
     ----------
@@ -41,6 +41,13 @@ class DivergedError(RuntimeError):
     def __init__(self, message: str, time: float) -> None:
         super().__init__(message)
         self.time = time
+
+
+class ChatteringError(DivergedError):
+    """A run that switches over and over again at one jump, and does not come away from it.
+
+    ``time`` is where it was found.  What handles runs that did not reach their end handles it.
+    """
 
 
 class CompileError(UsageError):

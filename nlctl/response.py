@@ -131,6 +131,8 @@ def input_output_response(
     ------
     DivergedError
         If the state becomes infinite or NaN.
+    ChatteringError
+        If machine code switches over and over again at a jump; the message names block and values.
     KeyboardInterrupt
         After Ctrl-C; machine code with ``ignore_errors`` returns what it has until then.
     CompileError, AlgebraicLoopError

@@ -22,8 +22,8 @@ class Quantiser:
 
     Its jumps are the zeros of a sine, which changes its sign at each: machine code locates them
     unless one step passes an even number of them, which the error control of what v drives sees.
-    Around a loop in continuous time it may chatter along a jump; the run then ends at the limit of
-    its steps, and says so.
+    Around a loop in continuous time it may chatter along a jump; the run then ends as
+    `CHATTERING`, and says where.
     """
 
     q: float = param(0.1, unit="1", meaning="step", above=0)

@@ -240,7 +240,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
     nodes = compiled.schedule.nodes
     if compiled.system.nstates:
         set_parameters(compiled.system, dict(trial.params) if trial.params else None)
-    y = _signals(compiled, trial, point)
+    y = block_outputs(compiled, trial.p, point)
     counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
     outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
     given = list(block_inputs(compiled.system, u[: compiled.system.ninputs or 0], outputs))
@@ -261,7 +261,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
                 raise _difference(labels[wrong[0]], node.path, (a[wrong[0]], b[wrong[0]]), t)
 
 
-def _signals(compiled: Compiled, trial: Trial, point: Any) -> np.ndarray:
+def block_outputs(compiled: Compiled, p: np.ndarray, point: Any) -> np.ndarray:
     """Return the outputs of all blocks, from the generator that the run's program is from."""
     nodes = compiled.schedule.nodes
     counts = [node.system.noutputs or 0 for node in nodes]
@@ -269,11 +269,11 @@ def _signals(compiled: Compiled, trial: Trial, point: Any) -> np.ndarray:
     schedule = replace(compiled.schedule, outputs=every)
     t, x, u = point
     y = np.empty((len(every), 1))
-    found = equations(schedule, compiled.program.layout, trial.p)
+    found = equations(schedule, compiled.program.layout, p)
     lowered = lower(schedule, compiled.program, 1, found)
     prepare, _, out = lowered_code(lowered)
     c = np.zeros((lowered.size, 1))
-    prepare(np.ascontiguousarray(trial.p[:, None]), c)
+    prepare(np.ascontiguousarray(p[:, None]), c)
     out(np.array([t]), x[:, None], u[:, None], c, y)
     return y[:, 0]
 

@@ -19,6 +19,7 @@ from ..params import checked_times, whole_number
 from ..responses.arguments import checked_params, input_array
 from .audit import Audit, Trial
 from .audit import audit as compare
+from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
 from .integrate.driver import (
@@ -27,10 +28,10 @@ from .integrate.driver import (
     Trajectory,
     begin,
     finish,
-    go_on,
     made,
     prepared,
     trajectory,
+    watched,
 )
 from .integrate.methods.tableau import Tableau
 from .integrate.state import RUNNING, STIFF, Status
@@ -145,7 +146,8 @@ def ensemble_response(
         Number of threads; by default one per core.
     rtol, atol : float, optional
     max_steps : int, optional
-        A member that needs more steps ends with the status STEP_LIMIT.
+        A member that needs more steps ends with the status STEP_LIMIT, one that switches over and
+        over again at a jump with CHATTERING.
     method : str or Tableau, optional
         As in `nlctl.input_output_response`.
     progress : callable, optional
@@ -270,8 +272,9 @@ def _ran(
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         run = prepared(compiled, times, inputs, *members, settings)
         begin(run)
+        paces = new_paces(run.lanes)
         while stop.wanted and np.any(run.lanes["status"] == RUNNING):
-            run = go_on(run)
+            run = watched(run, paces)
         return run, finish(run)
 
 

@@ -8,11 +8,12 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..errors import DivergedError
+from ..errors import ChatteringError, DivergedError
 from ..responses.arguments import evaluation_array, input_array, interpolated, state_array
 from ..responses.time_response import Response, response_of
 from .audit import Audit, Trial
 from .audit import audit as compare
+from .chattering.place import chattering_words
 from .compiled import Compiled
 from .integrate.driver import Settings, Statistics, Trajectory, trajectory
 from .integrate.state import Status
@@ -42,7 +43,7 @@ def respond(
 
     Raises
     ------
-    DivergedError
+    DivergedError, ChatteringError
         If the run does not reach the last time, unless `ignore_errors`: then the response ends
         where the run did, with ``success = False``.
     KeyboardInterrupt
@@ -64,11 +65,14 @@ def respond(
     compare(compiled, trial, audit)
     run = made.statistics
     if run.status is Status.STOPPED and not ignore_errors:
-        raise KeyboardInterrupt(_message(system, run))  # whoever takes it for an error continues
+        # whoever takes it for an error continues
+        raise KeyboardInterrupt(_message(compiled, run, p, params))
     if run.status is not Status.OK and not ignore_errors:
-        raise DivergedError(_message(system, run), run.time)
+        kind = ChatteringError if run.status is Status.CHATTERING else DivergedError
+        raise kind(_message(compiled, run, p, params), run.time)
     shown = np.flatnonzero(np.isin(made.time, wanted))
-    return _response(compiled, made, u, shown, params, form)
+    message = None if run.status is Status.OK else _message(compiled, run, p, params)
+    return _response(compiled, made, u, shown, (params, form, message))
 
 
 def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -104,14 +108,20 @@ def uninterrupted(response: Any) -> Any:
     return response
 
 
-def _message(system: ct.InputOutputSystem, run: Statistics) -> str:
+def _message(
+    compiled: Compiled, run: Statistics, p: np.ndarray, params: Mapping[str, Any] | None
+) -> str:
     what = {
         Status.DIVERGED: "diverged: no finite state after",
         Status.STEP_LIMIT: "stopped at the limit of steps at",
         Status.STOPPED: "was stopped at",
+        Status.CHATTERING: "is chattering at",
         Status.STEP_TOO_SMALL: "diverged or jumps: no step is small enough after",
     }
-    return f"'{system.name}' {what[run.status]} t = {run.time:.6g} s"
+    told = f"'{compiled.system.name}' {what[run.status]} t = {run.time:.6g} s"
+    if run.jump is None:
+        return told
+    return f"{told}: {chattering_words(compiled, p, params, run.jump)}"
 
 
 def _response(
@@ -119,15 +129,13 @@ def _response(
     made: Trajectory,
     inputs: np.ndarray,
     shown: np.ndarray,
-    params: Mapping[str, Any] | None,
-    form: Mapping[str, Any],
+    told: tuple[Mapping[str, Any] | None, Mapping[str, Any], str | None],
 ) -> Response:
-    system, run = compiled.system, made.statistics
-    ok = run.status is Status.OK
+    system, run, (params, form, message) = compiled.system, made.statistics, told
     signals = (made.time, made.outputs, made.states, inputs)
     response = response_of(
         system, [x[..., shown] for x in signals], params, form,
-        success=ok, message=None if ok else _message(system, run),
+        success=message is None, message=message,
     )  # fmt: skip
     response.statistics = run
     return response

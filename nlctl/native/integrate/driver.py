@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
 from numbers import Real
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from ...errors import ParameterError
 from ...names import unknown
 from ...sampling.clock import Instants
+from ..chattering.detection import PROBE, Jump, asked, jump_of, new_paces, snapshot
 from ..codegen.along import Along, derivatives
 from ..codegen.program import instants_of
 from ..compiled import Compiled
@@ -104,6 +106,8 @@ class Statistics:
         Corners and turning memories at which a step was ended.
     stiff : bool
         Whether the run ended with the stiff method.
+    jump : Jump or None
+        Where it chatters, of a run that ended as CHATTERING.
     """
 
     status: Status
@@ -112,6 +116,7 @@ class Statistics:
     rejected: int
     events: int = 0
     stiff: bool = False
+    jump: Jump | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,9 +146,9 @@ def trajectory(
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         try:
             begin(run)
+            paces = new_paces(run.lanes)
             while run.lanes["status"][0] == RUNNING:
-                run = go_on(run)
-                run = differentiated(compiled, run, p)
+                run = differentiated(compiled, watched(run, paces), p)
                 if progress is not None:
                     progress(float(run.lanes["t"][0]))
         except KeyboardInterrupt:
@@ -184,12 +189,15 @@ class Run:
         See `workspace`.
     along : Along or None
         Exact derivatives, if the stiff method has asked for them and there are any.
+    jumps : mapping
+        Of members that chatter, by their lanes: where.
     """
 
     machine: Machine
     task: Any
     work: Any
     along: Along | None = None
+    jumps: Mapping[int, Jump] = field(default_factory=dict)
 
     @property
     def lanes(self) -> np.ndarray:
@@ -213,6 +221,28 @@ def go_on(run: Run, rounds: int = ROUNDS) -> Run:
     integrators()["advance"](rhs, point, along, run.task, run.work, rounds)
     run.machine.check(run.task.p)
     return run
+
+
+def watched(run: Run, paces: np.ndarray) -> Run:
+    """Try a window of steps in every lane; one that chatters at its end gets that status.
+
+    The window is the same number of steps whatever lanes are looked at, so that what becomes of
+    one does not depend on the others.
+    """
+    run = go_on(run, ROUNDS - PROBE)
+    lanes = np.flatnonzero(asked(run.lanes, paces)) if run.task.fixed == 0.0 else ()
+    if not len(lanes):
+        return go_on(run, PROBE)
+    attempts = []
+    for _ in range(PROBE):
+        run, attempt = snapshot(run.work, partial(go_on, run, 1))
+        attempts.append(attempt)
+    found = {
+        j: jump_of(run, attempts, j) for j in map(int, lanes) if run.lanes["status"][j] == RUNNING
+    }
+    jumps = {j: jump for j, jump in found.items() if jump is not None}
+    run.lanes["status"][list(jumps)] = Status.CHATTERING
+    return replace(run, jumps={**run.jumps, **jumps})
 
 
 def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
@@ -340,6 +370,7 @@ def made(run: Run, outputs: np.ndarray, j: int) -> Trajectory:
         rejected=int(lane["rejected"]),
         events=int(lane["events"]),
         stiff=bool(lane["stiff"]),
+        jump=run.jumps.get(j),
     )
     return Trajectory(
         time=times[:done],

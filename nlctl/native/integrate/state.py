@@ -15,9 +15,10 @@ class Status(IntEnum):
     STEP_LIMIT = 2
     STEP_TOO_SMALL = 3
     STOPPED = 4
+    CHATTERING = 5
 
 
-OK, DIVERGED, STEP_LIMIT, STEP_TOO_SMALL, STOPPED = map(int, Status)  # for compiled code
+OK, DIVERGED, STEP_LIMIT, STEP_TOO_SMALL, STOPPED, CHATTERING = map(int, Status)  # compiled code's
 RUNNING, STIFF = -1, -2  # STIFF: to be finished by a method that only single runs have
 DERIVATIVES = -3  # to go on once it is known where the stiff method has its Jacobian from
 FIRST_PATIENCE = 15

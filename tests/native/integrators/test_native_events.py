@@ -360,13 +360,13 @@ class TestIdealRelay:
         """x' = 0.5 - 1.5 sign x slides from t = 0.5 on: no run may take that for a motion."""
         loop = joined(plant=Lag(a=0.0, gain=1.5, c=0.5), relay=Sign())
         made = run(
-            loop, [0, 1.0], 0, {"plant.x": 0.5}, method=method, max_steps=3000, ignore_errors=True
+            loop, [0, 1.0], 0, {"plant.x": 0.5}, method=method, max_steps=30_000, ignore_errors=True
         )
         assert made.statistics.time > 0.49
         if made.statistics.status is Status.OK:
             assert abs(made.states[0, -1]) < 1e-6
         else:
-            assert made.statistics.status in (Status.STEP_LIMIT, Status.STEP_TOO_SMALL)
+            assert made.statistics.status is Status.CHATTERING
 
     @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "auto"])
     def test_a_chattering_memory_ends_with_a_status(self, method):
@@ -379,13 +379,13 @@ class TestIdealRelay:
             0,
             start,
             method=method,
-            max_steps=3000,
+            max_steps=30_000,
             ignore_errors=True,
         )
         assert made.statistics.time > 0.99
         late = made.states[0, made.time > 1.01]
         assert np.all(abs(late) < 1e-4)
-        assert made.statistics.status in (Status.OK, Status.STEP_LIMIT, Status.STEP_TOO_SMALL)
+        assert made.statistics.status in (Status.OK, Status.CHATTERING, Status.STEP_TOO_SMALL)
 
 
 @nlctl.record

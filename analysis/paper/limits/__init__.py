@@ -1,0 +1,1 @@
+"""Where the paper's claims end: the same controller through every actuator."""

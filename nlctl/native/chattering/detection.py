@@ -1,0 +1,190 @@
+"""Whether a run chatters: its right-hand side jumps, and its steps do not come away from the jump.
+
+Where the solutions on both sides of a jump lead back to it, there is no step that error control
+accepts and that leaves it: a run makes ever more of the shortest steps.  Three things together
+tell that from stiffness and from fast oscillations:
+
+* by what it moves in a mean step, a state changes by no more than some tolerances;
+* of the last steps tried many contain a jump, of the right-hand side or of what a memory becomes;
+* halving the way across, down to neighbouring numbers, does not make it smaller.
+
+It is looked for in windows of so many steps that a usual run has none, and rarely in a run that
+goes on as it began.  What is found of a member never depends on the members beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..integrate.state import RUNNING
+
+__all__ = ["PROBE", "Attempt", "Jump", "asked", "jump_of", "new_paces", "snapshot"]
+
+PROBE = 200  # steps tried that are looked at, at the end of a window
+_JUMPS = 10  # of them with a jump
+_WITHIN = 100.0  # tolerances that a state moves in a mean step
+_SLOW = 0.1  # part of the longest window
+_LEAST = 0.1  # part of the range of the right-hand side that counts as a jump
+_REMAINS = 0.4  # part of it that is still there between neighbours; sign has a half at 0
+_HALVINGS = 200
+_PACES = np.dtype([("t", "f8"), ("longest", "f8"), ("windows", "i8"), ("slow", "i8")])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jump:
+    """A jump at which a run chatters.
+
+    Attributes
+    ----------
+    time : float
+        Of the jump (s).
+    before, after : ndarray of shape (nstates,)
+        Neighbouring states on both sides.
+    inputs : ndarray
+        Inputs of the program there.
+    """
+
+    time: float
+    before: np.ndarray
+    after: np.ndarray
+    inputs: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attempt:
+    """One step tried in every lane, as it was before and after; arrays as in `workspace`."""
+
+    t: np.ndarray
+    x: np.ndarray
+    first: np.ndarray
+    x_new: np.ndarray
+    h: np.ndarray
+    k: np.ndarray
+    u: np.ndarray
+    stiff: bool
+
+
+def new_paces(lanes: np.ndarray) -> np.ndarray:
+    """Return how fast lanes have been going that have not begun."""
+    paces = np.zeros(lanes.size, _PACES)
+    paces["t"] = lanes["t"]
+    return paces
+
+
+def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
+    """Return which lanes are to be looked at, at the end of a window.
+
+    Those that have become slow, and those that run on and on; after 1, 2, 4, 8, ... windows.
+    """
+    gone = lanes["t"] - paces["t"]
+    paces["t"] = lanes["t"]
+    paces["longest"] = np.maximum(paces["longest"], gone)
+    paces["windows"] += 1
+    paces["slow"] = np.where(gone < _SLOW * paces["longest"], paces["slow"] + 1, 0)
+    due = [(n & (n - 1)) == 0 for n in (paces["windows"], paces["slow"])]
+    return (lanes["status"] == RUNNING) & (due[0] | ((paces["slow"] > 0) & due[1]))
+
+
+def snapshot(work: Any, advance: Callable[[], Any]) -> tuple[Any, Attempt]:
+    """Try one step; return what `advance` returns, and the step."""
+    t, x, first = work.lanes["t"].copy(), work.x.copy(), work.k[0].copy()
+    run = advance()
+    w = run.work
+    lanes = w.t.size
+    return run, Attempt(
+        t=t, x=x, first=first, x_new=w.x_new.copy(), h=w.hh[:lanes].copy(), k=w.k.copy(),
+        u=w.u.copy(), stiff=bool(w.lanes["stiff"][0]),
+    )  # fmt: skip
+
+
+def jump_of(run: Any, attempts: list[Attempt], j: int) -> Jump | None:
+    """Return the last jump in the steps that lane `j` has tried, if it chatters there."""
+    task = run.task
+    slopes = np.concatenate([a.k[:, :, j] for a in attempts])
+    slopes = slopes[np.isfinite(slopes).all(axis=1)]
+    states = np.array([a.x[:, j] for a in attempts])
+    if not slopes.size or not np.isfinite(states).all():
+        return None
+    extent = slopes.max(axis=0) - slopes.min(axis=0)
+    scale = task.atol + task.rtol * np.abs(states).max(axis=0)
+    step = (run.lanes["t"][j] - attempts[0].t[j]) / len(attempts)
+    if not np.all(step * extent <= _WITHIN * scale):
+        return None
+    c = np.ascontiguousarray(np.repeat(task.p[:, j : j + 1], run.machine.width, axis=1))
+    evaluated = _Evaluated(run=run, j=j, c=c)
+    weights = np.zeros(extent.size + task.memory.size)
+    weights[: extent.size] = 1.0 / scale
+    weights[extent.size :] = 1.0 / (task.atol + task.rtol)  # memories jump by what they are
+    least = np.append(_LEAST * extent, np.full(task.memory.size, 1e3 * (task.atol + task.rtol)))
+    found, last = 0, None
+    for attempt in reversed(attempts):
+        jump = evaluated.jump(attempt, weights, least)
+        found, last = found + (jump is not None), last or jump
+        if found == _JUMPS:
+            return last
+    return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Evaluated:
+    """The right-hand side of one lane, with what its memories would become behind it."""
+
+    run: Any
+    j: int
+    c: np.ndarray  # its parameters, in every lane
+
+    def __call__(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        width, task = self.run.machine.width, self.run.task
+        tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), width, axis=1) for v in (t, x, u))
+        dx, g = np.empty_like(xx), np.empty((self.run.work.g.shape[0], width))
+        self.run.machine.rhs(tt[0].copy(), xx, uu, self.c, dx, g)
+        dx[task.memory] = 0.0
+        return np.concatenate([dx[:, 0], g[task.corners :, 0]])
+
+    def points(self, attempt: Attempt) -> Iterator[tuple[float, np.ndarray]]:
+        """Yield where a step has been: at its ends and, of the explicit method, at its stages."""
+        j, h = self.j, attempt.h[self.j]
+        t, x, A, C = attempt.t[j], attempt.x[:, j], self.run.task.A, self.run.task.C
+        yield t, x
+        if attempt.stiff:
+            yield t, attempt.x_new[:, j]
+            return
+        slopes = np.vstack([attempt.first[None, :, j], attempt.k[1:, :, j]])
+        for s in range(1, C.size):
+            yield t + C[s] * h, x + h * (A[s, :s] @ slopes[:s])
+
+    def jump(self, attempt: Attempt, weights: np.ndarray, least: np.ndarray) -> Jump | None:
+        """Return a jump inside of a step, if there is one."""
+        u = attempt.u[:, self.j]
+        places = [p for p in self.points(attempt) if np.isfinite(p[1]).all()]
+        values = np.array([self(*place, u) for place in places])
+        change = np.where(np.isfinite(values).all(axis=0), np.ptp(values, axis=0), 0.0)
+        change = np.where(change > least, weights * change, 0.0)
+        if not change.any():
+            return None
+        i = int(np.argmax(change))
+        low, high = places[int(values[:, i].argmin())], places[int(values[:, i].argmax())]
+        return self._narrowed(low, high, u, i)
+
+    def _narrowed(self, low: Any, high: Any, u: np.ndarray, i: int) -> Jump | None:
+        """Halve the way from one place to another; return where component `i` jumps, if it does."""
+        first, last = self(*low, u)[i], self(*high, u)[i]
+        whole = abs(last - first)
+        for _ in range(_HALVINGS):
+            t, x = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
+            if any(t == e[0] and np.array_equal(x, e[1]) for e in (low, high)):
+                break
+            middle = self(t, x, u)[i]
+            if abs(middle - first) > abs(last - middle):
+                high, last = (t, x), middle
+            else:
+                low, first = (t, x), middle
+            if not abs(last - first) > _REMAINS * whole:
+                return None
+        # the jump itself may have a value of its own, as sign(0) has: beside it on both sides
+        before, after = 2.0 * low[1] - high[1], 2.0 * high[1] - low[1]
+        return Jump(time=float(high[0]), before=before, after=after, inputs=u)

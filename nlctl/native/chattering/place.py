@@ -1,0 +1,130 @@
+"""At which block a run chatters, and between which values."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ...upstream.control_internals import rates_now, set_parameters
+from ..audit import block_outputs
+from ..codegen.program import count_switching_functions, memory
+from ..compiled import Compiled
+from ..diagram.block_inputs import block_inputs
+from .detection import Jump
+
+__all__ = ["chattering_words"]
+
+_ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
+_SMALL = 1e-300  # what is divided by where nothing else has changed
+
+
+def chattering_words(
+    compiled: Compiled, p: np.ndarray, params: Mapping[str, Any] | None, jump: Jump
+) -> str:
+    """Return which signal jumps between which values, and what to do.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    p : ndarray
+        The program's parameter vector.
+    params : mapping or None
+        The same as python-control takes them.
+    jump : Jump
+        Where the run chatters.
+    """
+    advice = (
+        "the run comes back to it with each of the shortest steps: smooth the jump over a small "
+        "width, give it hysteresis, or sample the controller (nlctl.sampled)"
+    )
+    found = _committed(compiled, p, jump) or _changed(compiled, p, params, jump)
+    return f"{found}; {advice}"
+
+
+def _committed(compiled: Compiled, p: np.ndarray, jump: Jump) -> str:
+    """Return which memory switches, if one does and that is what jumps."""
+    program, nodes = compiled.program, compiled.schedule.nodes
+    sides = [_events(compiled, p, jump, x) for x in (jump.before, jump.after)]
+    changes = np.abs(sides[1] - sides[0])[program.corners :]
+    if not changes.size or not changes.max() > 1e-3:
+        return ""
+    m = program.memory[int(changes.argmax())]
+    place = program.corners + int(changes.argmax())
+    node = next(node for node in nodes if m in memory(node))
+    label = node.system.state_labels[m - node.state_offset]
+    return _between(label, node.path, sides[0][place], sides[1][place])
+
+
+def _events(compiled: Compiled, p: np.ndarray, jump: Jump, x: np.ndarray) -> np.ndarray:
+    """Return switching functions, and what memories would become."""
+    rhs, _ = compiled.native
+    g = np.zeros(compiled.program.events)
+    rhs(jump.time, x.copy(), jump.inputs.copy(), p, np.empty(x.size), g)
+    return g
+
+
+def _changed(
+    compiled: Compiled, p: np.ndarray, params: Mapping[str, Any] | None, jump: Jump
+) -> str:
+    """Return the block whose values change most for what changes at its inputs and states."""
+    with _ONE_AT_A_TIME, np.errstate(all="ignore"):
+        if compiled.system.nstates:
+            set_parameters(compiled.system, dict(params) if params else None)
+        before, after = (
+            list(_blocks(compiled, p, (jump.time, x, jump.inputs)))
+            for x in (jump.before, jump.after)
+        )
+    sharpest, words = -1.0, ""
+    for i, ((given, labels, values), (given_2, _, values_2)) in enumerate(
+        zip(before, after, strict=True)
+    ):
+        if not values.size:
+            continue
+        change = np.abs(values_2 - values)
+        k = int(np.argmax(np.where(np.isfinite(change), change, 0.0)))
+        sharp = change[k] / max(float(np.abs(given_2 - given).max(initial=0.0)), _SMALL)
+        if change[k] > 0.0 and sharp > sharpest:
+            node = compiled.schedule.nodes[i]
+            words = _between(labels[k], node.path, values[k], values_2[k])
+            sharpest = float(sharp)
+            words += _switching_function(compiled, i, p, jump)
+    return words or "its right-hand side jumps there"
+
+
+def _blocks(
+    compiled: Compiled, p: np.ndarray, point: Any
+) -> Iterator[tuple[np.ndarray, list[str], np.ndarray]]:
+    """Yield for each block what it is given, and its outputs and rates with their names."""
+    t, x, u = point
+    nodes = compiled.schedule.nodes
+    y = block_outputs(compiled, p, point)
+    counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
+    outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
+    given = block_inputs(compiled.system, u[: compiled.system.ninputs or 0], outputs)
+    for i, (node, (block, inputs)) in enumerate(zip(nodes, given, strict=True)):
+        own = x[node.state_offset :][: block.nstates or 0]
+        values, labels = [np.asarray(outputs[i], dtype=float)], list(block.output_labels)
+        if block.nstates and node.sampled is None:
+            values.append(np.asarray(rates_now(block, t, own, inputs), dtype=float))
+            labels += [f"{label}'" for label in block.state_labels]
+        yield np.concatenate([inputs, own]), labels, np.concatenate(values)
+
+
+def _switching_function(compiled: Compiled, i: int, p: np.ndarray, jump: Jump) -> str:
+    """Return which switching function of a block changes its sign, of a block that has several."""
+    nodes = compiled.schedule.nodes
+    counts = np.cumsum([0, *(count_switching_functions(node) for node in nodes)])
+    sides = [_events(compiled, p, jump, x)[counts[i] :] for x in (jump.before, jump.after)]
+    count = int(counts[i + 1] - counts[i])
+    changed = np.flatnonzero(np.sign(sides[0][:count]) != np.sign(sides[1][:count]))
+    if count < 2 or not changed.size:
+        return ""
+    return f" where its switching function {changed[0] + 1} of {count} is 0"
+
+
+def _between(label: str, block: str, one: float, other: float) -> str:
+    return f"'{label}' of block '{block}' jumps between {one + 0.0:.6g} and {other + 0.0:.6g}"

@@ -1,0 +1,181 @@
+"""Runs that chatter end as that, soon, with the block named; runs that only look like it do not."""
+
+import control as ct
+import numpy as np
+import pytest
+
+import nlctl
+from nlctl.native import Status
+
+TIMES = np.linspace(0, 10, 101)
+FULLER = np.sqrt((np.sqrt(33) - 1) / 24)  # of its optimal switching curve x = -C x' |x'|
+
+
+@nlctl.record
+class Side:
+    """A relay with hysteresis whose output is its memory."""
+
+    width: float = nlctl.param(1.0, unit="1", meaning="threshold", above=0)
+    inputs, outputs, states, feedthrough = ("u",), ("v",), ("side",), False
+    memory, initial = ("side",), {"side": -1.0}
+
+    @staticmethod
+    @nlctl.equation
+    def update(t, x, u, p):
+        return (0.0,)
+
+    @staticmethod
+    @nlctl.equation
+    def output(t, x, u, p):
+        return (x[0],)
+
+    @staticmethod
+    @nlctl.equation
+    def commit(t, x, u, p):
+        if u[0] > p.width:
+            return (1.0,)
+        if u[0] < -p.width:
+            return (-1.0,)
+        return (x[0],)
+
+    @staticmethod
+    @nlctl.equation
+    def corners(t, x, u, p):
+        return u[0] - p.width, u[0] + p.width
+
+
+def plain(function, start, name="loop"):
+    """A system of one block and its start."""
+    n = len(start)
+    return ct.nlsys(function, lambda t, x, u, p: x, states=n, outputs=n, inputs=0, name=name), start
+
+
+def sign_loop(c=0.5):
+    """x' = c - sign x from 1: at 0 after 1 / (1 - c)."""
+    return plain(lambda t, x, u, p: c - np.sign(x), [1.0])
+
+
+def relay_loop():
+    """x'' = -2 sign(x + x' / 2) from rest at 1/2: on its line when 1/2 - t^2 = t."""
+    return plain(lambda t, x, u, p: np.array([x[1], -2 * np.sign(x[0] + 0.5 * x[1])]), [0.5, 0.0])
+
+
+def fuller_loop():
+    """Fuller's problem: switches accumulate."""
+    return plain(
+        lambda t, x, u, p: np.array([x[1], -np.sign(x[0] + FULLER * x[1] * abs(x[1]))]), [1.0, 0.0]
+    )
+
+
+def fuller_end():
+    """From rest at 1: arcs x'' = -+1, each of which a^2 of the one before, in closed form."""
+    start = np.sqrt(2 / (1 + 2 * FULLER))  # x' at the first switch, 1 - x'^2 / 2 = C x'^2
+    ratio = np.sqrt((1 - 2 * FULLER) / (1 + 2 * FULLER))
+    return start + start * (1 + ratio) / (1 - ratio)
+
+
+def run(system, start, **given):
+    return nlctl.input_output_response(system, TIMES, 0, start, ignore_errors=True, **given)
+
+
+@pytest.mark.parametrize(
+    ("loop", "exact"),
+    [(sign_loop(), 2.0), (relay_loop(), (np.sqrt(3) - 1) / 2), (fuller_loop(), fuller_end())],
+    ids=["sign", "relay", "Fuller"],
+)
+@pytest.mark.parametrize(("rtol", "atol"), [(1e-8, 1e-10), (1e-6, 1e-8)])
+def test_chattering_is_found_where_it_begins(loop, exact, rtol, atol):
+    """Within some windows, of which each goes no further than steps of the tolerance."""
+    made = run(*loop, rtol=rtol, atol=atol)
+    found = made.statistics
+    assert found.status is Status.CHATTERING
+    assert found.accepted + found.rejected <= 6000
+    assert found.time == pytest.approx(exact, abs=2e4 * rtol)
+    assert not made.success
+
+
+def test_the_message_names_signal_block_and_both_values():
+    system, start = sign_loop()
+    with pytest.raises(nlctl.ChatteringError, match=r"'x\[0\]'' of block 'loop' jumps") as caught:
+        nlctl.input_output_response(system, TIMES, 0, start)
+    assert "between -0.5 and 1.5" in str(caught.value)
+    assert caught.value.time == pytest.approx(2.0, abs=1e-4)
+    assert isinstance(caught.value, nlctl.DivergedError)  # whoever handles one handles the other
+
+
+@pytest.mark.parametrize(
+    ("actuator", "jump"),
+    [(nlctl.Quantiser(q=0.5), 0.5), (nlctl.Quantiser(), 0.1), (nlctl.DeadZoneInverse(), 0.8)],
+    ids=lambda value: type(value).__name__,
+)
+def test_the_block_inside_of_a_loop_is_named(actuator, jump):
+    """The paper's controller through a jump: the two values differ by the jump."""
+    loop = nlctl.paper.example_1(actuator=actuator)
+    made = nlctl.input_output_response(loop, TIMES, ignore_errors=True)
+    assert made.statistics.status is Status.CHATTERING
+    words = made.message.partition("'v' of block 'actuator' jumps between ")[2]
+    one, _, other = words.partition(";")[0].partition(" and ")
+    assert abs(float(one) - float(other)) == pytest.approx(jump, rel=1e-4)
+
+
+def test_a_memory_that_switches_is_named():
+    """A relay whose thresholds coincide to below the tolerance."""
+    relay = nlctl.Relay(on=1e-12, off=-1e-12)
+    plant = ct.nlsys(
+        lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0], states=1, inputs=["v"],
+        outputs=["u"], name="plant",
+    )  # fmt: skip
+    loop = nlctl.interconnect({"relay": relay, "plant": plant})
+    made = run(loop, {"plant.x[0]": 1.0})
+    assert made.statistics.status is Status.CHATTERING
+    assert "of block 'relay' jumps between" in made.message
+
+
+WELL = {
+    "a steep function that does not jump": plain(lambda t, x, u, p: 0.5 - np.tanh(1e7 * x), [1.0]),
+    "stiff": plain(lambda t, x, u, p: 1e6 * (np.cos(t) - x), [0.0]),
+    "a fast square wave": plain(lambda t, x, u, p: np.sign(np.sin(300 * t)) + 0 * x, [0.0]),
+    "a jump that is passed": plain(lambda t, x, u, p: -2 - np.sign(x), [1.0]),
+    "a fast oscillation": plain(
+        lambda t, x, u, p: np.array([1000 * x[1], -1000 * x[0]]), [1.0, 0.0]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WELL)
+def test_what_only_looks_like_it_ends_well(name):
+    assert run(*WELL[name]).statistics.status is Status.OK
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-5])
+def test_a_hysteresis_that_the_tolerance_resolves_is_integrated(width):
+    """x' = 0.5 - v stays within the thresholds; v is in the mean what holds x: 1/2."""
+    plant = ct.nlsys(
+        lambda t, x, u, p: np.array([0.5 - u[0], u[0]]), lambda t, x, u, p: x[0], states=2,
+        inputs=["v"], outputs=["u"], name="plant",
+    )  # fmt: skip
+    loop = nlctl.interconnect({"relay": Side(width=width), "plant": plant})
+    end = 100 * width
+    made = nlctl.input_output_response(loop, [0, end], 0)
+    assert made.statistics.status is Status.OK
+    assert np.max(np.abs(made.states[1])) <= 1.001 * width
+    assert made.states[2, -1] == pytest.approx(end / 2, abs=5 * width)
+
+
+def test_members_of_an_ensemble_chatter_whatever_is_beside_them():
+    """Statuses, times and steps of nine members, alone and together."""
+    block = ct.nlsys(
+        lambda t, x, u, p: p["c"] - np.sign(x), lambda t, x, u, p: x, states=1, outputs=["x"],
+        inputs=0, name="block", params={"c": 0.5},
+    )  # fmt: skip
+    loop = nlctl.compile(block)
+    c, start = np.linspace(-1.5, 1.5, 9), {"x[0]": 1.0}
+
+    def table(values):
+        made = nlctl.ensemble_response(loop, TIMES, 0, start, params={"c": values})
+        return made.table[["status", "time", "steps"]]
+
+    together = table(c)
+    assert list(together["status"]) == np.where(abs(c) < 1, "CHATTERING", "OK").tolist()
+    for k in range(9):
+        assert table(c[k : k + 1]).iloc[0].tolist() == together.iloc[k].tolist()
