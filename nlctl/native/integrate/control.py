@@ -96,11 +96,17 @@ def next_step(lane, error, rate, task):
     if task.fixed > 0.0:
         lane.h = task.fixed
     elif not lane.stiff:
-        # at the limit of stability the rates of memories are noise
-        limit = min(2.0, 0.8 * task.stable) if memories else 0.8 * task.stable
+        limit = min(_reach(task), 0.8 * task.stable)
         lane.slow = lane.slow + 1 if lane.h * rate > limit else 0
         if memories and lane.slow:
             lane.h = limit / rate
+
+
+@numba.njit(**INNER)
+def _reach(task):
+    """Return h |lambda| of the explicit steps that stability limits."""
+    # at the limit of stability the rates of memories are noise
+    return min(2.0, 0.8 * task.stable) if task.memory.size else task.stable
 
 
 @numba.njit(**INNER)
@@ -120,7 +126,7 @@ def choose_method(lane, task):
         return
     lane.stiff += 1
     if lane.stiff % TRIAL == 0:
-        limit = task.stable / max(lane.rate, 1e-300)
+        limit = _reach(task) / max(lane.rate, 1e-300)
         pays = lane.t - lane.judged_at > task.cost * limit * (tried - lane.judged_after)
         lane.judged_at, lane.judged_after = lane.t, tried
         if lane.stiff == TRIAL:
