@@ -5,6 +5,16 @@ from .adaptive import Zero, adaptive_neural
 from .adaptive_inverse import AdaptiveDeadZoneInverse
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
+from .mrac import (
+    DirectLaw,
+    EModifiedWeights,
+    LinearRegressor,
+    ModelError,
+    ModelReferenceLaw,
+    ProjectedWeights,
+    ReferenceModel,
+    mrac,
+)
 from .nussbaum import NussbaumLaw
 from .performance import FunnelControl, PrescribedPerformance
 from .pid import PID
@@ -24,15 +34,22 @@ __all__ = [
     "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
     "DeadZoneNussbaumLaw",
+    "DirectLaw",
+    "EModifiedWeights",
     "FilteredError",
     "FixedGainLaw",
     "FunnelControl",
     "GaussianBasis",
     "KnownSignLaw",
     "LeakyNussbaumLaw",
+    "LinearRegressor",
+    "ModelError",
+    "ModelReferenceLaw",
     "MonotoneNussbaumLaw",
     "NussbaumLaw",
     "PrescribedPerformance",
+    "ProjectedWeights",
+    "ReferenceModel",
     "RobustTerm",
     "SlidingModeLaw",
     "Zero",
@@ -42,6 +59,7 @@ __all__ = [
     "diagonal_centres",
     "grid_centres",
     "latin_hypercube_centres",
+    "mrac",
     "replaced",
     "sliding_mode",
 ]

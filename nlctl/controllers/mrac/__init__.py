@@ -1,0 +1,19 @@
+"""Model reference adaptive control (MRAC): reference model, error, regressors, weights, laws."""
+
+from .connected import mrac
+from .laws import DirectLaw, ModelReferenceLaw
+from .model_error import ModelError
+from .modified_weights import EModifiedWeights, ProjectedWeights
+from .reference_model import ReferenceModel
+from .regressors import LinearRegressor
+
+__all__ = [
+    "DirectLaw",
+    "EModifiedWeights",
+    "LinearRegressor",
+    "ModelError",
+    "ModelReferenceLaw",
+    "ProjectedWeights",
+    "ReferenceModel",
+    "mrac",
+]

@@ -1,0 +1,52 @@
+"""Regressors of adaptive laws: what the weights are multiplied by."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arguments import whole_number
+from ...equations import equation
+from ...params import record
+from ...plants import coordinate_names
+
+__all__ = ["LinearRegressor"]
+
+
+@record
+class LinearRegressor:
+    """Regressor of direct MRAC of a linear plant: its states and the command.
+
+        psi = (x_1, ..., x_n, yd)
+
+    Parameters
+    ----------
+    order : int, optional
+        Order n >= 1 of the plant.
+    """
+
+    order: int = 1
+
+    states = ()
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """An order."""
+        order = whole_number("LinearRegressor", "an order", self.order, at_least=1)
+        object.__setattr__(self, "order", order)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names x1, ..., xn, yd."""
+        return (*coordinate_names(self.order), "yd")
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names psi[0], ..., psi[n]."""
+        return tuple(f"psi[{i}]" for i in range(self.order + 1))
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The signals themselves."""
+        return np.copy(u)
