@@ -31,6 +31,7 @@ from .controllers import (
     PID,
     AdaptiveDeadZoneInverse,
     AdaptiveWeights,
+    ConcurrentWeights,
     DeadZoneNussbaumLaw,
     DirectLaw,
     EModifiedWeights,
@@ -38,6 +39,7 @@ from .controllers import (
     FixedGainLaw,
     FunnelControl,
     GaussianBasis,
+    HistoryStack,
     KnownSignLaw,
     LeakyNussbaumLaw,
     LinearRegressor,
@@ -50,6 +52,7 @@ from .controllers import (
     ReferenceModel,
     RobustTerm,
     SlidingModeLaw,
+    WingRockRegressor,
     Zero,
     ablations,
     adaptive_neural,
@@ -85,7 +88,7 @@ from .native import (
     typeset,
 )
 from .params import param, record
-from .plants import ForcedDuffing, Genesio, PureFeedback
+from .plants import ForcedDuffing, Genesio, PureFeedback, WingRock
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
 from .sampling import Clock, Sampled, Sampling, discretise, sampled
@@ -107,6 +110,7 @@ __all__ = [
     "Clock",
     "CompileError",
     "Compiled",
+    "ConcurrentWeights",
     "Coulomb",
     "Dahl",
     "DeadZone",
@@ -128,6 +132,7 @@ __all__ = [
     "Gain",
     "GaussianBasis",
     "Genesio",
+    "HistoryStack",
     "KnownSignLaw",
     "Lag",
     "LeakyNussbaumLaw",
@@ -162,6 +167,8 @@ __all__ = [
     "SumOfSines",
     "TransportDelay",
     "UnknownNameError",
+    "WingRock",
+    "WingRockRegressor",
     "Zero",
     "ablations",
     "actuators",

@@ -6,13 +6,16 @@ from .adaptive_inverse import AdaptiveDeadZoneInverse
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
 from .mrac import (
+    ConcurrentWeights,
     DirectLaw,
     EModifiedWeights,
+    HistoryStack,
     LinearRegressor,
     ModelError,
     ModelReferenceLaw,
     ProjectedWeights,
     ReferenceModel,
+    WingRockRegressor,
     mrac,
 )
 from .nussbaum import NussbaumLaw
@@ -33,6 +36,7 @@ __all__ = [
     "PID",
     "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
+    "ConcurrentWeights",
     "DeadZoneNussbaumLaw",
     "DirectLaw",
     "EModifiedWeights",
@@ -40,6 +44,7 @@ __all__ = [
     "FixedGainLaw",
     "FunnelControl",
     "GaussianBasis",
+    "HistoryStack",
     "KnownSignLaw",
     "LeakyNussbaumLaw",
     "LinearRegressor",
@@ -52,6 +57,7 @@ __all__ = [
     "ReferenceModel",
     "RobustTerm",
     "SlidingModeLaw",
+    "WingRockRegressor",
     "Zero",
     "ablations",
     "adaptive_neural",

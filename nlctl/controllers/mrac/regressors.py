@@ -7,9 +7,9 @@ import numpy as np
 from ...arguments import whole_number
 from ...equations import equation
 from ...params import record
-from ...plants import coordinate_names
+from ...plants import coordinate_names, wing_rock_regressor
 
-__all__ = ["LinearRegressor"]
+__all__ = ["LinearRegressor", "WingRockRegressor"]
 
 
 @record
@@ -50,3 +50,28 @@ class LinearRegressor:
     def output(t, x, u, p):
         """The signals themselves."""
         return np.copy(u)
+
+
+@record
+class WingRockRegressor:
+    """Regressor of wing rock, for a controller that knows its form and not its weights.
+
+    psi = (1, x1, x2, |x1| x2, |x2| x2, x1^3)
+    """
+
+    inputs = ("x1", "x2")
+    outputs = tuple(f"psi[{i}]" for i in range(6))
+    states = ()
+    feedthrough = True
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The functions of `WingRock`."""
+        return wing_rock_regressor(u)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """The break points of |x1| and |x2|."""
+        return u[0], u[1]
