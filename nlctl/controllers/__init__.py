@@ -7,6 +7,8 @@ from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
 from .mrac import (
     ConcurrentWeights,
+    ConstrainedError,
+    ConstrainedLaw,
     DirectLaw,
     EModifiedWeights,
     HistoryStack,
@@ -37,6 +39,8 @@ __all__ = [
     "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
     "ConcurrentWeights",
+    "ConstrainedError",
+    "ConstrainedLaw",
     "DeadZoneNussbaumLaw",
     "DirectLaw",
     "EModifiedWeights",

@@ -2,6 +2,7 @@
 
 from .concurrent import ConcurrentWeights, HistoryStack
 from .connected import mrac
+from .constrained import ConstrainedError, ConstrainedLaw
 from .laws import DirectLaw, ModelReferenceLaw
 from .model_error import ModelError
 from .modified_weights import EModifiedWeights, ProjectedWeights
@@ -10,6 +11,8 @@ from .regressors import LinearRegressor, WingRockRegressor
 
 __all__ = [
     "ConcurrentWeights",
+    "ConstrainedError",
+    "ConstrainedLaw",
     "DirectLaw",
     "EModifiedWeights",
     "HistoryStack",

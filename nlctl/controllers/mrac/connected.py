@@ -37,7 +37,8 @@ def mrac(
     model : ReferenceModel, optional
         Its number of coefficients is the order n.
     error : record or control.InputOutputSystem, optional
-        `ModelError` with the gains K = a of the model by default.
+        `ModelError` with the gains K = a of the model by default; `ConstrainedError` for
+        `ConstrainedLaw`.
     basis : record or control.InputOutputSystem, optional
         The regressor psi: `LinearRegressor` by default, `GaussianBasis` for RBF-MRAC, or a block
         of one's own with outputs ``psi[0]``, ``psi[1]``, ...
@@ -45,7 +46,8 @@ def mrac(
         `AdaptiveWeights` without modification by default; with sigma_1, `EModifiedWeights` or
         `ProjectedWeights` they stay bounded.
     law : record or control.InputOutputSystem, optional
-        `ModelReferenceLaw` by default, `DirectLaw` where the input gain is unknown.
+        `ModelReferenceLaw` by default, `DirectLaw` where the input gain is unknown,
+        `ConstrainedLaw` where the actuator saturates too.
     name : str, optional
 
     Returns
@@ -67,10 +69,10 @@ def mrac(
     model = ReferenceModel() if model is None else model
     order = len(model.a)
     error = ModelError(K=model.a, Q=(1.0,) * order) if error is None else error
-    if isinstance(error, ModelError) and error.plant_order != order:
+    gains = getattr(error, "plant_order", order)
+    if gains != order:
         raise ParameterError(
-            f"mrac needs as many K as its model has a, got {error.plant_order} of K and "
-            f"{order} of a"
+            f"mrac needs as many K as its model has a, got {gains} of K and {order} of a"
         )
     regressor = as_system(LinearRegressor(order=order) if basis is None else basis, "basis")
     nodes = sum(label.startswith("psi[") for label in regressor.output_labels)

@@ -14,7 +14,30 @@ from ...plants import coordinate_names
 from ..filtered_error import is_hurwitz
 from .reference_model import model_state_names
 
-__all__ = ["ModelError"]
+__all__ = ["ModelError", "check_error_gains", "lyapunov_matrix", "seen_error"]
+
+
+def lyapunov_matrix(K: tuple[float, ...], Q: tuple[float, ...]) -> np.ndarray:
+    """Return P of A^T P + P A = -diag(Q), shape (n, n), where E' = A E is E_n' = -K^T E."""
+    A = np.diag(np.ones(len(K) - 1), 1)
+    A[-1] = -np.array(K)
+    return np.atleast_2d(ct.lyap(A.T, np.diag(Q)))
+
+
+def check_error_gains(who: str, K: tuple[float, ...], Q: tuple[float, ...]) -> None:
+    """Refuse an entry of Q without a gain, and an error that does not decay."""
+    if len(Q) != len(K):
+        raise ParameterError(f"{who} needs as many Q as K, got {len(Q)} of Q and {len(K)} of K")
+    if not is_hurwitz((1.0, *K[::-1])):
+        raise ParameterError(
+            f"{who} needs a Hurwitz polynomial s^n + K_n s^(n-1) + ... + K_1, got K {K}"
+        )
+
+
+@equation
+def seen_error(E, p):
+    """What a law sees of an error: E_1, b^T P E, -K^T E, and its norm."""
+    return E[0], np.sum(p.P_b * E), -np.sum(p.K * E), np.sqrt(np.sum(E * E))
 
 
 @record
@@ -40,15 +63,7 @@ class ModelError:
 
     def check(self) -> None:
         """One entry of Q for each gain, and an error that decays."""
-        if len(self.Q) != len(self.K):
-            raise ParameterError(
-                f"ModelError needs as many Q as K, got {len(self.Q)} of Q and {len(self.K)} of K"
-            )
-        if not is_hurwitz((1.0, *self.K[::-1])):
-            raise ParameterError(
-                "ModelError needs a Hurwitz polynomial s^n + K_n s^(n-1) + ... + K_1, "
-                f"got K {self.K}"
-            )
+        check_error_gains("ModelError", self.K, self.Q)
 
     @property
     def plant_order(self) -> int:
@@ -63,9 +78,7 @@ class ModelError:
     @property
     def lyapunov_matrix(self) -> np.ndarray:
         """The matrix P, of shape (n, n)."""
-        A = np.diag(np.ones(len(self.K) - 1), 1)
-        A[-1] = -np.array(self.K)
-        return np.atleast_2d(ct.lyap(A.T, np.diag(self.Q)))
+        return lyapunov_matrix(self.K, self.Q)
 
     def derived(self) -> dict[str, Any]:
         """The last column of P, for the equation."""
@@ -76,5 +89,4 @@ class ModelError:
     def output(t, x, u, p):
         """The error, b^T P E, the feedback of the error, and its norm."""
         n = p.K.size
-        E = u[:n] - u[n:]
-        return E[0], np.sum(p.P_b * E), -np.sum(p.K * E), np.sqrt(np.sum(E * E))
+        return seen_error(u[:n] - u[n:], p)
