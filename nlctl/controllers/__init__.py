@@ -33,6 +33,7 @@ from .rbf import (
 from .remedies import DeadZoneNussbaumLaw, LeakyNussbaumLaw, MonotoneNussbaumLaw
 from .robust import RobustTerm
 from .sliding_mode import SlidingModeLaw, sliding_mode
+from .super_twisting import SuperTwistingLaw
 
 __all__ = [
     "PID",
@@ -61,6 +62,7 @@ __all__ = [
     "ReferenceModel",
     "RobustTerm",
     "SlidingModeLaw",
+    "SuperTwistingLaw",
     "WingRockRegressor",
     "Zero",
     "ablations",
