@@ -9,7 +9,52 @@ from ...equations import equation
 from ...params import record
 from ...plants import coordinate_names, wing_rock_regressor
 
-__all__ = ["LinearRegressor", "WingRockRegressor"]
+__all__ = ["AffineRegressor", "LinearRegressor", "WingRockRegressor"]
+
+
+def regressor_names(nodes: int) -> tuple[str, ...]:
+    """Return ("psi[0]", ..., "psi[l-1]")."""
+    return tuple(f"psi[{i}]" for i in range(nodes))
+
+
+@record
+class AffineRegressor:
+    """Regressor of a linear plant with a constant disturbance: its states, and 1.
+
+        psi = (x_1, ..., x_n, 1)
+
+    Parameters
+    ----------
+    order : int, optional
+        Order n >= 1 of the plant.
+    """
+
+    order: int = 1
+
+    states = ()
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """An order."""
+        order = whole_number("AffineRegressor", "an order", self.order, at_least=1)
+        object.__setattr__(self, "order", order)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names x1, ..., xn."""
+        return coordinate_names(self.order)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names psi[0], ..., psi[n]."""
+        return regressor_names(self.order + 1)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The states, and 1."""
+        return np.append(u, 1.0)
 
 
 @record
@@ -43,7 +88,7 @@ class LinearRegressor:
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names psi[0], ..., psi[n]."""
-        return tuple(f"psi[{i}]" for i in range(self.order + 1))
+        return regressor_names(self.order + 1)
 
     @staticmethod
     @equation
@@ -60,7 +105,7 @@ class WingRockRegressor:
     """
 
     inputs = ("x1", "x2")
-    outputs = tuple(f"psi[{i}]" for i in range(6))
+    outputs = regressor_names(6)
     states = ()
     feedthrough = True
 
