@@ -3,6 +3,7 @@
 from .ablations import FixedGainLaw, ablations, replaced
 from .adaptive import Zero, adaptive_neural
 from .adaptive_inverse import AdaptiveDeadZoneInverse
+from .backstepping import DynamicSurface, dynamic_surface_control
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
 from .mrac import (
@@ -49,6 +50,7 @@ __all__ = [
     "ConstrainedLaw",
     "DeadZoneNussbaumLaw",
     "DirectLaw",
+    "DynamicSurface",
     "EModifiedWeights",
     "FilteredError",
     "FilteredLaw",
@@ -76,6 +78,7 @@ __all__ = [
     "adaptive_neural",
     "binomial_lambdas",
     "diagonal_centres",
+    "dynamic_surface_control",
     "grid_centres",
     "l1_adaptive",
     "latin_hypercube_centres",
