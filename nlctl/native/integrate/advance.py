@@ -11,10 +11,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .control import choose_method, choose_step, next_step, rejected, shorten
+from .control import choose_method, choose_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
-from .events import AGAIN, CLEAR, EVENT, locate, step_accepted
-from .excursions import SHORTER, unforeseen, without_excursion
+from .events import AGAIN, CLEAR, EVENT, REFUSED, locate, step_accepted
+from .excursions import look_before, look_between
 from .methods import explicit, rodas5p
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
@@ -41,49 +41,48 @@ def _sample(lane, j, task, t_new, w):
 
 
 @numba.njit(**INNER)
-def _judge(task, lanes, w, done, passed):
-    """Accept or reject the step just tried in every lane, and propose the next.
-
-    ``done`` becomes whether it was accepted, ``passed`` whether it ended with an event or set a
-    memory in motion.  Return whether any lane has passed.
-    """
-    any_passed = False
-    corners, memories = task.corners, task.memory.size
-    shortest = 1e-7 * (task.times[-1] - task.times[0])
+def _judge(task, lanes, w, found):
+    """Say what became of the step just tried in every lane: refused, tried AGAIN, CLEAR, EVENT."""
     for j in range(lanes.size):
         lane = lanes[j]
-        done[j] = passed[j] = False
+        found[j] = REFUSED
         if lane.status != RUNNING or rejected(lane, w.error[j], task):
             continue
-        free = task.fixed == 0.0 and lane.step > shortest
-        growing = lane.step > 2.0 * lane.last and lane.tries == 0
-        if memories and growing and free and unforeseen(w, lane.step, j):
-            shorten(lane, SHORTER)
-            continue
-        found = CLEAR
+        found[j] = CLEAR
         if w.e.shape[0]:
-            found = locate(lane, corners, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j)
-        if found == AGAIN:
+            found[j] = locate(
+                lane, task.corners, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j
+            )
+        if found[j] == AGAIN:
             lane.rejected += 1
-            continue
-        # memories have slopes, and their stages too much noise
-        part = without_excursion(task, w, memories == 0, j) if free and not lane.stiff else 1.0
-        if part < 1.0:
-            shorten(lane, part)
-            continue
-        if task.delays.shape[0] and unresolved(task, lane, w, j, found == EVENT):
+
+
+@numba.njit(**INNER)
+def _accept(task, lanes, w, found, done, passed):
+    """Accept the steps that were found to be right, and propose the next.
+
+    ``done`` becomes whether one was accepted, ``passed`` whether it ended with an event or set a
+    memory in motion.  Return whether any lane has passed.
+    """
+    any_passed, corners, memories = False, task.corners, task.memory.size
+    for j in range(lanes.size):
+        lane, event = lanes[j], found[j] == EVENT
+        done[j] = passed[j] = False
+        if found[j] <= AGAIN or (task.delays.shape[0] and unresolved(task, lane, w, j, event)):
             continue
         t_new = next_stop(task, lane, w, j) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
             _sample(lane, j, task, t_new, w)
-        step_accepted(lane, found == EVENT)
+        step_accepted(lane, event)
         lane.t = t_new
         next_step(lane, w.error[j], w.rate[j], task)
+        if task.fixed == 0.0 and w.e.shape[0]:
+            lane.h = min(lane.h, w.resolved[j])
         done[j] = True
         if memories:  # at a corner of the inputs memories may reverse as well
             at_corner = lane.ends and w.u.shape[0] > 0
             passed[j] = at_corner or _began_to_move(corners, w.e_start, w.e, j)
-        passed[j] |= found == EVENT
+        passed[j] |= event
         any_passed |= passed[j]
         if task.method == AUTO:
             choose_method(lane, task)
@@ -122,6 +121,18 @@ def _take(task, w, done):
             w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
 
 
+@numba.njit(**INNER)
+def _event_functions(rhs, task, lanes, w):
+    """Fill w.e at the ends of the steps just tried."""
+    if task.memory.size:
+        for j in range(lanes.size):
+            w.t_end[j] = lanes[j].t + lanes[j].step
+        memory_rates(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1])
+    for i in range(task.corners):
+        for j in range(lanes.size):
+            w.e[i, j] = w.g[i, j]
+
+
 def advance(rhs, point, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
@@ -130,7 +141,7 @@ def advance(rhs, point, along, task, w, rounds):
     """
     lanes = w.lanes
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
-    sampled = np.zeros(lanes.size, np.bool_)
+    sampled, found = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.int64)
     for _ in range(rounds):
         running = 0
         for j in range(lanes.size):
@@ -149,14 +160,13 @@ def advance(rhs, point, along, task, w, rounds):
             explicit.explicit_attempt(rhs, task, lanes, w)
         if task.delays.shape[0]:
             look_within(task, lanes, w)
+        _event_functions(rhs, task, lanes, w)
+        _judge(task, lanes, w, found)
+        if w.e.shape[0]:
+            look_between(rhs, task, lanes, w, found)
         if task.memory.size:
-            for j in range(lanes.size):
-                w.t_end[j] = lanes[j].t + lanes[j].step
-            memory_rates(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1])
-        for i in range(task.corners):
-            for j in range(lanes.size):
-                w.e[i, j] = w.g[i, j]
-        any_passed = _judge(task, lanes, w, done, passed)
+            look_before(rhs, task, lanes, w, found)
+        any_passed = _accept(task, lanes, w, found, done, passed)
         _take(task, w, done)
         delays = task.delays.shape[0] > 0
         jumped = delays and keep(task, lanes, w, done, passed)

@@ -16,7 +16,7 @@ import numpy as np
 from .state import INNER
 
 STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
-AGAIN, CLEAR, EVENT = 0, 1, 2  # what became of the step just tried
+REFUSED, AGAIN, CLEAR, EVENT = -1, 0, 1, 2  # what became of the step just tried
 TRIES = 30
 SHORT = 1e-3  # part of a step: a shorter one between events is no progress
 PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory events

@@ -1,107 +1,416 @@
-"""What a step may have passed over: corners crossed and crossed back, turns of memories.
+"""What a step may have passed over: corners crossed and crossed back, memories that turned twice.
 
 Error control sees the states only.  Where a switching function, or what drives a memory, is no
 state (a dead zone behind a source), a step may grow until both of its ends lie on one side of a
-corner although it has been on the other in between.  Shallow excursions may still be missed.
-Steps of other explicit pairs and of the stiff method are not looked into.
+corner although it has been on the other in between.
+
+Each event function is followed through a step by the polynomial through five of its values, three
+of them at stages, which cost nothing.  Where that may be below 0 in between, by what it may be
+wrong, the function itself is evaluated on the solution inside the step: its minimum is sought until
+it is found to be below 0, and a step that ends there is tried instead; or above 0, or 0 to within
+1e-12 of the range.  So only what lies between two of the five values unseen is lost; the next step
+is never longer than what a polynomial of this degree follows to a tenth of the range.
 """
 
 from __future__ import annotations
 
 import numba
+import numpy as np
 
-from .methods.tsit5 import TSIT5
+from .control import shorten
+from .events import AGAIN, EVENT, STARTS_BEHIND
+from .methods import explicit, rodas5p
+from .methods.quartic import doubt, least_value, quartic, slope_at
 from .state import INNER
+from .workspace import evaluate
 
-_INSIDE = tuple(map(float, TSIT5.c[1:4]))  # parts of a step at which switching functions are kept
-_FIRST, _SECOND, _THIRD = _INSIDE
-_GRID = 32
-_NEAR = 0.01  # of the range: a minimum so close to 0 is looked at in a shorter step
-_DIP = 1e-4  # of the range: a minimum no deeper below the ends is one of them
-SHORTER = 0.3  # part of a step to be tried where its switching functions cannot be foreseen
+_CLEAR, _SUSPECT, _UNRESOLVED = 0, 1, 2  # what is known of an event function in a step
+_SHORTER = 0.3  # part of a step to be tried where its event functions cannot be followed
+_FAR = 20.0  # in ranges: what is so far from 0 may grow before it is followed
+_FOLLOWED = 0.2  # of the range: what the polynomial may be wrong by at most
+_FLAT = 8.0  # in doubts: a slope at an end that may as well have the other sign
+_DENSE = 2  # the row of task.inside that is no method's stages
+_PART = 1e-4  # of a step, over which the rate of a memory is taken
+_NARROW = (
+    3e-5  # part of a step: a minimum so near to an end is not below it by more than its square
+)
+_TOUCHING = 0.01  # the same at a start on the corner, where a memory has turned
+_TRIES = 24
+_DOUBLE = 2.0
+_DOUBLE = 2.0
+_NARROW = 1e-6
 
 
 @numba.njit(**INNER)
-def unforeseen(w, h, j):
-    """Whether an event function has changed over a step otherwise than its slopes say."""
-    for i in range(w.g.shape[0]):
-        change = w.g[i, j] - w.g_start[i, j]
-        before, after = h * w.slope_start[i, j], h * w.slope[i, j]
-        scale = abs(change) + abs(before) + abs(after)
-        noise = 1e-12 * abs(w.g[i, j])
-        if abs(change - 0.5 * (before + after)) > 0.2 * scale + noise:
+def look_between(rhs, task, lanes, w, found):
+    """Have shorter steps tried where an accepted one has passed over something.
+
+    ``found`` becomes AGAIN there, and w.resolved the longest step to be tried next.
+    """
+    wanted, any_wanted = w.wanted, False
+    shortest = 1e-7 * (task.times[-1] - task.times[0])
+    for j in range(lanes.size):
+        w.resolved[j] = np.inf
+        wanted[j] = (
+            found[j] > AGAIN and lanes[j].step > shortest and _suspected(task, lanes[j], w, j)
+        )
+        any_wanted |= wanted[j]
+    if not any_wanted:
+        return
+    for n in range(3):
+        for j in range(lanes.size):
+            w.part[j] = task.inside[_DENSE, n] if wanted[j] else 0.0
+        _inside(rhs, task, lanes, w, w.g_ahead)
+        for i in range(w.g.shape[0]):
+            for j in range(lanes.size):
+                w.g_inside[n, i, j] = w.g_ahead[i, j]
+    seeking = False
+    for j in range(lanes.size):
+        w.sought[j] = -1
+        if wanted[j]:
+            _go_on(task, lanes[j], w, found, j, 0)
+        seeking |= w.sought[j] >= 0
+    while seeking:
+        _evaluated(rhs, task, lanes, w)
+        seeking = False
+        for j in range(lanes.size):
+            if w.sought[j] >= 0:
+                _narrow(task, lanes[j], w, found, j)
+            seeking |= w.sought[j] >= 0
+
+
+@numba.njit(**INNER)
+def look_before(rhs, task, lanes, w, found):
+    """Make memories in w.g what they are just before the corner at which a step ends.
+
+    Behind it, what carries a memory along may have jumped back: it keeps what it was before.
+    """
+    wanted, any_wanted, nearer = w.wanted, False, w.g_inside[3]
+    back = 2.5 * min(10.0 * task.rtol, 1e-4)  # see `locate`: the corner is not so far back
+    for j in range(lanes.size):
+        wanted[j] = found[j] == EVENT and _crosses(task, w, w.e, j)
+        any_wanted |= wanted[j]
+    if not any_wanted:
+        return
+    for j in range(lanes.size):
+        w.part[j] = 1.0 - back
+    _inside(rhs, task, lanes, w, nearer)
+    for j in range(lanes.size):
+        w.part[j] = 1.0 - 2.0 * back
+        if _crosses(task, w, nearer, j):
+            w.part[j] = lanes[j].low / lanes[j].step
+    _inside(rhs, task, lanes, w, w.g_ahead)
+    for j in range(lanes.size):
+        far = _crosses(task, w, nearer, j)
+        ahead = 0.0 if far else 1.0 + _until_corner(task, w, nearer, j)
+        for i in range(task.corners, w.g.shape[0]):
+            if wanted[j] and w.e_start[i, j] != 0.0:
+                change = 0.0 if far else nearer[i, j] - w.g_ahead[i, j]
+                w.g[i, j] = w.g_ahead[i, j] + ahead * change
+
+
+@numba.njit(**INNER)
+def _until_corner(task, w, nearer, j):
+    """Return how far it is to the first corner, in distances between the last two looks."""
+    first = np.inf
+    for i in range(task.corners):
+        if w.e_start[i, j] * w.e[i, j] < 0.0:
+            first = min(first, nearer[i, j] / (w.g_ahead[i, j] - nearer[i, j]))
+    return min(max(first, 0.0), 1.0)
+
+
+@numba.njit(**INNER)
+def _crosses(task, w, e, j):
+    """Whether a switching function has another sign than at the start of a step."""
+    for i in range(task.corners):  # noqa: SIM110 (no generators in machine code)
+        if w.e_start[i, j] * e[i, j] < 0.0:
             return True
     return False
 
 
 @numba.njit(**INNER)
-def without_excursion(task, w, free, j):
-    """Return the part of the step just tried that is to be tried instead, 1 for all of it.
-
-    With an end on the side of the start, no switching function may have been on the other side;
-    with an end on the other side, only once.  With `free` that is asked of the polynomial through
-    them as well.
-    """
-    if task.C.size < 5 or (task.C[1], task.C[2], task.C[3]) != _INSIDE:
-        return 1.0
-    for i in range(task.corners):
-        start = w.e_start[i, j]
-        side = 1.0 if start > 0.0 or (start == 0.0 and w.g_inside[0, i, j] > 0.0) else -1.0
-        part = _turning_part(
-            side * start,
-            side * w.g_inside[0, i, j],
-            side * w.g_inside[1, i, j],
-            side * w.g_inside[2, i, j],
-            side * w.e[i, j],
-            free,
-        )
-        if part < 1.0:
-            return part
-    return 1.0
+def _suspected(task, lane, w, j):
+    """Whether the values at a method's stages leave anything to be looked at."""
+    row = 1 if lane.stiff else 0
+    if task.inside[row, 0] == 0.0:
+        return True  # no such stages
+    suspected = False
+    for i in range(w.e.shape[0]):
+        if i < task.corners and _is_far(w, i, j):
+            continue
+        suspected |= _known(task, lane, w, i, j, row)[0] != _CLEAR
+    return suspected
 
 
 @numba.njit(**INNER)
-def _turning_part(start, one, two, three, end, free):
-    """Return where a function that starts at or above 0 is below 0 before it comes back, or 1.
+def _known(task, lane, w, i, j, row):
+    """Return what is known of an event function, and where it may be least.
 
-    Between its values at the parts 0, `_INSIDE` and 1 it is taken for the polynomial through them.
-    Where that may be wrong by more than its distance from 0, its minimum counts as below 0.
+    Of `f`, which is above 0 at both ends of the step: sign times the event function plus offset.
     """
-    least = min(start, one, two, three, end)
-    extent = max(start, one, two, three, end) - least
-    if not least <= extent:  # far from the corner, or NaN
-        return 1.0
-    if (
-        free
-        and (one < 0.0 and not (two < 0.0 and three < 0.0 and end < 0.0))
-        and max(two, three, end) > 0.0
-    ):
-        return _FIRST
-    if two < 0.0 and max(three, end) > 0.0:
-        return _SECOND
-    if three < 0.0 and end > 0.0:
-        return _THIRD
-    if least < 0.0:
-        return 1.0  # one crossing, for `locate`
-    return _lowest(start, one, two, three, end, extent) if free else 1.0
+    if i >= task.corners and w.e_start[i, j] == 0.0:
+        return _standing(task, w, i, j, row)
+    carried = i >= task.corners
+    if carried and row != _DENSE:
+        return _may_turn(lane, w, i, j), 0.0
+    at, values, newton = task.inside[row], w.values, w.newton
+    offset = _follow(task, lane, w, i, j, at)
+    least = min(values[0], values[1], values[2], values[3], values[4])
+    most = max(values[0], values[1], values[2], values[3], values[4])
+    extent, wrong = most if carried else most - least, w.wrong[j]
+    if extent <= _still(task, w, j):
+        return _CLEAR, 0.0
+    w.narrow[j] = _TOUCHING if values[0] == 0.0 else _NARROW
+    w.floor[j] = max(w.narrow[j] ** 2 * extent, task.atol if values[0] == 0.0 else 0.0)
+    if not carried:
+        longer = (0.1 * extent / max(wrong, 1e-300)) ** (1 / 3)
+        if task.memory.size and row != _DENSE:
+            longer = max(longer, _DOUBLE)  # stages may be less accurate than what follows from them
+        w.resolved[j] = min(w.resolved[j], longer * lane.step)
+    if wrong > _FOLLOWED * extent:
+        return _UNRESOLVED, 0.0
+    if least > extent:
+        return _CLEAR, 0.0
+    lower, x = least_value(newton, at, carried)
+    if lower + (offset if carried else 0.0) > 2.0 * wrong or _leads_away(w, at, x, carried, j):
+        return _CLEAR, 0.0
+    return _SUSPECT, min(max(x, 0.02), 0.98)
 
 
 @numba.njit(**INNER)
-def _lowest(start, one, two, three, end, extent):
-    """Return where the polynomial through five values has a minimum near or below 0, or 1."""
-    # divided differences at 0, _FIRST, _SECOND, 1 and _THIRD
-    a = (one - start) / _FIRST
-    b = ((two - one) / (_SECOND - _FIRST) - a) / _SECOND
-    c = ((end - two) / (1.0 - _SECOND) - (two - one) / (_SECOND - _FIRST)) / (1.0 - _FIRST) - b
-    cubic = start + _THIRD * (a + (_THIRD - _FIRST) * (b + (_THIRD - _SECOND) * c))
-    error = abs(three - cubic)
-    if error > 0.2 * extent:
-        return SHORTER
-    d = (three - cubic) / (_THIRD * (_THIRD - _FIRST) * (_THIRD - _SECOND) * (_THIRD - 1.0))
-    lowest, part = min(start, end) - _DIP * extent, 1.0
-    for n in range(1, _GRID):
-        x = (n / _GRID) ** 2  # closer where a step starts that ended at a minimum
-        value = start + x * (a + (x - _FIRST) * (b + (x - _SECOND) * (c + (x - 1.0) * d)))
-        if value < lowest:
-            lowest, part = value, x
-    return part if lowest <= error + _NEAR * extent else 1.0
+def _follow(task, lane, w, i, j, at):
+    """Fill w.values and w.newton with an event function in a step; return its offset.
+
+    Of a memory they are its rate and the polynomial that it is the derivative of.
+    """
+    values, newton, carried = w.values, w.newton, i >= task.corners
+    sign, offset = _side(task, lane, w, i, j)
+    start, end = (w.g_start[i, j], w.g[i, j]) if carried else (w.e_start[i, j], w.e[i, j])
+    shift = 0.0 if carried else offset
+    values[0], values[4] = sign * start + shift, sign * end + shift
+    for n in range(3):
+        values[n + 1] = sign * w.g_inside[n, i, j] + shift
+    quartic(values, at, newton)
+    w.wrong[j] = doubt(newton, at)
+    if carried:
+        first, last = sign * lane.step * w.slope_start[i, j], sign * lane.step * w.slope[i, j]
+        begin, finish = slope_at(newton, at, 0.0), slope_at(newton, at, 1.0)
+        w.wrong[j] = max(abs(begin - first), abs(finish - last))
+        values[0], values[4] = first + offset, last + offset
+        for n in range(3):
+            values[n + 1] = slope_at(newton, at, at[n]) + offset
+    return offset
+
+
+@numba.njit(**INNER)
+def _still(task, w, j):
+    """Return what a function changes by that stands still: rounding, of memories for instance."""
+    largest = 0.0
+    for i in range(task.corners, w.g.shape[0]):
+        largest = max(largest, abs(w.g[i, j]))
+    return 0.01 * task.atol + 1e-14 * largest
+
+
+@numba.njit(**INNER)
+def _leads_away(w, at, x, carried, j):
+    """Whether a function that is least at an end of the step has no minimum near there."""
+    steep = _FLAT * w.wrong[j]
+    if x == 0.0:
+        return w.values[1] > w.values[0] and _slope(w.newton, at, 0.0, carried) > steep
+    return x == 1.0 and _slope(w.newton, at, 1.0, carried) < -steep
+
+
+@numba.njit(**INNER)
+def _is_far(w, i, j):
+    """Whether 0 is far from all values of a switching function, or one is NaN."""
+    a, b, c, d, e = (
+        *(w.e_start[i, j], w.g_inside[0, i, j], w.g_inside[1, i, j]),
+        *(w.g_inside[2, i, j], w.e[i, j]),
+    )
+    least, most = min(a, b, c, d, e), max(a, b, c, d, e)
+    near = _FAR * (most - least)
+    return not (least <= near and most >= -near)
+
+
+@numba.njit(**INNER)
+def _may_turn(lane, w, i, j):
+    """Whether a memory that is carried along may turn twice: _SUSPECT, by its rates at both ends.
+
+    At the stages it may be far less accurate than at the ends, where other states follow from it.
+    """
+    change = w.g[i, j] - w.g_start[i, j]
+    first, last = lane.step * w.slope_start[i, j], lane.step * w.slope[i, j]
+    wrong = abs(change - 0.5 * (first + last))
+    noise = 1e-12 * abs(w.g[i, j])
+    if wrong > _FOLLOWED * (abs(change) + abs(first) + abs(last)) + noise:
+        return _SUSPECT
+    side = 1.0 if first > 0.0 else -1.0
+    middle = side * (1.5 * change - 0.25 * (first + last))
+    low = min(middle, side * last)
+    return _SUSPECT if low < wrong and wrong > noise else _CLEAR
+
+
+@numba.njit(**INNER)
+def _slope(newton, at, x, carried):
+    """Return how fast `f` changes at an end."""
+    if not carried:
+        return slope_at(newton, at, x)
+    inner = x + (0.01 if x == 0.0 else -0.01)
+    return (slope_at(newton, at, inner) - slope_at(newton, at, x)) / (inner - x)
+
+
+@numba.njit(**INNER)
+def _side(task, lane, w, i, j):
+    """Return sign and offset that make an event function positive at both ends of a step.
+
+    Where a step ends right behind its event, twice of that rest is the level; where it begins
+    right behind one and ends in front of it, twice of that rest.
+    """
+    start, end = w.e_start[i, j], w.e[i, j]
+    side = 1.0 if start > 0.0 or (start == 0.0 and w.g_inside[0, i, j] > 0.0) else -1.0
+    if i >= task.corners:
+        end = lane.step * w.slope[i, j]
+    if side * end >= 0.0:
+        return side, 0.0
+    if i < task.corners and w.behind[i, j] != 0.0 and abs(start) <= STARTS_BEHIND * abs(end):
+        return -side, 2.0 * abs(start)
+    return side, -2.0 * side * end
+
+
+@numba.njit(**INNER)
+def _standing(task, w, i, j, row):
+    """Whether a memory that stands still at both ends of a step has moved in between, and where."""
+    before = w.x[task.memory[i - task.corners], j]
+    if w.e[i, j] == 0.0 and w.g[i, j] == before:
+        for n in range(3):
+            if abs(w.g_inside[n, i, j] - before) > task.atol + task.rtol * abs(before):
+                return _SUSPECT, task.inside[row, n]
+    return _CLEAR, 0.0
+
+
+@numba.njit(**INNER)
+def _go_on(task, lane, w, found, j, first):
+    """Go on to the next event function that is to be looked at, from `first` on."""
+    w.sought[j] = -1
+    free = task.fixed == 0.0 and lane.tries == 0
+    for i in range(first, w.e.shape[0]):
+        if (lane.quiet > 0) if i >= task.corners else _is_far(w, i, j):
+            continue
+        known, x = _known(task, lane, w, i, j, _DENSE)
+        growing = i < task.corners or lane.step > _DOUBLE * lane.last  # a memory's rate has noise
+        if known == _UNRESOLVED and free and growing:
+            shorten(lane, _SHORTER)
+            found[j] = AGAIN
+            return
+        if known == _SUSPECT and i >= task.corners and w.e_start[i, j] == 0.0:
+            shorten(lane, x)
+            found[j] = AGAIN
+            return
+        if known == _SUSPECT:
+            _bracket(w, x, j)
+            w.sought[j], w.attempts[j] = i, 0
+            return
+
+
+@numba.njit(**INNER)
+def _bracket(w, x, j):
+    """Begin to look at x, between the nearest known values: one of them below its neighbours."""
+    k = min(int(4.0 * x), 3)
+    inner = k + 1 if w.values[k + 1] < w.values[k] else k
+    low, high = (k, k + 1) if inner == 0 or inner == 4 else (inner - 1, inner + 1)
+    w.bracket[0, j], w.bracket[1, j], w.bracket[2, j] = 0.25 * low, 0.25 * inner, 0.25 * high
+    w.height[0, j], w.height[1, j], w.height[2, j] = w.values[low], w.values[inner], w.values[high]
+    if inner == 0 or inner == 4:
+        w.bracket[1, j] = -1.0
+    w.part[j], w.foreseen[j] = x, np.inf
+
+
+@numba.njit(**INNER)
+def _narrow(task, lane, w, found, j):
+    """Take a value of the function that is sought into its bracket; say where to look next."""
+    x, y, i = w.part[j], w.looked[j], w.sought[j]
+    w.attempts[j] += 1
+    if y < -w.floor[j]:
+        shorten(lane, x)
+        found[j], w.sought[j] = AGAIN, -1
+        return
+    low, middle, high = w.bracket[0, j], w.bracket[1, j], w.bracket[2, j]
+    seen = abs(y - w.foreseen[j]) < 0.3 * y
+    if not y > -np.inf or w.attempts[j] > _TRIES or high - low < w.narrow[j]:
+        _go_on(task, lane, w, found, j, i + 1)
+        return
+    if middle < 0.0 or y < w.height[1, j]:
+        end = 2 if middle > x else 0
+        if middle >= 0.0:
+            w.bracket[end, j], w.height[end, j] = middle, w.height[1, j]
+        w.bracket[1, j], w.height[1, j] = x, y
+    else:
+        end = 2 if x > middle else 0
+        w.bracket[end, j], w.height[end, j] = x, y
+    _aim(w, j)
+    if seen and 0.5 * w.height[1, j] < w.foreseen[j] < np.inf:
+        _go_on(task, lane, w, found, j, i + 1)
+
+
+@numba.njit(**INNER)
+def _aim(w, j):
+    """Set where to look next: at the vertex of the parabola, or towards an end that is lower."""
+    low, middle, high = w.bracket[0, j], w.bracket[1, j], w.bracket[2, j]
+    below, least, above = w.height[0, j], w.height[1, j], w.height[2, j]
+    w.foreseen[j] = np.inf
+    if least > below or least > above:
+        end = 0 if below < above else 2
+        w.part[j] = w.bracket[end, j] + 0.3 * (middle - w.bracket[end, j])
+        w.bracket[2 - end, j], w.height[2 - end, j] = middle, least
+        w.bracket[1, j] = -1.0
+        return
+    left, right = (least - below) / (middle - low), (above - least) / (high - middle)
+    bend = (right - left) / (high - low)
+    # the slope at the middle, of the parabola
+    slope = left + bend * (middle - low)
+    move = -0.5 * slope / bend if bend > 0.0 else 0.0
+    rest = 1e-3 * (high - low)
+    if abs(move) < rest:
+        move = rest if high - middle > middle - low else -rest
+    x = min(max(middle + move, low + rest), high - rest)
+    w.part[j] = x
+    w.foreseen[j] = least + (x - middle) * (slope + bend * (x - middle))
+
+
+@numba.njit(**INNER)
+def _evaluated(rhs, task, lanes, w):
+    """Fill w.looked with the functions that are sought, each at its w.part of the step."""
+    carried = False
+    for j in range(lanes.size):
+        if w.sought[j] < 0:
+            w.part[j] = 0.0
+        carried |= w.sought[j] >= task.corners
+    scratch = w.g_inside[3]
+    _inside(rhs, task, lanes, w, scratch)
+    if carried:
+        for j in range(lanes.size):
+            w.part[j] += _PART
+        _inside(rhs, task, lanes, w, w.g_ahead)
+        for j in range(lanes.size):
+            w.part[j] -= _PART
+    for j in range(lanes.size):
+        i = w.sought[j]
+        if i < 0:
+            continue
+        sign, offset = _side(task, lanes[j], w, i, j)
+        event = scratch[i, j]
+        if i >= task.corners:
+            event = (w.g_ahead[i, j] - event) / _PART
+        w.looked[j] = sign * event + offset
+
+
+@numba.njit(**INNER)
+def _inside(rhs, task, lanes, w, g):
+    """Fill `g` with switching functions and memories at w.part of the step just tried."""
+    for j in range(lanes.size):
+        w.t[j] = lanes[j].t + w.part[j] * lanes[j].step
+        if lanes[j].stiff:
+            rodas5p.interpolate(w.part[j], w.x, w.x_new, w.U, w.x_ahead)
+        else:
+            explicit.interpolate(w.part[j], lanes[j].step, w.x, w.k, task.B, j, w.x_ahead)
+    evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, g)

@@ -41,7 +41,14 @@ def memory_rates(rhs, task, lanes, w, x, dx):
 
 @numba.njit(**INNER)
 def restart(rhs, task, lanes, w, chosen):
-    """Make the chosen lanes' derivatives, event functions and memories those of their state."""
+    """Make the chosen lanes' derivatives, event functions and memories those of their state.
+
+    What is carried along is first what it was at the end of the step, before anything jumps.
+    """
+    for i in range(task.memory.size):
+        for j in range(lanes.size):
+            if chosen[j] and w.e_start[task.corners + i, j] != 0.0:
+                w.x[task.memory[i], j] = w.g[task.corners + i, j]
     _refresh(rhs, task, lanes, w, chosen)
     if task.memory.size:
         for _ in range(task.memory.size):  # one that commits may move the next

@@ -41,6 +41,8 @@ class Task(NamedTuple):
     B: np.ndarray
     C: np.ndarray
     E: np.ndarray
+    inside: np.ndarray  # parts of a step at which event functions are kept: see `Tableau.arrays`
+    kept: np.ndarray
     alone: int  # whether this is a single run
     ticks: np.ndarray  # (lanes, instants): when something happens to sampled blocks, then inf
     which: np.ndarray  # (lanes, instants): which of the functions then
@@ -83,6 +85,20 @@ class Work(NamedTuple):
     g: np.ndarray  # switching functions, and what memories would become
     g_start: np.ndarray
     g_inside: np.ndarray  # inside the step being tried, see `excursions`; the last is scratch
+    values: np.ndarray  # of one event function over a step
+    newton: np.ndarray
+    wanted: np.ndarray  # whether a step is to be looked into
+    resolved: np.ndarray  # the longest step over which event functions can be followed
+    sought: np.ndarray  # the event function whose minimum is sought, -1 if none is
+    attempts: np.ndarray
+    part: np.ndarray  # of the step: where it is evaluated
+    looked: np.ndarray  # what it is there
+    foreseen: np.ndarray  # and was foreseen to be
+    wrong: np.ndarray  # what the polynomial may be wrong by
+    narrow: np.ndarray  # part of the step below which it is not sought closer
+    floor: np.ndarray  # below 0: what is not told from it
+    bracket: np.ndarray  # parts below, at and above the least value that is known
+    height: np.ndarray  # and the values there
     e: np.ndarray  # event functions: those of corners, and the rates of memories
     e_start: np.ndarray
     e_low: np.ndarray  # at the ends of the bracket in which an event is located
@@ -155,6 +171,11 @@ def new_work(
         **dict.fromkeys(("g", "g_ahead", "g_start", "slope", "slope_start"), (events, lanes)),
         **dict.fromkeys(("e", "e_start", "e_low", "e_high", "behind"), (events, lanes)),
         **dict.fromkeys(("t", "h", "error", "rate", "t_end"), (lanes,)),
+        **dict.fromkeys(
+            ("resolved", "part", "looked", "foreseen", "wrong", "narrow", "floor"), (lanes,)
+        ),
+        **dict.fromkeys(("bracket", "height"), (3, lanes)),
+        **dict.fromkeys(("values", "newton"), (5,)),
         "g_inside": (4, events, lanes),
         "hh": (n * lanes,),
         "k": (stages, n, lanes),
@@ -170,6 +191,8 @@ def new_work(
         "u_along": (inputs, DIRECTIONS),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    counted = ("wanted", "sought", "attempts")
+    arrays |= {name: np.zeros(lanes, dtype=np.int64) for name in counted}
     arrays |= _past(times.size, outputs, lines, lanes)
     arrays["x"][:] = x0
     for name, rows in (("samples", n), ("y", outputs)):
@@ -216,7 +239,8 @@ TASK = type_of(  # only the types of these matter
     with_table(
         Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
         fixed=0.0, max_steps=0, method=0, pair_order=0.0, stable=0.0, A=_GRID, B=_GRID,
-        C=_LINE, E=_LINE, alone=0, ticks=_GRID, which=_PLACES, samples=_NONE,
+        C=_LINE, E=_LINE, inside=_GRID, kept=_NONE, alone=0,
+        ticks=_GRID, which=_PLACES, samples=_NONE,
         due=_PLACES, sampled=_NONE, derivatives=0, c_along=_GRID,
         delays=_GRID, direct=_PLACES, signals=_NONE, outputs=0,
         cost=0.0, order=_NONE, below=_NONE, below_start=_NONE, right=_NONE, right_start=_NONE,

@@ -31,7 +31,7 @@ def explicit_attempt(rhs, task, lanes, w):
             inputs_at(task, lanes, w)
         if s < last:
             combined(x, hh, task.A, k, s, w.x_stage_flat)
-            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.g_inside[min(s, 4) - 1])
+            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.g_inside[task.kept[s]])
         else:
             combined(x, hh, task.A, k, s, w.x_new_flat)
             call_rhs(rhs, w.t, w.x_new, w.u, task.p, w.k[s], w.g)

@@ -143,7 +143,8 @@ def stiff_attempt(rhs, point, along, task, lanes, w):
                 w.dx_ahead[i, 0] = w.k[0, i, 0]
         else:
             rodas5p.stage(s, w.x_flat, w.U, w.x_stage_flat)
-            evaluate(rhs, task, lanes, w, w.x_stage, w.dx_ahead, w.g_ahead)
+            kept = w.g_inside[rodas5p.KEPT[s]]
+            evaluate(rhs, task, lanes, w, w.x_stage, w.dx_ahead, kept)
         rodas5p.right_side(s, h, w.dx_ahead_flat, w.f_t, w.U)
         lu.solve(task, only_entries, w, w.U[s])
     for i in range(n):

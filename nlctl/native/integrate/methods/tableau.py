@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from ....errors import ParameterError
+from . import rodas5p
+from .quartic import following_nodes
 
 _Rows = tuple[tuple[float, ...], ...]
 
@@ -89,15 +92,31 @@ class Tableau:
         return len(self.c)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return A, C, E and B as `explicit` takes them.
+        """Return A, C, E, B, inside and kept as `explicit` and `excursions` take them.
 
         A is of shape (stages, stages), or wider: its written-out sums read six numbers of a row.
+        Of each stage, `kept` is which of the three parts of a step in the first row of `inside` it
+        belongs to, 3 for none.  A pair without stages at three different parts has 0 there.
         """
         A = np.zeros((self.stages, max(self.stages, 6)))
         for s, row in enumerate(self.a, start=1):
             A[s, :s] = row
         B = np.array(self.dense) if self.dense else self._cubic()
-        return {"A": A, "C": np.array(self.c), "E": np.array(self.error), "B": B}
+        parts = self._parts()
+        kept = np.array([parts.index(c) if c in parts else 3 for c in self.c], dtype=np.int64)
+        rows = (parts or (0.0, 0.0, 0.0), rodas5p.INSIDE, (0.25, 0.5, 0.75))
+        inside = np.array([following_nodes(row) for row in rows])
+        coefficients = {"A": A, "C": np.array(self.c), "E": np.array(self.error), "B": B}
+        return {**coefficients, "inside": inside, "kept": kept}
+
+    def _parts(self) -> tuple[float, ...]:
+        """Return three parts of a step at which there are stages, as far apart as there are."""
+
+        def gap(parts: tuple[float, ...]) -> float:
+            return float(np.min(np.diff([0.0, *parts, 1.0])))
+
+        inner = sorted({c for c in self.c if 0.0 < c < 1.0})
+        return max(itertools.combinations(inner, 3), key=gap, default=())
 
     def _cubic(self) -> np.ndarray:
         """Hermite's polynomial: 3 theta^2 - 2 theta^3 of the step, and a part of both slopes."""
