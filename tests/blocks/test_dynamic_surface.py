@@ -98,6 +98,15 @@ def test_the_network_pays_behind_the_dead_zone_of_example_1():
     assert late["with"] < 0.5 * late["without"], late
 
 
+def test_a_filter_that_starts_from_0_costs_a_large_input_at_first():
+    """Example 1 at t = 0: u is alpha_1 / tau, or c_2 alpha_1 from a_2 = alpha_1."""
+    surface = nlctl.DynamicSurface(c=(5.0, 10.0), tau=(0.02,))
+    alpha_1 = -5.0 * 0.5 + 0.75
+    spec, u = equation_arguments(surface), np.array([0.5, 0.0, 0.0, 0.75])
+    wanted = [sum(surface.output(0.0, np.array([a]), u, spec)[2:]) for a in (0.0, alpha_1)]
+    assert wanted == pytest.approx([alpha_1 / 0.02, 10.0 * alpha_1])
+
+
 @each_row(
     ("make", "told"),
     [

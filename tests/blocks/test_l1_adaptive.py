@@ -89,6 +89,7 @@ def rohrs_mrac(weights):
     [
         (nlctl.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.0), False),
         (nlctl.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.03), False),
+        (nlctl.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.1), False),
         (nlctl.ProjectedWeights(nodes=2, Gamma=1.0, W_max=15.0), True),
         (nlctl.ProjectedWeights(nodes=2, Gamma=1.0, W_max=20.0), False),
     ],
