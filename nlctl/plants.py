@@ -278,15 +278,15 @@ class Genesio:
 def wing_rock_regressor(x):
     """Regressor of wing rock: (1, x1, x2, |x1| x2, |x2| x2, x1^3)."""
     x1, x2 = x
-    return 1.0 + 0.0 * x1, x1, x2, np.absolute(x1) * x2, np.absolute(x2) * x2, x1 * x1 * x1
+    return 1.0, x1, x2, np.absolute(x1) * x2, np.absolute(x2) * x2, x1 * x1 * x1
 
 
 @equation
 def wing_rock_f(x, v, p):
     """Roll acceleration f(x, v) = w^T psi(x) + L v."""
-    acceleration = p.L * v
-    for w_i, psi_i in zip(p.w, wing_rock_regressor(x)):  # noqa: B905 (for numba)
-        acceleration = acceleration + w_i * psi_i
+    psi, acceleration = wing_rock_regressor(x), p.L * v
+    for i in range(6):
+        acceleration = acceleration + p.w[i] * psi[i]
     return acceleration
 
 
