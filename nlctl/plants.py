@@ -1,4 +1,4 @@
-"""The plant class (1) and the plants of the two examples.
+"""The plant class (1), the plants of the two examples, and wing rock.
 
 x_i' = x_{i+1},  i = 1, ..., n-1
 x_n' = f(x, v) + d(x, t)                                                   (1)
@@ -20,7 +20,7 @@ from .errors import ParameterError
 from .names import unknown
 from .params import param, record, whole_number
 
-__all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "integrator_chain"]
+__all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "WingRock", "integrator_chain"]
 
 
 def integrator_chain(f: Callable, d: Callable) -> Callable:
@@ -272,3 +272,73 @@ class Genesio:
     d = staticmethod(genesio_d)
     update = staticmethod(integrator_chain(genesio_f, genesio_d))
     output = staticmethod(measured_state)
+
+
+@equation
+def wing_rock_regressor(x):
+    """Regressor of wing rock: (1, x1, x2, |x1| x2, |x2| x2, x1^3)."""
+    x1, x2 = x
+    return 1.0, x1, x2, np.absolute(x1) * x2, np.absolute(x2) * x2, x1 * x1 * x1
+
+
+@equation
+def wing_rock_f(x, v, p):
+    """Roll acceleration f(x, v) = w^T psi(x) + L v."""
+    psi, acceleration = wing_rock_regressor(x), p.L * v
+    for i in range(6):
+        acceleration = acceleration + p.w[i] * psi[i]
+    return acceleration
+
+
+@equation
+def wing_rock_d(x, t, p):
+    """No disturbance."""
+    return 0.0
+
+
+@equation
+def wing_rock_output(t, x, u, p):
+    """Roll angle, state, and the roll acceleration that a sensor measures."""
+    x1, x2 = x
+    return x1, x1, x2, wing_rock_f((x1, x2), u[0], p)
+
+
+@record
+class WingRock:
+    """Wing rock of a delta wing at a high angle of attack: roll angle x1 and roll rate x2.
+
+        x1' = x2
+        x2' = w_0 + w_1 x1 + w_2 x2 + w_3 |x1| x2 + w_4 |x2| x2 + w_5 x1^3 + L v
+        y   = x1
+
+    The benchmark of Chowdhary and Johnson (49th IEEE CDC, 2010, p. 3674), with the numbers of
+    MathWorks' example "Model Reference Adaptive Control of Aircraft Undergoing Wing Rock".  The
+    output x2_dot is the roll acceleration.
+    """
+
+    w: tuple[float, ...] = param(
+        (0.8, 0.2314, 0.6918, -0.6245, 0.0095, 0.0214), unit="s^-2", meaning="weights w_0, ..., w_5"
+    )
+    L: float = param(3.0, unit="1/s^2", meaning="effect of the ailerons")
+
+    inputs = ("v",)
+    outputs = ("y", "x1", "x2", "x2_dot")
+    states = ("x1", "x2")
+    initial = {"x1": 1.2, "x2": 1.0}
+    feedthrough = True
+
+    f = staticmethod(wing_rock_f)
+    d = staticmethod(wing_rock_d)
+    update = staticmethod(integrator_chain(wing_rock_f, wing_rock_d))
+    output = staticmethod(wing_rock_output)
+
+    def check(self) -> None:
+        """Six weights."""
+        if len(self.w) != 6:
+            raise ParameterError(f"WingRock needs 6 weights w, got {len(self.w)}")
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """The break points of |x1| and |x2|."""
+        return x[0], x[1]

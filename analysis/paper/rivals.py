@@ -17,11 +17,14 @@ from nlctl.actuators import Backlash, DeadZone, Gain, Saturation
 from nlctl.controllers import (
     PID,
     AdaptiveWeights,
+    DynamicSurface,
     FunnelControl,
     NussbaumLaw,
     PrescribedPerformance,
     RobustTerm,
     SlidingModeLaw,
+    SuperTwistingLaw,
+    dynamic_surface_control,
     replaced,
     sliding_mode,
 )
@@ -44,6 +47,10 @@ KNOWLEDGE = {
     "PID": "sign of the gain, e and e', gains for this plant",
     "sliding mode": "sign of the gain, states, n - 1 derivatives of the reference, a bound of "
     "what disturbs",
+    "super-twisting": "sign of the gain, states, n - 1 derivatives of the reference, a bound of "
+    "the rate of what disturbs",
+    "dynamic surface": "sign of the gain and about its size, states, one derivative of the "
+    "reference",
     "prescribed performance": "sign of the gain, states, a bound of the initial errors",
     "funnel": "sign of the gain, states, n - 1 derivatives of the reference, a bound of the "
     "initial errors",
@@ -100,6 +107,22 @@ def _sliding(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSyste
     return sliding_mode(surface, SlidingModeLaw(K=gains["law.K"], phi=gains["law.phi"]))
 
 
+def _twisting(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
+    surface = part_of(published_controller(example), "filtered_error").spec
+    law = {key.removeprefix("law."): value for key, value in gains.items()}
+    return sliding_mode(surface, SuperTwistingLaw(**law))
+
+
+def _dynamic_surface(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
+    published = published_controller(example)
+    basis, old = (part_of(published, key).spec for key in ("basis", "weights"))
+    return dynamic_surface_control(
+        DynamicSurface(c=_tuple(gains, "surface.c"), tau=_tuple(gains, "surface.tau")),
+        basis=basis,
+        weights=AdaptiveWeights(nodes=old.nodes, sigma_1=old.sigma_1, Gamma=gains["weights.Gamma"]),
+    )
+
+
 def _prescribed(example: str, gains: Mapping[str, float]) -> PrescribedPerformance:
     k, rho_inf = _tuple(gains, "controller.k"), _tuple(gains, "controller.rho_inf")
     rho_0, decay = (3.0, 6.0, 12.0)[: len(k)], (gains["controller.decay[0]"], 0.7, 0.7)[: len(k)]
@@ -135,6 +158,16 @@ def _rivals(example: str) -> dict[str, _Rival]:
         "sliding mode": _Rival(
             make=_sliding, bounds={"law.K": (0.5, 30.0), "law.phi": (0.01, 1.0)}
         ),
+        "super-twisting": _Rival(
+            make=_twisting,
+            bounds={"law.k_1": (0.1, 30.0), "law.k_2": (0.1, 100.0), "law.phi": (0.01, 1.0)},
+        ),
+        "dynamic surface": _Rival(
+            make=_dynamic_surface,
+            bounds={f"surface.c[{i}]": (0.1, 20.0) for i in range(order)}
+            | {f"surface.tau[{i}]": (0.005, 1.0) for i in range(order - 1)}
+            | {"weights.Gamma": (0.1, 50.0)},
+        ),
         "prescribed performance": _Rival(
             make=_prescribed,
             bounds={f"controller.k[{i}]": (0.2, 20.0) for i in range(order)}
@@ -159,6 +192,13 @@ RIVAL_GAINS: dict[str, dict[str, dict[str, float]]] = {
             "controller.T_f": 0.00501,
         },
         "sliding mode": {"law.K": 9.47, "law.phi": 0.0265},
+        "super-twisting": {"law.k_1": 26.6, "law.k_2": 92.9, "law.phi": 0.0112},
+        "dynamic surface": {
+            "surface.c[0]": 12.7,
+            "surface.c[1]": 16.4,
+            "surface.tau[0]": 0.493,
+            "weights.Gamma": 1.96,
+        },
         "prescribed performance": {
             "controller.k[0]": 1.57,
             "controller.k[1]": 13.9,
@@ -177,6 +217,15 @@ RIVAL_GAINS: dict[str, dict[str, dict[str, float]]] = {
             "controller.T_f": 0.0102,
         },
         "sliding mode": {"law.K": 2.15, "law.phi": 0.0327},
+        "super-twisting": {"law.k_1": 1.77, "law.k_2": 1.51, "law.phi": 0.026},
+        "dynamic surface": {
+            "surface.c[0]": 0.773,
+            "surface.c[1]": 0.656,
+            "surface.c[2]": 9.55,
+            "surface.tau[0]": 0.186,
+            "surface.tau[1]": 0.264,
+            "weights.Gamma": 2.29,
+        },
         "prescribed performance": {
             "controller.k[0]": 0.501,
             "controller.k[1]": 0.574,

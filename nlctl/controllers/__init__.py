@@ -3,8 +3,28 @@
 from .ablations import FixedGainLaw, ablations, replaced
 from .adaptive import Zero, adaptive_neural
 from .adaptive_inverse import AdaptiveDeadZoneInverse
+from .backstepping import DynamicSurface, dynamic_surface_control
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
+from .mrac import (
+    AffineRegressor,
+    ConcurrentWeights,
+    ConstrainedError,
+    ConstrainedLaw,
+    DirectLaw,
+    EModifiedWeights,
+    FilteredLaw,
+    HistoryStack,
+    LinearRegressor,
+    ModelError,
+    ModelReferenceLaw,
+    ProjectedWeights,
+    ReferenceModel,
+    StatePredictor,
+    WingRockRegressor,
+    l1_adaptive,
+    mrac,
+)
 from .nussbaum import NussbaumLaw
 from .performance import FunnelControl, PrescribedPerformance
 from .pid import PID
@@ -18,30 +38,51 @@ from .rbf import (
 from .remedies import DeadZoneNussbaumLaw, LeakyNussbaumLaw, MonotoneNussbaumLaw
 from .robust import RobustTerm
 from .sliding_mode import SlidingModeLaw, sliding_mode
+from .super_twisting import SuperTwistingLaw
 
 __all__ = [
     "PID",
     "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
+    "AffineRegressor",
+    "ConcurrentWeights",
+    "ConstrainedError",
+    "ConstrainedLaw",
     "DeadZoneNussbaumLaw",
+    "DirectLaw",
+    "DynamicSurface",
+    "EModifiedWeights",
     "FilteredError",
+    "FilteredLaw",
     "FixedGainLaw",
     "FunnelControl",
     "GaussianBasis",
+    "HistoryStack",
     "KnownSignLaw",
     "LeakyNussbaumLaw",
+    "LinearRegressor",
+    "ModelError",
+    "ModelReferenceLaw",
     "MonotoneNussbaumLaw",
     "NussbaumLaw",
     "PrescribedPerformance",
+    "ProjectedWeights",
+    "ReferenceModel",
     "RobustTerm",
     "SlidingModeLaw",
+    "StatePredictor",
+    "SuperTwistingLaw",
+    "WingRockRegressor",
     "Zero",
     "ablations",
     "adaptive_neural",
     "binomial_lambdas",
     "diagonal_centres",
+    "dynamic_surface_control",
     "grid_centres",
+    "l1_adaptive",
     "latin_hypercube_centres",
+    "mrac",
     "replaced",
     "sliding_mode",
 ]

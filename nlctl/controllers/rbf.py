@@ -186,6 +186,23 @@ class GaussianBasis:
         return gaussian(u, p.centres, p.widths)
 
 
+def weight_names(nodes: int) -> tuple[str, ...]:
+    """Return ("W_hat[0]", ..., "W_hat[l-1]")."""
+    return tuple(f"W_hat[{i}]" for i in range(nodes))
+
+
+def weight_inputs(nodes: int) -> tuple[str, ...]:
+    """Return ("r", "psi[0]", ..., "psi[l-1]")."""
+    return ("r", *(f"psi[{i}]" for i in range(nodes)))
+
+
+@equation
+def network_output(t, x, u, p):
+    """The network's output W_hat^T psi, and the norm of the weights."""
+    psi, W_hat = u[1:], x
+    return np.sum(W_hat * psi), np.sqrt(np.sum(W_hat * W_hat))
+
+
 @record
 class AdaptiveWeights:
     """Weights of the network with sigma-modification (25), and its output.
@@ -200,6 +217,7 @@ class AdaptiveWeights:
     outputs = ("W_psi", "W_norm")
     feedthrough = True
     vector = True
+    output = staticmethod(network_output)
 
     def check(self) -> None:
         """A network has nodes."""
@@ -209,12 +227,12 @@ class AdaptiveWeights:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names r, psi[0], ..., psi[l-1]."""
-        return ("r", *(f"psi[{i}]" for i in range(self.nodes)))
+        return weight_inputs(self.nodes)
 
     @property
     def states(self) -> tuple[str, ...]:
         """Names W_hat[0], ..., W_hat[l-1]."""
-        return tuple(f"W_hat[{i}]" for i in range(self.nodes))
+        return weight_names(self.nodes)
 
     @staticmethod
     @equation
@@ -222,10 +240,3 @@ class AdaptiveWeights:
         """Adaptation law, first line of (25)."""
         r, psi, W_hat = u[0], u[1:], x
         return p.Gamma * (r * psi - p.sigma_1 * W_hat)
-
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The network's output W_hat^T psi, and the norm of the weights."""
-        psi, W_hat = u[1:], x
-        return np.sum(W_hat * psi), np.sqrt(np.sum(W_hat * W_hat))

@@ -63,7 +63,7 @@ def sliding_mode(
     filtered_error : FilteredError, optional
         Its lambdas are the slope of the sliding surface, and their number gives the order.
     law : record, optional
-        `SlidingModeLaw` by default.
+        `SlidingModeLaw` by default; `SuperTwistingLaw` where u is to be continuous.
     name : str, optional
 
     Returns

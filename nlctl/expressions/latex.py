@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from .functions import FUNCTIONS
 from .graph import Expr, Untraceable, needed
 
-__all__ = ["Index", "LatexWriter", "index_text", "number_text", "symbol"]
+__all__ = ["Index", "LatexWriter", "index_text", "number_text", "symbol", "with_index"]
 
 _GREEK = """alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma
 tau upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"""
@@ -38,7 +38,7 @@ def symbol(name: str) -> str:
     """
     found = re.fullmatch(r"(.*?)\[(\d+)\]", name)
     if found:
-        return _with_index(symbol(found[1]), str(int(found[2]) + 1))
+        return with_index(symbol(found[1]), str(int(found[2]) + 1))
     head, *rest = [part for part in name.split("_") if part] or [name]
     marks = [MARKS[part] for part in rest if part in MARKS]
     rest = [part for part in rest if part not in MARKS]
@@ -53,8 +53,10 @@ def symbol(name: str) -> str:
     return f"{text}_{{{','.join(map(_word, rest))}}}" if rest else text
 
 
-def _with_index(text: str, index: str) -> str:
-    return f"{text[:-1]},{index}}}" if re.search(r"_\{[^{}]*\}$", text) else f"{text}_{{{index}}}"
+def with_index(text: str, index: str) -> str:
+    """Return a symbol with an index, behind those that it has: LaTeX takes one subscript."""
+    has_one = re.search(r"_\{(?:[^{}]|\{[^{}]*\})*\}$", text)
+    return f"{text[:-1]},{index}}}" if has_one else f"{text}_{{{index}}}"
 
 
 def _word(part: str) -> str:
@@ -125,7 +127,7 @@ class LatexWriter:
         if by_name and expr in self.known:
             self.used[expr] = self.known[expr]
             name = self.known[expr]
-            return (name if index is None else _with_index(name, index_text(index))), ATOM
+            return (name if index is None else with_index(name, index_text(index))), ATOM
         if expr.op in FUNCTIONS:
             return self._function(expr, index, depth)
         return getattr(self, f"_{expr.op}", self._other)(expr, index, depth)
@@ -144,7 +146,7 @@ class LatexWriter:
         if not index[1]:
             return number_text(expr.data[index[0]]), ATOM
         name = self.tables.setdefault(expr, f"c^{{({len(self.tables) + 1})}}")
-        return _with_index(name, index_text(index)), ATOM
+        return with_index(name, index_text(index)), ATOM
 
     def _leaf(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         array, start, step = expr.data

@@ -18,7 +18,7 @@ from ..blocks import Block
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
 from ..expressions.graph import Expr, Graph, needed
-from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol
+from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol, with_index
 from ..params import declared_params
 from ..upstream.control_internals import set_parameters
 from .codegen.blocks import Reader
@@ -192,7 +192,7 @@ def _vector(names: list[str], at: int) -> tuple[Callable[[str], str], int]:
     """Return what names the elements of a vector by an index, and the number of the first one."""
     found = re.fullmatch(r"(.*)_\{((?:.*,)?)(\d+)\}", names[at])
     if not found:
-        return (lambda index: f"{names[at]}_{{{index}}}"), 1
+        return (lambda index: with_index(names[at], index)), 1
     return (lambda index: f"{found[1]}_{{{found[2]}{index}}}"), int(found[3])
 
 
@@ -224,11 +224,12 @@ def _entry(name: str, slot: Slot, index: Index) -> str:
     if not slot.shape:
         return name
     if len(slot.shape) == 1:
-        return f"{name}_{{{index_text(index)}}}"
+        return with_index(name, index_text(index))
     (start, step, letter), width = index, slot.shape[1]
     (row, column), along = divmod(start, width), step % width == 0
     first = index_text((row, step // width if along else 0, letter))
-    return f"{name}_{{{first},{index_text((column, 0 if along else step, letter))}}}"
+    second = index_text((column, 0 if along else step, letter))
+    return with_index(name, f"{first},{second}")
 
 
 @contextmanager
@@ -285,7 +286,7 @@ def _definitions(writer: LatexWriter) -> Iterator[str]:
         name = writer.used[expr]
         if expr.size:
             right = writer.formula(expr, (0, 1, "i"), by_name=False)
-            yield rf"{name}_{{i}} = {right}, \quad i = 1, \dots, {expr.size}"
+            yield rf"{with_index(name, 'i')} = {right}, \quad i = 1, \dots, {expr.size}"
         else:
             yield f"{name} = {writer.formula(expr, by_name=False)}"
     for table, name in writer.tables.items():

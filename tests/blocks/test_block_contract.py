@@ -34,6 +34,7 @@ NEEDED = {
     "PureFeedback": {"order": 3, "f": force, "d": disturbance},
     "FunctionReference": {"order": 2, "function": ramp},
     "Zero": {"outputs": ("W_psi", "W_norm")},
+    "HistoryStack": {"nodes": 3, "novelty": 1.5},  # points at random are that far apart
 }
 
 
@@ -69,6 +70,11 @@ def call(function, spec, t, x, u, p=None):
     return np.array(result, dtype=float).reshape(-1)
 
 
+def made(spec):
+    """The block; of a program in discrete time, with any sampling time."""
+    return nlctl.block(spec, "b", **({"dt": True} if getattr(spec, "discrete", False) else {}))
+
+
 def equations(spec):
     return [getattr(spec, name) for name in EQUATIONS if spec.states or name == "output"]
 
@@ -100,7 +106,7 @@ def test_the_contract_covers_the_blocks_that_exist():
 class TestEveryRecord:
     def test_it_works_from_its_defaults(self, spec):
         """Finite values, as many as declared, from the initial state and zero inputs."""
-        block = nlctl.block(spec, "b")
+        block = made(spec)
         x = nlctl.initial_state(block)
         assert x.shape == (len(spec.states),)
         result = everything(block, 0.0, x, np.zeros(len(spec.inputs)))
@@ -122,7 +128,7 @@ class TestEveryRecord:
 
     def test_python_control_computes_the_same(self, spec):
         """A block hands arrays to the equations; that makes no difference."""
-        block = nlctl.block(spec, "b")
+        block = made(spec)
         for t, x, u in points(spec):
             direct = np.concatenate([call(f, spec, t, x, u) for f in equations(spec)])
             np.testing.assert_array_equal(everything(block, t, x, u), direct)
@@ -175,7 +181,7 @@ class TestEveryRecord:
 
     def test_an_override_reaches_the_equation(self, spec):
         """A run with an override equals a run of the record made with that value."""
-        block = nlctl.block(spec, "b")
+        block = made(spec)
         for name in declared_params(spec):
             moved = False
             for value in other_values(spec, name):
@@ -183,7 +189,7 @@ class TestEveryRecord:
                     changed = dataclasses.replace(spec, **{name: value})
                 except nlctl.ParameterError:
                     continue
-                fresh = nlctl.block(changed, "b")
+                fresh = made(changed)
                 starts = [nlctl.initial_state(b) for b in (block, fresh)]
                 moved |= not np.array_equal(*starts)
                 for t, x, u in points(spec):
@@ -202,7 +208,7 @@ class TestEveryRecord:
 
     def test_its_repr_lists_every_parameter(self, spec):
         """Name and unit of each in one line of text, and in one row of HTML."""
-        block = nlctl.block(spec, "b")
+        block = made(spec)
         lines, html = repr(block).splitlines(), block._repr_html_()
         assert type(spec).__name__ in lines[0]
         assert "'b'" in lines[0]

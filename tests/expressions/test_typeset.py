@@ -1,5 +1,7 @@
 """Formulas are what is run: they are read back as numbers, and converted to MathML."""
 
+import re
+
 import control as ct
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from latex_values import values
 from test_derivatives import quiet
 
 import nlctl
+from analysis.catalogue import block_records
 from analysis.report.document import Equation
 from analysis.report.mathml import mathml
 from nlctl.errors import UsageError
@@ -24,6 +27,23 @@ def test_symbols():
         "speed": r"\mathrm{speed}", "x_1[2]": "x_{1,3}", "Gamma": r"\Gamma",
     }  # fmt: skip
     assert {name: symbol(name) for name in table} == table
+
+
+def test_no_symbol_has_two_subscripts():
+    """LaTeX refuses them: an index of a parameter stands behind those that its name has."""
+    for name, cls in block_records().items():
+        if name in ("PureFeedback", "FunctionReference", "Zero"):  # they need arguments
+            continue
+        spec = cls()
+        if not hasattr(spec, "outputs"):
+            continue
+        discrete = {"dt": True} if getattr(spec, "discrete", False) else {}
+        try:
+            (shown,) = nlctl.typeset(nlctl.block(spec, "b", **discrete))
+        except nlctl.CompileError:  # a memory, which has no formula
+            continue
+        for line in (*shown.equations, *shown.where):
+            assert not re.search(r"_\{(?:[^{}]|\{[^{}]*\})*\}_", line), (name, line)
 
 
 def test_numbers():

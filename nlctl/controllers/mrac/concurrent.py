@@ -1,0 +1,155 @@
+"""Concurrent learning: weights that learn from recorded points too, and their record."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arguments import whole_number
+from ...equations import equation
+from ...params import param, record
+from ..rbf import network_output, weight_inputs, weight_names
+
+__all__ = ["ConcurrentWeights", "HistoryStack"]
+
+
+def sum_names(nodes: int) -> tuple[str, ...]:
+    """Return ("z[0]", ..., "Omega[0,0]", "Omega[0,1]", ...)."""
+    rows = range(nodes)
+    matrix = [f"Omega[{i},{j}]" for i in rows for j in rows]
+    return (*(f"z[{i}]" for i in rows), *matrix)
+
+
+@equation
+def sums_of_point(psi, Delta):
+    """What a point adds: psi Delta, and psi psi^T by rows."""
+    added = psi * Delta
+    for i in range(psi.size):
+        added = np.append(added, psi[i] * psi)
+    return added
+
+
+@record
+class HistoryStack:
+    """Record of points (psi_j, Delta_j) for concurrent learning, a program in discrete time.
+
+        Omega = sum_j psi_j psi_j^T,   z = sum_j psi_j Delta_j,   Delta_j = x_n' - gain u
+
+    A sample is recorded if |psi - psi_last| >= novelty |psi|, psi_last the last recorded one,
+    until there are `points` of them (Chowdhary, Johnson, 49th IEEE CDC, 2010, p. 3674).  The law
+    reads only the sums, which are the states, from the next sample on.  Points are never replaced;
+    the algorithm that maximizes the least singular value (Chowdhary, Johnson, ACC 2011) does that.
+    It needs a measurement or an estimate of x_n' besides the states.  Use it as
+    ``nlctl.sampled(HistoryStack(...), dt)``.
+
+    Parameters
+    ----------
+    nodes : int, optional
+        Number of regressors.
+    points : int, optional
+        Largest number of points.
+    derivative : str, optional
+        Name of the signal x_n'.
+    """
+
+    nodes: int = 6
+    points: int = 100
+    derivative: str = "x2_dot"
+    gain: float = param(1.0, unit="1", meaning="input gain of the plant")
+    novelty: float = param(0.05, unit="1", meaning="least relative change of psi", at_least=0)
+
+    discrete = True
+    feedthrough = False
+    vector = True
+
+    def check(self) -> None:
+        """A network has nodes, and a record room."""
+        for name in ("nodes", "points"):
+            value = whole_number("HistoryStack", name, getattr(self, name), at_least=1)
+            object.__setattr__(self, name, value)
+
+    def derived(self) -> dict[str, int]:
+        """The number of points, for the equation."""
+        return {"points": self.points}
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names psi[0], ..., psi[l-1], x_n', u."""
+        return (*weight_inputs(self.nodes)[1:], self.derivative, "u")
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names count, z[0], ..., Omega[0,0], ..."""
+        return ("count", *sum_names(self.nodes))
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The outputs, and the point that was recorded last."""
+        return (*self.outputs, *(f"last[{i}]" for i in range(self.nodes)))
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Record the point, or leave all as it is."""
+        psi, Delta, count = u[:-2], u[-2] - p.gain * u[-1], x[0]
+        last = x[-psi.size :]
+        distance, size = np.sum((psi - last) ** 2), np.sum(psi * psi)
+        taken = distance >= p.novelty * p.novelty * size and count < p.points
+        change = np.append(np.append(np.ones(1), sums_of_point(psi, Delta)), psi - last)
+        return x + ((1.0 if taken else 0.0) + 0.0 * (distance + size + count)) * change  # NaN stays
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """How many points, and the sums over them."""
+        return x[: x.size - (u.size - 2)].copy()
+
+
+@record
+class ConcurrentWeights:
+    """Weights with concurrent learning: they converge without persistent excitation.
+
+        W_hat' = Gamma (r psi + z - Omega W_hat),   W_psi = W_hat^T psi,   W_hat(0) = 0
+
+    (Chowdhary, Johnson, 49th IEEE CDC, 2010, p. 3674), z and Omega those of `HistoryStack`: the
+    second term is sum_j psi_j (Delta_j - W_hat^T psi_j).  As soon as as many independent points are
+    recorded as there are weights, Omega is positive definite, and the error of the weights decays
+    at a rate of at least Gamma times its least eigenvalue.
+    """
+
+    nodes: int = 6
+    Gamma: float = param(5.0, unit="1", meaning="adaptation gain, Gamma I", above=0)
+
+    outputs = ("W_psi", "W_norm")
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """A network has nodes."""
+        nodes = whole_number("ConcurrentWeights", "nodes", self.nodes, at_least=1)
+        object.__setattr__(self, "nodes", nodes)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names r, psi[0], ..., psi[l-1], z[0], ..., Omega[0,0], ..."""
+        return (*weight_inputs(self.nodes), *sum_names(self.nodes))
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names W_hat[0], ..., W_hat[l-1]."""
+        return weight_names(self.nodes)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Adaptation law, row by row of Omega."""
+        n, W_hat = x.size, x
+        learned = u[0] * u[1 : n + 1] + u[n + 1 : 2 * n + 1]
+        for j in range(n):  # Omega is symmetric: its columns are its rows
+            learned = learned - u[(2 + j) * n + 1 : (3 + j) * n + 1] * W_hat[j]
+        return p.Gamma * learned
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """As `AdaptiveWeights`."""
+        return network_output(t, x, u[: x.size + 1], p)

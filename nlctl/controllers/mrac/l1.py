@@ -1,0 +1,179 @@
+"""L1 adaptive control: a state predictor, fast adaptation, and a low-pass filter in the law."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ...diagrams import as_system, interconnect
+from ...equations import equation
+from ...errors import ParameterError
+from ...params import param, record
+from ...plants import coordinate_names
+from ..filtered_error import is_hurwitz
+from .model_error import ModelError
+from .modified_weights import ProjectedWeights
+from .reference_model import model_state_names
+from .regressors import AffineRegressor
+
+__all__ = ["FilteredLaw", "StatePredictor", "l1_adaptive"]
+
+
+@record
+class StatePredictor:
+    """State predictor: the plant as the controller believes it to be.
+
+        xm_i' = xm_{i+1},   xm_n' = -a_1 xm_1 - ... - a_n xm_n + gain u + W_hat^T psi
+
+    With x_n' = -a^T x + gain u + W^T psi of the plant the error x - xm is driven by
+    (W - W_hat)^T psi alone, whatever u is.
+    """
+
+    a: tuple[float, ...] = param(
+        (4.0, 2.0), unit="s^-(n+1-i)", meaning="coefficients a_1, ..., a_n; their number is n"
+    )
+    gain: float = param(1.0, unit="1", meaning="input gain of the plant")
+
+    inputs = ("u", "W_psi")
+    feedthrough = False
+    vector = True
+
+    def check(self) -> None:
+        """The roots must lie in the open left half plane, and the input has an effect."""
+        if not is_hurwitz((1.0, *self.a[::-1])):
+            raise ParameterError(
+                "StatePredictor needs a Hurwitz polynomial s^n + a_n s^(n-1) + ... + a_1, "
+                f"got a {self.a}"
+            )
+        if self.gain == 0:
+            raise ParameterError("StatePredictor needs a gain other than 0, got 0.0")
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names xm1, ..., xmn."""
+        return model_state_names(len(self.a))
+
+    outputs = states
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """The plant with the estimates."""
+        return np.append(x[1:], p.gain * u[0] + u[1] - np.sum(p.a * x))
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """Its state."""
+        return x.copy()
+
+
+@record
+class FilteredLaw:
+    """Law behind a low-pass filter C(s) = omega / (s + omega): the estimates pass below omega.
+
+    u' = -omega (u - (b yd - W_hat^T psi) / gain)
+    """
+
+    omega: float = param(10.0, unit="rad/s", meaning="bandwidth of the filter", above=0)
+    b: float = param(4.0, unit="s^-n", meaning="gain of the command")
+    gain: float = param(1.0, unit="1", meaning="input gain of the plant")
+
+    inputs = ("yd", "W_psi")
+    outputs = ("u",)
+    states = ("u_f",)
+    feedthrough = False
+
+    def check(self) -> None:
+        """An input that has an effect."""
+        if self.gain == 0:
+            raise ParameterError("FilteredLaw needs a gain other than 0, got 0.0")
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """The filter."""
+        yd, W_psi = u
+        return (-p.omega * (x[0] - (p.b * yd - W_psi) / p.gain),)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """Its state."""
+        return (x[0],)
+
+
+def l1_adaptive(
+    predictor: StatePredictor | None = None,
+    *,
+    error: Any = None,
+    basis: Any = None,
+    weights: Any = None,
+    law: Any = None,
+    name: str = "controller",
+) -> ct.InterconnectedSystem:
+    """Connect L1 adaptive control: predictor -> error, basis -> weights -> law.
+
+        x_n' = -a^T x + gain u + W^T psi,   W_hat' = Gamma Proj(W_hat, r psi),   r = b^T P (x - xm)
+        u = C(s) (b yd - W_hat^T psi) / gain
+
+    (Hovakimyan, Cao, L1 Adaptive Control Theory, 2010, section 2.1, with psi = (x, 1).)  While W is
+    constant, in the inner ball of the projection, |x - xm|^2 <= |W - W_hat(0)|^2 / (Gamma
+    lambda_min(P)) from equal states, whatever the law does; what adaptation does above omega is
+    kept from the plant.  They show the loop stable if the L1 norm of (sI - A)^-1 b (1 - C(s)), A
+    and b as in `ModelError`, times the largest sum of |W_i| over the weights of the states is below
+    1; that is not checked here.
+
+    Parameters
+    ----------
+    predictor : StatePredictor, optional
+        Its number of coefficients is the order n.
+    error, basis, weights, law : record or control.InputOutputSystem, optional
+        `ModelError` with the gains K = a, `AffineRegressor`, `ProjectedWeights` with Gamma = 1000,
+        and `FilteredLaw` by default.
+    name : str, optional
+
+    Returns
+    -------
+    control.InterconnectedSystem
+        With inputs x1, ..., xn, yd and outputs e (of the predictor), r, u, W_norm, xm1, ..., xmn.
+
+    Raises
+    ------
+    ParameterError
+        If basis and weights do not fit to each other, or predictor and law differ in the gain.
+    DiagramError
+        If a replaced piece lacks a signal.
+
+    Examples
+    --------
+    >>> l1_adaptive().input_labels
+    ['x1', 'x2', 'yd']
+    """
+    predictor = StatePredictor() if predictor is None else predictor
+    order = len(predictor.a)
+    law = FilteredLaw(b=predictor.a[0], gain=predictor.gain) if law is None else law
+    if getattr(law, "gain", predictor.gain) != predictor.gain:
+        raise ParameterError(
+            f"l1_adaptive needs one gain of predictor and law, got {predictor.gain:g} and "
+            f"{law.gain:g}"
+        )
+    regressor = as_system(AffineRegressor(order=order) if basis is None else basis, "basis")
+    nodes = sum(label.startswith("psi[") for label in regressor.output_labels)
+    weights = ProjectedWeights(nodes=nodes, Gamma=1000.0) if weights is None else weights
+    if getattr(weights, "nodes", nodes) != nodes:
+        raise ParameterError(
+            f"l1_adaptive needs a weight for each output psi of its basis, got "
+            f"nodes={weights.nodes} for {nodes}"
+        )
+    error = ModelError(K=predictor.a, Q=(1.0,) * order) if error is None else error
+    pieces = {"predictor": predictor, "error": error, "basis": regressor, "weights": weights}
+    systems = [as_system(piece, key) for key, piece in {**pieces, "law": law}.items()]
+    return interconnect(
+        systems,
+        inputs=[*coordinate_names(order), "yd"],
+        outputs=["e", "r", "u", "W_norm", *model_state_names(order)],
+        name=name,
+    )

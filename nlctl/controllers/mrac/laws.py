@@ -1,0 +1,63 @@
+"""Control laws of model reference adaptive control."""
+
+from __future__ import annotations
+
+from ...equations import equation
+from ...errors import ParameterError
+from ...params import param, record
+
+__all__ = ["DirectLaw", "ModelReferenceLaw"]
+
+
+@record
+class ModelReferenceLaw:
+    """Control law for a matched uncertainty: the model's derivative, feedback, minus the network.
+
+        u = (nu + nu_e - W_hat^T psi) / gain
+
+    For x_n' = gain u + W^T psi(x) the error obeys E' = A E - b (W_hat - W)^T psi, A of
+    `ModelError`.  With K = a of the model it is -a^T x + b yd - W_hat^T psi, the model's own
+    feedback.  The gain is known, of either sign.
+    """
+
+    gain: float = param(1.0, unit="1", meaning="input gain of the plant")
+
+    inputs = ("nu", "nu_e", "W_psi")
+    outputs = ("u",)
+    states = ()
+    feedthrough = True
+
+    def check(self) -> None:
+        """An input that has an effect."""
+        if self.gain == 0:
+            raise ParameterError("ModelReferenceLaw needs a gain other than 0, got 0.0")
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The law."""
+        nu, nu_e, W_psi = u
+        return ((nu + nu_e - W_psi) / p.gain,)
+
+
+@record
+class DirectLaw:
+    """Control law of direct MRAC: all gains are estimated; the input gain is positive, no more.
+
+        u = -W_hat^T psi
+
+    For x_n' = -a^T x + b yd + lambda (u + W^T psi) with any lambda > 0 and the a of `ModelError`
+    as K, (W_hat - W)^T psi is all that drives the error (Narendra, Annaswamy, Stable Adaptive
+    Systems, 1989, section 3.3).
+    """
+
+    inputs = ("W_psi",)
+    outputs = ("u",)
+    states = ()
+    feedthrough = True
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The law."""
+        return (-u[0],)

@@ -1,0 +1,67 @@
+"""The reference model of model reference adaptive control, for plants of class (1)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...equations import equation
+from ...errors import ParameterError
+from ...params import param, record
+from ..filtered_error import is_hurwitz
+
+__all__ = ["ReferenceModel", "model_state_names"]
+
+
+def model_state_names(order: int) -> tuple[str, ...]:
+    """Return ("xm1", ..., "xmn")."""
+    return tuple(f"xm{i}" for i in range(1, order + 1))
+
+
+@record
+class ReferenceModel:
+    """Reference model: what the plant shall do with the command yd.
+
+        xm_i' = xm_{i+1},   xm_n' = -a_1 xm_1 - ... - a_n xm_n + b yd,   nu = xm_n'
+
+    The polynomial s^n + a_n s^(n-1) + ... + a_1 must be Hurwitz.  A gain b = a_1 makes xm_1
+    settle at the command.
+    """
+
+    a: tuple[float, ...] = param(
+        (4.0, 2.0), unit="s^-(n+1-i)", meaning="coefficients a_1, ..., a_n; their number is n"
+    )
+    b: float = param(4.0, unit="s^-n", meaning="gain of the command")
+
+    inputs = ("yd",)
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """The roots must lie in the open left half plane."""
+        if not is_hurwitz((1.0, *self.a[::-1])):
+            raise ParameterError(
+                "ReferenceModel needs a Hurwitz polynomial s^n + a_n s^(n-1) + ... + a_1, "
+                f"got a {self.a}"
+            )
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names xm1, ..., xmn."""
+        return model_state_names(len(self.a))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names xm1, ..., xmn, nu."""
+        return (*self.states, "nu")
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """The model in controller form."""
+        return np.append(x[1:], p.b * u[0] - np.sum(p.a * x))
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """Its state, and the derivative of the last one."""
+        return np.append(x, p.b * u[0] - np.sum(p.a * x))

@@ -1,0 +1,122 @@
+"""Regressors of adaptive laws: what the weights are multiplied by."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arguments import whole_number
+from ...equations import equation
+from ...params import record
+from ...plants import coordinate_names, wing_rock_regressor
+
+__all__ = ["AffineRegressor", "LinearRegressor", "WingRockRegressor"]
+
+
+def regressor_names(nodes: int) -> tuple[str, ...]:
+    """Return ("psi[0]", ..., "psi[l-1]")."""
+    return tuple(f"psi[{i}]" for i in range(nodes))
+
+
+@record
+class AffineRegressor:
+    """Regressor of a linear plant with a constant disturbance: its states, and 1.
+
+        psi = (x_1, ..., x_n, 1)
+
+    Parameters
+    ----------
+    order : int, optional
+        Order n >= 1 of the plant.
+    """
+
+    order: int = 1
+
+    states = ()
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """An order."""
+        order = whole_number("AffineRegressor", "an order", self.order, at_least=1)
+        object.__setattr__(self, "order", order)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names x1, ..., xn."""
+        return coordinate_names(self.order)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names psi[0], ..., psi[n]."""
+        return regressor_names(self.order + 1)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The states, and 1."""
+        return np.append(u, 1.0)
+
+
+@record
+class LinearRegressor:
+    """Regressor of direct MRAC of a linear plant: its states and the command.
+
+        psi = (x_1, ..., x_n, yd)
+
+    Parameters
+    ----------
+    order : int, optional
+        Order n >= 1 of the plant.
+    """
+
+    order: int = 1
+
+    states = ()
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """An order."""
+        order = whole_number("LinearRegressor", "an order", self.order, at_least=1)
+        object.__setattr__(self, "order", order)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names x1, ..., xn, yd."""
+        return (*coordinate_names(self.order), "yd")
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names psi[0], ..., psi[n]."""
+        return regressor_names(self.order + 1)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The signals themselves."""
+        return np.copy(u)
+
+
+@record
+class WingRockRegressor:
+    """Regressor of wing rock, for a controller that knows its form and not its weights.
+
+    psi = (1, x1, x2, |x1| x2, |x2| x2, x1^3)
+    """
+
+    inputs = ("x1", "x2")
+    outputs = regressor_names(6)
+    states = ()
+    feedthrough = True
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The functions of `WingRock`."""
+        return wing_rock_regressor(u)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """The break points of |x1| and |x2|."""
+        return u[0], u[1]
