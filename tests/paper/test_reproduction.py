@@ -71,13 +71,8 @@ RELAXED = 5e-5  # what python-control's relaxed play allows
 LSODA = {"method": "LSODA", "solve_ivp_kwargs": {"rtol": 1e-8, "atol": 1e-10}}
 
 
-@pytest.mark.parametrize(
-    "key",
-    [
-        pytest.param("1", marks=pytest.mark.slow),
-        *(pytest.param(key, marks=pytest.mark.weekly) for key in ("2", "2-dead-zone")),
-    ],
-)
+@pytest.mark.weekly
+@pytest.mark.parametrize("key", ["1", "2", "2-dead-zone"])
 def test_diagrams_as_they_stand_reach_their_figures_in_python_control(key):
     """With LSODA at rtol 1e-8 every figure is within the tolerance of its method."""
     result = measure(plain_run(CASE[key], **LSODA))

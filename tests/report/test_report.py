@@ -157,7 +157,7 @@ def test_svg_of_every_figure_is_valid_xml_with_a_description(page):
         assert root.get("aria-labelledby") == f"{title.get('id')} {description.get('id')}"
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_report_is_the_same_bytes_in_another_process(runs, tmp_path):
     """Neither hash seeds nor time leave a trace."""
     code = (

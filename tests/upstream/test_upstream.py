@@ -22,7 +22,7 @@ FILES = {  # calls that are equal at least, and refused at most: together 190 an
     "response": (0, 0),
     "stochsys": (31, 1),
 }
-LONG = ("iosys", "statefbk", "stochsys")  # two thirds of the time of all: once a week
+LONG = ("iosys", "statefbk", "stochsys", "timeresp", "response")  # most of the time: once a week
 CASES = [pytest.param(name, marks=[pytest.mark.weekly] * (name in LONG)) for name in FILES]
 
 

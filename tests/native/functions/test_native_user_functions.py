@@ -102,7 +102,7 @@ def test_functions_called_as_they_stand_in_machine_code(group):
 
 
 @machine_code
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_steps_in_machine_code():
     """Discrete time, several steps in a row."""
     report("stepped", 9, [e.name for e in PURE if e.discrete and judged(e, 9, 0.1).good])

@@ -155,7 +155,7 @@ def test_it_has_no_path_of_the_machine_that_made_it():
     assert b".py" not in code
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_made_anew_it_is_the_same_file(tmp_path):
     """Whoever makes it, on whatever machine, with the same numba."""
     if header()["numba"] != numba.__version__:
@@ -166,7 +166,7 @@ def test_made_anew_it_is_the_same_file(tmp_path):
     assert same  # a difference of bytes would be printed for minutes
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_edited_sources_are_compiled_and_kept(tmp_path, monkeypatch):
     """Without what is shipped: numba once, then from the cache, and the same bits."""
     monkeypatch.setenv("NLCTL_CACHE_DIR", str(tmp_path / "cache"))

@@ -62,10 +62,11 @@ def run(function, *given):
         return
     is_record = [isinstance(g, tuple) for g in given]
     kinds = [type_of(g) if r else numba.intp for g, r in zip(given, is_record, strict=True)]
-    code = COMPILED.setdefault(function, numba.cfunc(numba.void(*kinds))(function))
+    if function not in COMPILED:  # once, not once an example
+        COMPILED[function] = numba.cfunc(numba.void(*kinds))(function)
     call = ctypes.CFUNCTYPE(
         None, *[ctypes.c_void_p if record else ctypes.c_ssize_t for record in is_record]
-    )(code.address)
+    )(COMPILED[function].address)
     call(*(g.table.ctypes.data if isinstance(g, tuple) else g for g in given))
 
 
