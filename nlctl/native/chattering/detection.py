@@ -40,18 +40,29 @@ class Jump:
 
     Attributes
     ----------
-    time : float
-        Of the jump (s).
+    times : tuple of float
+        On both sides of the jump (s); the same, or neighbouring ones.
     before, after : ndarray of shape (nstates,)
         Neighbouring states on both sides.
     inputs : ndarray
         Inputs of the program there.
     """
 
-    time: float
+    times: tuple[float, float]
     before: np.ndarray
     after: np.ndarray
     inputs: np.ndarray
+
+    @property
+    def time(self) -> float:
+        """Time of the jump (s)."""
+        return self.times[1]
+
+    def sides(self, wider: float = 0.0) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Return times, states and inputs on both sides, further apart by so many distances."""
+        (t, t_2), (x, x_2) = self.times, (self.before, self.after)
+        apart, later = wider * (x_2 - x), wider * (t_2 - t)
+        return [(t - later, x - apart, self.inputs), (t_2 + later, x_2 + apart, self.inputs)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,8 +171,8 @@ class _Evaluated:
     def jump(self, attempt: Attempt, weights: np.ndarray, least: np.ndarray) -> Jump | None:
         """Return a jump inside of a step, if there is one."""
         u = attempt.u[:, self.j]
-        places = [p for p in self.points(attempt) if np.isfinite(p[1]).all()]
-        values = np.array([self(*place, u) for place in places])
+        places = [(t, x) for t, x in self.points(attempt) if np.isfinite(x).all()]
+        values = np.array([self(t, x, u) for t, x in places])
         change = np.where(np.isfinite(values).all(axis=0), np.ptp(values, axis=0), 0.0)
         change = np.where(change > least, weights * change, 0.0)
         if not change.any():
@@ -172,7 +183,7 @@ class _Evaluated:
 
     def _narrowed(self, low: Any, high: Any, u: np.ndarray, i: int) -> Jump | None:
         """Halve the way from one place to another; return where component `i` jumps, if it does."""
-        first, last = self(*low, u)[i], self(*high, u)[i]
+        first, last = self(low[0], low[1], u)[i], self(high[0], high[1], u)[i]
         whole = abs(last - first)
         for _ in range(_HALVINGS):
             t, x = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
@@ -186,5 +197,6 @@ class _Evaluated:
             if not abs(last - first) > _REMAINS * whole:
                 return None
         # the jump itself may have a value of its own, as sign(0) has: beside it on both sides
-        before, after = 2.0 * low[1] - high[1], 2.0 * high[1] - low[1]
-        return Jump(time=float(high[0]), before=before, after=after, inputs=u)
+        wider = Jump(times=(low[0], high[0]), before=low[1], after=high[1], inputs=u).sides(1.0)
+        (t, before, _), (t_2, after, _) = wider
+        return Jump(times=(float(t), float(t_2)), before=before, after=after, inputs=u)

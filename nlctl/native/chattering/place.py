@@ -19,6 +19,9 @@ from .detection import Jump
 __all__ = ["chattering_words"]
 
 _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
+_WIDER = (0.0, *(4.0**k for k in range(14)))  # in distances between neighbouring states
+_JUMPS = 1e3  # change of an output over that of inputs and states, which no usual function has
+_ROUNDING = 1e-9  # of a value: what is not a jump
 _SMALL = 1e-300  # what is divided by where nothing else has changed
 
 
@@ -48,7 +51,7 @@ def chattering_words(
 def _committed(compiled: Compiled, p: np.ndarray, jump: Jump) -> str:
     """Return which memory switches, if one does and that is what jumps."""
     program, nodes = compiled.program, compiled.schedule.nodes
-    sides = [_events(compiled, p, jump, x) for x in (jump.before, jump.after)]
+    sides = [_events(compiled, p, side) for side in jump.sides()]
     changes = np.abs(sides[1] - sides[0])[program.corners :]
     if not changes.size or not changes.max() > 1e-3:
         return ""
@@ -59,11 +62,12 @@ def _committed(compiled: Compiled, p: np.ndarray, jump: Jump) -> str:
     return _between(label, node.path, sides[0][place], sides[1][place])
 
 
-def _events(compiled: Compiled, p: np.ndarray, jump: Jump, x: np.ndarray) -> np.ndarray:
+def _events(compiled: Compiled, p: np.ndarray, side: Any) -> np.ndarray:
     """Return switching functions, and what memories would become."""
     rhs, _ = compiled.native
     g = np.zeros(compiled.program.events)
-    rhs(jump.time, x.copy(), jump.inputs.copy(), p, np.empty(x.size), g)
+    t, x, u = side
+    rhs(t, x.copy(), u.copy(), p, np.empty(x.size), g)
     return g
 
 
@@ -74,11 +78,17 @@ def _changed(
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
         if compiled.system.nstates:
             set_parameters(compiled.system, dict(params) if params else None)
-        before, after = (
-            list(_blocks(compiled, p, (jump.time, x, jump.inputs)))
-            for x in (jump.before, jump.after)
-        )
-    sharpest, words = -1.0, ""
+        for wider in _WIDER:  # it rounds otherwise than machine code
+            before, after = (list(_blocks(compiled, p, side)) for side in jump.sides(wider))
+            found = _sharpest(compiled, p, jump, before, after)
+            if found:
+                return found
+    return "its right-hand side jumps there"
+
+
+def _sharpest(compiled: Compiled, p: np.ndarray, jump: Jump, before: list, after: list) -> str:
+    """Return what changes most between both sides, "" if nothing jumps."""
+    sharpest, words = _JUMPS, ""
     for i, ((given, labels, values), (given_2, _, values_2)) in enumerate(
         zip(before, after, strict=True)
     ):
@@ -87,12 +97,12 @@ def _changed(
         change = np.abs(values_2 - values)
         k = int(np.argmax(np.where(np.isfinite(change), change, 0.0)))
         sharp = change[k] / max(float(np.abs(given_2 - given).max(initial=0.0)), _SMALL)
-        if change[k] > 0.0 and sharp > sharpest:
+        if change[k] > _ROUNDING * abs(values[k]) and sharp > sharpest:
             node = compiled.schedule.nodes[i]
             words = _between(labels[k], node.path, values[k], values_2[k])
             sharpest = float(sharp)
             words += _switching_function(compiled, i, p, jump)
-    return words or "its right-hand side jumps there"
+    return words
 
 
 def _blocks(
@@ -118,7 +128,7 @@ def _switching_function(compiled: Compiled, i: int, p: np.ndarray, jump: Jump) -
     """Return which switching function of a block changes its sign, of a block that has several."""
     nodes = compiled.schedule.nodes
     counts = np.cumsum([0, *(count_switching_functions(node) for node in nodes)])
-    sides = [_events(compiled, p, jump, x)[counts[i] :] for x in (jump.before, jump.after)]
+    sides = [_events(compiled, p, side)[counts[i] :] for side in jump.sides()]
     count = int(counts[i + 1] - counts[i])
     changed = np.flatnonzero(np.sign(sides[0][:count]) != np.sign(sides[1][:count]))
     if count < 2 or not changed.size:
