@@ -2,7 +2,7 @@
 
 Every function takes sample times and samples, and numba can compile it, see `in_machine_code`.
 Peaks between samples are found by a parabola, integrals by Simpson's rule, the rest by straight
-lines between samples.  A response with NaN has the number NaN, or one that is no finite number.
+lines between samples.  A response with NaN has the number NaN, or one that is not a finite number.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ def number(
     Raises
     ------
     ParameterError
-        If it is no real number, NaN, infinite, or breaks a bound.
+        If it is not a real number, NaN, infinite, or breaks a bound.
     """
     is_number = isinstance(value, int | float | np.integer | np.floating)
     if not is_number or isinstance(value, bool):
@@ -173,7 +173,7 @@ def tuple_of(who: str, name: str, values: Any, kind: type[_T]) -> tuple[_T, ...]
     Raises
     ------
     ParameterError
-        If it is no list or tuple, or an entry is of another type.
+        If it is not a list or tuple, or an entry is of another type.
     """
     if not isinstance(values, list | tuple):
         raise ParameterError(

@@ -304,7 +304,7 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     if missing or isinstance(spec, type):
         what = spec.__name__ if isinstance(spec, type) else type(spec).__name__
         why = "is a class: make a record of it first" if isinstance(spec, type) else None
-        raise BlockError(f"{what} {why or 'is no block: it lacks ' + ', '.join(missing)}")
+        raise BlockError(f"{what} {why or 'is not a block: it lacks ' + ', '.join(missing)}")
     if not (name is None or (isinstance(name, str) and name)):
         raise ParameterError(f"a block needs a name, got {name!r} for {type(spec).__name__}")
     ensure_checked(spec)

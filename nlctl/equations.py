@@ -37,7 +37,7 @@ def equation(function: _Function) -> _Function:
     Raises
     ------
     ParameterError
-        If it is no function.
+        If it is not a function.
 
     Examples
     --------

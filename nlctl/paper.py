@@ -86,7 +86,7 @@ def example_1(
         A block between the plant's x1, x2 and the controller, such as `BandLimitedNoise`.
     centres : str or array_like, optional
         Layout of the 27 centres, see `paper_centres`; ``"diagonal"`` by default.  The paper says
-        "evenly distributed in [-10, 10] x [-10, 10]", and 27 is no square.
+        "evenly distributed in [-10, 10] x [-10, 10]", and 27 is not a square.
     p1 : float, optional
         Stiffness; -0.2 as printed by default (which makes the term +0.2 x1).
     phase : {"product", "integral"}, optional

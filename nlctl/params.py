@@ -213,7 +213,7 @@ def check_params(spec: Any) -> None:
     Raises
     ------
     ParameterError
-        If a value is no finite number, has the wrong number of axes or leaves its bounds, or
+        If a value is not a finite number, has the wrong number of axes or leaves its bounds, or
         if the record's own ``check`` refuses it.
     """
     who = type(spec).__name__
@@ -346,7 +346,7 @@ def _replace_element(spec: Any, key: str, value: Any) -> Any:
     except IndexError:
         raise ParameterError(
             f"{type(spec).__name__} has {name} of shape {array.shape}; "
-            f"'{key}' = {value!r} is no element of it"
+            f"'{key}' = {value!r} is not an element of it"
         ) from None
     return dataclasses.replace(spec, **{name: array})
 

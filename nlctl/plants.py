@@ -172,8 +172,8 @@ def duffing_forcing(t, p):
 def duffing_d(x, t, p):
     """Example 1: everything that a static network cannot represent.
 
-    The paper's d(x, t) = 0.1 (x1^2 + x2^2) sin t, and the forcing q cos(w t), which is no
-    function of x and so belongs to the disturbance of (1), not to g(x).
+    The paper's d(x, t) = 0.1 (x1^2 + x2^2) sin t, and the forcing q cos(w t), which is not
+    a function of x and so belongs to the disturbance of (1), not to g(x).
     """
     x1, x2 = x
     return duffing_forcing(t, p) + p.d_amplitude * (x1 * x1 + x2 * x2) * np.sin(t + p.d_phase)

@@ -229,7 +229,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
     Raises
     ------
     UsageError, OSError
-        If a file is no report, or cannot be read.
+        If a file is not a report, or cannot be read.
     """
     from analysis.report.compare import compare_contents
     from analysis.studies import origin_differences, run_differences
@@ -278,7 +278,7 @@ def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     Raises
     ------
     UsageError
-        If there is no report, or the folder cannot be written to, or its page is no gallery.
+        If there is no report, or the folder cannot be written to, or its page is not a gallery.
     """
     from analysis.report.browser import open_page
     from analysis.report.gallery import write_gallery

@@ -106,7 +106,7 @@ def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
 
 
 def trace_of(error: BaseException) -> str:
-    """Return what is told of an error that is no mistake of usage.
+    """Return what is told of an error that is not a mistake of usage.
 
     Where it comes from a function of the user's, that is its kind, its message and the lines of
     the user's files; otherwise the whole trace.

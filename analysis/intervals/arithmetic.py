@@ -199,7 +199,9 @@ class Ball(NumPyFunctions):
             return other
         a, b = self.value, other.value
         if a.is_nan() or b.is_nan():
-            raise Undecided("a comparison with a ball that is no number (a division by 0, perhaps)")
+            raise Undecided(
+                "a comparison with a ball that is not a number (a division by 0, perhaps)"
+            )
         return branch(bool(yes(a, b)), bool(no(a, b)), f"{yes.__name__}({a}, {b})")
 
     def __lt__(self, other: Any) -> bool:
@@ -241,7 +243,7 @@ def power(x: arb, n: int) -> arb:
 
 
 def as_ball(x: Any) -> Any:
-    """Return a number as a ball without width; NotImplemented for what is no number."""
+    """Return a number as a ball without width; NotImplemented for what is not a number."""
     if isinstance(x, Ball):
         return x
     if isinstance(x, arb):

@@ -109,7 +109,7 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     Raises
     ------
     ParameterError
-        If it is no function or no box, `tol` is not positive, or `max_boxes` is below 1.
+        If it is not a function or not a box, `tol` is not positive, or `max_boxes` is below 1.
     """
     a_function("enclose", "function", function)
     of_type("enclose", "box", box, Box, "Box.of(x1=(-1, 1))")
@@ -160,7 +160,8 @@ def prove(
     Raises
     ------
     ParameterError
-        If it is no function or no box, the claim is not low <= high, or `max_boxes` is below 1.
+        If it is not a function or not a box, the claim is not low <= high, or `max_boxes` is
+        below 1.
     """
     a_function("prove", "function", function)
     of_type("prove", "box", box, Box, "Box.of(x1=(-1, 1))")
@@ -223,7 +224,7 @@ def _supremum(
 
 
 def upper(ball: Any) -> float:
-    """Return the upper end of a ball as a float, rounded up; infinite for what is no number."""
+    """Return the upper end of a ball as a float, rounded up; infinite for what is not a number."""
     end = as_ball(ball).value.upper()
     if not end.is_finite():
         return np.inf

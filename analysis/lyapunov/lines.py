@@ -195,7 +195,9 @@ def inequality_lines(run: MemberRun, found: Constants) -> list[Line]:
         if margin.equation in LITERAL:
             broken = f"{100 * margin.share_violated:.3g} % of {margin.t.size} samples violate it"
             line = _line(margin, run.signals, "checked", broken)
-            why = "q cos(w t) is no function of x; counted to d instead, the corrected line holds."
+            why = (
+                "q cos(w t) is not a function of x; counted to d instead, the corrected line holds."
+            )
             lines.append(
                 dataclasses.replace(
                     line,

@@ -79,7 +79,7 @@ def true_error(example: str = "example_1") -> ct.InterconnectedSystem:
     """An example with the output ``error``, y - yd of the plant itself.
 
     The output e is what the controller makes of its measurements: with a fault on one of them it
-    is no error of the plant.
+    is not an error of the plant.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ def compare_contents(
     OSError
         If a file cannot be read.
     UsageError
-        If a file is no report, or `rtol` is negative.
+        If a file is not a report, or `rtol` is negative.
     """
     if not 0 <= rtol < math.inf:
         raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
@@ -80,17 +80,17 @@ def read_report(path: str | os.PathLike[str]) -> Mapping[str, Any]:
     OSError
         If it cannot be read.
     UsageError
-        If it is no report.
+        If it is not a report.
     """
     path = Path(path)
     path = path / "report.json" if path.is_dir() else path
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise UsageError(f"'{path}' is no report: {error}") from None
+        raise UsageError(f"'{path}' is not a report: {error}") from None
     missing = [part for part in PARTS if not isinstance(content, dict) or part not in content]
     if missing:
-        raise UsageError(f"'{path}' is no report: it has no '{missing[0]}'")
+        raise UsageError(f"'{path}' is not a report: it has no '{missing[0]}'")
     return content
 
 

@@ -77,7 +77,7 @@ def write_gallery(folder: str | os.PathLike[str], *, force: bool = False) -> Pat
     ----------
     folder : path
     force : bool, optional
-        Whether an ``index.html`` is replaced that is no gallery.
+        Whether an ``index.html`` is replaced that is not a gallery.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def write_gallery(folder: str | os.PathLike[str], *, force: bool = False) -> Pat
     Raises
     ------
     UsageError
-        If there is no report, or an ``index.html`` that is no gallery.
+        If there is no report, or an ``index.html`` that is not a gallery.
     OSError
         If the folder cannot be written to.
     """

@@ -109,7 +109,7 @@ def _markup(latex: str, display: str) -> Markup:
 
 
 def _tree(latex: str, display: str) -> ElementTree.Element | None:
-    """Return a formula as elements that are on the lists; None if it is no such formula."""
+    """Return a formula as elements that are on the lists; None if it is another formula."""
     try:
         root = convert_to_element(latex, display=display)
         for element in root.iter():
@@ -125,7 +125,7 @@ def _tree(latex: str, display: str) -> ElementTree.Element | None:
 def _check(element: ElementTree.Element) -> None:
     """Refuse what is not on the lists; make text of character references."""
     if element.tag not in ELEMENTS:
-        raise NotMathError(f"<{element.tag}> is no element of a formula")
+        raise NotMathError(f"<{element.tag}> is not an element of a formula")
     for name in list(element.attrib):
         value = element.attrib.pop(name)
         if name == "columnalign" and value in ("left", "right"):
@@ -133,7 +133,7 @@ def _check(element: ElementTree.Element) -> None:
         elif name in ATTRIBUTES:
             element.set(name, value)
         elif name not in IGNORED:
-            raise NotMathError(f"'{name}' is no attribute of a formula")
+            raise NotMathError(f"'{name}' is not an attribute of a formula")
     if element.text:
         element.text = re.sub(
             "&#x([0-9A-F]{4,6});", lambda found: chr(int(found[1], 16)), element.text

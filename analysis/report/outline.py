@@ -54,8 +54,8 @@ MEANINGS = {  # of the statuses of claims, as the page explains them
     "proved": "for everything that the claim speaks of, by rigorous computation",
     "computed": "in closed form",
     "checked": "at every sample of one simulated run, which proves nothing of others",
-    "sampled": "found by simulated runs, at most with a stated confidence, which is no proof",
-    "shown": "by simulated runs, at most with a stated confidence, which is no proof",
+    "sampled": "found by simulated runs, at most with a stated confidence, which is not proof",
+    "shown": "by simulated runs, at most with a stated confidence, which is not proof",
     "refuted": "there is a run that contradicts it, or many with a stated confidence; the claim "
     "is wrong, and nothing of this report failed",
     "not shown yet": "what was run neither shows nor refutes it",

@@ -114,7 +114,7 @@ def times(study: Study) -> np.ndarray:
     Raises
     ------
     ParameterError
-        If the step is no whole part of the end, or far too short.
+        If the step is not a whole part of the end, or far too short.
     """
     end, step = study.time.end, study.time.step
     if end / step > _MOST_SAMPLES:

@@ -228,7 +228,7 @@ class Kind:
     Raises
     ------
     ParameterError
-        If a name is no name, or the schema no schema.
+        If a name is not a name, or the schema no schema.
     """
 
     name: str

@@ -28,7 +28,7 @@ ANEW = "restore it, or run the study in another folder with --out"
 
 
 class RunFolderError(UsageError):
-    """A folder that is no run of a study, or of another one; the message says what to do."""
+    """A folder that is not a run of a study, or of another one; the message says what to do."""
 
 
 def write_json(path: Path, content: Any) -> None:
@@ -61,7 +61,7 @@ def read_json(path: Path, remedy: str = ANEW) -> Any:
             f"no '{path.name}'"
         ) from None
     except (OSError, ValueError, RecursionError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no JSON"
+        reason = error.strerror if isinstance(error, OSError) else "it is not JSON"
         raise RunFolderError(f"'{path}' is damaged ({reason}): {remedy}") from error
     if not isinstance(content, dict) or content.pop(SEAL, None) != digest_of(content):
         raise RunFolderError(f"'{path}' is not as it was written: {remedy}")

@@ -58,7 +58,7 @@ def diagonal_centres(count: int, inputs: int, low: float = -10, high: float = 10
     Raises
     ------
     ParameterError
-        If `count` or `inputs` is no integer >= 1, or an end is not finite.
+        If `count` or `inputs` is not an integer >= 1, or an end is not finite.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def grid_centres(counts: Sequence[int], low: float = -10, high: float = 10) -> M
     Raises
     ------
     ParameterError
-        If a count is no integer >= 1, or an end is not finite.
+        If a count is not an integer >= 1, or an end is not finite.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def latin_hypercube_centres(
     Raises
     ------
     ParameterError
-        As `diagonal_centres`, and if the seed is no integer >= 0.
+        As `diagonal_centres`, and if the seed is not an integer >= 0.
 
     Examples
     --------

@@ -83,7 +83,7 @@ class _Reader:
         if node.op == "solve" and node.data[0] in self.fixed_points:
             return self._of_solution(node) if any(parts) else None
         if node.op in ("call", "solve"):
-            raise Untraceable(f"{node.data[0]} is no expression: it has no derivative")
+            raise Untraceable(f"{node.data[0]} is not an expression: it has no derivative")
         if all(part is None for part in parts) or node.op in COMPARISONS or node.op in LOGIC:
             return None
         if node.op in FUNCTIONS:

@@ -69,7 +69,7 @@ def _value(node: Expr, parts: list[np.ndarray], arrays: Mapping[str, np.ndarray]
     if node.op == "sum":
         return parts[0].sum(axis=0)
     if node.op in ("call", "solve"):
-        raise Untraceable(f"{node.data[0]} is no expression: it has no value by NumPy alone")
+        raise Untraceable(f"{node.data[0]} is not an expression: it has no value by NumPy alone")
     return numpy_function(node.op)(*parts)
 
 

@@ -179,8 +179,8 @@ def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: Any) -> Any:
         if not isinstance(other, Tracer | np.ndarray | float | int | bool | np.generic):
             if name in ("eq", "ne"):
-                raise Untraceable("comparison with what is no number")  # Python would say False
-            return NotImplemented  # a tuple is no array
+                raise Untraceable("comparison with what is not a number")  # Python would say False
+            return NotImplemented  # a tuple is not an array
         return elementwise(self.graph, name, *((other, self) if swapped else (self, other)))
 
     return method

@@ -81,7 +81,7 @@ class Stage:
         call = vars(type(thing)).get("__call__")
         if isinstance(call, FunctionType) and not _is_of_a_library(thing):
             return functools.partial(self.copied(call), self.instead(thing))
-        raise Untraceable(f"{thing!r} is no plain function")
+        raise Untraceable(f"{thing!r} is not a plain function")
 
     def instead(self, value: Any) -> Any:
         """Return what stands for a value that was there before."""

@@ -83,7 +83,7 @@ def with_faults(diagram: Any, *faults: Fault) -> ct.InterconnectedSystem:
     UnknownNameError, AmbiguousNameError
         If a fault, or its condition, names a signal that is not there, or not just one.
     DiagramError
-        If it is no diagram.
+        If it is not a diagram.
     ParameterError
         If something else than a fault is given, or one that needs a memory in discrete time.
 

@@ -165,7 +165,7 @@ def ensemble_response(
     AuditError
         If machine code and python-control differ.
     ParameterError
-        If `timepts` is no increasing grid or does not fit a discrete-time diagram, arrays have
+        If `timepts` is not an increasing grid or does not fit a discrete-time diagram, arrays have
         different lengths, or a value is refused; the message then names the member.  Inputs and
         initial states must be finite.
     UnknownNameError

@@ -88,7 +88,7 @@ def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
     Raises
     ------
     UsageError
-        If a third-party block's parameter name is no string.
+        If a third-party block's parameter name is not a string.
     """
     found: dict[int, dict[str, Slot]] = {}
     offset = 0
@@ -148,8 +148,8 @@ def packed(
                 )
             elif not _same(value, constants[name]):
                 raise UsageError(
-                    f"parameter '{path}.{name}' is no number and was {constants[name]!r} when the "
-                    f"diagram was compiled; it cannot be {value!r} now: compile again"
+                    f"parameter '{path}.{name}' is not a number and was {constants[name]!r} when "
+                    f"the diagram was compiled; it cannot be {value!r} now: compile again"
                 )
     return p
 

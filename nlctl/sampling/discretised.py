@@ -36,7 +36,7 @@ def discretise(system: Any, dt: float, method: str = "euler") -> Any:
     ------
     ParameterError
         If `dt` is not positive, the method is for linear blocks only, or a block has a memory
-        that is no state in discrete time.
+        that is not a state in discrete time.
 
     Examples
     --------

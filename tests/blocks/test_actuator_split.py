@@ -120,7 +120,7 @@ def test_a_band_that_a_user_declares_is_tried_and_never_called_proved():
     ],
 )
 def test_other_records_are_refused_too(spec, told):
-    """A gain of the wrong sign, and what is no actuator."""
+    """A gain of the wrong sign, and what is not an actuator."""
     with pytest.raises(DecompositionError, match=told):
         decompose(spec)
 

@@ -150,7 +150,7 @@ class TestEveryRecord:
                     assert np.isnan(results[2][depends]).all()
 
     def test_arguments_are_not_changed(self, spec):
-        """States and inputs may be read-only, and the result is no view of them."""
+        """States and inputs may be read-only, and the result is not a view of them."""
         p = equation_arguments(spec)
         for function in equations(spec):
             for t, x, u in points(spec, count=2):
@@ -271,10 +271,10 @@ def liar(**changes):
         ({"outputs": ("y", "z")}, "returns 1 values from output, needs 2: y, z"),
         ({"states": ("x", "w")}, "returns 1 values from update, needs 2: x, w"),
         ({"update": staticmethod(lambda t, x, u, p: (u[0], 0.0))}, "returns 2 values from update"),
-        ({"outputs": None}, "is no block: it lacks outputs"),
-        ({"inputs": None, "feedthrough": None}, "is no block: it lacks inputs, feedthrough"),
-        ({"update": None}, "is no block: it lacks update"),
-        ({"output": None}, "is no block: it lacks output"),
+        ({"outputs": None}, "is not a block: it lacks outputs"),
+        ({"inputs": None, "feedthrough": None}, "is not a block: it lacks inputs, feedthrough"),
+        ({"update": None}, "is not a block: it lacks update"),
+        ({"output": None}, "is not a block: it lacks output"),
     ],
 )
 def test_a_record_that_lies_is_refused(changes, told):

@@ -108,7 +108,7 @@ class TestBounds:
         ],
     )
     def test_nan_and_infinity_are_refused_by_name(self, bad, name, where, make):
-        """No bound is needed for a value that is no finite number; the element is named."""
+        """No bound is needed for a value that is not a finite number; the element is named."""
         with pytest.raises(ParameterError, match=rf"Mixed needs an? .*{re.escape(where)}.*{bad}"):
             Mixed(**{name: make(bad)})
 

@@ -138,7 +138,7 @@ def test_corners_of_inputs_arrive_late(engine):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_delay_breaks_a_ring_of_feedthrough(engine):
-    """y = 1 + y(t - 1) / 2 is no algebraic loop: it goes up in steps."""
+    """y = 1 + y(t - 1) / 2 is not an algebraic loop: it goes up in steps."""
     loop = nlctl.interconnect(
         {
             "half": ct.ss([], [], [], [[0.5, 1.0]], inputs=["late", "one"], outputs="y"),

@@ -42,7 +42,7 @@ def test_overflow_of_the_nussbaum_gain_is_divergence_with_a_time():
 
 
 def test_an_algebraic_loop_keeps_its_own_message():
-    """A ring of feedthrough is no divergence."""
+    """A ring of feedthrough is not a divergence."""
     one = ct.nlsys(None, lambda t, x, u, params: 2 * u + 1, inputs="a", outputs="b", name="one")
     two = ct.nlsys(None, lambda t, x, u, params: 2 * u + 1, inputs="b", outputs="a", name="two")
     integrator = ct.nlsys(lambda t, x, u, params: u, None, inputs="b", states=1, name="int")

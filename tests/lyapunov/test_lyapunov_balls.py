@@ -110,10 +110,10 @@ def test_a_comparison_that_balls_cannot_decide_is_refused(other):
 
 
 def test_nan_is_never_compared():
-    """A ball that is no number leaves every comparison undecided."""
+    """A ball that is not a number leaves every comparison undecided."""
     nan = as_ball(1.0) / interval(-1, 1)
     for compare in (np.less, np.greater, np.equal):
-        with pytest.raises(Undecided, match="no number"):
+        with pytest.raises(Undecided, match="not a number"):
             bool(compare(nan, 0.0))
 
 

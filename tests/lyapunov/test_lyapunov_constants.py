@@ -78,7 +78,7 @@ def test_the_tightest_weights_beat_none():
 
 
 def test_the_forcing_of_example_1_counts_as_disturbance():
-    """d* = 5.1 + 0.1 max |x|^2: q cos(w t) is no function of x."""
+    """d* = 5.1 + 0.1 max |x|^2: q cos(w t) is not a function of x."""
     corner = 1.0**2 + 1.1**2
     assert given_weights()["d*"] == pytest.approx(5.1 + 0.1 * corner, abs=1e-6)
 

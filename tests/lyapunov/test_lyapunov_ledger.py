@@ -127,7 +127,7 @@ def test_example_1_as_printed_is_violated_with_the_time():
         assert line.least < 0
         assert 0 <= line.first <= line.time < 2
         assert {"x1", "x2", "r", "u", "v", "zeta", "delta_hat"} <= set(line.state)
-        assert "no function of x" in line.follows
+        assert "not a function of x" in line.follows
         assert book(1)[key].status == "checked"
 
 

@@ -115,7 +115,7 @@ def test_a_plant_affine_in_v_has_one_sector_for_all_v(first):
 
 
 def test_example_1_has_one_sector_for_all_v():
-    """An unbounded v is no obstacle where the quotient stays bounded."""
+    """An unbounded v is not an obstacle where the quotient stays bounded."""
     box = Box.of(x1=(-1, 1), x2=(-1, 1), v=(-np.inf, np.inf))
     found = sector(nlctl.ForcedDuffing(), box)
     assert found.G_min == pytest.approx((1 + 0.1 * np.cos(1)) * 0.8, abs=2e-3)
@@ -172,5 +172,5 @@ def test_a_missing_side_and_a_missing_equation_are_named():
     """The box needs every state, and the plant f and d."""
     with pytest.raises(UnknownNameError, match="x2"):
         sector(nlctl.ForcedDuffing(), Box.of(x1=(0, 1), v=(0, 1)))
-    with pytest.raises(DiagramError, match="DeadZone is no plant"):
+    with pytest.raises(DiagramError, match="DeadZone is not a plant"):
         plant_terms(nlctl.DeadZone())

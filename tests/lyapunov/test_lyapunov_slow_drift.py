@@ -196,7 +196,7 @@ class TestWhatLemma1Leaves:
     def test_a_drift_that_lemma_1_excludes(self):
         """zeta' = c1 c2 / (2 + e^(zeta^2)), V' = -c2 V + c1 c2 + (N + 1) zeta' (13).
 
-        V stays below 2 c1 while zeta passes 3: the horizon is safe, and it is no bound.
+        V stays below 2 c1 while zeta passes 3: the horizon is safe, and it is not a bound.
         """
         c1, c2 = 1.0, 0.25
 

@@ -165,7 +165,7 @@ def one_state(function):
 
 
 def test_values_that_differ_from_call_to_call_are_the_error(monkeypatch):
-    """python-control's own right-hand side is no function then."""
+    """python-control's own right-hand side is not a function then."""
     system = one_state(lambda t, x, u, params: -x)
     compiled = nlctl.compile(system)
     drawn = iter(range(1000))

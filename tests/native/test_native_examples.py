@@ -253,9 +253,12 @@ def test_parameters_that_are_no_numbers_are_constants(params, native):
 @pytest.mark.parametrize(
     ("override", "words"),
     [
-        ({"mode": "plain"}, r"'tuned\.mode' is no number and was 'double' .* 'plain' now: compile"),
-        ({"offset": 1.0}, r"'tuned\.offset' is no number and was None .* cannot be 1\.0 now"),
-        ({"shape": bend}, r"'tuned\.shape' is no number .* compile again"),
+        (
+            {"mode": "plain"},
+            r"'tuned\.mode' is not a number and was 'double' .* 'plain' now: compile",
+        ),
+        ({"offset": 1.0}, r"'tuned\.offset' is not a number and was None .* cannot be 1\.0 now"),
+        ({"shape": bend}, r"'tuned\.shape' is not a number .* compile again"),
         ({"gain": "high"}, r"'tuned\.gain' had shape \(\) .* cannot be 'high' now: compile again"),
         ({"gain": 2.5}, r"'tuned\.gain' was an integer .* cannot be 2\.5 .* float \(2\.0\)"),
         ({"table": [[1, 2]]}, r"'tuned\.table' had shape \(2, 2\) .* have shape \(1, 2\)"),

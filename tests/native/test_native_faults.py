@@ -99,7 +99,7 @@ class TestDivergence:
 
     @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "auto"])
     def test_nan_from_a_block(self, method):
-        """sqrt(1 - t) is no number from t = 1 on."""
+        """sqrt(1 - t) is not a number from t = 1 on."""
         root = compiled(lambda t, x, u, params: np.array([np.sqrt(1.0 - t)]))
         made = run(root, np.linspace(0, 2, 21), ignore_errors=True, method=method)
         assert made.statistics.status is Status.DIVERGED

@@ -505,7 +505,7 @@ class TestSources:
         assert keys_of_copy(tmp_path, {name: EDITS[name]})[0] != integrator_key()
 
     def test_use_does_not_change_a_key(self):
-        """What a code generator remembers is no part of it."""
+        """What a code generator remembers is not a part of it."""
         before = module_key(*TAUGHT), integrator_key()
         for k in range(3):
             scope = source_text.run(

@@ -26,7 +26,7 @@ def table(errors, peaks=0.0):
     ("errors", "peaks", "expected"),
     [
         ([0.1, 0.15, 0.2], 0.0, (2.0, 3.0)),
-        ([0.1, np.nan, 0.1], 0.0, (1.0, 2.0)),  # what diverges violates; what follows is no excuse
+        ([0.1, np.nan, 0.1], 0.0, (1.0, 2.0)),  # what diverges violates; what follows is not excuse
         ([0.1, 0.1, 0.1], 15.0, (3.0, np.nan)),
         ([0.1, 0.1], 15.1, (np.nan, 1.0)),
     ],

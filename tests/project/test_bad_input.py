@@ -90,7 +90,7 @@ def low_order(order):
         (example_2, {"actuator": nlctl.Backlash(), "v0": 0.1}, ParameterError, ["v0", "actuator"]),
         (example_1, {"actuator": nlctl.Genesio()}, DiagramError, ["'plant'", "'actuator'"]),
         (example_1, {"actuator": nlctl.DeadZone}, TypeError, ["DeadZone is a class"]),
-        (example_1, {"actuator": "dead zone"}, TypeError, ["str is no block"]),
+        (example_1, {"actuator": "dead zone"}, TypeError, ["str is not a block"]),
     ],
 )
 def test_examples(make, choices, error, told):

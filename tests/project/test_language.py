@@ -19,8 +19,12 @@ TERMS = {  # what is not said -> what is
     r"\bgoes on (with|behind|from)\b": "resumes",
     r"\bring of signals\b": "algebraic loop",
     r"\b(blocks?|diagrams?) (is|are) joined\b|\bjoined by dots\b": "connected",
+    r"(?<!there )(?<!There )\bis no (?!better|worse|more|longer|calm|news|sharper)\w": "is not a",
 }
-ALLOWED = ('"delivers"', '"turned round"', "as in delivers, got ")  # names that are kept
+ALLOWED = (  # names that are kept, and the text of sources that are shipped compiled
+    *('"delivers"', '"turned round"', "as in delivers, got "),
+    *("is no progress", "is no event", "is no method's", "is no discrete-time"),
+)
 # whose text belongs to the pages
 ELSEWHERE = ("analysis/report", "analysis/studies/page", "analysis/paper/page")
 

@@ -118,7 +118,7 @@ def test_rows_get_names_of_their_own(rows):
 def test_what_is_no_report_is_refused_by_name(tmp_path, content):
     """Damaged, or another file."""
     (tmp_path / "report.json").write_text(content)
-    with pytest.raises(UsageError, match=r"report\.json' is no report"):
+    with pytest.raises(UsageError, match=r"report\.json' is not a report"):
         compare_contents(tmp_path, tmp_path)
 
 

@@ -269,7 +269,7 @@ def test_the_tables_show_the_numbers_of_the_findings(result, report):
 
 
 def test_json_holds_every_number(result, report):
-    """Findings, short tables and the running estimate with all digits; no token that is no JSON."""
+    """Findings, short tables and the running estimate with all digits; every token is JSON."""
     content = json.loads(render_json(report), parse_constant=pytest.fail)["numbers"]
     for finding in result.findings:
         for name, table in finding.tables.items():
@@ -328,7 +328,7 @@ def test_a_refused_guarantee_is_shown_with_its_reason(tmp_path, kind):
     assert "With confidence" not in made.verdict
     (section,) = (s for s in made.sections if s.key == "study_rows")
     assert kind in section.items[0].text
-    assert "no estimate of a probability" in section.items[0].text
+    assert "not an estimate of a probability" in section.items[0].text
 
 
 def test_an_analysis_without_an_answer_says_why(result):

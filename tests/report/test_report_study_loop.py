@@ -65,7 +65,7 @@ def test_the_diagram_and_the_equations_are_those_that_run(sections):
 
 
 def test_a_loop_without_formulas_or_blocks_is_shown_as_far_as_it_goes(study):
-    """A single system is no diagram; one that calls what cannot be read says so."""
+    """A single system is not a diagram; one that calls what cannot be read says so."""
     result, _ = study
 
     def secret(t, x, u, params):

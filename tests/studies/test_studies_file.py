@@ -221,7 +221,7 @@ def test_a_single_mistake_is_found_where_it_stands(old, new, place, message, tmp
 
 def test_a_file_that_is_no_toml_names_the_line(tmp_path):
     """tomllib's own words."""
-    with pytest.raises(StudyError, match=r"is no TOML: .*line 2"):
+    with pytest.raises(StudyError, match=r"is not TOML: .*line 2"):
         read_study(write(tmp_path, "loop = 'a'\nfree text\n"))
 
 
@@ -302,7 +302,7 @@ def test_settings_replace_what_stands_in_the_file(tmp_path):
     [
         ("runs.size", "KEY=VALUE"),
         ("=3", "KEY=VALUE"),
-        ("runs.size.more=3", "runs.size is no table"),
+        ("runs.size.more=3", "runs.size is not a table"),
         ("analysis.7.limit=0.1", r"number \(0 to 0\), or key or kind of one entry"),
     ],
 )

@@ -226,13 +226,13 @@ DAMAGE = [
     ("study.toml", lambda p: p.write_bytes(b""), "is damaged, or cut off"),
     ("study.toml", inside('title = "A lag"', 'title = "A leg"'), "is not the study that was run"),
     ("study.toml", lambda p: p.unlink(), "holds no run of a study"),
-    ("run.json", cut, "is damaged (it is no JSON)"),
+    ("run.json", cut, "is damaged (it is not JSON)"),
     ("run.json", inside('"study_folder": ".."', '"study_folder": "."'), "not as it was written"),
     ("run.json", lambda p: p.unlink(), "there is no 'run.json'"),
-    ("results.json", cut, "is damaged (it is no JSON)"),
+    ("results.json", cut, "is damaged (it is not JSON)"),
     ("results.json", inside('"title": "A lag"', '"title": "A leg"'), "not as it was written"),
     ("results.json", lambda p: p.unlink(), "no 'results.json'|is a run that is not done"),
-    ("worst-case/finding.json", cut, "is damaged (it is no JSON)"),
+    ("worst-case/finding.json", cut, "is damaged (it is not JSON)"),
     ("worst-case/finding.json", inside('"kind": "worst case"', '"kind": "best case"'),
      "not as it was written"),
     ("worst-case/finding.json", resealed, "was computed from another loop than the rest"),
@@ -242,7 +242,7 @@ DAMAGE = [
     ("worst-case/best.parquet", lambda p: p.unlink(), "cannot be read"),
     ("radius/steps.parquet", table(first_number), "not as it was written"),
     ("compare/ranking.parquet", table(first_number), "not as it was written"),
-    ("rows/study.json", cut, "is no study of a sweep"),
+    ("rows/study.json", cut, "is not a study of a sweep"),
 ]  # fmt: skip
 
 

@@ -178,7 +178,7 @@ def decompose(
         If eps_u is not bounded for all u, as with saturation, no split is known (a record may say
         why, as ``no_split``), or the record's own one is refuted by a sample of its output.
     ParameterError
-        If `k` is no pair with 0 < k_1 <= k_2, or `u_max` or `tol` is not positive.
+        If `k` is not a pair with 0 < k_1 <= k_2, or `u_max` or `tol` is not positive.
     """
     u_max = number("decompose", "u_max", u_max, above=0)
     tol = number("decompose", "tol", tol, above=0)

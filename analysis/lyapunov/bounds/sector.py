@@ -85,7 +85,7 @@ def plant_terms(plant: Any) -> tuple[Callable[[Any, Any], Any], Callable[[Any, A
     """
     if not (hasattr(plant, "f") and hasattr(plant, "d")):
         raise DiagramError(
-            f"{type(plant).__name__} is no plant of the class (1): it lacks f and d; see "
+            f"{type(plant).__name__} is not a plant of the class (1): it lacks f and d; see "
             "nlctl.PureFeedback"
         )
     if isinstance(plant, PureFeedback):  # the user's functions, without parameters
@@ -117,7 +117,7 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     UnknownNameError
         If the box lacks a side.
     ParameterError
-        If it is no box, or `tol` is not positive.
+        If it is not a box, or `tol` is not positive.
     """
     f, _ = plant_terms(plant)
     box = of_type("sector", "box", box, Box, "Box.of(x1=(-1, 1), v=(-5, 5))")

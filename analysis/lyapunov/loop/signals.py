@@ -68,7 +68,7 @@ def signals_of(response: Any) -> Signals:
     Raises
     ------
     ParameterError
-        If it is no response.
+        If it is not a response.
     """
     if not hasattr(response, "output_labels"):
         raise ParameterError(

@@ -181,7 +181,7 @@ def burst_peak(lobe: Lobe, kG: float) -> float:
     Raises
     ------
     ParameterError
-        If it is no lobe, or `kG` is not positive.
+        If it is not a lobe, or `kG` is not positive.
     """
     of_type("burst_peak", "lobe", lobe, Lobe, "lobe_around(zeta)")
     number("burst_peak", "kG", kG, above=0)

@@ -174,7 +174,7 @@ def opened(folder: str | os.PathLike[str]) -> ChunkStore:
             folder=path.parent, identity=content["identity"], columns=content["columns"]
         )
     except (OSError, ValueError, KeyError) as error:
-        raise StoreError(f"'{path}' is no study of a sweep: {error}") from error
+        raise StoreError(f"'{path}' is not a study of a sweep: {error}") from error
 
 
 def _write(store: ChunkStore, path: Path, content: bytes | memoryview) -> None:

@@ -154,8 +154,8 @@ def sweep(
     Raises
     ------
     ParameterError
-        If the design is of another space, `chunk` or `threads` is no integer >= 1, or there is no
-        folder to resume.
+        If the design is of another space, `chunk` or `threads` is not an integer >= 1, or there is
+        no folder to resume.
     StoreError
         As in `store.claimed`, or if a chunk cannot be written; those before it are kept.
     """

@@ -29,7 +29,7 @@ def evaluated(evaluate: Evaluate, table: pd.DataFrame) -> pd.DataFrame:
     KeyboardInterrupt
         If rows are missing, because Ctrl-C kept them from finishing.
     ParameterError
-        If `evaluate` is no function, or its result is no table of these rows with a column
+        If `evaluate` is not a function, or its result is not a table of these rows with a column
         ``spec``.
     """
     results = a_function("a search", "evaluate", evaluate)(table)

@@ -42,7 +42,7 @@ class FailureMap:
         Names of the quantities.
     table : pandas.DataFrame
         One row per point: the columns of the space, ``spec`` and the round in which it was added.
-        Points were chosen by looking at earlier ones, so their failing share is no probability.
+        Points were chosen by looking at earlier ones, so their failing share is not a probability.
     triangles : ndarray of int, shape (k, 3)
         Rows of the table that form a triangulation of the box, for `matplotlib.pyplot.tricontour`
         and the like.

@@ -56,7 +56,7 @@ def largest_scale(
     Raises
     ------
     ParameterError
-        If `at_most` is no finite number > 0, or the nominal values themselves are refused.
+        If `at_most` is not a finite number > 0, or the nominal values themselves are refused.
     UnknownNameError
         If the space has no quantity of such a name.
     """

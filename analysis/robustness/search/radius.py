@@ -44,7 +44,7 @@ class Radius:
     margin : float
         Of this row; NaN without one.
     searched : float
-        Largest size at which the search found nothing.  That is no bound: draws may have found a
+        Largest size at which the search found nothing.  That is not a bound: draws may have found a
         violation there.
     statement : Violation, optional
         How likely a violation is at the size `searched`, from independent draws of the laws of

@@ -129,8 +129,8 @@ def compare(
     UnknownNameError
         If the table lacks a column.
     ParameterError
-        If a sample was not run with every option, a row has other numbers than the design, there
-        is no metric, or only one option.
+        If a sample was not run with every option, a row has other numbers than the design, or
+        there is no metric, or only one option.
     NoGuaranteeError
         If the design's rows are no independent draws.
     """

@@ -214,8 +214,8 @@ def runs_needed(probability: float, confidence: float = 0.99, violations: int = 
     Raises
     ------
     ParameterError
-        If the probability is not between 0 and 1, the confidence is none, `violations` is no
-        integer >= 0, or more than 10^9 runs would be needed.
+        If the probability is not between 0 and 1, the confidence is none, `violations` is not
+        an integer >= 0, or more than 10^9 runs would be needed.
 
     Examples
     --------

@@ -251,7 +251,7 @@ def holm(p_values: np.ndarray) -> np.ndarray:
     Raises
     ------
     ParameterError
-        If a value is no number in [0, 1], or they are not in one row.
+        If a value is not a number in [0, 1], or they are not in one row.
 
     Examples
     --------

@@ -177,7 +177,7 @@ def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
     Raises
     ------
     ParameterError
-        If `size` is no power of 2, or there is one name only, whose share is 1.
+        If `size` is not a power of 2, or there is one name only, whose share is 1.
     """
     d, entropy = len(space.names), checked_entropy(entropy)
     if d < 2:

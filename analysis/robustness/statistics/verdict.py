@@ -28,7 +28,7 @@ class Verdict:
     answer : {"shown", "refuted", "not shown yet"}
         Shown and refuted with the confidence of the statement that the claim is about.
     needs : str
-        What it takes to show it; empty where that is no question.
+        What it takes to show it; empty where that is not a question.
     """
 
     answer: Answer

@@ -51,7 +51,7 @@ def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
     ParameterError
         If an end of a box breaks a rule of the block.
     SpaceError
-        If a parameter is no number, is an integer while its law is not, a name means the same
+        If a parameter is not a number, is an integer while its law is not, a name means the same
         as another one, or the diagram's own value lies outside the box.
     """
     system = diagram.system if isinstance(diagram, Compiled) else diagram

@@ -237,7 +237,7 @@ def from_table(
     Raises
     ------
     UnknownNameError
-        If a column is no name of the space, or a choice has no such option.
+        If a column is not a name of the space, or a choice has no such option.
     ParameterError
         If a column is missing, there is no row, or a number is not finite.
     """
@@ -310,7 +310,7 @@ def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
     Raises
     ------
     ParameterError
-        If `size` is no power of 2, which the sequence's balance needs.
+        If `size` is not a power of 2, which the sequence's balance needs.
     """
     entropy = checked_entropy(entropy)
     unit = sobol_points(len(space.names), size, entropy)

@@ -244,7 +244,7 @@ def checked_rows(space: Space, table: pd.DataFrame) -> dict[str, np.ndarray]:
     UnknownNameError
         If the table lacks a column of the space, or has an option that the space does not have.
     ParameterError
-        If it is no table, has a row twice, or a number that is none, NaN or infinite.
+        If it is not a table, has a row twice, or a number that is none, NaN or infinite.
     """
     of_type("a run of rows", "table", table, pd.DataFrame, "design.table")
     if not table.index.is_unique:
@@ -277,7 +277,7 @@ def checked_row(space: Space, row: Mapping[str, Any]) -> dict[str, Any]:
     UnknownNameError
         If it lacks a quantity or a choice, or has one that the space does not have.
     ParameterError
-        If it is no mapping, or a number is none, NaN or infinite.
+        If it is not a mapping, or a number is none, NaN or infinite.
     """
     of_type("a row", "row", row, Mapping, "{name: value}")
     for name in row:

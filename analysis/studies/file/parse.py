@@ -217,7 +217,7 @@ def _set(data: dict[str, Any], setting: str) -> KeyPath:
         else:
             target = target[key]
         if not isinstance(target, dict | list):
-            raise ParameterError(f"--set {setting}: {place_text(tuple(place))} is no table")
+            raise ParameterError(f"--set {setting}: {place_text(tuple(place))} is not a table")
     return tuple(place)
 
 

@@ -24,7 +24,7 @@ def read_toml(text: str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If it is no TOML, or larger or deeper than any study; the message is one sentence.
+        If it is not TOML, or larger or deeper than any study; the message is one sentence.
     """
     if len(text) > _LARGEST:
         raise ValueError(f"has {len(text):,} characters, a study at most {_LARGEST:,}")
@@ -38,7 +38,7 @@ def read_toml(text: str) -> dict[str, Any]:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"is no TOML: {error}") from None
+        raise ValueError(f"is not TOML: {error}") from None
     except RecursionError:
         raise ValueError(
             f"has lists or tables inside of each other, deeper than {DEEPEST}"

@@ -71,7 +71,7 @@ def checked_experiment(
     """Return the experiment of a study, and all mistakes; None if there are any.
 
     `named` are the names in the tables of the file, those of mistaken entries too, which the
-    study lacks: what speaks of them is no mistake of its own.
+    study lacks: what speaks of them is not a mistake of its own.
 
     Errors of another kind than `UsageError` come from the user's own functions and pass.
     """

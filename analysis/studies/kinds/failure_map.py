@@ -75,8 +75,8 @@ def _run(asked: Map, ground: Ground) -> Finding:
         fine = "" if found.is_finished else "; refinement ended with the number of runs"
         told = (
             f"{bad} of {len(found.table)} points violate the spec; cells at the boundary have "
-            f"sides {sides}{fine}. Points were chosen near the boundary, so their share is no "
-            "probability."
+            f"sides {sides}{fine}. Points were chosen near the boundary, so their share is not "
+            "a probability."
         )
     return made(
         asked,

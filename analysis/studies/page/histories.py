@@ -114,7 +114,7 @@ def histories(
 
 
 def limits_of_requirements(requirements: Sequence[Any]) -> dict[str, list[Limit]]:
-    """Return what requirements always ask of each signal; what they ask else is no line."""
+    """Return what requirements always ask of each signal; what they ask else is not a line."""
     found: dict[str, list[Limit]] = {}
 
     def walk(formula: Formula, start: float, end: float, until: float) -> None:

@@ -50,7 +50,7 @@ def limits(result: Result) -> list[str]:
         f"by the {law}. What happens with other laws was not looked at.",
         f"Runs end at {study.time.end:g} s. Nothing follows for later times.",
         "All this was sampled, nothing is proved: a search that finds no violation does not show "
-        "that there is none, and a bound of a probability is no bound of a single run.",
+        "that there is none, and a bound of a probability is not a bound of a single run.",
         f"Signals were sampled every {study.time.step:g} s, so that what is faster is not seen, "
         f"and integrated to rtol {study.solver.rtol:g}. The model is taken to be the real loop.",
     ]

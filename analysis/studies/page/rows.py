@@ -80,7 +80,7 @@ def row_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item]:
     violated = int(np.sum(violates(margins)))
     told = text.violate(violated, len(table))
     if refused := refusal(result):
-        told += f". That is no estimate of a probability: {refused}"
+        told += f". That is not an estimate of a probability: {refused}"
     yield Paragraph(text=f"{told}.")
     statuses = table["status"].astype(str)
     counts = statuses.value_counts().sort_index()

@@ -3,7 +3,7 @@
 python-control evaluates every output function up to n + 1 times per right-hand side, until no
 signal changes.  A schedule orders the outputs once, so that each is evaluated once.  What counts
 is which output depends on which input: a block that feeds itself through separate channels is
-evaluated more than once and is no algebraic loop.
+evaluated more than once and is not an algebraic loop.
 """
 
 from __future__ import annotations

@@ -152,7 +152,7 @@ def _source(name: str, stands: _AsItStands, system: Any) -> Source:
     Raises
     ------
     CompileError, UsageError
-        If a function is no plain one, or the name of a parameter cannot be that of a field.
+        If a function is not a plain one, or the name of a parameter cannot be that of a field.
     """
     _, x, u, p, count = stands.lengths
     first, second, third = 1, 1 + x, 1 + x + u
@@ -214,11 +214,11 @@ def _jitted(function: Any) -> Any:
     Raises
     ------
     CompileError
-        If it is no plain function.
+        If it is not a plain function.
     """
     if isinstance(function, CPUDispatcher):
         return function
     if not isinstance(function, FunctionType):
-        raise CompileError(f"{function!r} is no plain function")
+        raise CompileError(f"{function!r} is not a plain function")
     make_callable(function)
     return numba.njit(function, error_model="numpy", nogil=True, boundscheck=True)

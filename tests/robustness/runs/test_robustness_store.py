@@ -285,7 +285,7 @@ def test_an_unfinished_folder_can_be_read(made, design, whole, tmp_path):
 
 def test_a_folder_without_a_sweep_is_named(tmp_path):
     """With the file that is missing."""
-    with pytest.raises(StoreError, match=r"study\.json' is no study"):
+    with pytest.raises(StoreError, match=r"study\.json' is not a study"):
         load(tmp_path)
 
 

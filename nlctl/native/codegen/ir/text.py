@@ -24,7 +24,7 @@ class Value:
     text : str
         Its name, or a constant.
     width : int
-        Number of elements, 0 for what is no vector.
+        Number of elements, 0 for what is not a vector.
     kind : str
         ``"f"`` float, ``"b"`` truth value, ``"i"`` integer.
     """
