@@ -3,6 +3,7 @@ from ._version import __version__ as __version__
 from .actuators import (
     AsymmetricSaturation,
     Backlash,
+    BacklashInverse,
     BoucWen,
     Coulomb,
     Dahl,
@@ -112,6 +113,7 @@ __all__ = [
     "AmbiguousNameError",
     "AsymmetricSaturation",
     "Backlash",
+    "BacklashInverse",
     "BandLimitedNoise",
     "Block",
     "BlockEquations",

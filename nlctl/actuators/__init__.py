@@ -10,7 +10,7 @@ from .backlash import Backlash
 from .cascade import cascade
 from .dynamic import Lag, RateLimiter, SecondOrderLag
 from .friction import BoucWen, Coulomb, Dahl, LuGre, StickSlip, Stribeck
-from .inverses import DeadZoneInverse, PrandtlIshlinskiiInverse
+from .inverses import BacklashInverse, DeadZoneInverse, PrandtlIshlinskiiInverse
 from .prandtl_ishlinskii import OneSidedDeadZones, PrandtlIshlinskii, Stop
 from .quantiser import Quantiser
 from .relay import Preisach, Relay, relay_grid
@@ -19,6 +19,7 @@ from .static import AsymmetricSaturation, DeadZone, Gain, Saturation
 __all__ = [
     "AsymmetricSaturation",
     "Backlash",
+    "BacklashInverse",
     "BoucWen",
     "Coulomb",
     "Dahl",

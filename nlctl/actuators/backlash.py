@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..equations import equation
@@ -28,6 +30,13 @@ def play(u, memory, p):
     """The play operator: the memory, carried along by the nearer side of the gap."""
     low, high = play_band(u, p)
     return clip(memory, low, high)
+
+
+def check_gap(spec: Any) -> None:
+    """Refuse a gap whose left end is not on the left of its right end."""
+    if not spec.c_l < spec.c_r:
+        who = type(spec).__name__
+        raise ParameterError(f"{who} needs c_l < c_r, got {spec.c_l:g} and {spec.c_r:g}")
 
 
 @record
@@ -78,8 +87,7 @@ class Backlash:
         number = as_numbers(self.v0)
         if number is None or number.ndim or not np.isfinite(number):
             raise ParameterError(f"Backlash needs a finite v0, got {self.v0!r}")
-        if not self.c_l < self.c_r:
-            raise ParameterError(f"Backlash needs c_l < c_r, got {self.c_l:g} and {self.c_r:g}")
+        check_gap(self)
 
     @property
     def gains(self) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Inverses of actuators, as compensators in front of them: dead zone, sum of plays.
+"""Inverses of actuators, as compensators in front of them: dead zone, backlash, sum of plays.
 
 An inverse takes the wanted output of the actuator as its input u; its own output v is what the
 actuator needs.  ``cascade({"inverse": DeadZoneInverse(), "zone": DeadZone(...)})`` is then v = u.
@@ -12,6 +12,7 @@ import numpy as np
 
 from ..equations import equation
 from ..params import param, record
+from .backlash import check_gap
 from .memories import checked_start, memory_names, started
 from .prandtl_ishlinskii import (
     check_thresholds,
@@ -21,8 +22,9 @@ from .prandtl_ishlinskii import (
     weighted_band,
     weighted_plays,
 )
+from .relay import check_sides, moving_side
 
-__all__ = ["DeadZoneInverse", "PrandtlIshlinskiiInverse"]
+__all__ = ["BacklashInverse", "DeadZoneInverse", "PrandtlIshlinskiiInverse"]
 
 
 @record
@@ -78,6 +80,86 @@ class DeadZoneInverse:
         """Least and greatest output near input u: at the jump, from one side to the other."""
         right, left = u / p.slope_r, u / p.slope_l
         return np.minimum(right, left) + p.b_l, np.maximum(right, left) + p.b_r
+
+
+@record
+class BacklashInverse:
+    """Right inverse of a backlash, for an input whose rate is known.
+
+        v = max(u / m_r + c_r, u / m_l + c_l)    s = +1,   s = +1       u' > 0
+            min(u / m_r + c_r, u / m_l + c_l)    s = -1        -1       u' < 0
+                                                               s(t-)    u' = 0
+
+    (Tao, Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996,
+    chapter 2; with equal slopes the lines are u / m + c_r and u / m + c_l).  Its second input
+    ``u1`` is u', as references have it.  Once its input has crossed the gap, a `Backlash` behind
+    it has the output u.  The inverse crosses the gap in a jump where u reverses: that is why it
+    needs u', and no inverse from u alone does it.
+
+    It obeys (2) with k between 1 / m_r and 1 / m_l and eps_u between c_l and c_r.  In
+    python-control the memory of the side relaxes as that of `Relay`; it counts at u' = 0 only.
+
+    Parameters
+    ----------
+    v0 : float, optional
+        Side s(0-) at the start, 1 or -1: the initial value of the state ``side``.
+    """
+
+    m_r: float = param(1.2, unit="1", meaning="slope of the right (rising) side", above=0)
+    m_l: float = param(1.2, unit="1", meaning="slope of the left (falling) side", above=0)
+    c_r: float = param(0.5, unit="1", meaning="right end of the gap")
+    c_l: float = param(-0.6, unit="1", meaning="left end of the gap")
+    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memory", above=0)
+    v0: float = 1.0
+
+    inputs = ("u", "u1")
+    outputs = ("v",)
+    states = ("side",)
+    memory = ("side",)
+    feedthrough = True
+    no_split = "it takes the rate u' besides u"
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The side from which it starts."""
+        return {"side": float(self.v0)}
+
+    def check(self) -> None:
+        """The gap has a left and a right end; the side is one of two."""
+        check_gap(self)
+        check_sides(self, 1)
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """Relaxation of the memory onto the side."""
+        (side,) = x
+        return (p.rate * (moving_side(u[1], side) - side),)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """What the backlash needs."""
+        (side,) = x
+        wanted, u1 = u
+        one, other = wanted / p.m_r + p.c_r, wanted / p.m_l + p.c_l
+        now = moving_side(u1, side)  # +-1, or NaN
+        upper, lower = np.maximum(one, other), np.minimum(one, other)
+        return (np.where(now > 0, upper, np.where(now < 0, lower, now)),)
+
+    @staticmethod
+    @equation
+    def commit(t, x, u, p):
+        """The side."""
+        (side,) = x
+        return (moving_side(u[1], side),)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Where u reverses, and where the lines cross."""
+        wanted, u1 = u
+        return u1, wanted / p.m_r + p.c_r - wanted / p.m_l - p.c_l
 
 
 @record

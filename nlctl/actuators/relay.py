@@ -30,6 +30,13 @@ def relay_side(u, side, on, off):
     return np.where((off < u) & (u < on), kept_side(side), free)
 
 
+@equation
+def moving_side(rate, side):
+    """Side of what moves: +1 where its rate is > 0, -1 where it is < 0, at rest the memory's."""
+    moves = np.where(rate > 0, 1.0, np.where(rate < 0, -1.0, rate))  # NaN stays
+    return np.where(rate == 0, kept_side(side), moves)
+
+
 def check_sides(spec: Any, count: int) -> None:
     """Refuse initial sides other than 1 and -1."""
     sides = checked_start(spec, count)

@@ -19,15 +19,21 @@ SPLIT = {
     "Backlash", "DeadZone", "DeadZoneInverse", "Gain", "OneSidedDeadZones", "PrandtlIshlinskii",
     "PrandtlIshlinskiiInverse", "Quantiser",
 }  # fmt: skip
+RATED = {"BacklashInverse"}
 BOUNDED = {"AsymmetricSaturation", "Preisach", "Relay", "Saturation", "Stop"}
 LATE = {"Lag", "RateLimiter", "SecondOrderLag"}
 FORCES = {"BoucWen", "Coulomb", "Dahl", "LuGre", "StickSlip", "Stribeck"}
-WHY = [(BOUNDED, "its output is bounded"), (LATE, "follows u later"), (FORCES, "a force law")]
+WHY = [
+    (BOUNDED, "its output is bounded"),
+    (LATE, "follows u later"),
+    (FORCES, "a force law"),
+    (RATED, "takes the rate"),
+]
 
 
 def test_every_actuator_is_in_one_class():
     """None is left out, none is in two."""
-    classes = [SPLIT, BOUNDED, LATE, FORCES]
+    classes = [SPLIT, BOUNDED, LATE, FORCES, RATED]
     assert sorted(RECORDS) == sorted(name for names in classes for name in names)
 
 
@@ -55,7 +61,7 @@ def cached_split(name):
     return _SPLITS[name]
 
 
-@pytest.mark.parametrize(("names", "why"), WHY, ids=["bounded", "late", "forces"])
+@pytest.mark.parametrize(("names", "why"), WHY, ids=["bounded", "late", "forces", "rated"])
 def test_the_others_say_why_they_have_none(names, why):
     """With and without bounds of k given: a refusal that names the record, never another error."""
     for name in sorted(names):

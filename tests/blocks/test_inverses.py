@@ -2,6 +2,7 @@
 
 import functools
 
+import control as ct
 import numpy as np
 import pytest
 from actuator_rig import along
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from rows import each_row
 
 import nlctl
+from nlctl.diagrams import as_system
 from nlctl.params import declared_params
 
 positive = st.floats(0.1, 2).map(lambda v: round(v, 4))
@@ -104,9 +106,59 @@ class TestPrandtlIshlinskii:
         np.testing.assert_allclose(slopes * m, 1, rtol=1e-12)
 
 
+@functools.cache
+def backlash_behind_its_inverse():
+    """Return machine code: two sines with their derivative, the inverse, a backlash."""
+
+    def wave(t, x, u, params):
+        a, b, w = params["a"], params["b"], params["w"]
+        value = a * np.sin(t) + b * np.sin(w * t)
+        return [value, a * np.cos(t) + b * w * np.cos(w * t)]
+
+    source = ct.nlsys(
+        None, wave, inputs=0, outputs=["u", "u1"], params={"a": 1.0, "b": 0.0, "w": 3.0},
+        name="source",
+    )  # fmt: skip
+    inverse, gap = nlctl.BacklashInverse(), as_system(nlctl.Backlash(), "gap")
+    gap.update_names(inputs=["v"], outputs=["y"])
+    blocks = [source, nlctl.block(inverse, "inverse"), gap]
+    return nlctl.compile(nlctl.interconnect(blocks, outputs=["u", "v", "y"], name="compensated"))
+
+
+class TestBacklash:
+    """Tao and Kokotovic's inverse, which jumps where its input reverses."""
+
+    @given(a=positive, b=positive, m_r=positive, m_l=positive, c_l=st.floats(-1, 1), gap=positive)
+    @settings(max_examples=20)
+    def test_a_backlash_behind_its_inverse_is_the_identity(self, a, b, m_r, m_l, c_l, gap):
+        """After the gap has been crossed, at every time; whether slopes are equal or not."""
+        own = {"m_r": m_r, "m_l": m_l, "c_l": c_l, "c_r": c_l + gap}
+        params = {f"{name}.{k}": v for name in ("inverse", "gap") for k, v in own.items()}
+        times = np.linspace(0, 12, 121)
+        run = nlctl.input_output_response(
+            backlash_behind_its_inverse(), times, params=params | {"a": a, "b": b, "w": 2.3}
+        )
+        u, v, y = run.outputs
+        turns = a * np.cos(times) + 2.3 * b * np.cos(2.3 * times)
+        late = np.maximum.accumulate(turns < 0)  # it has come back once
+        np.testing.assert_allclose(y[late], u[late], atol=1e-6 * (1 + a + b))
+        upper, lower = (f(u / m_r + c_l + gap, u / m_l + c_l) for f in (np.maximum, np.minimum))
+        sure = np.abs(turns) > 1e-3
+        expected = np.where(turns > 0, upper, lower)
+        np.testing.assert_allclose(v[sure], expected[sure], atol=1e-12)
+
+    def test_at_rest_it_keeps_its_side(self):
+        """u' = 0: as it was before."""
+        block = nlctl.block(nlctl.BacklashInverse(), "b")
+        for side, end in ((1.0, 0.5), (-1.0, -0.6)):
+            assert block.output(0.0, [side], [1.2, 0.0])[0] == pytest.approx(1 + end)
+
+
 @each_row(
     ("make", "told"),
     [
+        (lambda: nlctl.BacklashInverse(c_l=0.5), "BacklashInverse needs c_l < c_r, got 0.5"),
+        (lambda: nlctl.BacklashInverse(v0=0.0), "BacklashInverse needs v0 of 1 and -1 only"),
         (lambda: nlctl.DeadZoneInverse(b_l=0.3), "DeadZoneInverse needs b_l < 0, got 0.3"),
         (
             lambda: nlctl.PrandtlIshlinskiiInverse(w=(-0.7, 0, 0, 0)),

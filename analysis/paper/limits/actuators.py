@@ -2,7 +2,7 @@
 
 ``python -m analysis.paper.limits.actuators`` makes it again, in a minute, and prints the table of
 ``docs/explanation/actuators.md``.  Friction is left out: it takes a velocity and makes a force, and
-is no actuator of the form v = k(u, t) u + eps_u (2) between the controller and the plant.
+is not an actuator of the form v = k(u, t) u + eps_u (2) between the controller and the plant.
 """
 
 from __future__ import annotations

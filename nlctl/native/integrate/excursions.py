@@ -1,6 +1,6 @@
 """What a step may have passed over: corners crossed and crossed back, memories that turned twice.
 
-Error control sees the states only.  Where a switching function, or what drives a memory, is no
+Error control sees the states only.  Where a switching function, or what drives a memory, is not a
 state (a dead zone behind a source), a step may grow until both of its ends lie on one side of a
 corner although it has been on the other in between.
 
@@ -95,18 +95,42 @@ def look_before(rhs, task, lanes, w, found):
     for j in range(lanes.size):
         w.part[j] = 1.0 - back
     _inside(rhs, task, lanes, w, nearer)
+    any_far = False
     for j in range(lanes.size):
         w.part[j] = 1.0 - 2.0 * back
-        if _crosses(task, w, nearer, j):
-            w.part[j] = lanes[j].low / lanes[j].step
+        w.sought[j] = 1 if wanted[j] and _crosses(task, w, nearer, j) else -1
+        any_far |= w.sought[j] > 0
+    if any_far:
+        _halve(rhs, task, lanes, w, back)
     _inside(rhs, task, lanes, w, w.g_ahead)
     for j in range(lanes.size):
-        far = _crosses(task, w, nearer, j)
+        far = w.sought[j] > 0
         ahead = 0.0 if far else 1.0 + _until_corner(task, w, nearer, j)
         for i in range(task.corners, w.g.shape[0]):
             if wanted[j] and w.e_start[i, j] != 0.0:
                 change = 0.0 if far else nearer[i, j] - w.g_ahead[i, j]
                 w.g[i, j] = w.g_ahead[i, j] + ahead * change
+
+
+@numba.njit(**INNER)
+def _halve(rhs, task, lanes, w, back):
+    """Set w.part right before the first corner of the lanes that are sought.
+
+    Where a memory turns at the corner at which its input jumps, a step ends farther behind.
+    """
+    for j in range(lanes.size):
+        if w.sought[j] > 0:
+            w.bracket[0, j], w.bracket[2, j] = lanes[j].low / lanes[j].step, 1.0 - back
+            w.part[j] = 0.5 * (w.bracket[0, j] + w.bracket[2, j])
+    for _ in range(_TRIES):
+        _inside(rhs, task, lanes, w, w.g_ahead)
+        for j in range(lanes.size):
+            if w.sought[j] > 0:
+                w.bracket[2 if _crosses(task, w, w.g_ahead, j) else 0, j] = w.part[j]
+                w.part[j] = 0.5 * (w.bracket[0, j] + w.bracket[2, j])
+    for j in range(lanes.size):
+        if w.sought[j] > 0:
+            w.part[j] = w.bracket[0, j]
 
 
 @numba.njit(**INNER)
