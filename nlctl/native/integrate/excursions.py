@@ -8,7 +8,7 @@ Each event function is followed through a step by the polynomial through five of
 of them at stages, which cost nothing.  Where that may be below 0 in between, by what it may be
 wrong, the function itself is evaluated on the solution inside the step: its minimum is sought until
 it is found to be below 0, and a step that ends there is tried instead; or above 0, or 0 to within
-1e-12 of the range.  So only what lies between two of the five values unseen is lost; the next step
+1e-9 of the range.  So only what lies between two of the five values unseen is lost; the next step
 is never longer than what a polynomial of this degree follows to a tenth of the range.
 """
 
