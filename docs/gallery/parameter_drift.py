@@ -49,7 +49,8 @@ for label, weights in remedies.items():
     x, found[label] = nlctl.input_output_response(loop, t, 0, start).outputs
     axes.plot(t, found[label], label=label)
 axes.set(xlabel="t (s)", ylabel=r"$|\hat{W}|$")
-axes.legend()
+axes.legend(ncols=2, loc="upper left")
+axes.set_ylim(top=6)
 
 # %%
 # The closed form of the drift to infinity, and the bounds of those that do not drift.
