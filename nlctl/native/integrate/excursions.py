@@ -8,7 +8,7 @@ Each event function is followed through a step by the polynomial through five of
 of them at stages, which cost nothing.  Where that may be below 0 in between, by what it may be
 wrong, the function itself is evaluated on the solution inside the step: its minimum is sought until
 it is found to be below 0, and a step that ends there is tried instead; or above 0, or 0 to within
-1e-9 of the range.  So only what lies between two of the five values unseen is lost; the next step
+1e-12 of the range.  So only what lies between two of the five values unseen is lost; the next step
 is never longer than what a polynomial of this degree follows to a tenth of the range.
 """
 
@@ -31,14 +31,10 @@ _FOLLOWED = 0.2  # of the range: what the polynomial may be wrong by at most
 _FLAT = 8.0  # in doubts: a slope at an end that may as well have the other sign
 _DENSE = 2  # the row of task.inside that is no method's stages
 _PART = 1e-4  # of a step, over which the rate of a memory is taken
-_NARROW = (
-    3e-5  # part of a step: a minimum so near to an end is not below it by more than its square
-)
+_NARROW = 1e-6  # part of a step: a minimum is not below what is so near by more than its square
 _TOUCHING = 0.01  # the same at a start on the corner, where a memory has turned
-_TRIES = 24
-_DOUBLE = 2.0
-_DOUBLE = 2.0
-_NARROW = 1e-6
+_TRIES = 24  # looks at one function in one step
+_DOUBLE = 2.0  # growth of a step up to which the noise of stages does not count
 
 
 @numba.njit(**INNER)
