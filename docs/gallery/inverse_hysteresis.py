@@ -3,9 +3,11 @@ The inverse of a hysteresis
 ===========================
 
 A Prandtl-Ishlinskii operator has an inverse that is one as well (Krejci and Kuhnen 2001). In front of the operator
-it makes the identity, whatever the input does.
+it makes the identity, whatever the input does. A backlash has an inverse that knows the rate of its input, and crosses
+the gap in a jump where that reverses (Tao and Kokotovic 1996).
 """
 
+import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -26,3 +28,20 @@ axes.legend()
 print(f"{np.abs(alone - u).max():.3f} off alone, {np.abs(v - u).max():.1e} behind the inverse")
 assert np.abs(alone - u).max() > 0.1
 assert np.abs(v - u).max() < 1e-6
+
+# %%
+# The backlash follows once its gap has been crossed; its inverse jumps by the whole gap.
+wave = nlctl.SumOfSines(order=1, amplitudes=(1.0, 0.6), frequencies=(1.0, 2.3))
+parts = {"wave": wave, "inverse": nlctl.BacklashInverse(), "gap": nlctl.Backlash()}
+loop = ct.interconnect(
+    [nlctl.block(record, name) for name, record in parts.items()],
+    connections=[["inverse.u", "wave.yd"], ["inverse.u1", "wave.yd1"], ["gap.u", "inverse.v"]],
+    inplist=[],
+    outlist=["wave.yd", "inverse.v", "gap.v"],
+    outputs=["u", "v", "y"],
+)
+wanted, needed, y = nlctl.input_output_response(loop, t).outputs
+late = t > 3.0
+print(f"{np.abs(y - wanted)[late].max():.1e} off, jumps of {np.abs(np.diff(needed)).max():.2f}")
+assert np.abs(y - wanted)[late].max() < 1e-6
+assert np.abs(np.diff(needed)).max() > 1.0

@@ -48,7 +48,6 @@ for (label, controller), axis in zip(controllers.items(), axes, strict=True):
     axis.set_ylabel(label)
     largest[label] = float(np.abs(y).max())
 axes[-1].set_xlabel("t (s)")
-figure.suptitle("x1 behind three controllers")
 
 # %%
 # Phase crossover and critical gain in closed form; only plain MRAC is lost.

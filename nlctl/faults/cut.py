@@ -55,7 +55,8 @@ def with_faults(diagram: Any, *faults: Fault) -> ct.InterconnectedSystem:
     """Return a diagram with faults on its signals; the one that was given stays as it is.
 
     Each signal is cut and goes through a block, whose parameters are addressed like all others:
-    ``"fault_actuator_v.onset"``, ``"fault_actuator_v.duration"``, ``"fault_actuator_v.value"``.
+    ``"fault_actuator_v.onset"``, ``"fault_actuator_v.duration"``, ``"fault_actuator_v.value"``;
+    that of a delay is ``"fault_actuator_v_line.delay"``.
     So one diagram, compiled once, serves for an ensemble of onsets and values; an onset of
     `nlctl.faults.NEVER` is a fault that does not begin.  A fault inside of a nested diagram has
     that diagram's name in front.  Several faults on one signal stand one behind the other, in their
@@ -119,9 +120,10 @@ def signal_names(diagram: Any) -> list[str]:
 
 def _check_timebase(system: ct.InterconnectedSystem, fault: Fault) -> None:
     """Memories are committed between steps of an integrator."""
-    has_memory = fault.condition is not None or memory_states(fault.effect)
+    has_memory = fault.condition is not None or memory_states(fault.effect) or fault.line
     if has_memory and not ct.isctime(system):
         what = "a condition" if fault.condition is not None else "no value"
+        what = what if fault.line is None else "a history"
         raise ParameterError(
             f"Fault '{fault.kind}' on '{fault.signal}' with {what} needs a diagram in continuous "
             f"time, '{system.name}' has dt = {system.dt}: give a time, and a value"
@@ -220,13 +222,18 @@ class _Wires:
         effect = block(cut.fault.effect, name, dt=dt)
         row, column = self._add(effect)
         self._cut(replace(cut.spot, label=""), row, column)
-        if cut.watched is None:
-            return [effect]
-        latch = block(cut.fault.latch, _free(f"{name}_condition", taken))
-        watch, on = self._add(latch)
-        self._read(replace(cut.watched, label=""), watch)
-        self.connect[row + 1, on] = self.connect[row + 2, on + 1] = 1.0
-        return [effect, latch]
+        made = [effect]
+        if cut.fault.line is not None:
+            made.append(block(cut.fault.line, _free(f"{name}_line", taken)))
+            before, late = self._add(made[-1])
+            self.connect[before], self.input[before] = self.connect[row], self.input[row]
+            self.connect[row + effect.ninputs - 1, late] = 1.0
+        if cut.watched is not None:
+            made.append(block(cut.fault.latch, _free(f"{name}_condition", taken)))
+            watch, on = self._add(made[-1])
+            self._read(replace(cut.watched, label=""), watch)
+            self.connect[row + 1, on] = self.connect[row + 2, on + 1] = 1.0
+        return made
 
     def _add(self, made: Any) -> tuple[int, int]:
         """Make room for a block; return its first input and output."""

@@ -20,6 +20,7 @@ __all__ = [
     "Bias",
     "DriftFault",
     "Latch",
+    "Late",
     "LockInPlace",
     "LossOfEffectiveness",
     "Noise",
@@ -188,6 +189,31 @@ class StuckAt(_Effect):
 
 
 @record
+class Late(_Effect):
+    """What a transport delay outputs, in the place of the signal that goes into it."""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The signal, what the latch says, and the signal as it was earlier."""
+        return ("signal", "on", "since", "late") if self.has_condition else ("signal", "late")
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The signal, the earlier one while the fault lasts."""
+        if is_present(t, u[:-1], p):
+            return (u[-1],)
+        return (u[0],)
+
+    @staticmethod
+    @equation
+    def corners(t, x, u, p):
+        """Beginning and end of the fault."""
+        since = age(t, u[:-1], p)
+        return since, since - p.duration
+
+
+@record
 class LockInPlace(_Effect):
     """Stuck at the value that the signal had at the onset.
 
@@ -242,8 +268,8 @@ class Latch:
     The condition is watched > level; |watched| > level with `is_magnitude`, < with `is_below`.
     ``on`` is 1 from then on, and ``since`` the time at which it began (s).
 
-    In machine code it is met exactly where the signal passes the level at the ends of a step: a
-    peak that crosses the level and comes back within one step is not seen.  In python-control
+    In machine code it is met exactly where the signal passes the level, also by a peak within one
+    step.  In python-control
     ``on`` rises with a rate, and counts when it has passed 1/2: a condition that is met for less
     than 0.7 / rate is not remembered, and what begins with it begins 0.7 / rate late.
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import number, text, whole_number
+from ..delays import TransportDelay
 from ..errors import ParameterError
 from ..names import unknown
 from .condition import Condition, parse_condition
@@ -18,6 +19,7 @@ from .effects import (
     Bias,
     DriftFault,
     Latch,
+    Late,
     LockInPlace,
     LossOfEffectiveness,
     Noise,
@@ -34,13 +36,20 @@ FAULT_KINDS: Mapping[str, Any] = MappingProxyType(
         "drift": DriftFault,
         "gain": LossOfEffectiveness,
         "noise": Noise,
+        "delay": Late,
         "dropout": Outage,
         "disconnection": Outage,
     }
 )
 """The record of each kind; ``stuck`` without a value is `effects.LockInPlace`."""
 
-NEEDS = {"bias": "offset", "drift": "rate in 1/s", "gain": "factor", "noise": "RMS"}
+NEEDS = {
+    "bias": "offset",
+    "drift": "rate in 1/s",
+    "gain": "factor",
+    "noise": "RMS",
+    "delay": "time in s",
+}
 
 
 @dataclass(frozen=True)
@@ -56,10 +65,11 @@ class Fault:
     kind : str
         ``"stuck"`` at `value`, or without a value at that of the onset; ``"bias"``, signal +
         value; ``"drift"``, signal + value (t - onset); ``"gain"``, value times the signal;
-        ``"noise"``, band-limited with the RMS value; ``"dropout"``, 0 while it lasts;
+        ``"noise"``, band-limited with the RMS value; ``"delay"``, the signal as it was value
+        seconds before, 0 before the run; ``"dropout"``, 0 while it lasts;
         ``"disconnection"``, 0 for ever.
     value : float, optional
-        In the unit of the signal, for drift per s; a gain has none.
+        In the unit of the signal, for drift per s; a gain has none; a delay in s.
     at : float, optional
         Time of the onset in s, at which the fault begins; with `when` the time before which it
         does not.
@@ -108,11 +118,6 @@ class Fault:
 
     def __post_init__(self) -> None:
         text("Fault", "signal", self.signal)
-        if self.kind == "delay":
-            raise ParameterError(
-                f"{self._who} cannot be a delay: a diagram keeps no history of its signals; take "
-                "one of " + ", ".join(FAULT_KINDS)
-            )
         if self.kind not in FAULT_KINDS:
             raise unknown("kind of fault", str(self.kind), FAULT_KINDS, f"on '{self.signal}'")
         self._check_value()
@@ -131,6 +136,8 @@ class Fault:
                 raise ParameterError(f"{self._who} takes no value, it is 0, got {self.value!r}")
         elif self.kind in NEEDS:
             raise ParameterError(f"{self._who} needs a value, its {NEEDS[self.kind]}, got none")
+        if self.kind == "delay":
+            number(self._who, "value", self.value, above=0)
         whole_number(self._who, "seed", self.seed, at_least=0)
 
     def _check_trigger(self) -> None:
@@ -179,7 +186,7 @@ class Fault:
         given: dict[str, Any] = {"onset": self.onset, "has_condition": self.condition is not None}
         if self.until is not None:
             given["duration"] = self.until - self.onset
-        if self.value is not None:
+        if self.value is not None and self.kind != "delay":
             given["value"] = self.value
         if self.kind == "noise":
             given |= {"low": self.low, "high": self.high, "seed": self.seed}
@@ -190,6 +197,13 @@ class Fault:
             return record(**given)
         except ParameterError as error:
             raise ParameterError(f"{self._who}: {error}") from None
+
+    @property
+    def line(self) -> TransportDelay | None:
+        """The record of the block that delays its signal."""
+        if self.kind != "delay":
+            return None
+        return TransportDelay(takes=("signal",), delivers=("late",), delay=self.value)
 
     @property
     def latch(self) -> Latch | None:

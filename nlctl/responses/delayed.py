@@ -181,7 +181,8 @@ class _Run:
             system, grid, interpolated(self.inputs, self.times, grid), self.x, params=self.params,
             squeeze=False, transpose=False, return_states=False, **self.settings,
         )  # fmt: skip
-        path = np.reshape(part.x, (-1, grid.size))
+        states = () if part.x is None else part.x  # None of a diagram without states
+        path = np.reshape(states, (system.nstates or 0, grid.size))
         values = self._arriving(nodes, path[:, np.searchsorted(grid, nodes)])
         pieces = [_FITTED @ each for each in values]
         if halvings < _HALVINGS and not all(map(self._settled, pieces)):

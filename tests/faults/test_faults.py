@@ -362,6 +362,56 @@ def test_a_fault_in_discrete_time():
         nlctl.with_faults(diagram, nlctl.Fault("half.u", "stuck", at=0.45))
 
 
+class TestDelay:
+    """The signal as it was: v(t - tau) of a wave that is known."""
+
+    @staticmethod
+    def wave():
+        def rising(t, x, u, p):
+            return [np.sin(3 * t) + 2.0]
+
+        source = ct.nlsys(None, rising, inputs=0, outputs=["u"], name="source")
+        return nlctl.interconnect({"source": source, "a": nlctl.Gain()}, outputs=["v"])
+
+    @pytest.mark.parametrize("engine", ["native", "python-control"])
+    @pytest.mark.parametrize("signal", ["source.u", "a.u"])
+    def test_it_is_the_signal_of_before_while_it_lasts(self, signal, engine):
+        """In both engines; behind the output for all that read it, at an input for one."""
+        fault = nlctl.Fault(signal, "delay", 0.3, at=1.0, until=2.0)
+        loop = nlctl.with_faults(self.wave(), fault)
+        t = np.array([0.0, 0.5, 0.99, 1.01, 1.5, 1.99, 2.01, 3.0])
+        made = nlctl.input_output_response(loop, t, engine=engine, rtol=1e-8)
+        late = (t >= 1.0) & (t < 2.0)
+        wanted = np.sin(3 * (t - np.where(late, 0.3, 0.0))) + 2.0
+        np.testing.assert_allclose(made.outputs[0], wanted, atol=1e-7)
+
+    def test_its_time_is_a_parameter(self):
+        """An ensemble of delays of one diagram, that was compiled once."""
+        fault = nlctl.Fault("source.u", "delay", 0.3, at=1.0)
+        loop = nlctl.compile(nlctl.with_faults(self.wave(), fault))
+        tau = np.array([0.1, 0.2, 0.5])
+        made = nlctl.ensemble_response(
+            loop, [0.0, 1.5], params={"fault_source_u_line.delay": tau}, keep=["v"]
+        )
+        wanted = np.sin(3 * (1.5 - tau)) + 2.0
+        np.testing.assert_allclose(made.signals["v"][:, -1], wanted, atol=1e-7)
+
+    def test_a_condition_begins_it(self):
+        """When sin(3 t) + 2 first passes 2.5."""
+        fault = nlctl.Fault("a.u", "delay", 0.1, when="source.u > 2.5")
+        t = np.array([0.0, 0.15, 0.2, 1.0])
+        made = nlctl.input_output_response(nlctl.with_faults(self.wave(), fault), t)
+        wanted = np.sin(3 * (t - np.where(t > np.arcsin(0.5) / 3, 0.1, 0.0))) + 2.0
+        np.testing.assert_allclose(made.outputs[0], wanted, atol=1e-7)
+
+
+def test_a_condition_is_seen_that_is_met_within_one_step():
+    """A peak that passes the level by a thousandth, where nothing else limits the steps."""
+    fault = nlctl.Fault("a.u", "bias", 10.0, when="source.u > 2.999")
+    made = nlctl.input_output_response(nlctl.with_faults(TestDelay.wave(), fault), [0.0, 0.4, 9.0])
+    np.testing.assert_allclose(made.outputs[0, 1:], np.sin([1.2, 27.0]) + [2.0, 12.0], atol=1e-7)
+
+
 def test_nan_travels_through_every_kind():
     """A signal that is lost in NaN does not look calm behind a fault."""
     for fault, _ in KINDS.values():
@@ -373,7 +423,8 @@ def test_nan_travels_through_every_kind():
     "arguments, more, message",
     [
         (("v", "biased", 1.0), {"at": 1}, "unknown kind of fault 'biased' on 'v'; nearest: 'bias'"),
-        (("v", "delay", 1.0), {"at": 1}, "no history of its signals"),
+        (("v", "delay", 0.0), {"at": 1}, "needs a finite value > 0, got 0.0"),
+        (("v", "delay"), {"at": 1}, "needs a value, its time in s, got none"),
         (("v", "bias"), {"at": 1}, "needs a value, its offset, got none"),
         (("v", "bias", "much"), {"at": 1}, "a number for value, got 'much'"),
         (("v", "bias", np.nan), {"at": 1}, "a finite value"),

@@ -133,6 +133,7 @@ class Faulty(Strict):
     drift: Number | None = Field(None, description="Rate of an offset, per s.")
     gain: Number | None = Field(None, description="Factor, a loss of effectiveness.")
     noise: Size | None = Field(None, description="RMS of band-limited noise.")
+    delay: Number | None = Field(None, gt=0, description="The signal as it was so long before (s).")
     dropout: Number | None = Field(None, gt=0, description="0 for so long (s).")
     disconnection: Literal[True] | None = Field(None, description="true: 0 for ever.")
 
