@@ -227,7 +227,7 @@ class _Wires:
             made.append(block(cut.fault.line, _free(f"{name}_line", taken)))
             before, late = self._add(made[-1])
             self.connect[before], self.input[before] = self.connect[row], self.input[row]
-            self.connect[row + effect.ninputs - 1, late] = 1.0
+            self.connect[row + len(effect.input_labels) - 1, late] = 1.0
         if cut.watched is not None:
             made.append(block(cut.fault.latch, _free(f"{name}_condition", taken)))
             watch, on = self._add(made[-1])

@@ -201,7 +201,7 @@ class Fault:
     @property
     def line(self) -> TransportDelay | None:
         """The record of the block that delays its signal."""
-        if self.kind != "delay":
+        if self.kind != "delay" or self.value is None:
             return None
         return TransportDelay(takes=("signal",), delivers=("late",), delay=self.value)
 
