@@ -28,6 +28,7 @@ PROBE = 200  # steps tried that are looked at, at the end of a window
 _JUMPS = 10  # of them with a jump
 _WITHIN = 100.0  # tolerances that a state moves in a mean step
 _SLOW = 0.1  # part of the longest window
+_LONG = 8  # windows after which a run is looked at that has not become slow
 _LEAST = 0.1  # part of the range of the right-hand side that counts as a jump
 _REMAINS = 0.4  # part of it that is still there between neighbours; sign has a half at 0
 _HALVINGS = 200
@@ -89,7 +90,8 @@ def new_paces(lanes: np.ndarray) -> np.ndarray:
 def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     """Return which lanes are to be looked at, at the end of a window.
 
-    Those that have become slow, and those that run on and on; after 1, 2, 4, 8, ... windows.
+    Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
+    `_LONG` windows on: what usual runs take must not cost them anything.
     """
     gone = lanes["t"] - paces["t"]
     paces["t"] = lanes["t"]
@@ -97,7 +99,9 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     paces["windows"] += 1
     paces["slow"] = np.where(gone < _SLOW * paces["longest"], paces["slow"] + 1, 0)
     due = [(n & (n - 1)) == 0 for n in (paces["windows"], paces["slow"])]
-    return (lanes["status"] == RUNNING) & (due[0] | ((paces["slow"] > 0) & due[1]))
+    return (lanes["status"] == RUNNING) & (
+        (due[0] & (paces["windows"] >= _LONG)) | ((paces["slow"] > 0) & due[1])
+    )
 
 
 def snapshot(work: Any, advance: Callable[[], Any]) -> tuple[Any, Attempt]:
