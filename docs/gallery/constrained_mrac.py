@@ -50,7 +50,7 @@ above.legend()
 below.set(xlabel="t (s)", ylabel="u")
 
 # %%
-# The proof: V loses twice the integral of the controllable error squared. |W| = 2.24 is true.
+# The proof: V loses twice the integral of the controllable error squared. The true weights have the norm 2.24.
 V = response.outputs[2] ** 2 + np.sum((gains[label] - [[2], [-1]]) ** 2, axis=0) / 0.1
 V += (states["controller.error.beta_hat"] - 1) ** 2
 print({label: gain[:, -1].round(2) for label, gain in gains.items()})
