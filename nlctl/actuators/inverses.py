@@ -82,6 +82,12 @@ class DeadZoneInverse:
         return np.minimum(right, left) + p.b_l, np.maximum(right, left) + p.b_r
 
 
+@equation
+def needed_lines(wanted, p):
+    """What brings a backlash to the wanted output on its rising and on its falling side."""
+    return wanted / p.m_r + p.c_r, wanted / p.m_l + p.c_l
+
+
 @record
 class BacklashInverse:
     """Right inverse of a backlash, for an input whose rate is known.
@@ -142,7 +148,7 @@ class BacklashInverse:
         """What the backlash needs."""
         (side,) = x
         wanted, u1 = u
-        one, other = wanted / p.m_r + p.c_r, wanted / p.m_l + p.c_l
+        one, other = needed_lines(wanted, p)
         now = moving_side(u1, side)  # +-1, or NaN
         upper, lower = np.maximum(one, other), np.minimum(one, other)
         return (np.where(now > 0, upper, np.where(now < 0, lower, now)),)
@@ -159,7 +165,8 @@ class BacklashInverse:
     def corners(t, x, u, p):
         """Where u reverses, and where the lines cross."""
         wanted, u1 = u
-        return u1, wanted / p.m_r + p.c_r - wanted / p.m_l - p.c_l
+        one, other = needed_lines(wanted, p)
+        return u1, one - other
 
 
 @record

@@ -53,6 +53,15 @@ def is_hurwitz(coefficients: Sequence[float]) -> bool:
     return True
 
 
+def check_hurwitz(who: str, letter: str, coefficients: tuple[float, ...]) -> None:
+    """Refuse s^n + a_n s^(n-1) + ... + a_1 with a root that is not in the open left half plane."""
+    if not is_hurwitz((1.0, *coefficients[::-1])):
+        raise ParameterError(
+            f"{who} needs a Hurwitz polynomial s^n + {letter}_n s^(n-1) + ... + {letter}_1, "
+            f"got {letter} {coefficients}"
+        )
+
+
 @record
 class FilteredError:
     """Filtered tracking error of a plant of order n (14).

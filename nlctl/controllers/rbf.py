@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
+import control as ct
 import numpy as np
 
 from ..arguments import number, tuple_of, whole_number
+from ..diagrams import as_system
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import gaussian
@@ -141,6 +144,11 @@ def latin_hypercube_centres(
     return _rows(low + (high - low) * unit)
 
 
+def regressor_names(nodes: int) -> tuple[str, ...]:
+    """Return ("psi[0]", ..., "psi[l-1]")."""
+    return tuple(f"psi[{i}]" for i in range(nodes))
+
+
 @record
 class GaussianBasis:
     """Gaussian basis functions of the state (10), Example 1.
@@ -177,7 +185,7 @@ class GaussianBasis:
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names psi[0], ..., psi[l-1]."""
-        return tuple(f"psi[{i}]" for i in range(len(self.centres)))
+        return regressor_names(len(self.centres))
 
     @staticmethod
     @equation
@@ -193,7 +201,7 @@ def weight_names(nodes: int) -> tuple[str, ...]:
 
 def weight_inputs(nodes: int) -> tuple[str, ...]:
     """Return ("r", "psi[0]", ..., "psi[l-1]")."""
-    return ("r", *(f"psi[{i}]" for i in range(nodes)))
+    return ("r", *regressor_names(nodes))
 
 
 @equation
@@ -204,15 +212,11 @@ def network_output(t, x, u, p):
 
 
 @record
-class AdaptiveWeights:
-    """Weights of the network with sigma-modification (25), and its output.
-
-    W_hat' = Gamma (r psi - sigma_1 W_hat),   W_psi = W_hat^T psi,   W_hat(0) = 0
-    """
+class NetworkWeights:
+    """What all weights of a network share; each has its own adaptation law W_hat'."""
 
     nodes: int = 27
     Gamma: float = param(0.5, unit="1", meaning="adaptation gain, Gamma I", above=0)
-    sigma_1: float = param(0.5, unit="1", meaning="sigma-modification of W_hat", at_least=0)
 
     outputs = ("W_psi", "W_norm")
     feedthrough = True
@@ -221,7 +225,7 @@ class AdaptiveWeights:
 
     def check(self) -> None:
         """A network has nodes."""
-        nodes = whole_number("AdaptiveWeights", "nodes", self.nodes, at_least=1)
+        nodes = whole_number(type(self).__name__, "nodes", self.nodes, at_least=1)
         object.__setattr__(self, "nodes", nodes)
 
     @property
@@ -234,9 +238,50 @@ class AdaptiveWeights:
         """Names W_hat[0], ..., W_hat[l-1]."""
         return weight_names(self.nodes)
 
+
+@record
+class AdaptiveWeights(NetworkWeights):
+    """Weights of the network with sigma-modification (25), and its output.
+
+    W_hat' = Gamma (r psi - sigma_1 W_hat),   W_psi = W_hat^T psi,   W_hat(0) = 0
+    """
+
+    sigma_1: float = param(0.5, unit="1", meaning="sigma-modification of W_hat", at_least=0)
+
     @staticmethod
     @equation
     def update(t, x, u, p):
         """Adaptation law, first line of (25)."""
         r, psi, W_hat = u[0], u[1:], x
         return p.Gamma * (r * psi - p.sigma_1 * W_hat)
+
+
+def fitting_network(
+    who: str, basis: Any, weights: Any, default: Callable[..., Any]
+) -> tuple[ct.InputOutputSystem, Any]:
+    """Return a regressor as a block, and its weights.
+
+    Parameters
+    ----------
+    who : str
+        What connects them, for the error.
+    basis : record or control.InputOutputSystem
+        With outputs ``psi[0]``, ``psi[1]``, ...
+    weights : record, control.InputOutputSystem or None
+    default : callable
+        ``default(nodes=...)`` makes weights where there are none.
+
+    Raises
+    ------
+    ParameterError
+        If the weights are not as many as the outputs psi.
+    """
+    regressor = as_system(basis, "basis")
+    nodes = sum(label.startswith("psi[") for label in regressor.output_labels)
+    weights = default(nodes=nodes) if weights is None else weights
+    if getattr(weights, "nodes", nodes) != nodes:
+        raise ParameterError(
+            f"{who} needs a weight for each output psi of its basis, got nodes={weights.nodes} "
+            f"for {nodes}"
+        )
+    return regressor, weights

@@ -38,10 +38,10 @@ SHARPER = 20.0  # what is tracked is that much faster than what freezes it
 def age(t, u, p):
     """Time since the onset (s); negative before it.
 
-    With a condition `u` is (signal, on, since), and the fault begins at the later one of `since`
-    and the onset.
+    With a condition `u` is (signal, on, since, ...), and the fault begins at the later one of
+    `since` and the onset; without, it is (signal, ...), one more signal at most.
     """
-    if u.size == 1:
+    if u.size < 3:
         return t - p.onset
     if u[1] > 0.5:
         return t - np.maximum(u[2], p.onset)
@@ -195,22 +195,15 @@ class Late(_Effect):
     @property
     def inputs(self) -> tuple[str, ...]:
         """The signal, what the latch says, and the signal as it was earlier."""
-        return ("signal", "on", "since", "late") if self.has_condition else ("signal", "late")
+        return (*super().inputs, "late")
 
     @staticmethod
     @equation
     def output(t, x, u, p):
         """The signal, the earlier one while the fault lasts."""
-        if is_present(t, u[:-1], p):
+        if is_present(t, u, p):
             return (u[-1],)
         return (u[0],)
-
-    @staticmethod
-    @equation
-    def corners(t, x, u, p):
-        """Beginning and end of the fault."""
-        since = age(t, u[:-1], p)
-        return since, since - p.duration
 
 
 @record

@@ -7,10 +7,9 @@ from typing import Any
 import control as ct
 
 from ...diagrams import as_system, interconnect
-from ...errors import ParameterError
 from ...plants import coordinate_names
 from ..mrac import ModelReferenceLaw
-from ..rbf import AdaptiveWeights, GaussianBasis, diagonal_centres
+from ..rbf import AdaptiveWeights, GaussianBasis, diagonal_centres, fitting_network
 from .dynamic_surface import DynamicSurface
 
 __all__ = ["dynamic_surface_control"]
@@ -63,14 +62,7 @@ def dynamic_surface_control(
     surface = DynamicSurface() if surface is None else surface
     order = len(surface.c)
     basis = GaussianBasis(centres=diagonal_centres(27, order)) if basis is None else basis
-    regressor = as_system(basis, "basis")
-    nodes = sum(label.startswith("psi[") for label in regressor.output_labels)
-    weights = AdaptiveWeights(nodes=nodes) if weights is None else weights
-    if getattr(weights, "nodes", nodes) != nodes:
-        raise ParameterError(
-            f"dynamic_surface_control needs a weight for each output psi of its basis, got "
-            f"nodes={weights.nodes} for {nodes}"
-        )
+    regressor, weights = fitting_network("dynamic_surface_control", basis, weights, AdaptiveWeights)
     pieces = {"surface": surface, "basis": regressor, "weights": weights}
     pieces["law"] = ModelReferenceLaw() if law is None else law
     systems = [as_system(piece, key) for key, piece in pieces.items()]

@@ -7,7 +7,7 @@ import numpy as np
 from ...arguments import whole_number
 from ...equations import equation
 from ...params import param, record
-from ..rbf import network_output, weight_inputs, weight_names
+from ..rbf import NetworkWeights, network_output, regressor_names, weight_inputs
 
 __all__ = ["ConcurrentWeights", "HistoryStack"]
 
@@ -74,7 +74,7 @@ class HistoryStack:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names psi[0], ..., psi[l-1], x_n', u."""
-        return (*weight_inputs(self.nodes)[1:], self.derivative, "u")
+        return (*regressor_names(self.nodes), self.derivative, "u")
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -105,7 +105,7 @@ class HistoryStack:
 
 
 @record
-class ConcurrentWeights:
+class ConcurrentWeights(NetworkWeights):
     """Weights with concurrent learning: they converge without persistent excitation.
 
         W_hat' = Gamma (r psi + z - Omega W_hat),   W_psi = W_hat^T psi,   W_hat(0) = 0
@@ -119,24 +119,10 @@ class ConcurrentWeights:
     nodes: int = 6
     Gamma: float = param(5.0, unit="1", meaning="adaptation gain, Gamma I", above=0)
 
-    outputs = ("W_psi", "W_norm")
-    feedthrough = True
-    vector = True
-
-    def check(self) -> None:
-        """A network has nodes."""
-        nodes = whole_number("ConcurrentWeights", "nodes", self.nodes, at_least=1)
-        object.__setattr__(self, "nodes", nodes)
-
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names r, psi[0], ..., psi[l-1], z[0], ..., Omega[0,0], ..."""
         return (*weight_inputs(self.nodes), *sum_names(self.nodes))
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names W_hat[0], ..., W_hat[l-1]."""
-        return weight_names(self.nodes)
 
     @staticmethod
     @equation

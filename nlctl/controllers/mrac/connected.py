@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import control as ct
@@ -9,7 +10,7 @@ import control as ct
 from ...diagrams import as_system, interconnect
 from ...errors import ParameterError
 from ...plants import coordinate_names
-from ..rbf import AdaptiveWeights
+from ..rbf import AdaptiveWeights, fitting_network
 from .laws import ModelReferenceLaw
 from .model_error import ModelError
 from .reference_model import ReferenceModel, model_state_names
@@ -74,14 +75,10 @@ def mrac(
         raise ParameterError(
             f"mrac needs as many K as its model has a, got {gains} of K and {order} of a"
         )
-    regressor = as_system(LinearRegressor(order=order) if basis is None else basis, "basis")
-    nodes = sum(label.startswith("psi[") for label in regressor.output_labels)
-    weights = AdaptiveWeights(nodes=nodes, sigma_1=0.0) if weights is None else weights
-    if getattr(weights, "nodes", nodes) != nodes:
-        raise ParameterError(
-            f"mrac needs a weight for each output psi of its basis, got nodes={weights.nodes} "
-            f"for {nodes}"
-        )
+    basis = LinearRegressor(order=order) if basis is None else basis
+    regressor, weights = fitting_network(
+        "mrac", basis, weights, partial(AdaptiveWeights, sigma_1=0.0)
+    )
     pieces = {"model": model, "error": error, "basis": regressor, "weights": weights}
     pieces["law"] = ModelReferenceLaw() if law is None else law
     systems = [as_system(piece, key) for key, piece in pieces.items()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import control as ct
@@ -12,7 +13,9 @@ from ...equations import equation
 from ...errors import ParameterError
 from ...params import param, record
 from ...plants import coordinate_names
-from ..filtered_error import is_hurwitz
+from ..filtered_error import check_hurwitz
+from ..rbf import fitting_network
+from .laws import check_input_gain
 from .model_error import ModelError
 from .modified_weights import ProjectedWeights
 from .reference_model import model_state_names
@@ -42,13 +45,8 @@ class StatePredictor:
 
     def check(self) -> None:
         """The roots must lie in the open left half plane, and the input has an effect."""
-        if not is_hurwitz((1.0, *self.a[::-1])):
-            raise ParameterError(
-                "StatePredictor needs a Hurwitz polynomial s^n + a_n s^(n-1) + ... + a_1, "
-                f"got a {self.a}"
-            )
-        if self.gain == 0:
-            raise ParameterError("StatePredictor needs a gain other than 0, got 0.0")
+        check_hurwitz("StatePredictor", "a", self.a)
+        check_input_gain("StatePredictor", self.gain)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -88,8 +86,7 @@ class FilteredLaw:
 
     def check(self) -> None:
         """An input that has an effect."""
-        if self.gain == 0:
-            raise ParameterError("FilteredLaw needs a gain other than 0, got 0.0")
+        check_input_gain("FilteredLaw", self.gain)
 
     @staticmethod
     @equation
@@ -160,14 +157,10 @@ def l1_adaptive(
             f"l1_adaptive needs one gain of predictor and law, got {predictor.gain:g} and "
             f"{law.gain:g}"
         )
-    regressor = as_system(AffineRegressor(order=order) if basis is None else basis, "basis")
-    nodes = sum(label.startswith("psi[") for label in regressor.output_labels)
-    weights = ProjectedWeights(nodes=nodes, Gamma=1000.0) if weights is None else weights
-    if getattr(weights, "nodes", nodes) != nodes:
-        raise ParameterError(
-            f"l1_adaptive needs a weight for each output psi of its basis, got "
-            f"nodes={weights.nodes} for {nodes}"
-        )
+    basis = AffineRegressor(order=order) if basis is None else basis
+    regressor, weights = fitting_network(
+        "l1_adaptive", basis, weights, partial(ProjectedWeights, Gamma=1000.0)
+    )
     error = ModelError(K=predictor.a, Q=(1.0,) * order) if error is None else error
     pieces = {"predictor": predictor, "error": error, "basis": regressor, "weights": weights}
     systems = [as_system(piece, key) for key, piece in {**pieces, "law": law}.items()]

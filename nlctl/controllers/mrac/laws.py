@@ -9,6 +9,12 @@ from ...params import param, record
 __all__ = ["DirectLaw", "ModelReferenceLaw"]
 
 
+def check_input_gain(who: str, gain: float) -> None:
+    """Refuse an input without an effect."""
+    if gain == 0:
+        raise ParameterError(f"{who} needs a gain other than 0, got 0.0")
+
+
 @record
 class ModelReferenceLaw:
     """Control law for a matched uncertainty: the model's derivative, feedback, minus the network.
@@ -29,8 +35,7 @@ class ModelReferenceLaw:
 
     def check(self) -> None:
         """An input that has an effect."""
-        if self.gain == 0:
-            raise ParameterError("ModelReferenceLaw needs a gain other than 0, got 0.0")
+        check_input_gain("ModelReferenceLaw", self.gain)
 
     @staticmethod
     @equation

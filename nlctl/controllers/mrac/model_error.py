@@ -11,7 +11,7 @@ from ...equations import equation
 from ...errors import ParameterError
 from ...params import param, record
 from ...plants import coordinate_names
-from ..filtered_error import is_hurwitz
+from ..filtered_error import check_hurwitz
 from .reference_model import model_state_names
 
 __all__ = ["ModelError", "check_error_gains", "lyapunov_matrix", "seen_error"]
@@ -28,10 +28,7 @@ def check_error_gains(who: str, K: tuple[float, ...], Q: tuple[float, ...]) -> N
     """Refuse an entry of Q without a gain, and an error that does not decay."""
     if len(Q) != len(K):
         raise ParameterError(f"{who} needs as many Q as K, got {len(Q)} of Q and {len(K)} of K")
-    if not is_hurwitz((1.0, *K[::-1])):
-        raise ParameterError(
-            f"{who} needs a Hurwitz polynomial s^n + K_n s^(n-1) + ... + K_1, got K {K}"
-        )
+    check_hurwitz(who, "K", K)
 
 
 @equation

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arguments import whole_number
 from ...equations import equation
 from ...params import param, record
-from ..rbf import network_output, weight_inputs, weight_names
+from ..rbf import NetworkWeights
 
 __all__ = ["EModifiedWeights", "ProjectedWeights"]
 
 
 @record
-class EModifiedWeights:
+class EModifiedWeights(NetworkWeights):
     """Weights with e-modification: they are forgotten only while there is an error.
 
         W_hat' = Gamma (r psi - sigma |r| W_hat),   W_psi = W_hat^T psi,   W_hat(0) = 0
@@ -26,29 +25,7 @@ class EModifiedWeights:
     |W_hat| <= max |psi| / sigma they stay, whatever r is.
     """
 
-    nodes: int = 27
-    Gamma: float = param(0.5, unit="1", meaning="adaptation gain, Gamma I", above=0)
     sigma: float = param(0.5, unit="1", meaning="e-modification of W_hat", at_least=0)
-
-    outputs = ("W_psi", "W_norm")
-    feedthrough = True
-    vector = True
-    output = staticmethod(network_output)
-
-    def check(self) -> None:
-        """A network has nodes."""
-        nodes = whole_number("EModifiedWeights", "nodes", self.nodes, at_least=1)
-        object.__setattr__(self, "nodes", nodes)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names r, psi[0], ..., psi[l-1]."""
-        return weight_inputs(self.nodes)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names W_hat[0], ..., W_hat[l-1]."""
-        return weight_names(self.nodes)
 
     @staticmethod
     @equation
@@ -72,7 +49,7 @@ def boundary_function(W_hat, p):
 
 
 @record
-class ProjectedWeights:
+class ProjectedWeights(NetworkWeights):
     """Weights with smooth projection: they stay in the ball |W_hat| <= W_max.
 
         W_hat' = Gamma Proj(W_hat, r psi),   W_psi = W_hat^T psi,   W_hat(0) = 0
@@ -86,30 +63,8 @@ class ProjectedWeights:
     (W_hat - W*)^T (Proj(W_hat, y) - y) <= 0.
     """
 
-    nodes: int = 27
-    Gamma: float = param(0.5, unit="1", meaning="adaptation gain, Gamma I", above=0)
     W_max: float = param(4.0, unit="1", meaning="radius of the ball", above=0)
     width: float = param(0.1, unit="1", meaning="width of the layer, of W_max^2", above=0)
-
-    outputs = ("W_psi", "W_norm")
-    feedthrough = True
-    vector = True
-    output = staticmethod(network_output)
-
-    def check(self) -> None:
-        """A network has nodes."""
-        nodes = whole_number("ProjectedWeights", "nodes", self.nodes, at_least=1)
-        object.__setattr__(self, "nodes", nodes)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names r, psi[0], ..., psi[l-1]."""
-        return weight_inputs(self.nodes)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names W_hat[0], ..., W_hat[l-1]."""
-        return weight_names(self.nodes)
 
     @staticmethod
     @equation

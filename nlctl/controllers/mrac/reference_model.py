@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...equations import equation
-from ...errors import ParameterError
 from ...params import param, record
-from ..filtered_error import is_hurwitz
+from ..filtered_error import check_hurwitz
 
 __all__ = ["ReferenceModel", "model_state_names"]
 
@@ -15,6 +14,12 @@ __all__ = ["ReferenceModel", "model_state_names"]
 def model_state_names(order: int) -> tuple[str, ...]:
     """Return ("xm1", ..., "xmn")."""
     return tuple(f"xm{i}" for i in range(1, order + 1))
+
+
+@equation
+def model_rate(x, yd, p):
+    """What the model's last state does."""
+    return p.b * yd - np.sum(p.a * x)
 
 
 @record
@@ -38,11 +43,7 @@ class ReferenceModel:
 
     def check(self) -> None:
         """The roots must lie in the open left half plane."""
-        if not is_hurwitz((1.0, *self.a[::-1])):
-            raise ParameterError(
-                "ReferenceModel needs a Hurwitz polynomial s^n + a_n s^(n-1) + ... + a_1, "
-                f"got a {self.a}"
-            )
+        check_hurwitz("ReferenceModel", "a", self.a)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -58,10 +59,10 @@ class ReferenceModel:
     @equation
     def update(t, x, u, p):
         """The model in controller form."""
-        return np.append(x[1:], p.b * u[0] - np.sum(p.a * x))
+        return np.append(x[1:], model_rate(x, u[0], p))
 
     @staticmethod
     @equation
     def output(t, x, u, p):
         """Its state, and the derivative of the last one."""
-        return np.append(x, p.b * u[0] - np.sum(p.a * x))
+        return np.append(x, model_rate(x, u[0], p))

@@ -8,20 +8,14 @@ from ...arguments import whole_number
 from ...equations import equation
 from ...params import record
 from ...plants import coordinate_names, wing_rock_regressor
+from ..rbf import regressor_names
 
 __all__ = ["AffineRegressor", "LinearRegressor", "WingRockRegressor"]
 
 
-def regressor_names(nodes: int) -> tuple[str, ...]:
-    """Return ("psi[0]", ..., "psi[l-1]")."""
-    return tuple(f"psi[{i}]" for i in range(nodes))
-
-
 @record
-class AffineRegressor:
-    """Regressor of a linear plant with a constant disturbance: its states, and 1.
-
-        psi = (x_1, ..., x_n, 1)
+class _StateRegressor:
+    """What regressors of the states and one more signal share.
 
     Parameters
     ----------
@@ -37,7 +31,7 @@ class AffineRegressor:
 
     def check(self) -> None:
         """An order."""
-        order = whole_number("AffineRegressor", "an order", self.order, at_least=1)
+        order = whole_number(type(self).__name__, "an order", self.order, at_least=1)
         object.__setattr__(self, "order", order)
 
     @property
@@ -50,6 +44,19 @@ class AffineRegressor:
         """Names psi[0], ..., psi[n]."""
         return regressor_names(self.order + 1)
 
+
+@record
+class AffineRegressor(_StateRegressor):
+    """Regressor of a linear plant with a constant disturbance: its states, and 1.
+
+        psi = (x_1, ..., x_n, 1)
+
+    Parameters
+    ----------
+    order : int, optional
+        Order n >= 1 of the plant.
+    """
+
     @staticmethod
     @equation
     def output(t, x, u, p):
@@ -58,7 +65,7 @@ class AffineRegressor:
 
 
 @record
-class LinearRegressor:
+class LinearRegressor(_StateRegressor):
     """Regressor of direct MRAC of a linear plant: its states and the command.
 
         psi = (x_1, ..., x_n, yd)
@@ -69,26 +76,10 @@ class LinearRegressor:
         Order n >= 1 of the plant.
     """
 
-    order: int = 1
-
-    states = ()
-    feedthrough = True
-    vector = True
-
-    def check(self) -> None:
-        """An order."""
-        order = whole_number("LinearRegressor", "an order", self.order, at_least=1)
-        object.__setattr__(self, "order", order)
-
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names x1, ..., xn, yd."""
         return (*coordinate_names(self.order), "yd")
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names psi[0], ..., psi[n]."""
-        return regressor_names(self.order + 1)
 
     @staticmethod
     @equation
