@@ -13,9 +13,11 @@ import numpy as np
 
 from .control import choose_method, choose_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
-from .events import AGAIN, CLEAR, EVENT, REFUSED, locate, step_accepted
-from .excursions import look_before, look_between
-from .methods import explicit, rodas5p
+from .events.excursions import look_between
+from .events.location import AGAIN, CLEAR, EVENT, REFUSED, locate, step_accepted
+from .events.near_side import look_before
+from .methods import explicit
+from .methods.dense import solution_at
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
 from .samples import begin_afresh, next_stop, take_samples
@@ -34,10 +36,8 @@ def _sample(lane, j, task, t_new, w):
         if theta >= 1.0:
             for i in range(x.shape[0]):
                 target[i, j] = x_new[i, j]  # exactly the solution, not its interpolant
-        elif lane.stiff:
-            rodas5p.interpolate(theta, x, x_new, w.U, target)
         else:
-            explicit.interpolate(theta, lane.step, x, w.k, task.B, j, target)
+            solution_at(theta, task, lane, w, j, target)
 
 
 @numba.njit(**INNER)

@@ -26,6 +26,16 @@ def of_state(t, x, u, params):
     return [params["A"] * np.sin(params["w"] * x[0])]
 
 
+def zone_and_integral():
+    """Return a dead zone with the slope 1 on the right, and an integrator behind it."""
+    zone = nlctl.DeadZone(slope_r=1.0, slope_l=1.0, ripple_r=0.0, ripple_l=0.0, b_l=-100.0)
+    sink = ct.nlsys(
+        lambda t, x, u, p: [u[0]], lambda t, x, u, p: x, inputs=["v"], outputs=["area"],
+        states=1, name="sink",
+    )  # fmt: skip
+    return nlctl.block(zone, "zone"), sink
+
+
 @functools.cache
 def compiled(driven):
     """Return a dead zone behind a sine of time or of a clock, and an integrator behind it."""
@@ -34,12 +44,7 @@ def compiled(driven):
         source = ct.nlsys(None, of_time, **given)
     else:
         source = ct.nlsys(lambda t, x, u, p: [1.0], of_state, states=1, **given)
-    zone = nlctl.DeadZone(slope_r=1.0, slope_l=1.0, ripple_r=0.0, ripple_l=0.0, b_l=-100.0)
-    sink = ct.nlsys(
-        lambda t, x, u, p: [u[0]], lambda t, x, u, p: x, inputs=["v"], outputs=["area"],
-        states=1, name="sink",
-    )  # fmt: skip
-    blocks = [source, nlctl.block(zone, "zone"), sink]
+    blocks = [source, *zone_and_integral()]
     return nlctl.compile(nlctl.interconnect(blocks, outputs=["area"], name="rig"))
 
 
@@ -129,14 +134,9 @@ def wave(t, x, u, params):
 def beside_a_play():
     """Return a dead zone with an integrator and a play, all behind the same wave."""
     given = {"params": {"A": 1.0, "w": 1.0, "c": 0.0}, "inputs": 0, "outputs": ["u"]}
-    zone = nlctl.DeadZone(slope_r=1.0, slope_l=1.0, ripple_r=0.0, ripple_l=0.0, b_l=-100.0)
-    sink = ct.nlsys(
-        lambda t, x, u, p: [u[0]], lambda t, x, u, p: x, inputs=["v"], outputs=["area"],
-        states=1, name="sink",
-    )  # fmt: skip
     play = nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.5, c_l=-0.5)
     loop = ct.interconnect(
-        [ct.nlsys(None, wave, name="wave", **given), nlctl.block(zone, "zone"), sink,
+        [ct.nlsys(None, wave, name="wave", **given), *zone_and_integral(),
          nlctl.block(play, "play")],
         connections=[["zone.u", "wave.u"], ["sink.v", "zone.v"], ["play.u", "wave.u"]],
         inplist=[], outlist=["sink.area", "play.v"], outputs=["area", "v"], name="beside",

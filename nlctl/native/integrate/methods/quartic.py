@@ -75,13 +75,22 @@ def least_value(n, at, slope):
     k = min(max(where, 1), _POINTS - 1)
     low, middle, high = _node(k - 1), _node(k), _node(k + 1)
     y = _either(n, at, middle, slope)
-    left = (y - _either(n, at, low, slope)) / (middle - low)
-    right = (_either(n, at, high, slope) - y) / (high - middle)
-    bend = (right - left) / (high - low)
-    tilt = left + bend * (middle - low)
+    below, above = _either(n, at, low, slope), _either(n, at, high, slope)
+    tilt, bend = parabola(low, middle, high, below, y, above)
     if bend > 0.0 and low < middle - 0.5 * tilt / bend < high:
         return y - 0.25 * tilt * tilt / bend, middle - 0.5 * tilt / bend
     return least, _node(where)
+
+
+@numba.njit(**INNER)
+def parabola(low, middle, high, below, least, above):
+    """Return the slope at the middle of three places, and the bend, of the parabola through them.
+
+    It is least + slope (x - middle) + bend (x - middle)^2.
+    """
+    left, right = (least - below) / (middle - low), (above - least) / (high - middle)
+    bend = (right - left) / (high - low)
+    return left + bend * (middle - low), bend
 
 
 @numba.njit(**INNER)

@@ -17,12 +17,12 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .control import shorten
-from .events import AGAIN, EVENT, STARTS_BEHIND
-from .methods import explicit, rodas5p
-from .methods.quartic import doubt, least_value, quartic, slope_at
-from .state import INNER
-from .workspace import evaluate
+from ..control import shorten
+from ..methods.dense import events_at_parts
+from ..methods.quartic import doubt, least_value, parabola, quartic, slope_at
+from ..restart import AHEAD
+from ..state import INNER
+from .location import AGAIN, STARTS_BEHIND
 
 _CLEAR, _SUSPECT, _UNRESOLVED = 0, 1, 2  # what is known of an event function in a step
 _SHORTER = 0.3  # part of a step to be tried where its event functions cannot be followed
@@ -30,7 +30,6 @@ _FAR = 20.0  # in ranges: what is so far from 0 may grow before it is followed
 _FOLLOWED = 0.2  # of the range: what the polynomial may be wrong by at most
 _FLAT = 8.0  # in doubts: a slope at an end that may as well have the other sign
 _DENSE = 2  # the row of task.inside that is no method's stages
-_PART = 1e-4  # of a step, over which the rate of a memory is taken
 _NARROW = 1e-6  # part of a step: a minimum is not below what is so near by more than its square
 _TOUCHING = 0.01  # the same at a start on the corner, where a memory has turned
 _TRIES = 24  # looks at one function in one step
@@ -56,7 +55,7 @@ def look_between(rhs, task, lanes, w, found):
     for n in range(3):
         for j in range(lanes.size):
             w.part[j] = task.inside[_DENSE, n] if wanted[j] else 0.0
-        _inside(rhs, task, lanes, w, w.g_ahead)
+        events_at_parts(rhs, task, lanes, w, w.g_ahead)
         for i in range(w.g.shape[0]):
             for j in range(lanes.size):
                 w.g_inside[n, i, j] = w.g_ahead[i, j]
@@ -73,79 +72,6 @@ def look_between(rhs, task, lanes, w, found):
             if w.sought[j] >= 0:
                 _narrow(task, lanes[j], w, found, j)
             seeking |= w.sought[j] >= 0
-
-
-@numba.njit(**INNER)
-def look_before(rhs, task, lanes, w, found):
-    """Make memories in w.g what they are just before the corner at which a step ends.
-
-    Behind it, what carries a memory along may have jumped back: it keeps what it was before.
-    """
-    wanted, any_wanted, nearer = w.wanted, False, w.g_inside[3]
-    back = 2.5 * min(10.0 * task.rtol, 1e-4)  # see `locate`: the corner is not so far back
-    for j in range(lanes.size):
-        wanted[j] = found[j] == EVENT and _crosses(task, w, w.e, j)
-        any_wanted |= wanted[j]
-    if not any_wanted:
-        return
-    for j in range(lanes.size):
-        w.part[j] = 1.0 - back
-    _inside(rhs, task, lanes, w, nearer)
-    any_far = False
-    for j in range(lanes.size):
-        w.part[j] = 1.0 - 2.0 * back
-        w.sought[j] = 1 if wanted[j] and _crosses(task, w, nearer, j) else -1
-        any_far |= w.sought[j] > 0
-    if any_far:
-        _halve(rhs, task, lanes, w, back)
-    _inside(rhs, task, lanes, w, w.g_ahead)
-    for j in range(lanes.size):
-        far = w.sought[j] > 0
-        ahead = 0.0 if far else 1.0 + _until_corner(task, w, nearer, j)
-        for i in range(task.corners, w.g.shape[0]):
-            if wanted[j] and w.e_start[i, j] != 0.0:
-                change = 0.0 if far else nearer[i, j] - w.g_ahead[i, j]
-                w.g[i, j] = w.g_ahead[i, j] + ahead * change
-
-
-@numba.njit(**INNER)
-def _halve(rhs, task, lanes, w, back):
-    """Set w.part right before the first corner of the lanes that are sought.
-
-    Where a memory turns at the corner at which its input jumps, a step ends farther behind.
-    """
-    for j in range(lanes.size):
-        if w.sought[j] > 0:
-            w.bracket[0, j], w.bracket[2, j] = lanes[j].low / lanes[j].step, 1.0 - back
-            w.part[j] = 0.5 * (w.bracket[0, j] + w.bracket[2, j])
-    for _ in range(_TRIES):
-        _inside(rhs, task, lanes, w, w.g_ahead)
-        for j in range(lanes.size):
-            if w.sought[j] > 0:
-                w.bracket[2 if _crosses(task, w, w.g_ahead, j) else 0, j] = w.part[j]
-                w.part[j] = 0.5 * (w.bracket[0, j] + w.bracket[2, j])
-    for j in range(lanes.size):
-        if w.sought[j] > 0:
-            w.part[j] = w.bracket[0, j]
-
-
-@numba.njit(**INNER)
-def _until_corner(task, w, nearer, j):
-    """Return how far it is to the first corner, in distances between the last two looks."""
-    first = np.inf
-    for i in range(task.corners):
-        if w.e_start[i, j] * w.e[i, j] < 0.0:
-            first = min(first, nearer[i, j] / (w.g_ahead[i, j] - nearer[i, j]))
-    return min(max(first, 0.0), 1.0)
-
-
-@numba.njit(**INNER)
-def _crosses(task, w, e, j):
-    """Whether a switching function has another sign than at the start of a step."""
-    for i in range(task.corners):  # noqa: SIM110 (no generators in machine code)
-        if w.e_start[i, j] * e[i, j] < 0.0:
-            return True
-    return False
 
 
 @numba.njit(**INNER)
@@ -384,10 +310,7 @@ def _aim(w, j):
         w.bracket[2 - end, j], w.height[2 - end, j] = middle, least
         w.bracket[1, j] = -1.0
         return
-    left, right = (least - below) / (middle - low), (above - least) / (high - middle)
-    bend = (right - left) / (high - low)
-    # the slope at the middle, of the parabola
-    slope = left + bend * (middle - low)
+    slope, bend = parabola(low, middle, high, below, least, above)
     move = -0.5 * slope / bend if bend > 0.0 else 0.0
     rest = 1e-3 * (high - low)
     if abs(move) < rest:
@@ -406,13 +329,13 @@ def _evaluated(rhs, task, lanes, w):
             w.part[j] = 0.0
         carried |= w.sought[j] >= task.corners
     scratch = w.g_inside[3]
-    _inside(rhs, task, lanes, w, scratch)
+    events_at_parts(rhs, task, lanes, w, scratch)
     if carried:
         for j in range(lanes.size):
-            w.part[j] += _PART
-        _inside(rhs, task, lanes, w, w.g_ahead)
+            w.part[j] += AHEAD
+        events_at_parts(rhs, task, lanes, w, w.g_ahead)
         for j in range(lanes.size):
-            w.part[j] -= _PART
+            w.part[j] -= AHEAD
     for j in range(lanes.size):
         i = w.sought[j]
         if i < 0:
@@ -420,17 +343,5 @@ def _evaluated(rhs, task, lanes, w):
         sign, offset = _side(task, lanes[j], w, i, j)
         event = scratch[i, j]
         if i >= task.corners:
-            event = (w.g_ahead[i, j] - event) / _PART
+            event = (w.g_ahead[i, j] - event) / AHEAD
         w.looked[j] = sign * event + offset
-
-
-@numba.njit(**INNER)
-def _inside(rhs, task, lanes, w, g):
-    """Fill `g` with switching functions and memories at w.part of the step just tried."""
-    for j in range(lanes.size):
-        w.t[j] = lanes[j].t + w.part[j] * lanes[j].step
-        if lanes[j].stiff:
-            rodas5p.interpolate(w.part[j], w.x, w.x_new, w.U, w.x_ahead)
-        else:
-            explicit.interpolate(w.part[j], lanes[j].step, w.x, w.k, task.B, j, w.x_ahead)
-    evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, g)

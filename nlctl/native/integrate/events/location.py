@@ -13,7 +13,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .state import INNER
+from ..state import INNER
 
 STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
 REFUSED, AGAIN, CLEAR, EVENT = -1, 0, 1, 2  # what became of the step just tried
