@@ -17,7 +17,6 @@ from numba.core import config
 from plain_plan import by_blocks
 
 import nlctl
-from nlctl import controllers
 from nlctl.native import CompileError
 from nlctl.native.codegen.lower import lower
 from nlctl.native.compiled import compile as compile_diagram
@@ -301,21 +300,24 @@ def test_a_thousand_nodes_stay_a_loop():
 
 def blocks():
     """Every record of nlctl that is a block as it stands."""
-    modules = [f"nlctl.controllers.{m.name}" for m in pkgutil.iter_modules(controllers.__path__)]
-    for name in ("nlctl.plants", "nlctl.actuators", "nlctl.references", *modules):
+    rooms = (nlctl.actuators, nlctl.controllers, nlctl.faults)
+    inside = [m.name for r in rooms for m in pkgutil.walk_packages(r.__path__, f"{r.__name__}.")]
+    for name in ("nlctl.plants", "nlctl.references", *inside):
         for thing in vars(importlib.import_module(name)).values():
             if dataclasses.is_dataclass(thing) and getattr(thing, "__module__", "") == name:
                 missing = dataclasses.MISSING
                 defaults = [(f.default, f.default_factory) for f in dataclasses.fields(thing)]
-                if (missing, missing) not in defaults and hasattr(thing, "inputs"):
+                parts = ("inputs", "update") if hasattr(thing, "states") else ("inputs",)
+                if (missing, missing) not in defaults and all(hasattr(thing, p) for p in parts):
                     yield thing
 
 
 @pytest.mark.parametrize("record", list(blocks()), ids=lambda record: record.__name__)
 def test_nlctls_blocks_are_traced(record):
     """Each of them, unmodified, with nothing left to be called."""
+    dt = 0.1 if getattr(record, "discrete", False) else None
     for lanes in (1, 2):
-        assert not check(nlctl.block(record(), "block"), lanes).opaque
+        assert not check(nlctl.block(record(), "block", dt=dt), lanes).opaque
 
 
 def integer_arrays(t, x, u, params):
