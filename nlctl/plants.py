@@ -189,6 +189,14 @@ class ForcedDuffing:
 
     with h(x, v) = (1 + 0.1 cos x1)(1 + 0.2 cos v) v, d = 0.1 (x1^2 + x2^2) sin t,
     q = 5 + 0.1 cos t, p = 0.2 + 0.2 cos(5 x1), w = 0.5 + 0.1 sin t, p1 = -0.2, x(0) = (0.5, 0).
+
+    Examples
+    --------
+    At rest in the origin only the forcing q cos(w t) drives it, q = 5.1 at t = 0:
+
+    >>> plant = nlctl.block(nlctl.ForcedDuffing(), "plant")
+    >>> print(plant.dynamics(0, [0.0, 0.0], [0.0]).round(9))
+    [0.  5.1]
     """
 
     p1: float = param(-0.2, unit="1/s^2", meaning="linear stiffness")
@@ -250,6 +258,12 @@ class Genesio:
 
     with h(x, v) = (2 + cos x1)(1 + 0.2 sin^2 v) v, d = sin(0.1 t), a = 1.6, b = 3, c = 6,
     x(0) = (1, 0, 0).
+
+    Examples
+    --------
+    >>> plant = nlctl.block(nlctl.Genesio(), "plant")
+    >>> print(plant.dynamics(0, [1.0, 0.0, 0.0], [0.0]))  # -c x1 + x1^2
+    [ 0.  0. -5.]
     """
 
     a: float = param(1.6, unit="1/s", meaning="coefficient of x3")
@@ -314,6 +328,14 @@ class WingRock:
     The benchmark of Chowdhary and Johnson (49th IEEE CDC, 2010, p. 3674), with the numbers of
     MathWorks' example "Model Reference Adaptive Control of Aircraft Undergoing Wing Rock".  The
     output x2_dot is the roll acceleration.
+
+    Examples
+    --------
+    The wing's bias alone, and with ailerons that half cancel it:
+
+    >>> wing = nlctl.block(nlctl.WingRock(), "wing")
+    >>> [float(wing.dynamics(0, [0.0, 0.0], [v])[1].round(9)) for v in (0.0, -0.4 / 3)]
+    [0.8, 0.4]
     """
 
     w: tuple[float, ...] = param(

@@ -42,6 +42,14 @@ class SumOfSines:
     ----------
     order : int, optional
         Number n >= 0 of derivatives that are outputs.
+
+    Examples
+    --------
+    The paper's reference at t = 0, with two derivatives:
+
+    >>> reference = nlctl.block(nlctl.SumOfSines(order=2), "reference")
+    >>> print(reference.output(0, [], []).round(9))
+    [0.   0.75 0.  ]
     """
 
     order: int = 2
@@ -97,6 +105,16 @@ class FilteredStep:
     ----------
     order : int, optional
         Number n >= 0 of derivatives that are outputs.
+
+    Examples
+    --------
+    A filter of order 1 with omega = 2 rad/s:
+
+    >>> import numpy as np
+    >>> reference = nlctl.block(nlctl.FilteredStep(order=0, omega=2.0), "reference")
+    >>> response = nlctl.input_output_response(reference, np.array([0.0, 0.5]))
+    >>> print(round(response.outputs[0, -1], 6), round(1 - np.exp(-1), 6))
+    0.632121 0.632121
     """
 
     order: int = 2
@@ -207,6 +225,15 @@ class BandLimitedNoise:
     ----------
     takes, delivers : tuple of str
         Names of the signals before and after, pairwise.
+
+    Examples
+    --------
+    The same function of time in every run; nothing of it depends on a step size:
+
+    >>> sensor = nlctl.block(nlctl.BandLimitedNoise(takes=("y",), delivers=("ym",)), "sensor")
+    >>> once, again = sensor.output(0.3, [], [1.0]), sensor.output(0.3, [], [1.0])
+    >>> print(bool(once == again), bool(0 < abs(once[0] - 1.0) < 0.1))
+    True True
     """
 
     takes: tuple[str, ...] = ("x1", "x2")

@@ -62,6 +62,17 @@ class Backlash:
     ----------
     v0 : float, optional
         Memory v(0-) at the start: the initial value of the state ``memory``.
+
+    Examples
+    --------
+    Its output follows u half a gap behind, and holds where u reverses:
+
+    >>> import numpy as np
+    >>> gap = nlctl.block(nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.5, c_l=-0.5), "actuator")
+    >>> times = np.array([0.0, 1.0, 1.5, 2.0])
+    >>> response = nlctl.input_output_response(gap, times, [0.0, 2.0, 1.2, 0.0])
+    >>> print(response.outputs.round(6))
+    [0.  1.5 1.5 0.5]
     """
 
     m_r: float = param(1.2, unit="1", meaning="slope of the right (rising) side", above=0)

@@ -29,6 +29,16 @@ class RateLimiter:
     ----------
     v0 : float, optional
         Output at the start.
+
+    Examples
+    --------
+    A unit step is followed at 2 1/s, so it takes half a second:
+
+    >>> import numpy as np
+    >>> limiter = nlctl.block(nlctl.RateLimiter(rise=2.0), "actuator")
+    >>> response = nlctl.input_output_response(limiter, np.array([0.0, 0.25]), 1.0)
+    >>> print(round(response.outputs[-1], 6))
+    0.5
     """
 
     rise: float = param(1.0, unit="1/s", meaning="greatest v'", above=0)
@@ -85,6 +95,16 @@ class Lag:
     ----------
     v0 : float, optional
         Output at the start.
+
+    Examples
+    --------
+    After one time constant 1 - 1/e of a step is there:
+
+    >>> import numpy as np
+    >>> lag = nlctl.block(nlctl.Lag(T=0.05), "actuator")
+    >>> response = nlctl.input_output_response(lag, np.array([0.0, 0.05]), 1.0)
+    >>> print(round(response.outputs[-1], 6), round(1 - np.exp(-1), 6))
+    0.632121 0.632121
     """
 
     k: float = param(1.0, unit="1", meaning="gain")
@@ -134,6 +154,17 @@ class SecondOrderLag:
     ----------
     v0 : float, optional
         Output at the start; it starts at rest.
+
+    Examples
+    --------
+    A step overshoots by exp(-pi zeta / sqrt(1 - zeta^2)), half a damped period after it:
+
+    >>> import numpy as np
+    >>> lag = nlctl.block(nlctl.SecondOrderLag(omega=20.0, zeta=0.6), "actuator")
+    >>> top = np.pi / (20.0 * np.sqrt(1 - 0.6**2))
+    >>> response = nlctl.input_output_response(lag, np.array([0.0, top]), 1.0)
+    >>> print(round(response.outputs[-1], 5), round(1 + np.exp(-np.pi * 0.6 / 0.8), 5))
+    1.09478 1.09478
     """
 
     k: float = param(1.0, unit="1", meaning="gain")

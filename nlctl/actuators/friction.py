@@ -43,6 +43,12 @@ class Coulomb:
     A force law for velocities that keep their sign, or change it.  It does not hold a mass at
     rest: there the sign chatters, and a run ends at the limit of its steps; `StickSlip` and `LuGre`
     stick.
+
+    Examples
+    --------
+    >>> friction = nlctl.block(nlctl.Coulomb(F_c=1.0, sigma_2=0.5), "friction")
+    >>> [float(friction.output(0, [], [velocity])[0]) for velocity in (-2.0, 0.0, 2.0)]
+    [-2.0, 0.0, 2.0]
     """
 
     F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
@@ -77,6 +83,14 @@ class Stribeck:
 
     (Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30, 1994, p. 1083.)  With F_s = F_c it
     is `Coulomb`; it does not hold a mass at rest either.
+
+    Examples
+    --------
+    Just behind rest it is F_s, far from it F_c and the viscous part:
+
+    >>> friction = nlctl.block(nlctl.Stribeck(F_c=1.0, F_s=1.5, sigma_2=0.5), "friction")
+    >>> [round(float(friction.output(0, [], [velocity])[0]), 6) for velocity in (1e-9, 2.0)]
+    [1.5, 2.0]
     """
 
     F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
@@ -138,6 +152,14 @@ class StickSlip:
     ----------
     v0 : float, optional
         Mode at the start, 0, 1 or -1: the initial value of the state ``mode``.
+
+    Examples
+    --------
+    At rest it takes up what is applied, up to F_s:
+
+    >>> friction = nlctl.block(nlctl.StickSlip(F_c=1.0, F_s=1.5), "friction")
+    >>> [float(friction.output(0, [0.0], [0.0, applied])[0]) for applied in (0.7, -1.4, 1.6)]
+    [0.7, -1.4, 1.0]
     """
 
     F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
@@ -207,6 +229,16 @@ class Dahl:
     that is d force / d position = sigma_0 (1 - sign(velocity) force / F_c) (Dahl, AIAA Journal 14,
     1976, p. 1675, with the exponent 1).  |force| <= F_c if it is so at the start.  The force is a
     function of the path alone: it is rate-independent.
+
+    Examples
+    --------
+    Along a path in one direction the force tends to F_c as 1 - exp(-sigma_0 x / F_c):
+
+    >>> import numpy as np
+    >>> friction = nlctl.block(nlctl.Dahl(sigma_0=2.0, F_c=1.0), "friction")
+    >>> response = nlctl.input_output_response(friction, np.array([0.0, 1.0]), 1.0)
+    >>> print(round(response.outputs[-1], 6), round(1 - np.exp(-2), 6))
+    0.864665 0.864665
     """
 
     sigma_0: float = param(1e5, unit="N/m", meaning="stiffness before sliding", above=0)
@@ -251,6 +283,17 @@ class LuGre:
     (Canudas de Wit, Olsson, Åström, Lischinsky, IEEE Transactions on Automatic Control 40, 1995,
     p. 419; defaults from their table 1.)  |z| <= F_s / sigma_0 if it is so at the start.  At a
     constant velocity the force tends to that of `Stribeck`.
+
+    Examples
+    --------
+    At a constant velocity the force tends to that of `Stribeck`:
+
+    >>> import numpy as np
+    >>> friction = nlctl.block(nlctl.LuGre(), "friction")
+    >>> response = nlctl.input_output_response(friction, np.array([0.0, 0.1]), 0.01)
+    >>> steady = nlctl.block(nlctl.Stribeck(), "steady").output(0, [], [0.01])
+    >>> print(round(response.outputs[-1], 6), steady.round(6))
+    1.004 [1.004]
     """
 
     sigma_0: float = param(1e5, unit="N/m", meaning="stiffness of the bristles", above=0)
@@ -310,6 +353,17 @@ class BoucWen:
     If gamma + delta > 0 and gamma >= delta, |z| <= (alpha / (beta (gamma + delta)))^(1 / nu) if it
     is so at the start (Ikhouane, Rodellar, Systems with Hysteresis, 2007, chapter 2).  With the
     benchmark's values gamma + delta < 0: along a path in one direction z grows without bound.
+
+    Examples
+    --------
+    Where gamma + delta > 0 the force tends to a bound:
+
+    >>> import numpy as np
+    >>> record = nlctl.BoucWen(alpha=2.0, beta=1.0, gamma=0.5, delta=0.5)
+    >>> force = nlctl.block(record, "spring")
+    >>> response = nlctl.input_output_response(force, np.array([0.0, 1.0]), 1.0)
+    >>> print(record.z_max, round(response.outputs[-1], 6), round(2 * (1 - np.exp(-1)), 6))
+    2.0 1.264241 1.264241
     """
 
     alpha: float = param(5e4, unit="N/m", meaning="stiffness at z = 0", above=0)

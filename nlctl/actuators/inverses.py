@@ -39,6 +39,13 @@ class DeadZoneInverse:
     these parameters and without ripple has the output u.  The inverse jumps at u = 0.
 
     It obeys (2) with k between 1 / slope_r and 1 / slope_l and eps_u between b_l and b_r.
+
+    Examples
+    --------
+    >>> inverse, zone = nlctl.DeadZoneInverse(), nlctl.DeadZone(ripple_r=0, ripple_l=0)
+    >>> both = nlctl.actuators.cascade({"inverse": inverse, "zone": zone})
+    >>> [round(float(both.output(0, [], [u])[0]), 6) for u in (-0.4, 0.0, 0.7)]
+    [-0.4, 0.0, 0.7]
     """
 
     slope_r: float = param(1.0, unit="1", meaning="slope on the right of the dead zone", above=0)
@@ -109,6 +116,14 @@ class BacklashInverse:
     ----------
     v0 : float, optional
         Side s(0-) at the start, 1 or -1: the initial value of the state ``side``.
+
+    Examples
+    --------
+    It jumps across the gap where its input reverses:
+
+    >>> inverse = nlctl.block(nlctl.BacklashInverse(m_r=1.0, m_l=1.0, c_r=0.5, c_l=-0.6), "inverse")
+    >>> [float(inverse.output(0, [1.0], [2.0, rate])[0]) for rate in (1.0, -1.0)]
+    [2.5, 1.4]
     """
 
     m_r: float = param(1.2, unit="1", meaning="slope of the right (rising) side", above=0)
@@ -188,6 +203,13 @@ class PrandtlIshlinskiiInverse:
     ----------
     v0 : float or tuple of float, optional
         Memories of the operator at the start: one for all, or one each.
+
+    Examples
+    --------
+    >>> operator, inverse = nlctl.PrandtlIshlinskii(), nlctl.PrandtlIshlinskiiInverse()
+    >>> both = nlctl.actuators.cascade({"inverse": inverse, "operator": operator})
+    >>> [round(float(both.output(0, [0.0] * 8, [u])[0]), 6) for u in (-0.4, 0.1, 0.7)]
+    [-0.4, 0.1, 0.7]
     """
 
     w_0: float = param(0.6, unit="1", meaning="weight of u in the operator", above=0)

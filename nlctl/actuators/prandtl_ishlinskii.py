@@ -60,6 +60,14 @@ class Stop:
     v0 : float, optional
         Memory w(0-) of the play at the start, the initial value of the state ``memory``.  The
         output lies in [-r, r] from the first instant, whatever it is.
+
+    Examples
+    --------
+    The play that it completes stays behind u by r, so that the stop stays at r:
+
+    >>> stop = nlctl.block(nlctl.Stop(r=1.0), "stop")
+    >>> [float(stop.output(0, [0.0], [u])[0]) for u in (0.4, 3.0, -3.0)]
+    [0.4, 1.0, -1.0]
     """
 
     r: float = param(1.0, unit="1", meaning="largest |v|, half gap of the play", above=0)
@@ -151,6 +159,15 @@ class PrandtlIshlinskii:
     ----------
     v0 : float or tuple of float, optional
         Memories H_i(0-) at the start: one for all, or one each.
+
+    Examples
+    --------
+    One play of half gap 0.4 with weight 0.5, beside u itself:
+
+    >>> record = nlctl.PrandtlIshlinskii(w_0=1.0, w=(0.5,), r=(0.4,))
+    >>> hysteresis = nlctl.block(record, "actuator")
+    >>> [round(float(hysteresis.output(0, [0.0], [u])[0]), 6) for u in (0.3, 1.0)]
+    [0.3, 1.3]
     """
 
     w_0: float = param(0.6, unit="1", meaning="weight of u itself", above=0)
@@ -234,6 +251,15 @@ class OneSidedDeadZones:
 
     It obeys (2): v / u tends to the outer slopes, and k lies between the least and the greatest
     slope.  There eps_u = 0, since v(0) = 0.
+
+    Examples
+    --------
+    Slopes 1 between the thresholds, 0.5 beyond 1 on the right, 2 beyond -1 on the left:
+
+    >>> record = nlctl.OneSidedDeadZones(w_0=1.0, w=(1.0, -0.5), r=(-1.0, 1.0))
+    >>> shape = nlctl.block(record, "actuator")
+    >>> [float(shape.output(0, [], [u])[0]) for u in (-2.0, 0.5, 3.0)]
+    [-3.0, 0.5, 2.0]
     """
 
     w_0: float = param(1.0, unit="1", meaning="slope at u = 0", above=0)

@@ -24,6 +24,12 @@ class Quantiser:
     unless one step passes an even number of them, which the error control of what v drives sees.
     Around a loop in continuous time it may chatter along a jump; the run then ends as
     `CHATTERING`, and says where.
+
+    Examples
+    --------
+    >>> steps = nlctl.block(nlctl.Quantiser(q=0.5), "actuator")
+    >>> [float(steps.output(0, [], [u])[0]) for u in (0.2, 0.3, -1.1)]
+    [0.0, 0.5, -1.0]
     """
 
     q: float = param(0.1, unit="1", meaning="step", above=0)

@@ -65,6 +65,14 @@ class Relay:
     ----------
     v0 : float, optional
         Side s(0-) at the start, 1 or -1: the initial value of the state ``side``.
+
+    Examples
+    --------
+    >>> relay = nlctl.block(nlctl.Relay(on=1.0, off=-1.0), "relay")
+    >>> [float(relay.output(0, [side], [0.5])[0]) for side in (-1.0, 1.0)]
+    [-1.0, 1.0]
+    >>> print(relay.output(0, [-1.0], [1.0]))
+    [1.]
     """
 
     on: float = param(1.0, unit="1", meaning="input from which the relay is on")
@@ -172,6 +180,15 @@ class Preisach:
     ----------
     v0 : float or tuple of float, optional
         Sides s_k(0-) at the start, 1 or -1: one for all, or one each.
+
+    Examples
+    --------
+    Two relays of half weight, which turn on at 0.5 and 1:
+
+    >>> record = nlctl.Preisach(alpha=(0.5, 1.0), beta=(-0.5, -1.0), w=(0.5, 0.5))
+    >>> hysteresis = nlctl.block(record, "actuator")
+    >>> [float(hysteresis.output(0, [-1.0, -1.0], [u])[0]) for u in (0.0, 0.6, 1.1)]
+    [-1.0, 0.0, 1.0]
     """
 
     alpha: tuple[float, ...] = param(_GRID[0], unit="1", meaning="inputs from which relays are on")

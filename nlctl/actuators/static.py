@@ -18,9 +18,17 @@ BOUNDED_OUTPUT = "its output is bounded for all u, so that no k >= k_1 > 0 keeps
 class DeadZone:
     """Asymmetric dead zone with slopes that depend on the input (Lv et al. 2017, Example 1).
 
-    v = (1 + 0.3 sin u) (u - b_r)      u >= b_r
-        0                              b_l < u < b_r
-        (0.8 + 0.2 cos u) (u - b_l)    u <= b_l
+        v = (1 + 0.3 sin u) (u - b_r)      u >= b_r
+            0                              b_l < u < b_r
+            (0.8 + 0.2 cos u) (u - b_l)    u <= b_l
+
+    Examples
+    --------
+    With constant slopes, left of the gap, inside, and right of it:
+
+    >>> zone = nlctl.block(nlctl.DeadZone(ripple_r=0, ripple_l=0), "actuator")
+    >>> [float(zone.output(0, [], [u])[0]) for u in (-1.3, 0.2, 1.5)]
+    [-0.8, 0.0, 1.0]
     """
 
     slope_r: float = param(1.0, unit="1", meaning="mean slope on the right", above=0)
@@ -68,10 +76,16 @@ class DeadZone:
 class Gain:
     """Linear actuator.
 
-    v = k u
+        v = k u
 
     It obeys (2) where k > 0.  With k = -1 behind another actuator the sign of the input gain is
     reversed.
+
+    Examples
+    --------
+    >>> reversed_sign = nlctl.block(nlctl.Gain(k=-1.0), "actuator")
+    >>> print(reversed_sign.output(0, [], [0.7]))
+    [-0.7]
     """
 
     k: float = param(1.0, unit="1", meaning="gain")
@@ -98,6 +112,12 @@ class Saturation:
     """Symmetric saturation, v = min(max(u, -limit), limit).
 
     No k >= k_1 > 0 keeps eps_u of (2) bounded for it: the paper's theory does not cover it.
+
+    Examples
+    --------
+    >>> limit = nlctl.block(nlctl.Saturation(limit=2.0), "actuator")
+    >>> [float(limit.output(0, [], [u])[0]) for u in (-5.0, 0.5, 5.0)]
+    [-2.0, 0.5, 2.0]
     """
 
     limit: float = param(10.0, unit="1", meaning="largest |v|", above=0)
@@ -129,6 +149,12 @@ class AsymmetricSaturation:
             max(slope_l u, limit_l)    u < 0
 
     With equal slopes of 1 and equal limits it is `Saturation`.  It does not obey (2) either.
+
+    Examples
+    --------
+    >>> limit = nlctl.block(nlctl.AsymmetricSaturation(slope_l=2.0, limit_l=-6.0), "actuator")
+    >>> [float(limit.output(0, [], [u])[0]) for u in (-5.0, -1.0, 1.0, 50.0)]
+    [-6.0, -2.0, 1.0, 10.0]
     """
 
     slope_r: float = param(1.0, unit="1", meaning="slope on the right", above=0)

@@ -23,6 +23,12 @@ class FixedGainLaw:
 
     It assumes an input gain whose sign is known and positive, as that of the paper's plants; N of
     (23) then has to be negative.  It has the inputs of `NussbaumLaw` and no output ``zeta``.
+
+    Examples
+    --------
+    >>> law = nlctl.block(nlctl.FixedGainLaw(beta=2.0, kappa=10.0), "law")
+    >>> print(law.output(0, [], [0.5, 0.25, 0.0, 0.0]))  # -kappa (beta r + W_psi)
+    [-12.5]
     """
 
     beta: float = param(2.5, unit="1", meaning="gain of the filtered error", above=0)

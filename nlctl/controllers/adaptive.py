@@ -28,6 +28,12 @@ class Zero:
     ----------
     outputs : tuple of str
         The signals that are 0, for instance ``("W_psi", "W_norm")`` for no network.
+
+    Examples
+    --------
+    >>> no_network = nlctl.controllers.Zero(outputs=("W_psi", "W_norm"))
+    >>> print(nlctl.block(no_network, "weights").output(0, [], []))
+    [0. 0.]
     """
 
     outputs: tuple[str, ...]

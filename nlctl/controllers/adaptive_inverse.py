@@ -44,6 +44,14 @@ class AdaptiveDeadZoneInverse:
     dead zone is as wide as the true one, theta* the true values of a dead zone with constant
     slopes.  It needs a plant that is known but for the dead zone, and the sign of its gain,
     positive here.
+
+    Examples
+    --------
+    Its outputs are the input of the dead zone and both estimated break points:
+
+    >>> inverse = nlctl.block(nlctl.AdaptiveDeadZoneInverse(), "inverse")
+    >>> print(inverse.output(0, [1.0, 0.5, 1.0, -0.25], [2.0, 0.0]))
+    [ 2.5   0.5  -0.25]
     """
 
     gamma: float = param(2.0, unit="1", meaning="adaptation gain", above=0)

@@ -71,6 +71,14 @@ class FilteredError:
         Y_d = -yd^(n) + lambda_{n-1} e_2 + ... + lambda_1 e_n
 
     The polynomial s^(n-1) + lambda_1 s^(n-2) + ... + lambda_{n-1} must be Hurwitz.
+
+    Examples
+    --------
+    For lambda_1 = 1.5, e_1 = 2 and e_2 = 1 the outputs are e, r = 1.5 e_1 + e_2 and Y_d:
+
+    >>> error = nlctl.block(nlctl.FilteredError(lambdas=(1.5,)), "error")
+    >>> print(error.output(0, [], [2.0, 1.0, 0.0, 0.0, 0.5]))
+    [2. 4. 1.]
     """
 
     lambdas: tuple[float, ...] = param(

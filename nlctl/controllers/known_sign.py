@@ -36,6 +36,14 @@ class KnownSignLaw:
     It has the inputs of `NussbaumLaw` and stands in its place in `adaptive_neural`; it has no
     state, and no output ``zeta``.  The sign is that of the paper's plants; for a negative gain
     reverse the actuator's sign.
+
+    Examples
+    --------
+    Without a network's output its bracket is beta r, as r s = 0:
+
+    >>> law = nlctl.block(nlctl.KnownSignLaw(beta=2.5, N_0=2.0), "law")
+    >>> print(law.output(0, [], [0.2, 0.0, 0.0, 0.0]))
+    [-1.]
     """
 
     beta: float = param(2.5, unit="1", meaning="gain of the filtered error", above=0)

@@ -43,6 +43,15 @@ class NussbaumLaw:
     N : equation, optional
         Nussbaum function; by default the paper's `nlctl.functions.nussbaum`, which is 0 at
         zeta = 1.
+
+    Examples
+    --------
+    At zeta = 1 the paper's Nussbaum function is 0; zeta' = r eta is not:
+
+    >>> law = nlctl.block(nlctl.NussbaumLaw(beta=2.5), "law")
+    >>> u = [2.0, 0.0, 0.0, 1.0]  # r, W_psi, robust, Y_d
+    >>> print(law.output(0, [1.0], u).round(12), law.dynamics(0, [1.0], u))
+    [0. 1.] [12.]
     """
 
     beta: float = param(2.5, unit="1", meaning="gain of the filtered error", above=0)

@@ -36,6 +36,14 @@ class PID:
     it is for the paper's controller; the filter starts from D(0) = 0, so that no initial error
     kicks it.  PID assumes an input gain whose sign is known and positive; the adaptive controller
     of the paper assumes neither.
+
+    Examples
+    --------
+    The outputs are the error and u, here at its limit:
+
+    >>> controller = nlctl.block(nlctl.PID(k_p=10.0, u_max=20.0), "controller")
+    >>> print(controller.output(0, [0.0, 0.0], [3.0, 0.0, 0.0, 0.0]))
+    [  3. -20.]
     """
 
     k_p: float = param(10.0, unit="1", meaning="proportional gain", at_least=0)

@@ -156,6 +156,13 @@ class GaussianBasis:
         psi_i(x) = exp(-|x - mu_i|^2 / nu_i^2),   i = 1, ..., l
 
     The number of columns of `centres` is the number of inputs x1, ..., xn.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> basis = nlctl.block(nlctl.GaussianBasis(centres=((0.0,), (2.0,)), widths=(2.0,)), "basis")
+    >>> print(basis.output(0, [], [0.0]).round(6), round(np.exp(-1), 6))
+    [1.       0.367879] 0.367879
     """
 
     centres: Matrix = param(
@@ -243,7 +250,17 @@ class NetworkWeights:
 class AdaptiveWeights(NetworkWeights):
     """Weights of the network with sigma-modification (25), and its output.
 
-    W_hat' = Gamma (r psi - sigma_1 W_hat),   W_psi = W_hat^T psi,   W_hat(0) = 0
+        W_hat' = Gamma (r psi - sigma_1 W_hat),   W_psi = W_hat^T psi,   W_hat(0) = 0
+
+    Examples
+    --------
+    Two weights at 0 learn r psi, by Gamma = 0.5; the outputs are W_hat^T psi and |W_hat|:
+
+    >>> weights = nlctl.block(nlctl.AdaptiveWeights(nodes=2), "weights")
+    >>> print(weights.dynamics(0, [0.0, 0.0], [2.0, 1.0, 0.25]))
+    [1.   0.25]
+    >>> print(weights.output(0, [3.0, 4.0], [2.0, 1.0, 0.25]))
+    [4. 5.]
     """
 
     sigma_1: float = param(0.5, unit="1", meaning="sigma-modification of W_hat", at_least=0)

@@ -35,6 +35,14 @@ class DeadZoneNussbaumLaw(NussbaumLaw):
     zeta stands still while |r| <= r_0 and grows until |r| stays there, so that r_0 is about what
     |r| reaches.  d is the continuous dead zone, so that d(r)^2 / 2 in the place of r^2 / 2 in (21)
     has the derivative d(r) r' and N(zeta) zeta' = d(r) u holds exactly.
+
+    Examples
+    --------
+    zeta stands still while |r| <= r_0:
+
+    >>> law = nlctl.block(nlctl.DeadZoneNussbaumLaw(beta=2.0, r_0=0.3), "law")
+    >>> [round(float(law.dynamics(0, [1.0], [r, 0.0, 0.0, 0.0])[0]), 6) for r in (0.3, 0.5)]
+    [0.0, 0.2]
     """
 
     r_0: float = param(0.3, unit="1", meaning="half width of the dead zone of r", above=0)
@@ -61,6 +69,14 @@ class LeakyNussbaumLaw(NussbaumLaw):
 
     zeta settles where the mean of r eta is c (zeta - 1).  It cannot settle at 1, where N of the
     paper is 0, so the price is a larger steady error than that of a gain which has grown.
+
+    Examples
+    --------
+    At r = 0 zeta goes back to 1 at the rate c:
+
+    >>> law = nlctl.block(nlctl.LeakyNussbaumLaw(c=0.5), "law")
+    >>> print(law.dynamics(0, [3.0], [0.0, 0.0, 0.0, 0.0]))
+    [-1.]
     """
 
     c: float = param(0.01, unit="1/s", meaning="rate of the leakage", at_least=0)
@@ -83,6 +99,15 @@ class MonotoneNussbaumLaw(NussbaumLaw):
     Not a remedy by itself: zeta still drifts.  But it cannot oscillate, and so cannot pump V
     under a gain that varies with time; `analysis.lyapunov.nussbaum.energy.safe_horizon` supposes a
     monotone zeta.
+
+    Examples
+    --------
+    With s = -3 the law of the paper lets zeta fall; here it cannot:
+
+    >>> falls = nlctl.block(nlctl.NussbaumLaw(beta=2.0), "law")
+    >>> never = nlctl.block(nlctl.MonotoneNussbaumLaw(beta=2.0), "law")
+    >>> falls.dynamics(0, [1.0], [1, -3, 0, 0])[0] < 0 < never.dynamics(0, [1.0], [1, -3, 0, 0])[0]
+    np.True_
     """
 
     b: float = param(0.1, unit="1", meaning="width of the smooth sign of r s", above=0)

@@ -13,7 +13,16 @@ __all__ = ["RobustTerm"]
 class RobustTerm:
     """Robust term against actuator, approximation and disturbance errors (25).
 
-    delta_hat' = gamma (r tanh(r/tau) - sigma_2 delta_hat),   robust = delta_hat tanh(r/tau)
+        delta_hat' = gamma (r tanh(r/tau) - sigma_2 delta_hat),   robust = delta_hat tanh(r/tau)
+
+    Examples
+    --------
+    At r = tau the term is delta_hat tanh(1):
+
+    >>> import numpy as np
+    >>> term = nlctl.block(nlctl.RobustTerm(tau=0.2), "robust")
+    >>> print(term.output(0, [2.0], [0.2]).round(6), round(2 * np.tanh(1), 6))
+    [1.523188 2.      ] 1.523188
     """
 
     gamma: float = param(1.5, unit="1", meaning="adaptation gain", above=0)

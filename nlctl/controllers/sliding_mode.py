@@ -25,6 +25,12 @@ class SlidingModeLaw:
     as the sliding variable s and no model in the equivalent control.)  Outside of the layer |u| = K
     drives r inwards if K dominates the disturbance, within it the law is a proportional gain
     K / phi.  It assumes an input gain whose sign is known and positive.
+
+    Examples
+    --------
+    >>> law = nlctl.block(nlctl.SlidingModeLaw(K=12.0, phi=0.1), "law")
+    >>> [round(float(law.output(0, [], [r])[0]), 6) for r in (-1.0, 0.05, 1.0)]
+    [12.0, -6.0, -12.0]
     """
 
     K: float = param(12.0, unit="1", meaning="control input outside of the layer", above=0)

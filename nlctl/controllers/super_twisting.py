@@ -23,6 +23,12 @@ class SuperTwistingLaw:
     any size.  Where d' is constant, |r| ends at phi |d'| / k_2.  Crossings of r = 0 without a layer
     accumulate, no step size would follow them; within it the law is linear.  It assumes an input
     gain whose sign is known and positive.
+
+    Examples
+    --------
+    >>> law = nlctl.block(nlctl.SuperTwistingLaw(k_1=6.0, k_2=8.0), "law")
+    >>> print(law.output(0, [1.5], [0.25]), law.dynamics(0, [1.5], [0.25]))  # w - k_1 sqrt(r), -k_2
+    [-1.5] [-8.]
     """
 
     k_1: float = param(6.0, unit="1", meaning="gain of the square root of r", above=0)

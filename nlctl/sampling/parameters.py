@@ -25,6 +25,14 @@ class Sampling:
         Whether they are rounded.
     own_time : bool, optional
         Whether what is sampled has a sampling time of its own, which cannot be overridden.
+
+    Examples
+    --------
+    `sampled` makes one; its parameters are overridden as those of any block:
+
+    >>> controller = nlctl.sampled(nlctl.block(nlctl.Gain(), "controller"), 0.1)
+    >>> float(nlctl.parameters(controller)["value"]["controller.sampling.dt"])
+    0.1
     """
 
     dt: float = param(0.01, unit="s", meaning="sampling time", above=0)

@@ -37,6 +37,16 @@ class DynamicSurface:
     Backstepping would differentiate alpha_{i-1}; here first-order filters with time constants tau_i
     do, so that one derivative of the reference is enough.  Of order 2, where s_2 = 0, the error has
     tau e'' + e' + c_1 e = -tau yd'': the price is an error of the order of tau.
+
+    Examples
+    --------
+    On both surfaces, with a reference that stands still, nothing is left to do: e, r, nu, nu_e.
+
+    >>> surfaces = nlctl.block(nlctl.DynamicSurface(c=(2.0, 4.0), tau=(0.02,)), "surfaces")
+    >>> print(surfaces.output(0, [0.0], [0.5, 0.0, 0.5, 0.0]) + 0.0)
+    [0. 0. 0. 0.]
+    >>> print(surfaces.output(0, [0.0], [0.5, 0.1, 0.5, 0.0])[3])  # -c_2 s_2
+    -0.4
     """
 
     c: tuple[float, ...] = param(

@@ -24,6 +24,12 @@ class ConstrainedLaw:
 
     (Karason, Annaswamy, IEEE Transactions on Automatic Control 39, 1994, p. 2325.)  Its output du
     is what the constraint takes away; `ConstrainedError` keeps the adaptation free of it.
+
+    Examples
+    --------
+    >>> law = nlctl.block(nlctl.ConstrainedLaw(u_max=10.0), "law")
+    >>> print(law.output(0, [], [-12.0]))  # u, and what is missing
+    [10. -2.]
     """
 
     u_max: float = param(10.0, unit="1", meaning="limit of the input", above=0)
@@ -60,6 +66,15 @@ class ConstrainedError:
     gain.  With E_u = E - E_d the function E_u^T P E_u + lambda |W_hat - W|^2 / Gamma +
     (beta_hat - lambda)^2 / gamma_d has the derivative -E_u^T diag(Q) E_u, whatever du is; that E
     is bounded too holds from initial states from which the plant can be held with |u| <= u_max.
+
+    Examples
+    --------
+    What the estimate E_d explains of an error, weights do not learn from: r = 0.
+
+    >>> error = nlctl.block(nlctl.ConstrainedError(K=(2.0,), Q=(1.0,)), "error")
+    >>> e, r, nu_e, E_norm, beta_hat = error.output(0, [2.0, 0.0], [3.0, 1.0, -1.0])
+    >>> print(e, r)
+    2.0 0.0
     """
 
     K: tuple[float, ...] = param(

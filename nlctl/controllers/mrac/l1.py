@@ -32,6 +32,12 @@ class StatePredictor:
 
     With x_n' = -a^T x + gain u + W^T psi of the plant the error x - xm is driven by
     (W - W_hat)^T psi alone, whatever u is.
+
+    Examples
+    --------
+    >>> predictor = nlctl.block(nlctl.StatePredictor(a=(2.0,), gain=3.0), "predictor")
+    >>> print(predictor.dynamics(0, [0.5], [1.0, 0.25]))  # -a xm + gain u + W_psi
+    [2.25]
     """
 
     a: tuple[float, ...] = param(
@@ -72,7 +78,15 @@ class StatePredictor:
 class FilteredLaw:
     """Law behind a low-pass filter C(s) = omega / (s + omega): the estimates pass below omega.
 
-    u' = -omega (u - (b yd - W_hat^T psi) / gain)
+        u' = -omega (u - (b yd - W_hat^T psi) / gain)
+
+    Examples
+    --------
+    It goes to (b yd - W_psi) / gain at the rate omega:
+
+    >>> law = nlctl.block(nlctl.FilteredLaw(omega=10.0, b=4.0, gain=2.0), "law")
+    >>> [float(law.dynamics(0, [u], [1.0, 1.0])[0]) for u in (0.0, 1.0)]
+    [15.0, 5.0]
     """
 
     omega: float = param(10.0, unit="rad/s", meaning="bandwidth of the filter", above=0)

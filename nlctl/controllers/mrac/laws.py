@@ -24,6 +24,12 @@ class ModelReferenceLaw:
     For x_n' = gain u + W^T psi(x) the error obeys E' = A E - b (W_hat - W)^T psi, A of
     `ModelError`.  With K = a of the model it is -a^T x + b yd - W_hat^T psi, the model's own
     feedback.  The gain is known, of either sign.
+
+    Examples
+    --------
+    >>> law = nlctl.block(nlctl.ModelReferenceLaw(gain=2.0), "law")
+    >>> print(law.output(0, [], [1.0, -3.0, 4.0]))  # (nu + nu_e - W_psi) / gain
+    [-3.]
     """
 
     gain: float = param(1.0, unit="1", meaning="input gain of the plant")
@@ -54,6 +60,11 @@ class DirectLaw:
     For x_n' = -a^T x + b yd + lambda (u + W^T psi) with any lambda > 0 and the a of `ModelError`
     as K, (W_hat - W)^T psi is all that drives the error (Narendra, Annaswamy, Stable Adaptive
     Systems, 1989, section 3.3).
+
+    Examples
+    --------
+    >>> print(nlctl.block(nlctl.DirectLaw(), "law").output(0, [], [4.0]))
+    [-4.]
     """
 
     inputs = ("W_psi",)

@@ -46,6 +46,14 @@ class ModelError:
 
     With E' = A E + b d the function E^T P E has the derivative -E^T diag(Q) E + 2 r d: r is the
     error by which weights learn d.  Its output e is E_1.
+
+    Examples
+    --------
+    Of order 1 with K = 2 and Q = 1, P = 1/4; the outputs are e, r = P E, -K E and |E|:
+
+    >>> error = nlctl.block(nlctl.ModelError(K=(2.0,), Q=(1.0,)), "error")
+    >>> print(error.output(0, [], [3.0, 1.0]))
+    [ 2.   0.5 -4.   2. ]
     """
 
     K: tuple[float, ...] = param(

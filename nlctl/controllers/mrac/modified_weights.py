@@ -23,6 +23,16 @@ class EModifiedWeights(NetworkWeights):
     (Narendra, Annaswamy, IEEE Transactions on Automatic Control 32, 1987, p. 134.)  Where r = 0
     the weights stand still; sigma-modification, `AdaptiveWeights`, forgets them.  Within
     |W_hat| <= max |psi| / sigma they stay, whatever r is.
+
+    Examples
+    --------
+    Without an error it forgets nothing:
+
+    >>> weights = nlctl.block(nlctl.EModifiedWeights(nodes=2, Gamma=1.0, sigma=0.5), "weights")
+    >>> print(weights.dynamics(0, [3.0, 4.0], [0.0, 1.0, 1.0]))
+    [0. 0.]
+    >>> print(weights.dynamics(0, [3.0, 4.0], [-2.0, 1.0, 1.0]))  # r psi - sigma |r| W_hat
+    [-5. -6.]
     """
 
     sigma: float = param(0.5, unit="1", meaning="e-modification of W_hat", at_least=0)
@@ -61,6 +71,15 @@ class ProjectedWeights(NetworkWeights):
     Wise, Robust and Adaptive Control, 2013, section 11.4.)  The ball is invariant, whatever r and
     psi are, and for W* with f(W*) <= 0 projection never makes V' larger:
     (W_hat - W*)^T (Proj(W_hat, y) - y) <= 0.
+
+    Examples
+    --------
+    On the boundary of the ball nothing points outwards any more:
+
+    >>> weights = nlctl.block(nlctl.ProjectedWeights(nodes=2, Gamma=1.0, W_max=5.0), "weights")
+    >>> rate = weights.dynamics(0, [3.0, 4.0], [2.0, 3.0, 4.0])
+    >>> print(abs(round(float(rate @ [3.0, 4.0]), 9)))
+    0.0
     """
 
     W_max: float = param(4.0, unit="1", meaning="radius of the ball", above=0)

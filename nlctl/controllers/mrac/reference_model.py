@@ -30,6 +30,14 @@ class ReferenceModel:
 
     The polynomial s^n + a_n s^(n-1) + ... + a_1 must be Hurwitz.  A gain b = a_1 makes xm_1
     settle at the command.
+
+    Examples
+    --------
+    With b = a_1 it settles at the command: there nu = 0.
+
+    >>> model = nlctl.block(nlctl.ReferenceModel(a=(4.0, 2.0), b=4.0), "model")
+    >>> print(model.output(0, [0.5, 0.0], [0.5]))
+    [0.5 0.  0. ]
     """
 
     a: tuple[float, ...] = param(

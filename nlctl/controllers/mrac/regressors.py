@@ -55,6 +55,12 @@ class AffineRegressor(_StateRegressor):
     ----------
     order : int, optional
         Order n >= 1 of the plant.
+
+    Examples
+    --------
+    >>> regressor = nlctl.block(nlctl.AffineRegressor(order=2), "basis")
+    >>> print(regressor.output(0, [], [0.1, 0.2]))
+    [0.1 0.2 1. ]
     """
 
     @staticmethod
@@ -74,6 +80,12 @@ class LinearRegressor(_StateRegressor):
     ----------
     order : int, optional
         Order n >= 1 of the plant.
+
+    Examples
+    --------
+    >>> regressor = nlctl.block(nlctl.LinearRegressor(order=2), "basis")
+    >>> print(regressor.output(0, [], [0.1, 0.2, 5.0]))
+    [0.1 0.2 5. ]
     """
 
     @property
@@ -92,7 +104,13 @@ class LinearRegressor(_StateRegressor):
 class WingRockRegressor:
     """Regressor of wing rock, for a controller that knows its form and not its weights.
 
-    psi = (1, x1, x2, |x1| x2, |x2| x2, x1^3)
+        psi = (1, x1, x2, |x1| x2, |x2| x2, x1^3)
+
+    Examples
+    --------
+    >>> regressor = nlctl.block(nlctl.WingRockRegressor(), "basis")
+    >>> print(regressor.output(0, [], [-2.0, 3.0]))
+    [ 1. -2.  3.  6.  9. -8.]
     """
 
     inputs = ("x1", "x2")

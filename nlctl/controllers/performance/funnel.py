@@ -40,6 +40,14 @@ class FunnelControl:
     ----------
     order : int, optional
         Relative degree n >= 1 of the plant.
+
+    Examples
+    --------
+    Half way to the boundary the gain is 1 / (1 - 1/4):
+
+    >>> record = nlctl.FunnelControl(order=1, k=3.0, rho_0=1.0)
+    >>> print(nlctl.block(record, "controller").output(0, [], [0.5, 0.0]))
+    [ 0.5 -2.   1. ]
     """
 
     order: int = 2

@@ -37,6 +37,18 @@ class PrescribedPerformance:
 
     Bounds of x_{i+1} - a_i that are wide against k_i make xi_i come close to 1 before x_i turns
     round, where a double has no room: 1 - xi is at least 1e-16, so that |a_i| < 38 k_i.
+
+    Examples
+    --------
+    Half way to its bound the error is answered by k ln 3; at the bound there is no law:
+
+    >>> import numpy as np
+    >>> record = nlctl.PrescribedPerformance(k=(2.0,), rho_0=(1.0,), rho_inf=(0.1,), decay=(1.0,))
+    >>> controller = nlctl.block(record, "controller")
+    >>> print(controller.output(0, [], [0.5, 0.0]).round(6), round(-2 * np.log(3), 6))
+    [ 0.5      -2.197225  1.      ] -2.197225
+    >>> print(controller.output(0, [], [1.0, 0.0])[1])
+    nan
     """
 
     k: tuple[float, ...] = param((1.0, 8.0), unit="1", meaning="gains k_i", above=0)
