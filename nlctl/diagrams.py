@@ -1,4 +1,4 @@
-"""Diagrams: joining blocks by signal name, and addressing what is inside."""
+"""Diagrams: connecting blocks by signal name, and addressing what is inside."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .blocks import (
     within,
 )
 from .errors import DiagramError, ParameterError
-from .names import Parameters, find_name, unknown
+from .names import Parameters, base_name, find_name, unknown
 from .params import as_numbers, declared_params
 from .upstream.control_internals import StandIn, is_system, set_parameters
 
@@ -218,7 +218,7 @@ def _signal_sources(systems: Sequence[ct.InputOutputSystem]) -> dict[str, str]:
         for signal in system.output_labels:
             if signal in sources:
                 raise DiagramError(
-                    f"signal '{signal}' is an output of '{sources[signal]}' and by "
+                    f"signal '{signal}' is an output of '{sources[signal]}' and of "
                     f"'{system.name}'; rename one, or add them in a ct.summing_junction"
                 )
             sources[signal] = system.name
@@ -352,6 +352,23 @@ def initial_state(
             raise ParameterError(f"state '{full}' needs a finite initial value, got {value!r}")
         x[index[full]] = number
     return x
+
+
+def check_read(system: ct.InputOutputSystem, params: Mapping[str, Any] | None) -> None:
+    """Refuse parameters without a block's name that nothing in a diagram can read.
+
+    A third-party function reads what it likes; blocks of nlctl and linear systems do not.
+
+    Raises
+    ------
+    UnknownNameError
+        The nearest name is given.
+    """
+    bare = [key for key in params or {} if isinstance(key, str) and "." not in key]
+    bare = [key for key in bare if base_name(key) not in system.params]
+    own = Block, ct.StateSpace, ct.TransferFunction
+    if bare and all(isinstance(within(leaf.system), own) for leaf in leaves(system)):
+        raise unknown("parameter", bare[0], parameter_names(system))
 
 
 def parameter_names(system: ct.InputOutputSystem) -> list[str]:

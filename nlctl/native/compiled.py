@@ -13,6 +13,7 @@ import cloudpickle
 import control as ct
 import numpy as np
 
+from ..diagrams import check_read
 from ..errors import CompileError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
@@ -118,6 +119,7 @@ class Compiled(StandIn):
                 f"'{other.name}' was {_short(other.then)} when '{self.system.name}' was compiled "
                 f"and is {_short(other.now)} now: compile again, or make it a parameter"
             )
+        check_read(self.system, params)
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks
             set_parameters(self.system, params)
             return packed(self.schedule.holders, self.program.layout, self.program.fixed)
@@ -301,7 +303,8 @@ def compile(  # noqa: A001 (what it does)
             f"compile needs a diagram or a block, got {type(system).__name__}: nlctl.block makes "
             "a block of a record"
         )
-    set_parameters(system, checked_params(params))
+    check_read(system, checked_params(params))
+    set_parameters(system, params)
     if algebraic_loops not in LOOPS:
         raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
     read = schedule(system, solve_loops=algebraic_loops == "solve")

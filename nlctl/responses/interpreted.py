@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import OdeSolver
 
 from ..delays.lines import delayed_blocks
-from ..diagrams import leaves
+from ..diagrams import check_read, leaves
 from ..errors import DivergedError, ParameterError
 from ..names import unknown
 from ..sampling.system import Sampled
@@ -43,6 +43,7 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
         If inputs, initial state or times are refused.
     """
     system, times, params, solver = run.system, run.times, run.params, run.solver
+    check_read(system, params)
     # a function that declares no numbers of inputs or states gets what it is given
     inputs = run.inputs if system.ninputs is None else input_array(system, run.inputs, times)
     whole = system.nstates is None and run.initial_state is not None

@@ -115,7 +115,8 @@ class Walk:
         try:
             return self.body(definition(thing), thing, None, given, named)
         except Unreadable as error:
-            raise Impure(f"calls {thing.__qualname__}: {error}", "see there") from None
+            reason = f"calls {thing.__qualname__}, and {error}"
+            raise Impure(reason, error.advice) from None
 
     def body(
         self,

@@ -27,7 +27,17 @@ _FUTURES = functools.reduce(
 
 
 class Unreadable(Exception):  # noqa: N818 (it says what is the matter with a source)
-    """The source of a function cannot be had; the message says why."""
+    """The source of a function cannot be had.
+
+    Attributes
+    ----------
+    advice : str
+        What to do, beside the message, which says why.
+    """
+
+    def __init__(self, reason: str, advice: str) -> None:
+        super().__init__(reason)
+        self.advice = advice
 
 
 def definition(function: FunctionType) -> Definition:
@@ -47,17 +57,19 @@ def definition(function: FunctionType) -> Definition:
     linecache.checkcache(code.co_filename)
     text = "".join(linecache.getlines(code.co_filename, function.__globals__))
     if not text:
-        raise Unreadable("its source cannot be found: define it in a file or a notebook")
+        raise Unreadable("its source cannot be found", "define it in a file or a notebook")
     try:
         module = text, code.co_filename, code.co_flags & _FUTURES
         places, codes = _compiled(*module)
     except (SyntaxError, ValueError) as error:
-        raise Unreadable(f"its source cannot be parsed ({error})") from error
+        raise Unreadable(f"its source cannot be parsed ({error})", "mend its file") from error
     if code not in codes and code not in _by_cells(*module, code.co_firstlineno):
-        raise Unreadable("its source is not what it was made of: was the file edited since?")
+        advice = "import its module again: was the file edited since?"
+        raise Unreadable("its source is not what it was made of", advice)
     found = [node for node in _candidates(places, code) if _contains(node, code)]
     if not found or len({ast.dump(node) for node in found}) > 1:
-        raise Unreadable("its source cannot be told from others on the same line")
+        advice = "give each function a line of its own"
+        raise Unreadable("its source cannot be told from others on the same line", advice)
     return found[0]
 
 
