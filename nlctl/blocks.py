@@ -63,6 +63,21 @@ class Spec(Protocol):
     Notes
     -----
     Equations are pure, as `nlctl.equation` says.  Memory is a state, never an attribute.
+
+    Examples
+    --------
+    A record that follows it is a block:
+
+    >>> @nlctl.record
+    ... class Square:
+    ...     inputs, outputs, states, feedthrough = ("u",), ("v",), (), True
+    ...
+    ...     @staticmethod
+    ...     @nlctl.equation
+    ...     def output(t, x, u, p):
+    ...         return (u[0] ** 2,)
+    >>> print(nlctl.block(Square(), "square").output(0, [], [3.0]))
+    [9.]
     """
 
     inputs: Sequence[str]
@@ -143,6 +158,10 @@ class Block(OwnParameters):
         The record with the overrides of the latest run.
     params : Parameters
         Qualified names and values, ``{"actuator.b_r": 0.5}``.
+
+    Examples
+    --------
+    See `block`.
     """
 
     def __init__(self, spec: Any, name: str, **kwargs: Any) -> None:

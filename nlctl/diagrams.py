@@ -354,7 +354,7 @@ def initial_state(
     return x
 
 
-def check_read(system: ct.InputOutputSystem, params: Mapping[str, Any] | None) -> None:
+def check_read(system: Any, params: Mapping[str, Any] | None) -> None:
     """Refuse parameters without a block's name that nothing in a diagram can read.
 
     A third-party function reads what it likes; blocks of nlctl and linear systems do not.

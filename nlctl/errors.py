@@ -6,11 +6,26 @@ class UsageError(ValueError):
 
 
 class ParameterError(UsageError):
-    """A parameter breaks a rule: the message names record, rule, value and block."""
+    """A parameter breaks a rule: the message names record, rule, value and block.
+
+    Examples
+    --------
+    >>> nlctl.DeadZone(b_r=-0.1)
+    Traceback (most recent call last):
+    nlctl.errors.ParameterError: DeadZone needs b_r > 0, got -0.1
+    """
 
 
 class UnknownNameError(UsageError):
-    """A parameter, state, signal or block of that name does not exist."""
+    """A parameter, state, signal or block of that name does not exist.
+
+    Examples
+    --------
+    >>> zone = nlctl.block(nlctl.DeadZone(), "actuator")
+    >>> nlctl.input_output_response(zone, [0.0, 1.0], 0.5, params={"actuator.br": 0.6})
+    Traceback (most recent call last):
+    nlctl.errors.UnknownNameError: unknown parameter 'br' of block 'actuator'; nearest: 'b_r'
+    """
 
 
 class UnknownKeywordError(UnknownNameError, TypeError):
@@ -18,15 +33,38 @@ class UnknownKeywordError(UnknownNameError, TypeError):
 
 
 class AmbiguousNameError(UsageError):
-    """A name that means more than one thing in this diagram."""
+    """A name that means more than one thing in this diagram.
+
+    Examples
+    --------
+    >>> stage = nlctl.actuators.cascade({"gain": nlctl.Gain()})
+    >>> two = nlctl.actuators.cascade({"first": stage, "second": stage.copy(name="second")})
+    >>> nlctl.input_output_response(two, [0.0, 1.0], 1.0, params={"gain.k": 2.0})
+    Traceback (most recent call last):
+    nlctl.errors.AmbiguousNameError: parameter 'gain.k' could be first.gain.k or second.gain.k
+    """
 
 
 class DiagramError(UsageError):
-    """Blocks that cannot be connected: the message names block and signal."""
+    """Blocks that cannot be connected: the message names block and signal.
+
+    Examples
+    --------
+    >>> nlctl.interconnect({"a": nlctl.Lag(), "b": nlctl.Lag()}, inputs=["u"], outputs=["v"])
+    Traceback (most recent call last):
+    nlctl.errors.DiagramError: signal 'v' is an output of 'a' and of 'b'; rename one, or ...
+    """
 
 
 class BlockError(DiagramError, TypeError):
-    """What cannot be made a block: the message says what it lacks; Python's kind as well."""
+    """What cannot be made a block: the message says what it lacks; Python's kind as well.
+
+    Examples
+    --------
+    >>> nlctl.block(nlctl.DeadZone, "actuator")
+    Traceback (most recent call last):
+    nlctl.errors.BlockError: DeadZone is a class: make a record of it first
+    """
 
 
 class DivergedError(RuntimeError):
@@ -36,6 +74,18 @@ class DivergedError(RuntimeError):
     ----------
     time : float
         Last accepted time of the integrator (s).
+
+    Examples
+    --------
+    x' = x^2 from x = 1 is 1 / (1 - t): it does not reach t = 2.
+
+    >>> import control as ct
+    >>> escapes = ct.nlsys(lambda t, x, u, params: x**2, inputs=0, states=1, name="escapes")
+    >>> try:
+    ...     nlctl.input_output_response(escapes, [0.0, 2.0], 0, [1.0])
+    ... except nlctl.DivergedError as error:
+    ...     print(round(error.time, 6))
+    1.0
     """
 
     def __init__(self, message: str, time: float) -> None:
@@ -47,8 +97,35 @@ class ChatteringError(DivergedError):
     """A run that switches over and over again at one jump, and does not come away from it.
 
     ``time`` is where it was found.  What handles runs that did not reach their end handles it.
+
+    Examples
+    --------
+    An ideal relay takes x to 0 at t = 1, and would hold it there:
+
+    >>> import control as ct
+    >>> import numpy as np
+    >>> holds = ct.nlsys(lambda t, x, u, params: -np.sign(x), inputs=0, states=1, name="holds")
+    >>> try:
+    ...     nlctl.input_output_response(holds, [0.0, 2.0], 0, [1.0])
+    ... except nlctl.ChatteringError as error:
+    ...     print(round(error.time, 3))
+    1.0
     """
 
 
 class CompileError(UsageError):
-    """A block that cannot be compiled: the message names it and says why."""
+    """A block that cannot be compiled: the message names it and says why.
+
+    Examples
+    --------
+    A function that remembers is not one of its arguments; python-control still runs it:
+
+    >>> import control as ct
+    >>> def remembers(t, x, u, params):
+    ...     seen.append(u[0])
+    ...     return u
+    >>> seen = []
+    >>> nlctl.compile(ct.nlsys(None, remembers, inputs=1, outputs=1, name="block"))
+    Traceback (most recent call last):
+    nlctl.errors.CompileError: block 'block' cannot be compiled: ...
+    """

@@ -49,6 +49,11 @@ def paper_centres(layout: Any, order: int) -> Any:
     ------
     ParameterError
         If the name is none of these.
+
+    Examples
+    --------
+    >>> len(nlctl.paper.paper_centres("3x3x3", 3)), nlctl.paper.paper_centres("diagonal", 2)[0]
+    (27, (-10.0, -10.0))
     """
     if not isinstance(layout, str):
         return layout
@@ -106,6 +111,13 @@ def example_1(
     ParameterError, DiagramError
         If a value or a block does not fit, or a choice is given together with the block that
         it belongs to.
+
+    Examples
+    --------
+    >>> loop = nlctl.paper.example_1()
+    >>> start = nlctl.initial_state(loop)
+    >>> print(len(start), loop.output_labels[:4])
+    31 ['y', 'yd', 'e', 'r']
     """
     _exclusive("plant", plant, p1=p1, phase=phase)
     _exclusive("controller", controller, centres=centres)
@@ -156,6 +168,14 @@ def example_2(
     ------
     ParameterError, DiagramError
         As in `example_1`.
+
+    Examples
+    --------
+    Another actuator in the paper's loop:
+
+    >>> loop = nlctl.paper.example_2(actuator=nlctl.DeadZone())
+    >>> float(nlctl.parameters(loop)["value"]["actuator.b_r"])
+    0.5
     """
     _exclusive("actuator", actuator, v0=v0)
     _exclusive("controller", controller, centres=centres, lambdas=lambdas)
@@ -187,6 +207,11 @@ def named_example(name: str) -> Callable[..., ct.InterconnectedSystem]:
     ------
     UnknownNameError
         If there is no such example.
+
+    Examples
+    --------
+    >>> nlctl.paper.named_example("example-1") is nlctl.paper.example_1
+    True
     """
     known = {key.replace("_", "-"): make for key, make in EXAMPLES.items()}
     if name not in known:

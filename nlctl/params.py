@@ -84,6 +84,14 @@ def param(
     -------
     dataclasses.Field
         To be assigned in the body of a class decorated with `record`.
+
+    Examples
+    --------
+    >>> @nlctl.record
+    ... class Damper:
+    ...     d: float = nlctl.param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
+    >>> print(nlctl.parameters(Damper())["unit"]["d"])
+    N s/m
     """
     declared = Param(
         unit=unit,
@@ -123,6 +131,15 @@ def record(cls: type[_T]) -> type[_T]:
         When a record is made with a value that breaks a rule.
     UnknownNameError
         When it is made with a parameter that it does not have; also a `TypeError`.
+
+    Examples
+    --------
+    >>> @nlctl.record
+    ... class Spring:
+    ...     k: float = nlctl.param(2.0, unit="N/m", meaning="stiffness", above=0)
+    >>> Spring(k=-1.0)
+    Traceback (most recent call last):
+    nlctl.errors.ParameterError: Spring needs k > 0, got -1
     """
     if not isinstance(cls, type):
         raise ParameterError(f"record needs a class, got {type(cls).__name__}")

@@ -28,7 +28,23 @@ NATIVE_ONLY = ("max_steps", "step")  # settings that python-control does not kno
 
 
 class EngineWarning(UserWarning):
-    """A diagram could not be compiled, and python-control runs it: the message says why."""
+    """A diagram could not be compiled, and python-control runs it: the message says why.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import control as ct
+    >>> def remembers(t, x, u, params):
+    ...     seen.append(u[0])
+    ...     return u
+    >>> seen = []
+    >>> block = ct.nlsys(None, remembers, inputs=1, outputs=1, name="block")
+    >>> with warnings.catch_warnings(record=True) as told:
+    ...     warnings.simplefilter("always")
+    ...     response = nlctl.input_output_response(block, [0.0, 1.0], 2.0)
+    >>> print(told[0].category.__name__, response.outputs)
+    EngineWarning [2. 2.]
+    """
 
 
 def input_output_response(

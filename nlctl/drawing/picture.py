@@ -213,6 +213,12 @@ def draw(
     ------
     TypeError
         If `diagram` is not an interconnection of blocks.
+
+    Examples
+    --------
+    >>> figure = nlctl.draw(nlctl.paper.example_1(), title="Example 1")
+    >>> round(float(figure.get_figwidth()), 6)  # inches; figure.savefig("loop.svg") keeps it
+    9.0
     """
     panels = list(_panels(diagram, title or "", "", expand))
     width = max([_WIDTH, *(panel.layout.width + 2 * MARGIN for panel in panels)])

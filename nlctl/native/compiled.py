@@ -53,6 +53,12 @@ class Compiled(StandIn):
 
     The stiff method's Jacobian is exact too.  Where a function is opaque it is taken by
     differences; the printed form says so, and why.
+
+    Examples
+    --------
+    >>> compiled = nlctl.compile(nlctl.block(nlctl.Lag(T=0.05), "lag"))
+    >>> print(compiled.dynamics(0, [1.0], [3.0]), compiled.linearize([0.0], [0.0]).A)
+    [40.] [[-20.]]
     """
 
     schedule: Schedule

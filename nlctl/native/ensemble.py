@@ -78,6 +78,10 @@ class Ensemble:
     time : ndarray of shape (m,)
     signals : dict of ndarray of shape (members, m)
         The signals that were kept, NaN after the end of a run.
+
+    Examples
+    --------
+    See `ensemble_response`.
     """
 
     table: pd.DataFrame
@@ -170,6 +174,19 @@ def ensemble_response(
         initial states must be finite.
     UnknownNameError
         If a parameter, state or signal does not exist.
+
+    Examples
+    --------
+    A sine of amplitude 1 behind gains of 1, 2 and 3, at its peak:
+
+    >>> import numpy as np
+    >>> times = np.linspace(0, np.pi, 5)
+    >>> gain = nlctl.block(nlctl.Gain(), "actuator")
+    >>> many = nlctl.ensemble_response(
+    ...     gain, times, np.sin(times), params={"actuator.k": np.array([1.0, 2.0, 3.0])}, keep=["v"]
+    ... )
+    >>> print(many.signals["v"][:, 2], many.table["status"].tolist())
+    [1. 2. 3.] ['OK', 'OK', 'OK']
     """
     times = checked_times(timepts)
     if not isinstance(compiled, Compiled):

@@ -44,6 +44,10 @@ class BlockEquations:
         LaTeX: what the symbols of these equations stand for.
     inputs : tuple of str
         LaTeX: what the inputs are connected to, where it is not a signal of the same name.
+
+    Examples
+    --------
+    See `typeset`.
     """
 
     block: str

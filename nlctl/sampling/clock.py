@@ -42,6 +42,14 @@ class Clock:
     ParameterError
         If a number is not finite or out of its bounds, or a delay together with the jitter reaches
         the next sample.
+
+    Examples
+    --------
+    Two samples and their delayed outputs:
+
+    >>> clock = nlctl.Clock(dt=0.1, delay=0.25)
+    >>> clock.pending  # samples that wait for their outputs
+    3
     """
 
     dt: float

@@ -66,6 +66,10 @@ class Sampled(Around):
         Whether its outputs wait for the delay.
     converters : tuple of str
         Which quantum of `sampling` its inputs and its outputs are rounded to; "" for none.
+
+    Examples
+    --------
+    See `sampled`.
     """
 
     def __init__(

@@ -6,10 +6,15 @@ import inspect
 import pkgutil
 import re
 
+from places import ROOT
 from rows import each_row
 
 import analysis
 import nlctl
+
+
+PUBLIC = re.compile(r"^\.\. public:: (\S+)\n\n((?:   .*\n?)+)", re.MULTILINE)
+REFERS = re.compile(r"\nExamples\n--------\nSee `(\w+)`\.$")
 
 
 def modules():
@@ -25,7 +30,11 @@ def modules():
 def test_the_examples_run():
     """They print what they say, those of each module by themselves."""
     results = {
-        name: doctest.testmod(importlib.import_module(name), extraglobs={"nlctl": nlctl})
+        name: doctest.testmod(
+            importlib.import_module(name),
+            extraglobs={"nlctl": nlctl},
+            optionflags=doctest.ELLIPSIS,
+        )
         for name in modules()
     }
     assert results
@@ -40,12 +49,30 @@ def functions(package):
     return {name: made for name, made in found.items() if inspect.isfunction(made)}
 
 
-@each_row("name", sorted(functions("nlctl")))
-def test_functions_of_nlctl_have_an_example(name):
-    """All but those that make a picture, many runs, or a part of a record."""
-    without = {"draw", "ensemble_response", "param", "record"}
-    shown = ">>> " in (inspect.getdoc(functions("nlctl")[name]) or "")
-    assert shown == (name not in without)
+def documented():
+    """Every name of the reference, by the package that offers it."""
+    for page in sorted((ROOT / "docs" / "reference").glob("*.rst")):
+        for home, names in PUBLIC.findall(page.read_text(encoding="utf-8")):
+            for name in names.split():
+                made = getattr(importlib.import_module(home), name)
+                if callable(made) and home.startswith("nlctl"):
+                    yield f"{home}.{name}", made
+
+
+def has_example(made):
+    """Whether its own docstring has one, or names what makes it."""
+    told = inspect.getdoc(made) or ""
+    return ">>> " in told or REFERS.search(told) is not None
+
+
+@each_row(("name", "made"), sorted(dict(documented()).items()))
+def test_public_names_have_an_example(name, made):
+    """Of their own, or that of the function which makes them, and nothing else refers."""
+    assert has_example(made), name
+    found = REFERS.search(inspect.getdoc(made))
+    if found:
+        home = importlib.import_module(name.rpartition(".")[0])
+        assert ">>> " in inspect.getdoc(getattr(home, found[1])), f"{name} refers to {found[1]}"
 
 
 def offered():

@@ -15,7 +15,22 @@ Combination = Mapping["Signal", float]
 
 
 class AlgebraicLoopError(UsageError):
-    """Signals that depend on each other at the same instant; the message prints the loop."""
+    """Signals that depend on each other at the same instant; the message prints the loop.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> def half(t, x, u, params):
+    ...     return 1 + 0.5 * u
+    >>> half = ct.nlsys(None, half, inputs="v", outputs="w", name="half")
+    >>> same = ct.nlsys(None, lambda t, x, u, params: u, inputs="w", outputs="v", name="same")
+    >>> ring = ct.interconnect([half, same], outputs="w", name="ring")
+    >>> nlctl.compile(ring)
+    Traceback (most recent call last):
+    nlctl.native.diagram.wiring.AlgebraicLoopError: ...
+    >>> print(nlctl.compile(ring, algebraic_loops="solve").output(0, []))  # w = 1 + w / 2
+    [2.]
+    """
 
 
 @dataclass(frozen=True)
