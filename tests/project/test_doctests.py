@@ -12,7 +12,6 @@ from rows import each_row
 import analysis
 import nlctl
 
-
 PUBLIC = re.compile(r"^\.\. public:: (\S+)\n\n((?:   .*\n?)+)", re.MULTILINE)
 REFERS = re.compile(r"\nExamples\n--------\nSee `(\w+)`\.$")
 
