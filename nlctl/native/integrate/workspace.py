@@ -15,6 +15,7 @@ import numpy as np
 from ..machine.address import call_out, call_rhs
 from .memory import type_of, with_table
 from .methods import rodas5p
+from .methods.lu import WHOLE
 from .state import DIRECTIONS, INNER, new_lanes
 
 AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
@@ -57,10 +58,10 @@ class Task(NamedTuple):
     outputs: int  # number of the outputs
     cost: float  # of a step of the stiff method, in explicit ones
     order: np.ndarray  # of pivots, and where their entries are: see `lu.Elimination`
-    below: np.ndarray
-    below_start: np.ndarray
-    right: np.ndarray
-    right_start: np.ndarray
+    rank: np.ndarray
+    start: np.ndarray
+    pivot: np.ndarray
+    column: np.ndarray
     source: np.ndarray
     target: np.ndarray
     table: np.ndarray
@@ -243,8 +244,7 @@ TASK = type_of(  # only the types of these matter
         ticks=_GRID, which=_PLACES, samples=_NONE,
         due=_PLACES, sampled=_NONE, derivatives=0, c_along=_GRID,
         delays=_GRID, direct=_PLACES, signals=_NONE, outputs=0,
-        cost=0.0, order=_NONE, below=_NONE, below_start=_NONE, right=_NONE, right_start=_NONE,
-        source=_NONE, target=_NONE,
+        cost=0.0, **vars(WHOLE),
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))

@@ -95,11 +95,13 @@ class TestElimination:
             factors[k + 1 :, k] /= factors[k, k]
             factors[k + 1 :, k + 1 :] -= np.outer(factors[k + 1 :, k], factors[k, k + 1 :])
         for k in range(n):
-            rows = order.below[order.below_start[k] : order.below_start[k + 1]]
-            columns = order.right[order.right_start[k] : order.right_start[k + 1]]
-            after = order.order[k + 1 :]
-            assert set(after[factors[k + 1 :, k] != 0]) <= set(rows) <= set(after)
-            assert set(after[factors[k, k + 1 :] != 0]) <= set(columns) <= set(after)
+            row, middle = order.column[order.start[k] : order.start[k + 1]], order.pivot[k]
+            left, right = np.split(row, [middle - order.start[k]])
+            before, now, after = np.split(order.order, [k, k + 1])
+            assert right[:1] == now
+            assert set(before[factors[k, :k] != 0]) <= set(left) <= set(before)
+            assert set(after[factors[k, k + 1 :] != 0]) <= set(right[1:]) <= set(after)
+            assert list(order.rank[left]) == sorted(order.rank[left])
 
     @pytest.mark.parametrize("n", [20, 40, 200])
     def test_arrows_and_bands_are_not_filled(self, n):
