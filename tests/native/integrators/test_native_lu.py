@@ -22,6 +22,7 @@ from nlctl.native.integrate.methods.lu import (
     elimination,
     factorise,
     jacobian_place,
+    multiply,
     solve,
 )
 from nlctl.native.integrate.state import DIRECTIONS
@@ -46,6 +47,12 @@ def both(order, diagonal, w, x):
     only_entries = factorise(order, diagonal, w)
     solve(order, only_entries, w, x)
     return only_entries
+
+
+@numba.njit(error_model="numpy")
+def times(order, jacobian, v, product):
+    """Multiply, called from Python."""
+    multiply(order, jacobian, v, product)
 
 
 def arrow(n, full=2):
@@ -127,6 +134,17 @@ class TestSolution:
             x, only_entries = solved(order, diagonal, matrix, b)
             assert only_entries == (order is not WHOLE)
             np.testing.assert_allclose(x, exact, rtol=1e-12, atol=1e-14)
+
+    @pytest.mark.parametrize("shape", [arrow, banded])
+    def test_its_products_are_numpys(self, shape):
+        """J v, by entries and as a whole."""
+        n, rng = 20, np.random.default_rng(2)
+        where = shape(n)
+        matrix, v = np.where(where, rng.normal(size=(n, n)), 0.0), rng.normal(size=n)
+        for order in (elimination(where), WHOLE):
+            found = np.full(n, np.nan)
+            times(Order(**vars(order)), work(matrix).jacobian_flat, v, found)
+            np.testing.assert_allclose(found, matrix @ v, rtol=1e-13, atol=1e-14)
 
     def test_a_small_pivot_is_exchanged(self):
         """1 / h - J has a zero on its diagonal: solved as a whole, with partial pivoting."""

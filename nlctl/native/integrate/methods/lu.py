@@ -213,6 +213,19 @@ def _solve_entries(task, factors, b):
 
 
 @numba.njit(**INNER)
+def multiply(task, jacobian, v, product):
+    """Fill `product` with J v."""
+    n, source, column = v.size, task.source, task.column
+    for i in range(n):
+        product[i] = 0.0
+        for j in range(0 if task.order.size else n):
+            product[i] += jacobian[place(i, j, n)] * v[j]
+    for k in range(task.order.size):
+        for e in range(task.start[k], task.start[k + 1]):  # also where only factors have entries
+            product[task.order[k]] += jacobian[source[e]] * v[column[e]]
+
+
+@numba.njit(**INNER)
 def _factorise_all(columns, pivots):
     """Factorise a square matrix in place, P M = L U, with partial pivoting.
 

@@ -86,7 +86,7 @@ def _differences(rhs, task, lanes, w):
 
 
 @numba.njit(**INNER)
-def _spectral_radius(w):
+def _spectral_radius(task, w):
     """Estimate the largest eigenvalue's magnitude by a few steps of the power method."""
     n = w.x.shape[0]
     v, product, rate = np.zeros(n), np.zeros(n), 0.0
@@ -94,10 +94,8 @@ def _spectral_radius(w):
         v[i] = 0.5 + (0.6180339887 * (i + 1)) % 1.0  # like no matrix's null space
     for _ in range(8):
         before, after = 0.0, 0.0
+        lu.multiply(task, w.jacobian_flat, v, product)
         for i in range(n):
-            product[i] = 0.0
-            for j in range(n):
-                product[i] += w.jacobian_flat[place(i, j, n)] * v[j]
             before += v[i] * v[i]
             after += product[i] * product[i]
         rate = np.sqrt(after / before)
@@ -134,7 +132,7 @@ def stiff_attempt(rhs, point, along, task, lanes, w):
     if lane.jacobian_at != lane.t:
         _jacobian(rhs, point, along, task, lanes, w)
         if (lane.stiff + 1) % TRIAL == 0:  # when the methods are compared
-            w.rate[0] = _spectral_radius(w)
+            w.rate[0] = _spectral_radius(task, w)
     only_entries = lu.factorise(task, 1.0 / (h * rodas5p.GAMMA), w)
     for s in range(rodas5p.STAGES):
         w.t[0] = lane.t + rodas5p.NODES[s] * h
