@@ -353,6 +353,16 @@ def tracking_metrics(
     ------
     ParameterError
         If a number is not finite, the band not positive or the swing negative.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from analysis.robustness import tracking_metrics
+    >>> metrics = {metric.key: metric for metric in tracking_metrics(start=1.0, band=0.1)}
+    >>> times = np.linspace(0.0, 2 * np.pi, 1001)
+    >>> peak = metrics["peak_u"]
+    >>> round(float(peak.function(times, *(3.0 * np.sin(times) for signal in peak.signals))), 6)
+    3.0
     """
     number("tracking metrics", "start", start)
     number("tracking metrics", "band", band, above=0)

@@ -54,7 +54,7 @@ def documented():
         for home, names in PUBLIC.findall(page.read_text(encoding="utf-8")):
             for name in names.split():
                 made = getattr(importlib.import_module(home), name)
-                if callable(made) and home.startswith("nlctl"):
+                if callable(made) and home.startswith(("nlctl", "analysis.robustness")):
                     yield f"{home}.{name}", made
 
 

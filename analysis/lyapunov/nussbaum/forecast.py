@@ -45,6 +45,21 @@ class BurstForecast:
         The Nussbaum function of the law.
     start, end : float
         Interval of time (s) that counts, from 0 on.
+
+    Examples
+    --------
+    From zeta = 1 with r u = -0.4, and zeta at its lobe's place for each time, at a constant rate:
+
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.robustness import BurstForecast
+    >>> N = nlctl.functions.nussbaum_integral
+    >>> zetas = np.linspace(1.0, 3.0, 4001)  # a lobe of N
+    >>> t = np.linspace(0.0, 100.0, 10001)
+    >>> zeta = np.interp(0.4 * t, N(1.0) - N(zetas), zetas)
+    >>> found = BurstForecast(window=5.0).function(t, zeta, np.ones(t.size), np.full(t.size, -0.4))
+    >>> bool(abs(found / ((N(1.0) - N(3.0)) / 0.4) - 1) < 0.02)
+    True
     """
 
     key: str = "burst"

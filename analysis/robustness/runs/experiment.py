@@ -72,6 +72,10 @@ class Experiment:
         quantities have the same name, or a tolerance or a number of steps is not positive.
     UnknownNameError
         If there is no such method.
+
+    Examples
+    --------
+    See `prepare`.
     """
 
     space: Space
@@ -131,6 +135,10 @@ class Prepared:
         Its space has full names, and units and nominal values from the nominal diagram.
     loops : tuple of (labels, Compiled)
         One for each combination of the choices.
+
+    Examples
+    --------
+    See `prepare`.
     """
 
     experiment: Experiment
@@ -158,6 +166,27 @@ def prepare(experiment: Experiment) -> Prepared:
         If the inputs do not fit a diagram, or are not finite.
     UnknownNameError
         If a requirement or a metric asks for a signal that a diagram lacks.
+
+    Examples
+    --------
+    A lag whose time constant is uncertain has to be at 0.9 from 0.3 s on:
+
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.robustness import (
+    ...     Experiment, Requirement, Space, Spec, Uncertain, always, evaluate, grid, in_band,
+    ...     prepare, rows,
+    ... )
+    >>> space = Space(quantities=(Uncertain(name="lag.T", bounds=(0.05, 0.1)),))
+    >>> high = always(in_band("v", lower=0.9), start=0.3)
+    >>> fast = Requirement(key="fast", formula=high, until=1.0)
+    >>> experiment = Experiment(
+    ...     space=space, build=lambda: nlctl.actuators.cascade({"lag": nlctl.Lag()}),
+    ...     spec=Spec(requirements=(fast,)), timepts=np.linspace(0, 1, 101), inputs=1.0,
+    ... )
+    >>> found = evaluate(prepare(experiment), rows(grid(space, 2), range(2)))
+    >>> print(found["spec"].round(6).tolist(), round((0.1 - np.exp(-0.3 / 0.05)) / 0.9, 6))
+    [0.108357, 0.055792] 0.108357
     """
     space = of_type("prepare", "experiment", experiment, Experiment).space
     built = diagrams(space, experiment.build)
@@ -207,6 +236,10 @@ def evaluate(
     ------
     UnknownNameError, ParameterError
         If the table lacks a column, has a row twice, or a number that is not finite.
+
+    Examples
+    --------
+    See `prepare`.
     """
     of_type("evaluate", "prepared", prepared, Prepared, "prepare(experiment)")
     checked_rows(prepared.experiment.space, table)

@@ -35,6 +35,10 @@ class Progress:
         Rows per second since the sweep was started or resumed.
     is_iid : bool
         Whether the rows are independent draws.
+
+    Examples
+    --------
+    See `until_decided`.
     """
 
     done: int
@@ -137,6 +141,10 @@ def until_decided(
         If the rows are no independent draws.
     ParameterError
         If the threshold is not between 0 and 1, or the confidence is none.
+
+    Examples
+    --------
+    See `sweep`.
     """
     check_iid(design)
     checked_confidence(confidence)

@@ -48,7 +48,16 @@ __all__ = [
 
 
 class StoreError(UsageError):
-    """A folder that a sweep cannot be kept in; the message names it and says what is kept."""
+    """A folder that a sweep cannot be kept in; the message names it and says what is kept.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from analysis.robustness import load
+    >>> load(tempfile.mkdtemp())
+    Traceback (most recent call last):
+    analysis.robustness.runs.store.StoreError: ...
+    """
 
 
 @dataclass(frozen=True, kw_only=True)

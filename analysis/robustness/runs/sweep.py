@@ -54,6 +54,10 @@ class Sweep:
         Whether Ctrl-C was pressed; in the last chunk that leaves it complete.
     notes : tuple of str
         What the user has to know: damaged chunks that were run again, lost workers.
+
+    Examples
+    --------
+    See `sweep`.
     """
 
     design: Design | None = field(repr=False)
@@ -96,6 +100,10 @@ def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
     ------
     StoreError
         If the folder holds no sweep.
+
+    Examples
+    --------
+    See `sweep`.
     """
     store = opened(folder)
     done = stored(store)
@@ -158,6 +166,27 @@ def sweep(
         no folder to resume.
     StoreError
         As in `store.claimed`, or if a chunk cannot be written; those before it are kept.
+
+    Examples
+    --------
+    Dead zones of many widths; it stops as soon as it is clear that few are too wide:
+
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.robustness import (
+    ...     Experiment, Requirement, Space, Spec, Uncertain, eventually, in_band, independent,
+    ...     prepare, sweep, until_decided,
+    ... )
+    >>> space = Space(quantities=(Uncertain(name="zone.b_r", bounds=(0.1, 0.9)),))
+    >>> moves = Requirement(key="moves", formula=eventually(in_band("v", lower=0.01)), until=1.0)
+    >>> experiment = Experiment(
+    ...     space=space, build=lambda: nlctl.actuators.cascade({"zone": nlctl.DeadZone()}),
+    ...     spec=Spec(requirements=(moves,)), timepts=np.linspace(0, 1, 5), inputs=1.0,
+    ... )
+    >>> design = independent(space, 2000, entropy=1)
+    >>> made = sweep(prepare(experiment), design, chunk=200, stop=until_decided(design, 0.05))
+    >>> print(made.decided.decision, made.done < 2000, made.complete)
+    below True False
     """
     _check(prepared, design, executor, threads, resume and folder is None)
     chunk = _chunk_size(design) if chunk is None else whole_number("a sweep", "chunk", chunk, 1)

@@ -46,6 +46,10 @@ class Confirmation:
         first is as in the study.
     reason : str
         Why it is not confirmed; empty if it is.
+
+    Examples
+    --------
+    See `confirm`.
     """
 
     row: Mapping[str, Any]
@@ -99,6 +103,24 @@ def confirm(
     ------
     UnknownNameError, ParameterError
         If the row lacks a quantity, has another one, or a number is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.robustness import (
+    ...     Experiment, Requirement, Space, Spec, Uncertain, always, confirm, in_band, prepare
+    ... )
+    >>> space = Space(quantities=(Uncertain(name="lag.T", bounds=(0.05, 0.5)),))
+    >>> high = always(in_band("v", lower=0.9), start=0.3)
+    >>> fast = Requirement(key="fast", formula=high, until=1.0)
+    >>> experiment = Experiment(
+    ...     space=space, build=lambda: nlctl.actuators.cascade({"lag": nlctl.Lag()}),
+    ...     spec=Spec(requirements=(fast,)), timepts=np.linspace(0, 1, 101), inputs=1.0,
+    ... )
+    >>> found = confirm(prepare(experiment), {"lag.T": 0.4})
+    >>> print(found.reason == "", bool((found.replays["margin"] < 0).all()))
+    True True
     """
     study = of_type("confirm", "prepared", prepared, Prepared, "prepare(experiment)").experiment
     row = checked_row(study.space, row)

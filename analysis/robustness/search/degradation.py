@@ -35,6 +35,10 @@ class Degradation:
         That an interval holds: of each by itself, or of all together.
     is_simultaneous : bool
         Which of the two.
+
+    Examples
+    --------
+    See `degradation_curve`.
     """
 
     factors: tuple[float, ...]
@@ -111,6 +115,16 @@ def degradation_curve(
         If a scaled value is refused by the loop, see `largest_scale.largest_scale`.
     KeyboardInterrupt
         If Ctrl-C kept rows from finishing.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, degradation_curve
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(-1.0, 1.0), nominal=0.0),))
+    >>> def margin(table):
+    ...     return table.assign(spec=1.5 - table["a"].abs())
+    >>> curve = degradation_curve(margin, space, [1.0, 2.0], runs=200, entropy=1)
+    >>> [0.0 < statement.violations / 200 < 0.5 for statement in curve.statements]
+    [False, True]
     """
     confidence = checked_confidence(confidence)
     simultaneous = flag("a degradation curve", "simultaneous", simultaneous)

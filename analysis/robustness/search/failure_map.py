@@ -50,6 +50,10 @@ class FailureMap:
         Sides of the cells at the boundary: how sharp it is, where cells were fine enough to see it.
     is_finished : bool
         False if `most` ended the refinement.
+
+    Examples
+    --------
+    See `failure_map`.
     """
 
     x: str
@@ -109,6 +113,18 @@ def failure_map(
         If a quantity that is not given has no nominal value.
     KeyboardInterrupt
         If Ctrl-C kept rows from finishing.
+
+    Examples
+    --------
+    The margin 1 - a^2 - b^2 is 0 on a circle:
+
+    >>> from analysis.robustness import Space, Uncertain, boundary, failure_map
+    >>> box = (Uncertain(name="a", bounds=(0.0, 1.5)), Uncertain(name="b", bounds=(0.0, 1.5)))
+    >>> def margin(table):
+    ...     return table.assign(spec=1 - table["a"] ** 2 - table["b"] ** 2)
+    >>> points = boundary(failure_map(margin, Space(quantities=box), "a", "b"))
+    >>> bool(((points["a"] ** 2 + points["b"] ** 2 - 1).abs() < 1e-2).all())
+    True
     """
     who = "a failure map"
     of_type(who, "space", space, Space)
@@ -237,6 +253,10 @@ def boundary(made: FailureMap) -> pd.DataFrame:
     -------
     pandas.DataFrame
         Columns by the names of the two quantities.
+
+    Examples
+    --------
+    See `failure_map`.
     """
     of_type("a boundary", "made", made, FailureMap, "failure_map(...)")
     edges = np.sort(made.triangles[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)

@@ -59,6 +59,26 @@ def largest_scale(
         If `at_most` is not a finite number > 0, or the nominal values themselves are refused.
     UnknownNameError
         If the space has no quantity of such a name.
+
+    Examples
+    --------
+    A dead zone needs b_r > 0, so that a box of 0.5 +- 0.2 may grow to 2.5 times its size:
+
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.robustness import (
+    ...     Experiment, Requirement, Space, Spec, Uncertain, eventually, in_band, largest_scale,
+    ...     prepare,
+    ... )
+    >>> space = Space(quantities=(Uncertain(name="zone.b_r", bounds=(0.3, 0.7)),))
+    >>> moves = Requirement(key="moves", formula=eventually(in_band("v", lower=0.01)), until=1.0)
+    >>> experiment = Experiment(
+    ...     space=space, build=lambda: nlctl.actuators.cascade({"zone": nlctl.DeadZone(b_r=0.5)}),
+    ...     spec=Spec(requirements=(moves,)), timepts=np.linspace(0, 1, 5), inputs=1.0,
+    ... )
+    >>> factor, reason = largest_scale(prepare(experiment))
+    >>> print(round(factor, 6))
+    2.5
     """
     of_type("a largest scale", "prepared", prepared, Prepared, "prepare(experiment)")
     factor, why = number("a largest scale", "at_most", at_most, above=0), ""

@@ -55,6 +55,10 @@ class Radius:
         Why it is the largest, and why there is no statement.
     steps : pandas.DataFrame
         What was run: step ("nominal", "search", "ray"), size, lowest margin, runs.
+
+    Examples
+    --------
+    See `robustness_radius`.
     """
 
     upper: float
@@ -171,6 +175,19 @@ def robustness_radius(
         If a quantity has no nominal value.
     KeyboardInterrupt
         If Ctrl-C kept rows from finishing.
+
+    Examples
+    --------
+    The margin a + b - 1 is 0 where both are 0.5, half way from 1 to the ends of a box of size 1:
+
+    >>> from analysis.robustness import Space, Uncertain, robustness_radius
+    >>> a = Uncertain(name="a", bounds=(0.0, 2.0), nominal=1.0)
+    >>> b = Uncertain(name="b", bounds=(0.0, 2.0), nominal=1.0)
+    >>> def margin(table):
+    ...     return table.assign(spec=table["a"] + table["b"] - 1.0)
+    >>> found = robustness_radius(margin, Space(quantities=(a, b)), runs=40, draws=0, entropy=1)
+    >>> 0.5 <= found.upper <= 0.52
+    True
     """
     who = "a robustness radius"
     of_type(who, "space", space, Space)

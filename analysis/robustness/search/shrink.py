@@ -40,6 +40,10 @@ class Shrunk:
         Whether every smaller set of the first row's deviations was tried and holds; otherwise
         fewer may suffice.
     runs : int
+
+    Examples
+    --------
+    See `shrink`.
     """
 
     row: Mapping[str, Any]
@@ -104,6 +108,19 @@ def shrink(
         If the row does not violate the spec, or a number is out of range or not finite.
     SpaceError
         If a quantity has no nominal value.
+
+    Examples
+    --------
+    Of two deviations one suffices, and 1 - a > 0.5 is needed of it:
+
+    >>> from analysis.robustness import Space, Uncertain, shrink
+    >>> a = Uncertain(name="a", bounds=(0.0, 2.0), nominal=1.0)
+    >>> b = Uncertain(name="b", bounds=(0.0, 2.0), nominal=1.0)
+    >>> def margin(table):
+    ...     return table.assign(spec=table["a"] - 0.5)
+    >>> least = shrink(margin, Space(quantities=(a, b)), {"a": 0.0, "b": 2.0})
+    >>> print(least.names, round(least.row["a"], 2), least.row["b"], least.is_fewest)
+    ('a',) 0.5 1.0 True
     """
     of_type("shrinking", "space", space, Space)
     steps = whole_number("shrinking", "steps", steps, at_least=0)

@@ -35,6 +35,10 @@ class WorstCase:
         False if Ctrl-C ended the search.
     all_corners : bool
         Whether every corner of the box is among the rows; otherwise they are a random subset.
+
+    Examples
+    --------
+    See `worst_case`.
     """
 
     design: Design
@@ -134,6 +138,19 @@ def worst_case(
         If `runs` is not an integer >= 1, or an option of a choice has weight 0.
     KeyboardInterrupt
         If Ctrl-C comes before the first batch is done; later it ends the search.
+
+    Examples
+    --------
+    The margin a + b - 1.5 is lowest in the corner (0.5, 0.5):
+
+    >>> from analysis.robustness import Space, Uncertain, worst_case
+    >>> a = Uncertain(name="a", bounds=(0.5, 1.0), nominal=1.0)
+    >>> b = Uncertain(name="b", bounds=(0.5, 1.0), nominal=1.0)
+    >>> def margin(table):
+    ...     return table.assign(spec=table["a"] + table["b"] - 1.5)
+    >>> found = worst_case(margin, Space(quantities=(a, b)), runs=16, entropy=1)
+    >>> print(found.margin, found.witness)
+    -0.5 {'a': 0.5, 'b': 0.5}
     """
     of_type("a worst case", "space", space, Space)
     runs = whole_number("a worst case", "runs", runs, at_least=1)

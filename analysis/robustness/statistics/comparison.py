@@ -49,6 +49,10 @@ class Comparison:
         By metric and pair, see `paired.differences`; p_holm is adjusted for the pairs of a metric.
     wins : pandas.DataFrame
         By metric and winner: in how many samples it beats each other option, see `paired.wins`.
+
+    Examples
+    --------
+    See `compare`.
     """
 
     choice: str
@@ -83,6 +87,15 @@ def crossed(design: Design, choice: Choice) -> pd.DataFrame:
     -------
     pandas.DataFrame
         For `experiment.evaluate`, or as `design.from_table` of a space with the choice.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Choice, Space, Uncertain, crossed, grid
+    >>> import nlctl
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> law = Choice(name="law", options={"one": nlctl.Gain(k=1.0), "two": nlctl.Gain(k=2.0)})
+    >>> crossed(grid(space, 2), law).values.tolist()
+    [[0.0, 'one'], [0.0, 'two'], [1.0, 'one'], [1.0, 'two']]
     """
     of_type("a comparison", "choice", choice, Choice)
     labels = list(choice.options)
@@ -133,6 +146,20 @@ def compare(
         there is no metric, or only one option.
     NoGuaranteeError
         If the design's rows are no independent draws.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> from analysis.robustness import Choice, Space, Uncertain, compare, crossed, independent
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> design = independent(space, 5, entropy=1)
+    >>> law = Choice(name="law", options={"one": nlctl.Gain(k=1.0), "two": nlctl.Gain(k=2.0)})
+    >>> table = crossed(design, law)
+    >>> late_rms = table["law"].map({"one": 0.2, "two": 0.1})
+    >>> table = table.assign(spec=1.0, status="OK", late_rms=late_rms)
+    >>> found = compare(design, law, table, {"late_rms": "smaller"})
+    >>> print(found.ranking.index.tolist(), found.ranking["median late_rms"].tolist())
+    ['two', 'one'] [0.1, 0.2]
     """
     of_type("a comparison", "design", design, Design)
     of_type("a comparison", "choice", choice, Choice)

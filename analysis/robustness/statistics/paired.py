@@ -60,6 +60,15 @@ def differences(
         If rows are no independent draws.
     ParameterError
         If there are less than two controllers, or numbers are missing.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, differences, independent
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> errors = {"PID": [3.0, 4.0, 5.0, 6.0], "paper": [1.0, 2.0, 3.0, 4.0]}
+    >>> found = differences(independent(space, 4, entropy=1), errors)
+    >>> print(found["median"].tolist(), found["p"].tolist())  # both signs alike: 2 / 2^4
+    [2.0] [0.125]
     """
     check_iid(design)
     confidence = checked_confidence(confidence)
@@ -108,6 +117,14 @@ def wins(
     -------
     pandas.DataFrame
         Counts, controllers in rows and columns.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, independent, wins
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> errors = {"PID": [3.0, 4.0, 5.0], "paper": [1.0, 2.0, 9.0]}
+    >>> wins(independent(space, 3, entropy=1), errors).loc["paper", "PID"]
+    np.int64(2)
     """
     of_type("a comparison", "outcomes", outcomes, Mapping, "{controller: numbers}")
     names = list(outcomes)
@@ -144,6 +161,18 @@ def mcnemar(design: Design, margins: Mapping[str, Margins]) -> pd.DataFrame:
         If rows are no independent draws.
     ParameterError
         If there are less than two controllers, or margins are missing.
+
+    Examples
+    --------
+    Of five rows in which only one of them violates, all are the PID's: 2 / 2^5.
+
+    >>> from analysis.robustness import Space, Uncertain, independent, mcnemar
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> found = mcnemar(
+    ...     independent(space, 5, entropy=1), {"PID": [-1.0] * 5, "paper": [1.0] * 5}
+    ... )
+    >>> print(found["p"].tolist())
+    [0.0625]
     """
     check_iid(design)
     of_type("a comparison", "margins", margins, Mapping, "{controller: margins}")

@@ -47,6 +47,15 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
     ------
     ParameterError
         If no run reached its end.
+
+    Examples
+    --------
+    A run that failed counts as the least of the others, and at most as -1:
+
+    >>> from analysis.robustness import censored, unfinished_margin
+    >>> values, failed, least = censored([0.5, -0.2, unfinished_margin(1.0, 10.0)])
+    >>> print(values, failed, least)
+    [ 0.5 -0.2 -1. ] 1 -1.0
     """
     values = series_of(margins, "margins").to_numpy(copy=True)
     ended = values > -FAILED  # not of NaN
@@ -83,6 +92,10 @@ def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None
     ------
     ParameterError
         If the space has choices, or a number is out of range.
+
+    Examples
+    --------
+    See `elementary_effects`.
     """
     if space.choices:
         raise ParameterError(
@@ -132,6 +145,18 @@ def elementary_effects(
     ------
     ParameterError
         If the design is another, or a value is not finite.
+
+    Examples
+    --------
+    Of a + 3 b the effects are 1 and 3, wherever they are taken:
+
+    >>> from analysis.robustness import Space, Uncertain, elementary_effects, morris, rows
+    >>> box = (Uncertain(name="a", bounds=(0.0, 1.0)), Uncertain(name="b", bounds=(0.0, 1.0)))
+    >>> design = morris(Space(quantities=box), 4, entropy=1)
+    >>> table = rows(design, range(design.size))
+    >>> found = elementary_effects(design, table["a"] + 3 * table["b"])
+    >>> print(found["mu_star"].round(6).tolist(), (found["sigma"] < 1e-12).all())
+    [1.0, 3.0] True
     """
     y = _checked(design, values, "Morris", "morris")
     space, r = design.space, design.details["trajectories"]
@@ -178,6 +203,10 @@ def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
     ------
     ParameterError
         If `size` is not a power of 2, or there is one name only, whose share is 1.
+
+    Examples
+    --------
+    See `sobol_indices`.
     """
     d, entropy = len(space.names), checked_entropy(entropy)
     if d < 2:
@@ -220,6 +249,18 @@ def sobol_indices(
     ------
     ParameterError
         If the design is another, or a value is not finite.
+
+    Examples
+    --------
+    Of a + 3 b, a and b uniform, b has nine tenths of the variance:
+
+    >>> from analysis.robustness import Space, Uncertain, rows, saltelli, sobol_indices
+    >>> box = (Uncertain(name="a", bounds=(0.0, 1.0)), Uncertain(name="b", bounds=(0.0, 1.0)))
+    >>> design = saltelli(Space(quantities=box), 256, entropy=1)
+    >>> table = rows(design, range(design.size))
+    >>> found = sobol_indices(design, table["a"] + 3 * table["b"], resamples=99)
+    >>> print(found["ST"].round(2).tolist())
+    [0.1, 0.9]
     """
     y = _checked(design, values, "Saltelli", "saltelli")
     resamples = whole_number(_WHO, "resamples", resamples, at_least=1)
@@ -280,6 +321,16 @@ def regional(design: Design, margins: Margins) -> pd.DataFrame:
     ------
     ParameterError
         If a margin is missing, or all runs pass or all fail.
+
+    Examples
+    --------
+    What decides about failing has the statistic 1:
+
+    >>> from analysis.robustness import Space, Uncertain, independent, regional, rows
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(-1.0, 1.0)),))
+    >>> design = independent(space, 100, entropy=1)
+    >>> print(regional(design, rows(design, range(100))["a"])["statistic"].tolist())
+    [1.0]
     """
     of_type("regional sensitivity", "design", design, Design)
     passed = series_of(margins, "margins").sort_index().to_numpy() > 0

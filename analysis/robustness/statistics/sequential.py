@@ -78,6 +78,13 @@ def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tup
     ------
     ParameterError
         If not 0 <= violations <= runs with at least one run, or the confidence is none.
+
+    Examples
+    --------
+    >>> from analysis.robustness import sequence_bounds
+    >>> lower, upper = sequence_bounds(5, 100)
+    >>> lower < 0.05 < upper
+    True
     """
     k, n = checked_counts(violations, runs)
     limit = -np.log(1 - checked_confidence(confidence))
@@ -113,6 +120,10 @@ class SequentialTest:
     decision : {"below", "above", "undecided"}
     statement : Violation
         What is known when it was decided, or now.
+
+    Examples
+    --------
+    See `decide`.
     """
 
     threshold: float
@@ -150,6 +161,19 @@ def confidence_sequence(
     ------
     NoGuaranteeError
         If the rows are no independent draws, or not the first ones without a gap.
+
+    Examples
+    --------
+    It is wider than the bounds for a number of runs that was fixed in advance:
+
+    >>> from analysis.robustness import (
+    ...     Space, Uncertain, confidence_sequence, independent, violation_probability
+    ... )
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> design = independent(space, 100, entropy=1)
+    >>> fixed = violation_probability(design, [1.0] * 100, side="both")
+    >>> confidence_sequence(design, [1.0] * 100).upper > fixed.upper
+    True
     """
     violated = violations_of(design, margins)
     return _statement(design, int(np.count_nonzero(violated)), violated.size, confidence)
@@ -204,6 +228,14 @@ def decide(
     ------
     ParameterError
         If the threshold is not between 0 and 1.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, decide, independent
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> test = decide(independent(space, 1000, entropy=1), [1.0] * 1000, threshold=0.05)
+    >>> print(test.decision, test.statement.violations, test.statement.runs < 1000)
+    below 0 True
     """
     threshold = fraction("a test", "threshold", threshold)
     limit = -np.log(1 - checked_confidence(confidence))

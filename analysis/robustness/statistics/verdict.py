@@ -29,6 +29,10 @@ class Verdict:
         Shown and refuted with the confidence of the statement that the claim is about.
     needs : str
         What it takes to show it; empty where that is not a question.
+
+    Examples
+    --------
+    See `bound_verdict`.
     """
 
     answer: Answer
@@ -61,6 +65,16 @@ def bound_verdict(statement: Violation, limit: float) -> Verdict:
     ------
     ParameterError
         If the limit is not between 0 and 1.
+
+    Examples
+    --------
+    >>> from analysis.robustness import (
+    ...     Space, Uncertain, bound_verdict, independent, violation_probability
+    ... )
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> found = violation_probability(independent(space, 459, entropy=1), [1.0] * 459)
+    >>> bound_verdict(found, 0.01).answer, bound_verdict(found, 0.005).answer
+    ('shown', 'not shown yet')
     """
     limit = fraction("a verdict", "limit", limit)
     low, high = statement.singly
@@ -88,6 +102,14 @@ def test_verdict(test: SequentialTest) -> Verdict:
     -------
     Verdict
         Shown, refuted, or not shown yet.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, decide, independent, test_verdict
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> test = decide(independent(space, 1000, entropy=1), [1.0] * 1000, threshold=0.05)
+    >>> test_verdict(test).answer
+    'shown'
     """
     if test.decision != "undecided":
         return Verdict(answer="shown" if test.decision == "below" else "refuted")

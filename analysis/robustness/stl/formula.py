@@ -155,6 +155,16 @@ def in_band(
     ------
     ParameterError
         If both bounds are infinite or they are in the wrong order, or the scale is not positive.
+
+    Examples
+    --------
+    The margin counts in multiples of the bound:
+
+    >>> import numpy as np
+    >>> from analysis.robustness import Requirement, in_band, margin
+    >>> band = Requirement(key="band", formula=in_band("e", lower=-0.2, upper=0.2), until=0.0)
+    >>> margin(band, np.zeros(1), {"e": np.array([0.1])})
+    0.5
     """
     text("a band", "signal", signal)
     for name, bound in (("lower", lower), ("upper", upper)):
@@ -191,6 +201,20 @@ def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
     ------
     ParameterError
         If not 0 <= start <= end, or start is infinite.
+
+    Examples
+    --------
+    The error stays within 0.1 from 1 s on:
+
+    >>> import numpy as np
+    >>> from analysis.robustness import Requirement, always, in_band, margin
+    >>> small = always(in_band("e", lower=-0.1, upper=0.1), start=1.0)
+    >>> tracks = Requirement(key="tracks", formula=small, until=5.0)
+    >>> times = np.linspace(0.0, 5.0, 501)
+    >>> round(margin(tracks, times, {"e": np.exp(-3 * times)}), 6)
+    0.502129
+    >>> print(round((0.1 - np.exp(-3)) / 0.1, 6))
+    0.502129
     """
     _check_window("always", part, start, end)
     return Always(part=part, start=float(start), end=float(end))
@@ -209,6 +233,15 @@ def eventually(part: Formula, start: float = 0.0, end: float = np.inf) -> Eventu
     Returns
     -------
     Eventually
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from analysis.robustness import Requirement, eventually, in_band, margin
+    >>> rises = Requirement(key="rises", formula=eventually(in_band("y", lower=0.9)), until=5.0)
+    >>> times = np.linspace(0.0, 5.0, 501)
+    >>> margin(rises, times, {"y": np.minimum(times, 1.8)})  # (1.8 - 0.9) / 0.9
+    1.0
     """
     _check_window("eventually", part, start, end)
     return Eventually(part=part, start=float(start), end=float(end))

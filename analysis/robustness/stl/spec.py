@@ -47,6 +47,10 @@ class Requirement:
     until : float
         Time (s) that a run has to reach and that windows without an end stop at.  A run that ends
         before has failed.
+
+    Examples
+    --------
+    See `margin`.
     """
 
     key: str
@@ -87,6 +91,10 @@ class Spec:
     ------
     ParameterError
         If there is none, or two have the same key.
+
+    Examples
+    --------
+    See `margins`.
     """
 
     requirements: tuple[Requirement, ...]
@@ -125,6 +133,14 @@ def unfinished_margin(time: float, until: float) -> float:
     -------
     float
         Dimensionless, negative.
+
+    Examples
+    --------
+    The earlier a run ended, the lower it counts:
+
+    >>> from analysis.robustness import unfinished_margin
+    >>> unfinished_margin(1.0, 10.0) < unfinished_margin(9.0, 10.0) < -1.0
+    True
     """
     reached = np.clip(np.nan_to_num(time / until), 0.0, 1.0) if until > 0 else 0.0
     return float(-FAILED * (2 - reached))
@@ -157,6 +173,15 @@ def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.nda
         If the response starts after t = 0.
     UnknownNameError
         If a signal is missing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from analysis.robustness import Requirement, always, in_band, margin
+    >>> low = Requirement(key="low", formula=always(in_band("u", upper=10.0)), until=1.0)
+    >>> times = np.linspace(0.0, 1.0, 11)
+    >>> margin(low, times, {"u": 12.0 * times})  # 2 beyond the bound of 10
+    -0.2
     """
     until = requirement.until
     of_type("a margin", "signals", signals, Mapping, "{name: samples}")
@@ -215,6 +240,15 @@ def margins(spec: Spec, t: np.ndarray, signals: Mapping[str, np.ndarray]) -> dic
     -------
     dict of str to float
         Dimensionless.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from analysis.robustness import Requirement, Spec, in_band, margins
+    >>> low = Requirement(key="low", formula=in_band("u", upper=10.0), until=0.0)
+    >>> high = Requirement(key="high", formula=in_band("u", lower=-10.0), until=0.0)
+    >>> margins(Spec(requirements=(low, high)), np.zeros(1), {"u": np.array([5.0])})
+    {'low': 0.5, 'high': 1.5, 'spec': 0.5}
     """
     values = {r.key: margin(r, t, signals) for r in spec.requirements}
     return values | {"spec": float(min(values.values()))}

@@ -53,6 +53,16 @@ def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
     SpaceError
         If a parameter is not a number, is an integer while its law is not, a name means the same
         as another one, or the diagram's own value lies outside the box.
+
+    Examples
+    --------
+    Names may be short, and the diagram says what is nominal:
+
+    >>> import nlctl
+    >>> from analysis.robustness import Space, Uncertain, nominal, resolved
+    >>> space = Space(quantities=(Uncertain(name="b_r", bounds=(0.4, 0.7)),))
+    >>> nominal(resolved(space, nlctl.actuators.cascade({"zone": nlctl.DeadZone(b_r=0.5)})))
+    {'zone.b_r': 0.5}
     """
     system = diagram.system if isinstance(diagram, Compiled) else diagram
     of_type("a space", "diagram", system, ct.InputOutputSystem, "nlctl.interconnect(...)")
@@ -164,6 +174,16 @@ def diagrams(
         If `build` has no such keyword.
     UsageError
         As in `resolved`; the message names the combination.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> from analysis.robustness import Choice, Space, diagrams
+    >>> stages = {"zone": nlctl.DeadZone(), "gain": nlctl.Gain()}
+    >>> space = Space(choices=(Choice(name="stage", options=stages),))
+    >>> made = diagrams(space, lambda stage: nlctl.actuators.cascade({"stage": stage}))
+    >>> [labels["stage"] for labels, diagram in made]
+    ['zone', 'gain']
     """
     a_function("an experiment", "build", build)
     for choice in space.choices:

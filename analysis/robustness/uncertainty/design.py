@@ -69,6 +69,10 @@ class Design:
         The rows; None for i.i.d. rows, which are drawn when they are asked for.
     details : mapping
         Numbers that analyses of this kind of design need.
+
+    Examples
+    --------
+    See `independent`.
     """
 
     space: Space
@@ -101,6 +105,15 @@ def row_seed(design: Design, row: int) -> np.random.SeedSequence:
     Returns
     -------
     numpy.random.SeedSequence
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from analysis.robustness import Space, Uncertain, independent, row_seed
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> once, again = (row_seed(independent(space, size, entropy=1), 2) for size in (3, 9))
+    >>> np.random.default_rng(once).random() == np.random.default_rng(again).random()
+    True
     """
     row = whole_number("a design", "row", row, at_least=0)
     return np.random.SeedSequence(design.entropy, spawn_key=(row,))
@@ -120,6 +133,14 @@ def seed_number(design: Design, row: int) -> int:
     -------
     int
         Below 2^64.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, independent, seed_number
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> design = independent(space, 3, entropy=1)
+    >>> len({seed_number(design, row) for row in range(3)})
+    3
     """
     return int(row_seed(design, row).generate_state(1, np.uint64)[0])
 
@@ -142,6 +163,13 @@ def rows(design: Design, numbers: range) -> pd.DataFrame:
     ------
     ParameterError
         If a number is not in the design.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, grid, rows
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> rows(grid(space, 5), range(2, 4))["a"].to_dict()
+    {2: 0.5, 3: 0.75}
     """
     of_type("a design", "numbers", numbers, range)
     if len(numbers) and not (min(numbers) >= 0 and max(numbers) < design.size):
@@ -185,6 +213,16 @@ def independent(space: Space, size: int, entropy: int | None = None) -> Design:
     -------
     Design
         Rows that follow from `entropy` and their numbers alone.
+
+    Examples
+    --------
+    Rows follow from the entropy and their numbers: a longer design begins with the same rows.
+
+    >>> from analysis.robustness import Space, Uncertain, independent, rows
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> short, long = independent(space, 3, entropy=1), independent(space, 5, entropy=1)
+    >>> bool((rows(short, range(3)) == rows(long, range(3))).all(axis=None)), short.is_iid
+    (True, True)
     """
     of_type("a design", "space", space, Space)
     size = whole_number("a design", "size", size, at_least=1)
@@ -240,6 +278,15 @@ def from_table(
         If a column is not a name of the space, or a choice has no such option.
     ParameterError
         If a column is missing, there is no row, or a number is not finite.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from analysis.robustness import Space, Uncertain, from_table
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> design = from_table(space, pd.DataFrame({"a": [0.1, 0.9]}))
+    >>> design.size, design.is_iid
+    (2, False)
     """
     of_type("a design", "table", table, pd.DataFrame, "pandas.DataFrame(...)")
     independently = flag("a design", "drawn_independently", drawn_independently)
@@ -311,6 +358,16 @@ def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
     ------
     ParameterError
         If `size` is not a power of 2, which the sequence's balance needs.
+
+    Examples
+    --------
+    Of 2^k rows each half of a box holds half:
+
+    >>> from analysis.robustness import Space, Uncertain, rows, sobol
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> drawn = rows(sobol(space, 8, entropy=1), range(8))
+    >>> int((drawn["a"] < 0.5).sum())
+    4
     """
     entropy = checked_entropy(entropy)
     unit = sobol_points(len(space.names), size, entropy)
@@ -346,6 +403,14 @@ def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Desi
     Returns
     -------
     Design
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, latin_hypercube, rows
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 4.0)),))
+    >>> drawn = rows(latin_hypercube(space, 4, entropy=1), range(4))
+    >>> sorted(int(a) for a in drawn["a"])  # one in each quarter
+    [0, 1, 2, 3]
     """
     size = whole_number("a Latin hypercube", "size", size, at_least=1)
     affordable("a Latin hypercube", size, len(space.names))
@@ -375,6 +440,13 @@ def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = No
         If a number of levels is missing or below 1.
     UnknownNameError
         If a level is given for an unknown quantity.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, grid, rows
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
+    >>> rows(grid(space, 3), range(3))["a"].tolist()
+    [0.0, 0.5, 1.0]
     """
     names = [q.name for q in of_type("a grid", "space", space, Space).quantities]
     given = levels if isinstance(levels, Mapping) else dict.fromkeys(names, levels)
@@ -407,6 +479,13 @@ def corners(space: Space, entropy: int | None = None) -> Design:
     ------
     ParameterError
         If an option of a choice has weight 0.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, corners, rows
+    >>> box = (Uncertain(name="a", bounds=(0.0, 1.0)), Uncertain(name="b", bounds=(2.0, 3.0)))
+    >>> rows(corners(Space(quantities=box)), range(4)).values.tolist()
+    [[0.0, 2.0], [0.0, 3.0], [1.0, 2.0], [1.0, 3.0]]
     """
     rows = math.prod([2] * len(space.quantities) + _options(space))
     affordable("a design of corners", rows, len(space.names))
@@ -451,6 +530,14 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
         If `levels` is below 2.
     SpaceError
         If a quantity has no nominal value.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, one_at_a_time, rows
+    >>> a = Uncertain(name="a", bounds=(0.0, 1.0), nominal=0.5)
+    >>> b = Uncertain(name="b", bounds=(2.0, 3.0), nominal=2.5)
+    >>> rows(one_at_a_time(Space(quantities=(a, b))), range(5)).values.tolist()
+    [[0.5, 2.5], [0.0, 2.5], [1.0, 2.5], [0.5, 2.0], [0.5, 3.0]]
     """
     levels = whole_number("one at a time", "levels", levels, at_least=2)
     affordable("a design", levels * len(space.names), len(space.names))

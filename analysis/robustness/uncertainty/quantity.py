@@ -20,7 +20,15 @@ QUANTILES = (0.001, 0.999)
 
 
 class SpaceError(UsageError):
-    """A space that contradicts itself or the diagram; the message names the quantity."""
+    """A space that contradicts itself or the diagram; the message names the quantity.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Uncertain
+    >>> Uncertain(name="plant.m", bounds=(2.0, 1.0))
+    Traceback (most recent call last):
+    analysis.robustness.uncertainty.quantity.SpaceError: ...
+    """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +55,16 @@ class Uncertain:
     SpaceError
         If there is neither law nor bounds, the law is not frozen, the bounds are no interval, or
         the nominal value lies outside of them.
+
+    Examples
+    --------
+    A law of scipy.stats, and the box that it is searched in:
+
+    >>> from scipy import stats
+    >>> from analysis.robustness import Uncertain
+    >>> mass = Uncertain(name="plant.m", law=stats.norm(2.0, 0.1), bounds=(1.7, 2.3))
+    >>> print(mass.law.mean(), mass.box)
+    2.0 (1.7, 2.3)
     """
 
     name: str
@@ -134,6 +152,14 @@ class Choice:
     SpaceError
         If there is no option, the nominal label is none of them, or the weights are no
         probabilities.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> from analysis.robustness import Choice
+    >>> bodies = {"dead zone": nlctl.DeadZone(), "gain": nlctl.Gain()}
+    >>> Choice(name="actuator", options=bodies).nominal
+    'dead zone'
     """
 
     name: str

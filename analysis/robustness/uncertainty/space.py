@@ -48,6 +48,14 @@ class Space:
     SpaceError
         If nothing is uncertain, two names are equal, the scale is negative, or a scale other than
         1 meets a quantity without nominal value.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, nominal
+    >>> slope = Uncertain(name="actuator.slope_r", bounds=(0.8, 1.2), nominal=1.0)
+    >>> point = Uncertain(name="actuator.b_r", bounds=(0.4, 0.7), nominal=0.5)
+    >>> nominal(Space(quantities=(slope, point)))
+    {'actuator.slope_r': 1.0, 'actuator.b_r': 0.5}
     """
 
     quantities: tuple[Uncertain, ...] = ()
@@ -108,6 +116,10 @@ def nominal(space: Space) -> dict[str, Any]:
     ------
     SpaceError
         If a quantity has none.
+
+    Examples
+    --------
+    See `Space`.
     """
     numbers = {q.name: _nominal_of(q) for q in space.quantities}
     return numbers | {c.name: c.nominal for c in space.choices}
@@ -126,6 +138,13 @@ def scaled(space: Space, factor: float) -> Space:
     Returns
     -------
     Space
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, corners, rows, scaled
+    >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0), nominal=0.5),))
+    >>> rows(corners(scaled(space, 2.0)), range(2))["a"].tolist()
+    [-0.5, 1.5]
     """
     of_type("a scaled space", "space", space, Space)
     return replace(space, scale=space.scale * number("a scaled space", "factor", factor))
@@ -224,6 +243,15 @@ def arguments(space: Space, table: pd.DataFrame) -> dict[str, dict[str, np.ndarr
     ------
     UnknownNameError, ParameterError
         As in `checked_rows`.
+
+    Examples
+    --------
+    >>> from analysis.robustness import Space, Uncertain, arguments, grid, rows
+    >>> start = Uncertain(name="plant.x1(0)", bounds=(0.0, 1.0))
+    >>> space = Space(quantities=(Uncertain(name="law.k", bounds=(1.0, 2.0)), start))
+    >>> given = arguments(space, rows(grid(space, {"law.k": 2, "plant.x1(0)": 1}), range(2)))
+    >>> given["params"]["law.k"].tolist(), given["initial_state"]["plant.x1"].tolist()
+    ([1.0, 2.0], [0.5, 0.5])
     """
     params, states = {}, {}
     checked = checked_rows(space, table)
