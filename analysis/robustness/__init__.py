@@ -37,17 +37,15 @@ from .stl.spec import Requirement, Spec, margin, margins, unfinished_margin
 from .uncertainty.binding import diagrams, resolved
 from .uncertainty.design import (
     Design,
-    corners,
     from_table,
-    grid,
     independent,
     latin_hypercube,
-    one_at_a_time,
     row_seed,
     rows,
     seed_number,
     sobol,
 )
+from .uncertainty.lattice import corners, grid, one_at_a_time
 from .uncertainty.quantity import Choice, SpaceError, Uncertain
 from .uncertainty.space import Space, arguments, nominal, scaled
 

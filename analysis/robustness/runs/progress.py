@@ -38,7 +38,7 @@ class Progress:
 
     Examples
     --------
-    See `until_decided`.
+    See `sweep`.
     """
 
     done: int

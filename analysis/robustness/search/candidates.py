@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..uncertainty.design import corners, numbered
+from ..uncertainty.design import numbered
+from ..uncertainty.lattice import corners
 from ..uncertainty.space import Space, ends, from_unit_cube
 from .evaluation import Evaluate, evaluated, margins_of
 

@@ -18,7 +18,7 @@ from analysis.robustness.search.largest_scale import largest_scale
 from analysis.robustness.search.radius import robustness_radius, size_of
 from analysis.robustness.stl.formula import always, in_band
 from analysis.robustness.stl.spec import Requirement, Spec
-from analysis.robustness.uncertainty.design import corners
+from analysis.robustness.uncertainty.lattice import corners
 from analysis.robustness.uncertainty.quantity import QUANTILES, Choice, SpaceError, Uncertain
 from analysis.robustness.uncertainty.space import Space, scaled
 

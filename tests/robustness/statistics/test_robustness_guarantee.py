@@ -24,15 +24,13 @@ from analysis.robustness.statistics.sequential import (
     sequence_bounds,
 )
 from analysis.robustness.uncertainty.design import (
-    corners,
     from_table,
-    grid,
     independent,
     latin_hypercube,
     listed,
-    one_at_a_time,
     sobol,
 )
+from analysis.robustness.uncertainty.lattice import corners, grid, one_at_a_time
 from analysis.robustness.uncertainty.quantity import Uncertain
 from analysis.robustness.uncertainty.space import Space
 

@@ -13,17 +13,15 @@ from scipy import stats
 
 import nlctl
 from analysis.robustness.uncertainty.design import (
-    corners,
     from_table,
-    grid,
     independent,
     latin_hypercube,
-    one_at_a_time,
     row_seed,
     rows,
     seed_number,
     sobol,
 )
+from analysis.robustness.uncertainty.lattice import corners, grid, one_at_a_time
 from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
 from analysis.robustness.uncertainty.space import Space
 
