@@ -31,6 +31,13 @@ class Box:
         "sampled" for a box that trajectories have visited.
     how : str
         Where the box comes from.
+
+    Examples
+    --------
+    >>> from analysis.lyapunov import Box
+    >>> box = Box(names=("x1", "v"), low=(-1.0, 0.0), high=(1.0, 2.0))
+    >>> box.cell
+    ((-1.0, 1.0), (0.0, 2.0))
     """
 
     names: tuple[str, ...]
@@ -100,6 +107,16 @@ def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
     ------
     ParameterError
         If there is no response, no state among its outputs, or a value that is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.lyapunov import visited_box
+    >>> response = nlctl.input_output_response(nlctl.paper.example_1(), np.linspace(0, 1, 101))
+    >>> box = visited_box(response, margin=0.0)
+    >>> print(box.provenance, float(box.low[box.names.index("x1")]))  # x1 starts at 0.5 and rises
+    sampled 0.5
     """
     if not responses or not margin >= 0:
         raise ParameterError(

@@ -47,6 +47,10 @@ class Range:
     boxes, undecided : int
         Boxes looked at, and those left without a finite bound.
     seconds : float
+
+    Examples
+    --------
+    See `enclose`.
     """
 
     low: float
@@ -78,6 +82,10 @@ class Proof:
     value : float
         Value of the function there.
     seconds : float
+
+    Examples
+    --------
+    See `prove`.
     """
 
     holds: bool | None
@@ -110,6 +118,15 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     ------
     ParameterError
         If it is not a function or not a box, `tol` is not positive, or `max_boxes` is below 1.
+
+    Examples
+    --------
+    x (1 - x) on [0, 1] has the range [0, 1/4]:
+
+    >>> from analysis.lyapunov import Box, enclose
+    >>> found = enclose(lambda x: x[0] * (1 - x[0]), Box(names=("x",), low=(0.0,), high=(1.0,)))
+    >>> -1e-3 < found.low <= 0.0 and 0.25 <= found.high < 0.251
+    True
     """
     a_function("enclose", "function", function)
     of_type("enclose", "box", box, Box, "Box.of(x1=(-1, 1))")
@@ -162,6 +179,16 @@ def prove(
     ParameterError
         If it is not a function or not a box, the claim is not low <= high, or `max_boxes` is
         below 1.
+
+    Examples
+    --------
+    >>> from analysis.lyapunov import Box, prove
+    >>> box = Box(names=("x",), low=(0.0,), high=(1.0,))
+    >>> prove(lambda x: x[0] * (1 - x[0]), box, high=0.26).holds
+    True
+    >>> refuted = prove(lambda x: x[0] * (1 - x[0]), box, high=0.2)
+    >>> print(refuted.holds, refuted.value > 0.2)
+    False True
     """
     a_function("prove", "function", function)
     of_type("prove", "box", box, Box, "Box.of(x1=(-1, 1))")

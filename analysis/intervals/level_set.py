@@ -56,6 +56,20 @@ def prove_decrease(
     ParameterError
         If `gradient` is not that of V at the centre of the box's upper quarter, or not
         0 < floor < level.
+
+    Examples
+    --------
+    V = x1^2 + x2^2 of a focus has V' = -2 V:
+
+    >>> from analysis.lyapunov import Box, prove_decrease
+    >>> proof = prove_decrease(
+    ...     lambda x: x[0] ** 2 + x[1] ** 2,
+    ...     lambda x: (2 * x[0], 2 * x[1]),
+    ...     lambda x: (-x[0] + x[1], -x[0] - x[1]),
+    ...     Box(names=("x1", "x2"), low=(-1.0, -1.0), high=(1.0, 1.0)), level=0.9, floor=0.1,
+    ... )
+    >>> proof.holds
+    True
     """
     if not 0 < floor < level:
         raise ParameterError(f"prove_decrease needs 0 < floor < level, got {floor:g} and {level:g}")

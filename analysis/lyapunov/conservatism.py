@@ -59,6 +59,10 @@ class DirectBound:
         max(|r(start)|, rho).
     max_r : float
         max |r| on the interval.
+
+    Examples
+    --------
+    See `observed`.
     """
 
     start: float
@@ -97,6 +101,10 @@ class Conservatism:
     e_1, tail_max_e_1 : float
         Bound tail max |r| / lambda_{n-1} of limsup |e_1| for real stable roots, and what
         max |e_1| is over the second half.
+
+    Examples
+    --------
+    See `conservatism`.
     """
 
     C_0: float
@@ -155,6 +163,17 @@ def conservatism(
     Returns
     -------
     Conservatism
+
+    Examples
+    --------
+    C_0^2 / 2 is the sum of its terms:
+
+    >>> import nlctl
+    >>> from analysis.lyapunov import conservatism
+    >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
+    >>> found = conservatism(nlctl.paper.example_1(controller=controller), 0.2)
+    >>> print(round(sum(share.share for share in found.shares), 9), found.max_r < found.C_0)
+    1.0 True
     """
     study = loop if isinstance(loop, Examination) else examine(loop, run, **settings)
     member, found = study.runs.first, study.constants
@@ -257,6 +276,10 @@ def comparison(signals: Signals, given: Premises, start: float, end: float) -> D
     -------
     Comparison
         With an infinite bound where k G N is not negative on the whole interval.
+
+    Examples
+    --------
+    See `observed`.
     """
     x, gains = terms(signals, given), given.gains
     inside = (signals.t >= start - 1e-9) & (signals.t <= end + 1e-9)

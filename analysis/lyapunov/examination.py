@@ -72,6 +72,10 @@ class Examination:
     loop : control.InterconnectedSystem
     runs : Runs
     constants : Constants
+
+    Examples
+    --------
+    See `ledger`.
     """
 
     loop: ct.InterconnectedSystem
@@ -126,6 +130,10 @@ def examine(
         If the actuator has no split (2).
     ParameterError, UnknownNameError
         If a run, a box or a name is refused.
+
+    Examples
+    --------
+    See `ledger`.
     """
     max_steps = whole_number("examine", "max_steps", max_steps, at_least=1)
     if isinstance(W, str):

@@ -130,6 +130,10 @@ def inequalities(signals: Signals, given: Premises) -> tuple[Margin, ...]:
     -------
     tuple of Margin
         (1), (9), (14), (15), (18), (20), (22), (26)-(32), (34), (36), in this order.
+
+    Examples
+    --------
+    See `observed`.
     """
     x = terms(signals, given)
     return (

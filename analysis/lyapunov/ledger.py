@@ -49,6 +49,10 @@ class Ledger:
         sup I(t) of (33) and max |r|, over all runs.
     slow_drift : SlowDrift or None
         Of the first run, if it is long enough.
+
+    Examples
+    --------
+    See `ledger`.
     """
 
     loop: str
@@ -159,6 +163,21 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
     ------
     DiagramError, DecompositionError, ParameterError, UnknownNameError
         As `examine` does.
+
+    Examples
+    --------
+    Without the network, which leaves little to be bounded, over a fifth of a second:
+
+    >>> import nlctl
+    >>> from analysis.lyapunov import examine, ledger
+    >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
+    >>> found = examine(nlctl.paper.example_1(controller=controller), 0.2)
+    >>> book = ledger(found)
+    >>> status = {line.key: line.status for line in book.lines}
+    >>> status["A2"], status["(31)"], status["(31) literal"]
+    ('proved', 'checked', 'violated')
+    >>> found.constants["d*"] < 5.3  # of q cos(w t) and 0.1 |x|^2 sin t
+    True
     """
     for name in settings:
         if name not in _SETTINGS:

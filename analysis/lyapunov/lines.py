@@ -81,6 +81,10 @@ class Line:
         Options of the command line that repeat that run.
     runs : int
         Number of runs behind the line.
+
+    Examples
+    --------
+    See `ledger`.
     """
 
     key: str

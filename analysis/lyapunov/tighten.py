@@ -78,6 +78,10 @@ class Tightened:
         max |u| along the run, its limit, and the length of the runs (s).
     trials : tuple of TrialBound
         All gains that the search looked at, in order.
+
+    Examples
+    --------
+    See `tighten`.
     """
 
     gains: dict[str, float]
@@ -157,6 +161,16 @@ def tighten(
     ------
     ParameterError
         If no gains that were looked at keep the limit, or it is not positive.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> from analysis.lyapunov import tighten
+    >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
+    >>> loop = nlctl.paper.example_1(controller=controller)
+    >>> found = tighten(loop, u_limit=20.0, horizon=0.5, evaluations=4)
+    >>> print(found.u <= 20.0, sorted(found.gains)[0])
+    True controller.law.beta
     """
     if bound not in _BOUNDS:
         raise unknown("bound", bound, _BOUNDS)

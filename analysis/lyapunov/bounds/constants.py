@@ -35,6 +35,12 @@ def kappa() -> Proof:
     Returns
     -------
     Proof
+
+    Examples
+    --------
+    >>> from analysis.lyapunov import kappa
+    >>> kappa().holds
+    True
     """
     return prove(lambda s: s[0] - s[0] * smooth_sign(s[0], 1.0), Box.of(s=(0, 10)), high=KAPPA)
 
@@ -57,6 +63,18 @@ def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float 
     -------
     Range
         In the unit of d, rounded outwards.
+
+    Examples
+    --------
+    sin(0.1 t) of Example 2, for all time:
+
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.lyapunov import Box, disturbance
+    >>> box = Box(names=("x1", "x2", "x3"), low=(-1.0,) * 3, high=(1.0,) * 3)
+    >>> found = disturbance(nlctl.Genesio(), box, (0.0, np.inf))
+    >>> -1.0001 < found.low <= -1.0 and 1.0 <= found.high < 1.0001
+    True
     """
     _, d = plant_terms(plant)
     of_type("disturbance", "box", box, Box, "Box.of(x1=(-1, 1))")
@@ -109,6 +127,10 @@ def constants(
         If the actuator has no split (2).
     ParameterError, UnknownNameError
         If the box lacks a side, W has the wrong length or its norm is above 1e5.
+
+    Examples
+    --------
+    See `literal`.
     """
     parts = read_parts(loop, start, params)
     box = of_type("constants", "box", box, Box, "Box.of(x1=(-1, 1), v=(-5, 5))")

@@ -35,7 +35,16 @@ TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared 
 
 
 class DecompositionError(UsageError):
-    """An actuator that (2) and (3) do not describe; the message says why."""
+    """An actuator that (2) and (3) do not describe; the message says why.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> from analysis.lyapunov import decompose
+    >>> decompose(nlctl.Saturation())
+    Traceback (most recent call last):
+    analysis.lyapunov.bounds.decomposition.DecompositionError: Saturation is not of the form (2)...
+    """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +64,10 @@ class Decomposition:
         samples do not refute it, and nothing proves it.
     how, over : str
         How the bounds were obtained, and for which inputs they hold.
+
+    Examples
+    --------
+    See `decompose`.
     """
 
     k_1: float
@@ -116,6 +129,13 @@ def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
     ------
     ParameterError
         If not 0 < k_1 <= k_2, both finite.
+
+    Examples
+    --------
+    >>> from analysis.lyapunov import clipped_split
+    >>> part = clipped_split(0.5, 2.0)
+    >>> print(part(1.0, 1.5), part(1.0, 3.0))  # k = v/u, and at most 2
+    1.5 2.0
     """
     number("clipped_split", "k_1", k_1, above=0)
     number("clipped_split", "k_2", k_2, at_least=k_1)
@@ -179,6 +199,14 @@ def decompose(
         why, as ``no_split``), or the record's own one is refuted by a sample of its output.
     ParameterError
         If `k` is not a pair with 0 < k_1 <= k_2, or `u_max` or `tol` is not positive.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> from analysis.lyapunov import decompose
+    >>> split = decompose(nlctl.DeadZone(ripple_r=0, ripple_l=0))
+    >>> print(split.k_1, split.k_2, split.eps_low, split.eps_high, split.provenance)
+    0.8 1.0 -0.5 0.3 computed
     """
     u_max = number("decompose", "u_max", u_max, above=0)
     tol = number("decompose", "tol", tol, above=0)

@@ -40,6 +40,10 @@ class Premises:
         Bounds of G, d* and eps*, and delta*.
     forcing : callable
         ``forcing(t)`` of arrays: what the reading counts to g and not to d.
+
+    Examples
+    --------
+    See `literal`.
     """
 
     gains: Gains
@@ -85,6 +89,10 @@ def premises(
     Returns
     -------
     Premises
+
+    Examples
+    --------
+    See `literal`.
     """
     parts = constants.parts
     return Premises(
@@ -118,6 +126,21 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
     -------
     Premises or None
         With the printed numbers in the place of the derived ones.
+
+    Examples
+    --------
+    Example 1's forcing belongs to the disturbance, so that the printed d* is too small:
+
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.lyapunov import Box, constants, literal, premises
+    >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
+    >>> loop = nlctl.paper.example_1(controller=controller)
+    >>> box = Box(names=("x1", "x2", "v"), low=(-1.0, -1.0, -5.0), high=(1.0, 1.0, 5.0))
+    >>> found = constants(loop, box, times=(0.0, 1.0))
+    >>> given = premises(found)
+    >>> bool(literal(given, found).d < 0.21 < 5.0 < given.d)
+    True
     """
     declared: Any = constants.parts.plant
     plant = declared if plant is None else plant

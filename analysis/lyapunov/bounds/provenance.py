@@ -43,6 +43,13 @@ class Constant:
         Method, or formula.
     over : str
         Set for which it holds.
+
+    Examples
+    --------
+    >>> from analysis.lyapunov import Constant
+    >>> given = Constant(symbol="tau", value=0.2, unit="1", provenance="given", how="", over="")
+    >>> print(given.symbol, given.value, given.provenance)
+    tau 0.2 given
     """
 
     symbol: str
@@ -70,6 +77,10 @@ class Constants:
         Of the actuator.
     W : ndarray of shape (l,)
         The ideal weights that were chosen; empty without a network.
+
+    Examples
+    --------
+    See `literal`.
     """
 
     entries: tuple[Constant, ...]

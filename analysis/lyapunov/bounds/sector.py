@@ -33,6 +33,10 @@ class Sector:
         Proved range of F/v over the box with v >= 0 and with v < 0; at v = 0 it is dF/dv.  None
         where the box has no such v.
     box : Box
+
+    Examples
+    --------
+    See `sector`.
     """
 
     positive: Range | None
@@ -118,6 +122,17 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
         If the box lacks a side.
     ParameterError
         If it is not a box, or `tol` is not positive.
+
+    Examples
+    --------
+    h(x, v) / v of Example 1 lies in (1 +- 0.1) (1 +- 0.2):
+
+    >>> import nlctl
+    >>> from analysis.lyapunov import Box, sector
+    >>> box = Box(names=("x1", "x2", "v"), low=(-1.0, -1.0, 0.0), high=(1.0, 1.0, 5.0))
+    >>> found = sector(nlctl.ForcedDuffing(), box).positive
+    >>> 0.9 * 0.8 <= found.low and found.high <= 1.1 * 1.2 + 1e-6
+    True
     """
     f, _ = plant_terms(plant)
     box = of_type("sector", "box", box, Box, "Box.of(x1=(-1, 1), v=(-5, 5))")

@@ -66,6 +66,10 @@ class Certificate:
         Of the actuator.
     loop : KnownSignLoop
         The parameters that it is about.
+
+    Examples
+    --------
+    See `certify`.
     """
 
     holds: bool
@@ -183,6 +187,18 @@ def certify(
         If the actuator has no split (2).
     ParameterError
         If `u_max`, `tol` or `max_iterations` is not positive, or a bound of an input is refused.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> from analysis.lyapunov import certify
+    >>> law, robust = nlctl.KnownSignLaw(), nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
+    >>> weights = nlctl.AdaptiveWeights(Gamma=10.0)
+    >>> controller = nlctl.adaptive_neural(2, law=law, weights=weights, robust=robust)
+    >>> found = certify(nlctl.paper.example_1(controller=controller))
+    >>> known = (2 * max(found.V_0, found.alpha_0 / found.alpha_1)) ** 0.5
+    >>> print(found.holds, abs(found.C_0 - known) < 1e-9)
+    True True
     """
     max_iterations = whole_number("certify", "max_iterations", max_iterations, at_least=1)
     for name, value in (("u_max", u_max), ("tol", tol)):

@@ -61,6 +61,10 @@ class GainDesign:
         The limit that was asked for, and the length of the simulation (s).
     trials : tuple of Trial
         All gains that the search looked at, in order.
+
+    Examples
+    --------
+    See `design`.
     """
 
     gains: dict[str, float]
@@ -134,6 +138,18 @@ def design(
     ParameterError
         If no gains were found for which the box closes and |u| keeps its limit, or a network
         has sigma_1 = 0.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> from analysis.lyapunov import design
+    >>> law, robust = nlctl.KnownSignLaw(), nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
+    >>> no_network = nlctl.controllers.Zero(outputs=("W_psi", "W_norm"))
+    >>> controller = nlctl.adaptive_neural(2, law=law, weights=no_network, robust=robust)
+    >>> loop = nlctl.paper.example_1(controller=controller)
+    >>> found = design(loop, u_limit=100.0, horizon=1.0, evaluations=3)
+    >>> print(found.certificate.holds, found.u <= 100.0)
+    True True
     """
     u_limit = number("design", "u_limit", u_limit, above=0)
     horizon = number("design", "horizon", horizon, above=0)

@@ -84,6 +84,29 @@ def observed(
     ------
     DiagramError
         If the law has no Nussbaum argument.
+
+    Examples
+    --------
+    Every step of the proof, from a run of the loop with all its signals:
+
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.lyapunov import (
+    ...     Box, comparison, constants, inequalities, observed, premises, read_parts, signals_of
+    ... )
+    >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
+    >>> loop = nlctl.paper.example_1(controller=controller)
+    >>> box = Box(names=("x1", "x2", "v"), low=(-1.0, -1.0, -5.0), high=(1.0, 1.5, 5.0))
+    >>> found = constants(loop, box, times=(0.0, 1.0))
+    >>> given = premises(found)
+    >>> seen = observed(loop, read_parts(loop), given.split, found["alpha_1"])
+    >>> run = nlctl.input_output_response(seen, np.linspace(0, 0.2, 51), engine="native")
+    >>> margins = {margin.equation: margin for margin in inequalities(signals_of(run), given)}
+    >>> bool(margins["(31)"].margin.min() > 0)
+    True
+    >>> bound = comparison(signals_of(run), given, 0.1, 0.2)
+    >>> bool(bound.max_r <= bound.bound < np.inf)
+    True
     """
     if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
         raise DiagramError(

@@ -35,6 +35,18 @@ def sharpest(split: Decomposition) -> Decomposition:
     Returns
     -------
     Decomposition
+
+    Examples
+    --------
+    Where v = k u is within the bounds of k nothing is left for eps_u:
+
+    >>> import nlctl
+    >>> from analysis.lyapunov import decompose, sharpest
+    >>> split = decompose(nlctl.DeadZone(ripple_r=0, ripple_l=0))
+    >>> zone = nlctl.block(nlctl.DeadZone(ripple_r=0, ripple_l=0), "actuator")
+    >>> v = float(zone.output(0, [], [10.0])[0])
+    >>> print(v, sharpest(split).part(10.0, v), split.part(10.0, v))
+    9.5 9.5 10.0
     """
     return dataclasses.replace(split, part=clipped_split(split.k_1, split.k_2))
 
@@ -54,6 +66,15 @@ class NussbaumIntegral:
     ----------
     part : equation, optional
         ``part(u, v)`` is k u of the actuator's split (2); by default k = 1.
+
+    Examples
+    --------
+    Its three integrals are states and outputs:
+
+    >>> import nlctl
+    >>> from analysis.lyapunov import NussbaumIntegral
+    >>> nlctl.block(NussbaumIntegral(), "integral").state_labels
+    ['I', 'I_bar', 'I_printed']
     """
 
     alpha_1: float = param(0.25, unit="1/s", meaning="rate of the weight", at_least=0)

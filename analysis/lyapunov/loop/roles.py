@@ -326,6 +326,10 @@ class Parts:
         Places of the blocks in the diagram.
     gains : Gains
         Gains and initial values of the controller.
+
+    Examples
+    --------
+    See `read_parts`.
     """
 
     plant: Any
@@ -377,6 +381,14 @@ def read_parts(
     ------
     DiagramError
         As `analysis.lyapunov.loop.roles.read_roles` does, or if there are external inputs.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> from analysis.lyapunov import read_parts
+    >>> parts = read_parts(nlctl.paper.example_1(), params={"law.beta": 3.0})
+    >>> type(parts.actuator).__name__, parts.gains.beta
+    ('DeadZone', 3.0)
     """
     roles = read_roles(loop)
     if roles.disturbances and not inputs:

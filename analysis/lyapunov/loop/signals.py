@@ -26,6 +26,10 @@ class Signals:
     t : ndarray of shape (m,)
     values : mapping
         Arrays of shape (m,) by output name.
+
+    Examples
+    --------
+    See `signals_of`.
     """
 
     t: np.ndarray
@@ -69,6 +73,15 @@ def signals_of(response: Any) -> Signals:
     ------
     ParameterError
         If it is not a response.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.lyapunov import signals_of
+    >>> response = nlctl.input_output_response(nlctl.paper.example_1(), np.linspace(0, 0.1, 11))
+    >>> float(signals_of(response)["zeta"][0])
+    1.0
     """
     if not hasattr(response, "output_labels"):
         raise ParameterError(
@@ -99,6 +112,10 @@ class Margin:
         Size of the terms that the statement is made of.
     tolerance : float
         Relative to `scale`.
+
+    Examples
+    --------
+    See `observed`.
     """
 
     equation: str

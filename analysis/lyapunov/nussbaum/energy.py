@@ -45,6 +45,10 @@ class Drift:
     mismatch : float
         Largest distance between `phi` and the integral of r u (trapezoidal rule), over the
         largest |phi|: how well the samples obey N(zeta) zeta' = r u.
+
+    Examples
+    --------
+    See `drift`.
     """
 
     time: np.ndarray
@@ -95,6 +99,16 @@ def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
     ------
     UnknownNameError, ParameterError
         If zeta, r or u is missing or not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.lyapunov import drift, drift_margin
+    >>> loop = nlctl.paper.example_1()
+    >>> run = drift(nlctl.input_output_response(loop, np.linspace(0, 1, 101)))
+    >>> print(run.mismatch < 0.01, drift_margin(run, 1.0, 10.0, l_min=0.7, l_max=1.3).monotone)
+    True False
     """
     if not hasattr(response, "output_labels"):
         raise ParameterError(
@@ -175,6 +189,10 @@ def drift_margin(
     ------
     ParameterError
         If the bounds are not 0 < l_min <= l_max.
+
+    Examples
+    --------
+    See `drift`.
     """
     _check_gain(l_min, l_max)
     V = run.r**2 / 2 if V is None else np.asarray(V)
@@ -240,6 +258,16 @@ def safe_horizon(
     ------
     ParameterError
         If a bound is refused, or N has no whole lobe with N < 0 within 8 above zeta_0.
+
+    Examples
+    --------
+    With a constant gain and no V(0) it is what the lobe holds, over alpha_0:
+
+    >>> from analysis.lyapunov import nussbaum_property, safe_horizon
+    >>> lobe = nussbaum_property().lobes[1]
+    >>> found = safe_horizon(0.0, 0.1, l_min=1.0, l_max=1.0)
+    >>> print(round(found.time, 3), round((abs(lobe.integral) - (lobe.high - lobe.low)) / 0.1, 3))
+    3902.555 3902.555
     """
     _check_gain(l_min, l_max)
     number("safe_horizon", "V_0", V_0, at_least=0)

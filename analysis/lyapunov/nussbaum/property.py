@@ -260,6 +260,13 @@ def nussbaum_property(
     ParameterError
         If a range is given that holds fewer than four lobes or on which N is not finite, or if N is
         not finite at 0.
+
+    Examples
+    --------
+    >>> from analysis.lyapunov import nussbaum_property
+    >>> found = nussbaum_property()
+    >>> [(lobe.low, lobe.high) for lobe in found.lobes[:3]]  # cos(pi zeta / 2) changes its sign
+    [(0.0, 1.0), (1.0, 3.0), (3.0, 5.0)]
     """
     end, found, whole = _with_lobes(N) if end is None else _lobes_until(N, end)
     if len(whole) < 4:

@@ -97,6 +97,10 @@ class SlowDrift:
     mismatch : float
         Largest distance between int |N| dzeta and -int r u dt over the response, over the largest
         of them: how well the samples obey N zeta' = r u.
+
+    Examples
+    --------
+    See `slow_drift`.
     """
 
     time: float
@@ -182,6 +186,15 @@ def burst_peak(lobe: Lobe, kG: float) -> float:
     ------
     ParameterError
         If it is not a lobe, or `kG` is not positive.
+
+    Examples
+    --------
+    Through the lobe of the paper's N from 1 to 3, with a gain of 1:
+
+    >>> from analysis.lyapunov import burst_peak, nussbaum_property
+    >>> lobe = nussbaum_property().lobes[1]
+    >>> print(round(burst_peak(lobe, 1.0), 4), round((2 * abs(lobe.integral)) ** 0.5, 4))
+    28.0091 28.0091
     """
     of_type("burst_peak", "lobe", lobe, Lobe, "lobe_around(zeta)")
     number("burst_peak", "kG", kG, above=0)
@@ -230,6 +243,24 @@ def slow_drift(
     ParameterError
         If the response is not one of `loop`, zeta, r or u is not finite, fewer than 5 windows are
         left, or zeta lies in a lobe without end.
+
+    Examples
+    --------
+    From zeta = 1 with r u = -0.4, where A grows at that rate through the lobe of N up to zeta = 3:
+
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.lyapunov import slow_drift
+    >>> N = nlctl.functions.nussbaum_integral
+    >>> zetas, t = np.linspace(1.0, 3.0, 4001), np.linspace(0.0, 100.0, 10001)
+    >>> zeta = np.interp(0.4 * t, N(1.0) - N(zetas), zetas)
+    >>> outputs = np.array([zeta, np.ones(t.size), np.full(t.size, -0.4)])
+    >>> labels = ["zeta", "r", "u"]
+    >>> run = ct.TimeResponseData(t, outputs, issiso=False, output_labels=labels)
+    >>> found = slow_drift(run, window=5.0)
+    >>> bool(abs(found.burst / ((N(1.0) - N(3.0)) / 0.4) - 1) < 0.02)
+    True
     """
     N = N if loop is None else law_of_response(loop, response)
     run = drift(response, N)
