@@ -243,8 +243,6 @@ def evaluate(
     """
     of_type("evaluate", "prepared", prepared, Prepared, "prepare(experiment)")
     checked_rows(prepared.experiment.space, table)
-    of_type("evaluate", "prepared", prepared, Prepared, "prepare(experiment)")
-    checked_rows(prepared.experiment.space, table)
     parts, finished = [], 0
     for loop, rows in by_diagram(prepared, table):
         notify = None if progress is None else partial(_forward, progress, finished)

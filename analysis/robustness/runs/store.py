@@ -52,11 +52,11 @@ class StoreError(UsageError):
 
     Examples
     --------
-    >>> import tempfile
     >>> from analysis.robustness import load
-    >>> load(tempfile.mkdtemp())
+    >>> load("no/such/folder")
     Traceback (most recent call last):
-    analysis.robustness.runs.store.StoreError: ...
+        ...
+    analysis...StoreError: 'no/such/folder/study.json' is not a study of a sweep: ...
     """
 
 

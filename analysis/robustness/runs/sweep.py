@@ -103,7 +103,21 @@ def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
 
     Examples
     --------
-    See `sweep`.
+    >>> import tempfile
+    >>> import nlctl
+    >>> from analysis.robustness import (
+    ...     Experiment, Requirement, Space, Spec, Uncertain, grid, in_band, load, prepare, sweep
+    ... )
+    >>> space = Space(quantities=(Uncertain(name="valve.limit", bounds=(1.0, 3.0), nominal=2.0),))
+    >>> strong = Requirement(key="strong", formula=in_band("v", lower=2.0), until=1.0)
+    >>> experiment = Experiment(
+    ...     space=space, build=lambda: nlctl.actuators.cascade({"valve": nlctl.Saturation()}),
+    ...     spec=Spec(requirements=(strong,)), timepts=[0, 1], inputs=5.0,
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     made = sweep(prepare(experiment), grid(space, 2), folder)
+    ...     print(load(folder).complete, load(folder).columns("spec")["spec"].tolist())
+    True [-0.5, 0.5]
     """
     store = opened(folder)
     done = stored(store)

@@ -116,13 +116,16 @@ def failure_map(
 
     Examples
     --------
-    The margin 1 - a^2 - b^2 is 0 on a circle:
+    The margin 1 - a^2 - b^2 is 0 on a circle; cells end at 1.5 / (8 * 2^4):
 
     >>> from analysis.robustness import Space, Uncertain, boundary, failure_map
     >>> box = (Uncertain(name="a", bounds=(0.0, 1.5)), Uncertain(name="b", bounds=(0.0, 1.5)))
     >>> def margin(table):
     ...     return table.assign(spec=1 - table["a"] ** 2 - table["b"] ** 2)
-    >>> points = boundary(failure_map(margin, Space(quantities=box), "a", "b"))
+    >>> made = failure_map(margin, Space(quantities=box), "a", "b")
+    >>> made.is_finished, [round(side, 6) for side in made.cell]
+    (True, [0.011719, 0.011719])
+    >>> points = boundary(made)
     >>> bool(((points["a"] ** 2 + points["b"] ** 2 - 1).abs() < 1e-2).all())
     True
     """

@@ -49,7 +49,8 @@ class NoGuaranteeError(UsageError):
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> violation_probability(grid(space, 3), [1.0, 1.0, 1.0])
     Traceback (most recent call last):
-    analysis.robustness.statistics.guarantee.NoGuaranteeError: ...
+        ...
+    analysis...NoGuaranteeError: no guarantee from a design of kind 'grid': its rows were chosen ...
     """
 
 

@@ -120,11 +120,14 @@ def wins(
 
     Examples
     --------
+    A tie counts for neither, and a run that diverged loses:
+
     >>> from analysis.robustness import Space, Uncertain, independent, wins
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
-    >>> errors = {"PID": [3.0, 4.0, 5.0], "paper": [1.0, 2.0, 9.0]}
-    >>> wins(independent(space, 3, entropy=1), errors).loc["paper", "PID"]
-    np.int64(2)
+    >>> errors = {"PID": [3.0, 2.0, 5.0, float("nan")], "paper": [1.0, 2.0, 9.0, 4.0]}
+    >>> count = wins(independent(space, 4, entropy=1), errors)
+    >>> int(count.loc["paper", "PID"]), int(count.loc["PID", "paper"])
+    (2, 1)
     """
     of_type("a comparison", "outcomes", outcomes, Mapping, "{controller: numbers}")
     names = list(outcomes)

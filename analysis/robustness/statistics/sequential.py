@@ -81,10 +81,13 @@ def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tup
 
     Examples
     --------
+    After one run without a violation the evidence is B(1/2, 3/2) / B(1/2, 1/2) / (1 - p), 1/2 over
+    1 - p, which is 100 at p = 0.995:
+
     >>> from analysis.robustness import sequence_bounds
-    >>> lower, upper = sequence_bounds(5, 100)
-    >>> lower < 0.05 < upper
-    True
+    >>> lower, upper = sequence_bounds(0, 1, confidence=0.99)
+    >>> lower, round(upper, 6)
+    (0.0, 0.995)
     """
     k, n = checked_counts(violations, runs)
     limit = -np.log(1 - checked_confidence(confidence))

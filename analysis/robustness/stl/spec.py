@@ -136,11 +136,11 @@ def unfinished_margin(time: float, until: float) -> float:
 
     Examples
     --------
-    The earlier a run ended, the lower it counts:
+    The earlier a run ended, the lower it counts, here as -1e6 (2 - 1/4) and -1e6 (2 - 3/4):
 
     >>> from analysis.robustness import unfinished_margin
-    >>> unfinished_margin(1.0, 10.0) < unfinished_margin(9.0, 10.0) < -1.0
-    True
+    >>> unfinished_margin(5.0, 20.0), unfinished_margin(15.0, 20.0)
+    (-1750000.0, -1250000.0)
     """
     reached = np.clip(np.nan_to_num(time / until), 0.0, 1.0) if until > 0 else 0.0
     return float(-FAILED * (2 - reached))

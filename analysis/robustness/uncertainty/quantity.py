@@ -25,9 +25,10 @@ class SpaceError(UsageError):
     Examples
     --------
     >>> from analysis.robustness import Uncertain
-    >>> Uncertain(name="plant.m", bounds=(2.0, 1.0))
+    >>> Uncertain(name="plant.m")
     Traceback (most recent call last):
-    analysis.robustness.uncertainty.quantity.SpaceError: ...
+        ...
+    analysis...SpaceError: 'plant.m' needs a law (scipy.stats) or bounds, got neither
     """
 
 
