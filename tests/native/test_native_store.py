@@ -155,7 +155,7 @@ class TestEntries:
         """Whoever reads finds a whole entry."""
         script = (
             "from nlctl.native.machine import store\n"
-            "for i in range(300):\n"
+            "for i in range(60):\n"
             "    store.write('key', bytes([i % 7]) * 200_000)\n"
             "    body = store.read('key')\n"
             "    assert len(body) == 200_000 and len(set(body)) == 1\n"
