@@ -355,9 +355,10 @@ def initial_state(
 
 
 def check_read(system: Any, params: Mapping[str, Any] | None) -> None:
-    """Refuse parameters without a block's name that nothing in a diagram can read.
+    """Refuse parameters without a block's name that nothing in a diagram of nlctl's can read.
 
-    A third-party function reads what it likes; blocks of nlctl and linear systems do not.
+    A third-party function reads what it likes; blocks of nlctl and linear systems do not.  Where
+    none is nlctl's, python-control's own rule holds: what nothing reads is ignored.
 
     Raises
     ------
@@ -366,8 +367,12 @@ def check_read(system: Any, params: Mapping[str, Any] | None) -> None:
     """
     bare = [key for key in params or {} if isinstance(key, str) and "." not in key]
     bare = [key for key in bare if base_name(key) not in system.params]
-    own = Block, ct.StateSpace, ct.TransferFunction
-    if bare and all(isinstance(within(leaf.system), own) for leaf in leaves(system)):
+    if not bare:
+        return
+    parts = [within(leaf.system) for leaf in leaves(system)]
+    others = [part for part in parts if not isinstance(part, Block)]
+    linear = ct.StateSpace, ct.TransferFunction
+    if len(others) < len(parts) and all(isinstance(part, linear) for part in others):
         raise unknown("parameter", bare[0], parameter_names(system))
 
 

@@ -78,7 +78,7 @@ def test_a_cell_that_was_edited_since_is_not_believed(ends, change):
     remember(TEXT.replace(*change), file)
     for place, function in enumerate(known):
         if place in places:
-            with pytest.raises(Unreadable, match="was the file edited since"):
+            with pytest.raises(Unreadable, match="is not what it was made of"):
                 definition(function)
         else:
             definition(function)
