@@ -163,7 +163,7 @@ def test_a_hysteresis_that_the_tolerance_resolves_is_integrated(width):
 
 
 def test_members_of_an_ensemble_chatter_whatever_is_beside_them():
-    """Statuses, times and steps of nine members, alone and together."""
+    """Statuses, times and steps of nine members, together and three of them alone."""
     block = ct.nlsys(
         lambda t, x, u, p: p["c"] - np.sign(x), lambda t, x, u, p: x, states=1, outputs=["x"],
         inputs=0, name="block", params={"c": 0.5},
@@ -177,5 +177,5 @@ def test_members_of_an_ensemble_chatter_whatever_is_beside_them():
 
     together = table(c)
     assert list(together["status"]) == np.where(abs(c) < 1, "CHATTERING", "OK").tolist()
-    for k in range(9):
+    for k in (0, 3, 8):
         assert table(c[k : k + 1]).iloc[0].tolist() == together.iloc[k].tolist()

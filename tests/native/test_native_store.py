@@ -425,11 +425,10 @@ class TestKeys:
         script = (
             "import hashlib, nlctl\n"
             "from nlctl.native.codegen.lower import lower\n"
-            "for make in (nlctl.paper.example_1, nlctl.paper.example_2):\n"
-            "    compiled = nlctl.compile(make())\n"
-            "    lowered = lower(compiled.schedule, compiled.program)\n"
-            "    text = hashlib.sha256(lowered.text.encode()).hexdigest()\n"
-            "    print(text, len(lowered.text))\n"
+            "compiled = nlctl.compile(nlctl.paper.example_2())\n"
+            "lowered = lower(compiled.schedule, compiled.program)\n"
+            "text = hashlib.sha256(lowered.text.encode()).hexdigest()\n"
+            "print(text, len(lowered.text))\n"
         )
         keys = [
             subprocess.run(
@@ -438,7 +437,7 @@ class TestKeys:
             ).stdout.split()
             for seed in ("1", "2")
         ]  # fmt: skip
-        assert len(set(keys[0])) == 4
+        assert len(set(keys[0])) == 2
         assert keys[0] == keys[1]
 
     def test_what_contains_itself_has_a_key(self):
@@ -463,6 +462,9 @@ EDITS = {  # module -> what is edited there
     "integrate/state.py": ('"error_model": "numpy"', '"error_model": "python"'),
     "machine/address.py": ("ir.VoidType()", "ir.IntType(32)"),
 }
+
+
+DAILY = "integrate/memory.py", "machine/address.py"  # the others' way into the key is the same
 
 
 def keys_of_copy(path, edits):
@@ -499,7 +501,10 @@ class TestSources:
         """Paths and processes do not count."""
         assert keys_of_copy(tmp_path, {}) == [integrator_key(), module_key(*TAUGHT)]
 
-    @pytest.mark.parametrize("name", EDITS)
+    @pytest.mark.parametrize(
+        "name",
+        [name if name in DAILY else pytest.param(name, marks=pytest.mark.weekly) for name in EDITS],
+    )
     def test_an_edit_of_any_module_of_the_integrators(self, tmp_path, name):
         """Constants, coefficients, generated code, options."""
         assert keys_of_copy(tmp_path, {name: EDITS[name]})[0] != integrator_key()
