@@ -43,7 +43,7 @@ def marked_up(lines):
     done = []
     for paragraph in _paragraphs(lines[:end]):
         if _is_formula(paragraph):
-            done += ["::", "", *(f"    {line}" for line in paragraph), ""]
+            done += [".. code-block:: text", "", *(f"    {line}" for line in paragraph), ""]
         else:
             done += [*map(_escaped, paragraph), ""]
     return done + [_escaped(line) for line in lines[end:]]
