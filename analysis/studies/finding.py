@@ -38,6 +38,10 @@ class Finding:
     is_answered : bool
         False where rows or loop did not admit the analysis: the sentence says why, and there are
         neither numbers nor tables.
+
+    Examples
+    --------
+    See `made`.
     """
 
     key: str

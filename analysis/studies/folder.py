@@ -204,6 +204,10 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
     ------
     RunFolderError
         If it holds no results, or files are damaged.
+
+    Examples
+    --------
+    See `run`.
     """
     own, gone = _own_kinds(folder, trust)
     study, run = load_study(folder, own), load_run(folder)
@@ -288,6 +292,10 @@ def origin_differences(first: Path, second: Path) -> str:
     ------
     RunFolderError
         If a folder holds no run.
+
+    Examples
+    --------
+    See `run_differences`.
     """
     one, other = (load_run(folder)["origin"] for folder in (first, second))
     told = [loop_differences(one, other), version_differences(one, other)]
@@ -311,6 +319,34 @@ def run_differences(first: Path, second: Path) -> list[str]:
     ------
     RunFolderError
         If a folder holds no results, or what does not belong together.
+
+    Examples
+    --------
+    What two runs have found that differs, and why it may:
+
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from analysis.studies import origin_differences, read_study, run, run_differences
+    >>> text = '''
+    ... loop = "nlctl:block"
+    ... options = { spec = { block = "Lag" }, name = "lag" }
+    ... study = { title = "A lag", seed = 1 }
+    ... space."lag.T" = { bounds = [0.05, 0.4] }
+    ... inputs.u = 1.0
+    ... spec.rises = "always from 1 s on v >= 0.9"
+    ... time = { end = 1.2, step = 0.1 }
+    ... runs.size = 20
+    ... analysis = [{ kind = "probability" }]
+    ... '''
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     one, other = Path(folder, "one"), Path(folder, "other")
+    ...     _ = Path(folder, "lag.toml").write_text(text, encoding="utf-8")
+    ...     _ = run(read_study(Path(folder, "lag.toml")), one)
+    ...     _ = run(read_study(Path(folder, "lag.toml"), ["inputs.u=0.8"]), other)
+    ...     found, reason = run_differences(one, other), origin_differences(one, other)
+    >>> reason
+    '[inputs] of the study'
+    >>> print(found)
     """
     found = []
     for folder in (first, second):

@@ -46,6 +46,10 @@ class Replay:
         All outputs; NaN after the end of a run that diverged.
     versions : str
         Which versions differ from those of the run, in words.
+
+    Examples
+    --------
+    See `replay`.
     """
 
     row: int
@@ -101,6 +105,35 @@ def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Re
         If the folder holds no run, or one of another loop, or the loop no longer fits the study.
     ParameterError
         If the row is not there.
+
+    Examples
+    --------
+    The last corner of a box is T = 0.4 s; one second after a step the lag is at 1 - exp(-1 / 0.4):
+
+    >>> import math
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from analysis.studies import read_study, replay, replay_figure, run
+    >>> text = '''
+    ... loop = "nlctl:block"
+    ... options = { spec = { block = "Lag" }, name = "lag" }
+    ... study = { title = "A lag", seed = 1 }
+    ... space."lag.T" = { bounds = [0.05, 0.4] }
+    ... inputs.u = 1.0
+    ... spec.rises = "always from 1 s on v >= 0.9"
+    ... time = { end = 1.2, step = 0.1 }
+    ... runs.design = "corners"
+    ... '''
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "lag.toml").write_text(text, encoding="utf-8")
+    ...     _ = run(read_study(Path(folder, "lag.toml")), Path(folder, "run"))
+    ...     last = replay(Path(folder, "run"), 1)
+    >>> last.stored["lag.T"], last.differences
+    (0.4, ())
+    >>> round(float(last.signals["v"][10]), 4), round(1 - math.exp(-1 / 0.4), 4)
+    (0.9179, 0.9179)
+    >>> replay_figure(last).axes[0].get_title(loc="left")
+    'rises: always from 1 s on v >= 0.9'
     """
     run = reopened(folder, trust=trust)
     table = _table(folder, part)
@@ -173,6 +206,10 @@ def replay_figure(made: Replay) -> Figure:
     -------
     Figure
         Of matplotlib; nothing is written or shown.
+
+    Examples
+    --------
+    See `replay`.
     """
     bounds: dict[str, set[float]] = {}
     texts: dict[str, list[str]] = {}

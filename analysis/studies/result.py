@@ -47,6 +47,10 @@ class Result:
         What the user has to know, such as lost workers.
     origin : mapping
         What all of it was computed from, see `origin.origin_of`.
+
+    Examples
+    --------
+    See `run`.
     """
 
     folder: Path

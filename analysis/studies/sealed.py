@@ -28,7 +28,16 @@ ANEW = "restore it, or run the study in another folder with --out"
 
 
 class RunFolderError(UsageError):
-    """A folder that is not a run of a study, or of another one; the message says what to do."""
+    """A folder that is not a run of a study, or of another one; the message says what to do.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from analysis.studies import load_result
+    >>> load_result(Path("arm"))
+    Traceback (most recent call last):
+    analysis.studies.sealed.RunFolderError: 'arm' holds no run of a study, or one that has not come ...
+    """
 
 
 def write_json(path: Path, content: Any) -> None:

@@ -278,6 +278,29 @@ step = 0.01
     assert published.params["plant.integrate_w"] is True
 
 
+LOADED_LATER = """
+loop = "nlctl:{name}"
+options = {{ spec = {{ block = "Lag", T = 0.2 }}, name = "lag" }}
+study = {{ title = "A lag", seed = 1 }}
+space."lag.T".bounds = [0.1, 0.4]
+inputs.u = 1.0
+spec.rises = "always from 1 s on v >= 0.9"
+time = {{ end = 1.2, step = 0.1 }}
+"""
+
+
+def test_a_function_that_a_package_loads_when_asked_is_a_loop(tmp_path):
+    """`nlctl.block` is not among nlctl's attributes before; a wrong name has its nearest."""
+    path = tmp_path / "lag.toml"
+    path.write_text(LOADED_LATER.format(name="block"), encoding="utf-8")
+    experiment = read_study(path).experiment
+    assert nominal(resolved(experiment.space, experiment.build())) == {"lag.T": 0.2}
+    path.write_text(LOADED_LATER.format(name="blok"), encoding="utf-8")
+    line, message = mistakes(path)["loop"]
+    assert line == 2
+    assert message.startswith("unknown function 'blok' in 'nlctl'; nearest: 'block'")
+
+
 def test_settings_replace_what_stands_in_the_file(tmp_path):
     """Dotted keys as in TOML, entries of lists by number, key or kind, texts without quotes."""
     path = write(tmp_path)

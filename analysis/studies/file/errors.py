@@ -43,6 +43,10 @@ class Problem:
         Line of the file, from 1; None for what is not in the file.
     settings : tuple of str
         Of the command line, ``key=value``, that are mistaken or have a part in it.
+
+    Examples
+    --------
+    See `StudyError`.
     """
 
     place: KeyPath
@@ -80,6 +84,17 @@ class StudyError(UsageError):
     Attributes
     ----------
     problems : tuple of Problem
+
+    Examples
+    --------
+    >>> from analysis.studies import read_study, shipped
+    >>> try:
+    ...     read_study(shipped("example-1-quick"), ["runs.sise=10", "time.end=-1"])
+    ... except StudyError as error:
+    ...     for problem in error.problems:
+    ...         print(problem.place, problem.message)
+    ('time', 'end') input should be greater than 0, got -1
+    ('runs', 'sise') unknown key 'sise'; nearest: 'size'
     """
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:

@@ -44,6 +44,10 @@ class StudyFile:
         What stands in the file, with the settings of the command line.
     experiment : Experiment
         What is simulated for each row.
+
+    Examples
+    --------
+    See `read_study`.
     """
 
     path: Path
@@ -91,6 +95,15 @@ def read_study(
         If a setting cannot be read.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> from analysis.studies import read_study, shipped
+    >>> file = read_study(shipped("example-1-quick"), ["runs.size=10"])
+    >>> file.study.runs.size, file.experiment.space.names[0]
+    (10, 'actuator.b_r')
+    >>> file.experiment.timepts.size  # 20 s in steps of 0.01 s
+    2001
     """
     text = path.read_bytes().decode("utf-8-sig", errors="replace")
     folder = path.parent if folder is None else folder

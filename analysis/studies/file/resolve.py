@@ -69,10 +69,11 @@ def named_function(name: str, folder: Path) -> Callable[..., Any]:
         If it has no such function.
     """
     module, source, attribute = _place(name, folder)
-    functions = [key for key, value in vars(module).items() if callable(value)]
-    if attribute not in functions:
+    function = getattr(module, attribute, None)  # some packages load a name when it is first used
+    if not callable(function):
+        loaded = vars(module)
+        functions = [key for key in dir(module) if key not in loaded or callable(loaded[key])]
         raise unknown("function", attribute, functions, f"in '{source}'")
-    function = getattr(module, attribute)
     check_function(function, name)
     return function
 

@@ -139,7 +139,12 @@ class Faulty(Strict):
 
 
 class Study(Strict):
-    """A study file; `study_model` adds what its analyses look like."""
+    """A study file; `study_model` adds what its analyses look like.
+
+    Examples
+    --------
+    See `from_toml`.
+    """
 
     loop: str = Field(
         description="'example-1', 'example-2', 'path/to/file.py:function' or 'module:function'."

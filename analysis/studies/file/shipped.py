@@ -28,6 +28,15 @@ def shipped(name: str) -> Path:
     ------
     UnknownNameError
         If there is none.
+
+    Examples
+    --------
+    >>> from analysis.studies import shipped
+    >>> shipped("example-1-quick").name
+    'example-1-quick.toml'
+    >>> shipped("example-1-quik")
+    Traceback (most recent call last):
+    nlctl.errors.UnknownNameError: unknown study 'example-1-quik'; nearest: 'example-1-quick', ...
     """
     found = {path.stem: path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))}
     if name not in found:

@@ -25,6 +25,18 @@ def to_toml(study: Study) -> str:
     -------
     str
         TOML.
+
+    Examples
+    --------
+    >>> from analysis.studies import from_toml, shipped, to_toml
+    >>> study = from_toml(shipped("example-1-quick").read_text(encoding="utf-8"))
+    >>> text = to_toml(study)
+    >>> from_toml(text) == study
+    True
+    >>> print(text[text.index("[time]"):].split("[metrics]")[0].strip())
+    [time]
+    end = 20.0
+    step = 0.01
     """
     return tomli_w.dumps(study.model_dump(mode="json", exclude_unset=True, exclude_none=True))
 
@@ -46,5 +58,20 @@ def from_toml(text: str, own: Mapping[str, Kind] | None = None) -> Study:
     ------
     ValueError
         If it is not a study.
+
+    Examples
+    --------
+    >>> from analysis.studies import from_toml
+    >>> study = from_toml('''
+    ... loop = "example-1"
+    ... study = { title = "Does it track?", seed = 1 }
+    ... space."actuator.b_r".uniform = [0.3, 0.7]
+    ... spec.tracks = "always from 10 s on |e| <= 0.15"
+    ... time = { end = 20.0, step = 0.01 }
+    ... ''')
+    >>> study.space["actuator.b_r"].uniform, study.spec["tracks"].formula
+    ((0.3, 0.7), 'always from 10 s on |e| <= 0.15')
+    >>> study.solver.rtol  # the default
+    1e-06
     """
     return model_of(own or {}).model_validate(read_toml(text))
