@@ -118,6 +118,19 @@ def loop_report(
         If the response, the ledger or the study is seen to be of another loop.
     UnknownNameError
         If the loop has no output that `signals` names.
+
+    Examples
+    --------
+    A page of one's own loop, and what of it the page says:
+
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from analysis.loop_report import loop_report
+    >>> loop = nlctl.actuators.cascade({"zone": nlctl.DeadZone(), "lag": nlctl.Lag()})
+    >>> run = nlctl.input_output_response(loop, np.linspace(0, 1, 101), 1.0)
+    >>> report = loop_report(loop, title="A lag behind a dead zone", response=run)
+    >>> report.verdict
+    "The loop 'actuator' has 2 blocks and 1 states."
     """
     found = [
         f"The loop '{loop.name}' has {len(list(leaves(loop)))} blocks and {loop.nstates} states."

@@ -64,6 +64,18 @@ def write_pdf(page: str | os.PathLike[str], path: str | os.PathLike[str]) -> Pat
     UsageError
         If no browser is installed, it prints nothing, or it hangs.  How long a print takes is
         not limited as long as the browser computes.
+
+    Examples
+    --------
+    It needs an installed Chromium; without one it says so:
+
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from analysis.report import Report, write_pdf, write_report
+    >>> report = Report(title="Nothing", verdict="Nothing.", claims=[], sections=[], command="")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = write_report(report, folder)
+    ...     pdf = write_pdf(page, Path(folder, "page.pdf"))  # doctest: +SKIP
     """
     browser = find_browser()
     flags = [*FLAGS, "--no-sandbox"] if _is_root() else FLAGS

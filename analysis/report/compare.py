@@ -61,6 +61,10 @@ def compare_contents(
         If a file cannot be read.
     UsageError
         If a file is not a report, or `rtol` is negative.
+
+    Examples
+    --------
+    See `write_report`.
     """
     if not 0 <= rtol < math.inf:
         raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")

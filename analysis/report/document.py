@@ -37,7 +37,12 @@ __all__ = [
 
 @dataclass(frozen=True, kw_only=True)
 class Paragraph:
-    """A paragraph of plain text, and what is to be typed below it, such as a command."""
+    """A paragraph of plain text, and what is to be typed below it, such as a command.
+
+    Examples
+    --------
+    See `Report`.
+    """
 
     text: str
     code: str = ""
@@ -45,7 +50,18 @@ class Paragraph:
 
 @dataclass(frozen=True, kw_only=True)
 class Equation:
-    """A formula in LaTeX, with the paper's number where it has one."""
+    """A formula in LaTeX, with the paper's number where it has one.
+
+    Examples
+    --------
+    >>> import json
+    >>> from analysis.report import Equation, Report, Section, render_json
+    >>> law = Equation(latex=r"\\dot{x} = -\beta x", number="(1)")
+    >>> shown = Section(key="law", title="The law", items=[law])
+    >>> report = Report(title="A law", verdict="", claims=[], sections=[shown], command="")
+    >>> json.loads(render_json(report))["sections"]["law"]["items"][0]["number"]
+    '(1)'
+    """
 
     latex: str
     number: str = ""
@@ -61,6 +77,15 @@ class Table:
         Title of a column that holds ``"pass"``, ``"fail"`` and the like, drawn as a badge.
     folded : bool
         Whether the page shows the caption only until it is opened; paper shows all.
+
+    Examples
+    --------
+    >>> from analysis.report import Report, Section, Table, render_html
+    >>> table = Table(caption="Gains", columns=["gain", "value"], rows=[["beta", 2.5]])
+    >>> shown = Section(key="gains", title="Gains", items=[table])
+    >>> report = Report(title="Gains", verdict="", claims=[], sections=[shown], command="")
+    >>> "<caption" in render_html(report)
+    True
     """
 
     caption: str
@@ -75,6 +100,18 @@ class Figure:
     """A matplotlib figure with its caption and a description for those who cannot see it.
 
     `key` is its anchor, unless a section or another figure has it already.
+
+    Examples
+    --------
+    >>> import matplotlib.figure
+    >>> from analysis.report import Figure, Report, Section, render_html
+    >>> drawn = matplotlib.figure.Figure(figsize=(3, 2))
+    >>> lines = drawn.add_subplot().plot([0, 1], [0, 1])
+    >>> figure = Figure(key="line", caption="A line", description="From 0 to 1", figure=drawn)
+    >>> shown = Section(key="lines", title="Lines", items=[figure])
+    >>> report = Report(title="Lines", verdict="", claims=[], sections=[shown], command="")
+    >>> "<svg" in render_html(report)
+    True
     """
 
     key: str
@@ -108,6 +145,13 @@ class History:
     ParameterError
         If the times do not increase, a signal is not as long as they are, or a name in `shown`
         is that of no signal.
+
+    Examples
+    --------
+    >>> from analysis.report import History
+    >>> History(key="x", caption="x", description="x", time=[0.0, 1.0], signals={"x": [1.0]})
+    Traceback (most recent call last):
+    nlctl.errors.ParameterError: signal 'x' of history 'x' has shape (1,), its time (2,)
     """
 
     key: str
@@ -143,6 +187,10 @@ class Section:
     folded : bool
         Whether the page shows the heading only, until it is opened or something inside is linked
         to; paper shows all.
+
+    Examples
+    --------
+    See `Report`.
     """
 
     key: str
@@ -169,6 +217,10 @@ class Claim:
     by : str
         Who else claims it, such as ``"the paper"``: where it does not hold, they are refuted and
         nothing of ours has failed, which the page says in another colour.
+
+    Examples
+    --------
+    See `Report`.
     """
 
     text: str
@@ -211,6 +263,18 @@ class Report:
     author, revision, date : str
         Below the title; on paper the first page is then a title page.  They are only what is
         given: a report that is made twice is the same to the byte.
+
+    Examples
+    --------
+    A page with one claim and its evidence:
+
+    >>> from analysis.report import Claim, Paragraph, Report, Section, render_html
+    >>> shown = Section(key="one", title="A sum", items=[Paragraph(text="Two and two are four.")])
+    >>> claim = Claim(text="2 + 2 = 4", measured="4", limit="4", holds=True, evidence="one")
+    >>> report = Report(title="Sums", verdict="Known.", claims=[claim], sections=[shown], command="")
+    >>> page = render_html(report)
+    >>> "Two and two are four." in page, "https://" in page
+    (True, False)
     """
 
     title: str

@@ -90,6 +90,10 @@ def write_gallery(folder: str | os.PathLike[str], *, force: bool = False) -> Pat
         If there is no report, or an ``index.html`` that is not a gallery.
     OSError
         If the folder cannot be written to.
+
+    Examples
+    --------
+    See `write_report`.
     """
     found = entries(folder)
     if not force:

@@ -62,6 +62,10 @@ def render_html(
     -------
     str
         The page.
+
+    Examples
+    --------
+    See `Report`.
     """
     placed = place_anchors(report)
     light, told = summary(report.claims)
@@ -125,6 +129,10 @@ def render_json(report: Report) -> str:
     -------
     str
         JSON; numbers that are not finite are text.
+
+    Examples
+    --------
+    See `Equation`.
     """
     content = {
         "title": report.title,
@@ -193,6 +201,20 @@ def write_report(
         If it would replace files that no report has made.
     OSError
         If the folder cannot be written to.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from analysis.report import Report, compare_contents, write_gallery, write_report
+    >>> report = Report(title="Nothing", verdict="Nothing.", claims=[], sections=[], command="")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     pages = [write_report(report, Path(folder, name)) for name in ("one", "two")]
+    ...     names = sorted(path.name for path in pages[0].parent.iterdir())
+    ...     differ = compare_contents(*(page.parent for page in pages))
+    ...     gallery = write_gallery(folder).read_text(encoding="utf-8")
+    >>> print(names, differ, gallery.count("Nothing.") >= 2)
+    ['index.html', 'report.json'] [] True
     """
     folder = Path(folder)
     if not force:
@@ -238,6 +260,13 @@ def framed(report: Report) -> Framed:
     Returns
     -------
     Framed
+
+    Examples
+    --------
+    >>> from analysis.report import Report, framed
+    >>> report = Report(title="Nothing", verdict="Nothing.", claims=[], sections=[], command="")
+    >>> framed(report)
+    report 'Nothing', ... kB
     """
     return Framed(title=plain_text(report.title), page=render_html(report))
 
@@ -261,6 +290,17 @@ def file_hashes(paths: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
         If a file cannot be read.
     ParameterError
         If two files have one name: they could not both lie beside the page.
+
+    Examples
+    --------
+    >>> import hashlib, tempfile
+    >>> from pathlib import Path
+    >>> from analysis.report import file_hashes
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "rows.csv").write_bytes(b"1,2")
+    ...     hashes = file_hashes([Path(folder, "rows.csv")])
+    >>> hashes == {"rows.csv": hashlib.sha256(b"1,2").hexdigest()}
+    True
     """
     hashes: dict[str, str] = {}
     for path in map(Path, paths):

@@ -346,7 +346,8 @@ def run_differences(first: Path, second: Path) -> list[str]:
     ...     found, reason = run_differences(one, other), origin_differences(one, other)
     >>> reason
     '[inputs] of the study'
-    >>> print(found)
+    >>> print(found[1])
+    findings.probability.numbers.violations was 0, now 20
     """
     found = []
     for folder in (first, second):

@@ -55,7 +55,12 @@ _NAME = re.compile(r"[a-z][a-z0-9]*([ -][a-z0-9]+)*")
 
 
 class Asked(Strict):
-    """What a study file says of every analysis; the schema of a kind adds its own keys."""
+    """What a study file says of every analysis; the schema of a kind adds its own keys.
+
+    Examples
+    --------
+    See `Kind`.
+    """
 
     key: str = Field(
         "",
@@ -73,7 +78,17 @@ class Asked(Strict):
 
 
 class Varied(Asked):
-    """An analysis that may vary a part of the quantities."""
+    """An analysis that may vary a part of the quantities.
+
+    Examples
+    --------
+    >>> from typing import Literal
+    >>> from analysis.studies import Varied
+    >>> class Spread(Varied):
+    ...     kind: Literal["spread"] = "spread"
+    >>> Spread(quantities=("lag.T",)).quantities
+    ('lag.T',)
+    """
 
     quantities: Names = Field((), description="What is varied, the rest nominal; all by default.")
 
@@ -95,6 +110,10 @@ class Setup:
         What paths in the study are relative to.
     experiment : Experiment
         What is simulated for each row.
+
+    Examples
+    --------
+    See `Kind`.
     """
 
     study: Study
@@ -119,6 +138,10 @@ class Ground:
         Runs rows here, see `analysis.robustness.search.evaluation.Evaluate`; what a table leaves
         out is nominal.
     run_design : RunDesign
+
+    Examples
+    --------
+    See `Kind`.
     """
 
     study: Study
@@ -229,6 +252,25 @@ class Kind:
     ------
     ParameterError
         If a name is not a name, or the schema no schema.
+
+    Examples
+    --------
+    A kind that looks at the main table, here one of two runs:
+
+    >>> from types import SimpleNamespace
+    >>> from typing import Literal
+    >>> import numpy as np
+    >>> from analysis.studies import Asked, Kind, made
+    >>> class Tally(Asked):
+    ...     kind: Literal["tally"] = "tally"
+    ...     limit: int = 0
+    >>> def tally(asked, ground):
+    ...     _, margins = ground.main
+    ...     return made(asked, f"{int((margins <= asked.limit).sum())} runs violate the spec.")
+    >>> kind = Kind(name="tally", schema=Tally, run=tally, title="Tally", needs_rows=True)
+    >>> ground = SimpleNamespace(main=(None, np.array([0.1, -0.2])))
+    >>> kind.run(Tally(), ground).sentence
+    '1 runs violate the spec.'
     """
 
     name: str
@@ -316,6 +358,10 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
     Returns
     -------
     Finding
+
+    Examples
+    --------
+    See `Kind`.
     """
     parts = {"claim": asked.claim} | parts
     return Finding(key="", kind=asked.kind, title="", sentence=sentence, **parts)

@@ -115,8 +115,8 @@ def run(
 
     Examples
     --------
-    A lag is above 0.9 one second after a step, whatever T up to 0.4 s: none of 20 runs violates that,
-    and the bound of the probability is 1 - 0.01^(1/20) with a confidence of 99 %.
+    A lag is above 0.9 one second after a step, whatever T up to 0.4 s: none of 20 runs violates
+    that, and the bound of the probability is 1 - 0.01^(1/20) with a confidence of 99 %.
 
     >>> import tempfile
     >>> from pathlib import Path

@@ -36,7 +36,7 @@ class RunFolderError(UsageError):
     >>> from analysis.studies import load_result
     >>> load_result(Path("arm"))
     Traceback (most recent call last):
-    analysis.studies.sealed.RunFolderError: 'arm' holds no run of a study, or one that has not come ...
+    analysis.studies.sealed.RunFolderError: 'arm' holds no run of a study, or one that ...
     """
 
 
