@@ -1,6 +1,6 @@
 """What the studies ``reports/rivals-1.toml`` and ``rivals-2.toml`` found: a kept record.
 
-``python -m analysis.paper.limits.rivals`` runs both again, in four minutes, and prints the tables
+``python -m analysis.paper.limits.rivals`` runs both again, in six minutes, and prints the tables
 of ``docs/explanation/rivals.md``.
 """
 
