@@ -36,6 +36,7 @@ def rivals_section(record: pd.DataFrame) -> Section:
                 "of them, and the last table has the rest."
             ),
             *(Paragraph(text=_sentence(record, example)) for example in _TITLES),
+            _winners(record),
             *(_table(record, example) for example in _TITLES),
             Table(
                 caption="What each controller has to know.",
@@ -54,15 +55,29 @@ def rivals_section(record: pd.DataFrame) -> Section:
 
 
 def _sentence(record: pd.DataFrame, example: str) -> str:
-    """Say where the paper's controller is beaten, and by whom, and whom it beats."""
-    parts = []
-    for actuator, found in beaten_by(record, example).items():
-        beaten, beats = (_listed(found[key]) for key in ("beaten by", "beats"))
-        parts.append(f"{RIVAL_ACTUATORS[actuator]}: beaten by {beaten}, better than {beats}")
+    """Say who beats the paper's controller behind every actuator, and whom it beats."""
+    found = beaten_by(record, example).values()
+    beaten, beats = (
+        tuple(x for x in KNOWLEDGE if all(x in each[key] for each in found))
+        for key in ("beaten by", "beats")
+    )
     return (
-        f"{_TITLES[example]}, the paper's controller as printed. {'; '.join(parts)}. One beats "
-        f"another with no more violations and a smaller RMS of e for t ≥ {TAIL:g} s, the exact "
-        "interval of the median difference on the same samples on one side of 0."
+        f"{_TITLES[example]}: behind every one of the actuators the paper's controller as printed "
+        f"is beaten by {_listed(beaten)}, and better than {_listed(beats)}."
+    )
+
+
+def _winners(record: pd.DataFrame) -> Table:
+    return Table(
+        caption="Who beats the paper's controller as printed, and whom it beats: with no more "
+        f"violations and a smaller RMS of e for t ≥ {TAIL:g} s, the exact interval of the median "
+        "difference on the same samples on one side of 0.",
+        columns=("example", "actuator", "beaten by", "better than"),
+        rows=[
+            (title, RIVAL_ACTUATORS[name], _listed(each["beaten by"]), _listed(each["beats"]))
+            for example, title in _TITLES.items()
+            for name, each in beaten_by(record, example).items()
+        ],
     )
 
 
