@@ -28,6 +28,7 @@ from ..studies.page.redrawn import loop_again, rows_again
 from ..studies.page.report import study_part
 from . import evidence as proofs
 from .cases import CASES, HORIZON
+from .limits.rivals import checked_rivals
 from .numerics import numerics
 from .page.proof import lyapunov_sections
 from .page.report import paper_report, paper_sections
@@ -216,6 +217,7 @@ def compose(
         studies=robustness(folders, threads=threads, tell=tell) if folders else (),
         numerics=numbers,
         sampling=record,
+        rivals=checked_rivals(),
     )
     return Composed(report=made, drawn=drawn, passed=all(c.passed for c in checks(runs)))
 

@@ -1,43 +1,65 @@
-"""The kept record of the paper's controller through every actuator is that of today's loops."""
+"""The kept record of controllers through every actuator is that of today's loops."""
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.collections import PathCollection
 from places import ROOT
 
+from analysis.paper.figures import actuator_errors
 from analysis.paper.limits.actuators import (
     ACTUATOR_RECORD,
     actuator_run,
     actuators_of_the_table,
     assumption,
-    table_text,
+    assumption_text,
+    controllers_text,
 )
+from analysis.paper.rivals import rival_controllers
+from analysis.paper.sampling_limits import BAND, meets_the_spec
 from nlctl import paper
+from nlctl.actuators import Gain, Lag
 
 RECORD = pd.read_csv(ACTUATOR_RECORD)
 PAGE = ROOT / "docs" / "explanation" / "actuators.md"
 
 
-def test_it_has_every_actuator_in_both_examples():
-    wanted = [(example, name) for example in paper.EXAMPLES for name in actuators_of_the_table()]
-    assert list(zip(RECORD["example"], RECORD["actuator"], strict=True)) == wanted
+def test_it_has_every_actuator_behind_every_controller_in_both_examples():
+    wanted = [
+        (example, label, name)
+        for example in paper.EXAMPLES
+        for label in rival_controllers(example)
+        for name in actuators_of_the_table()
+    ]
+    assert list(RECORD[["example", "controller", "actuator"]].itertuples(index=False)) == wanted
 
 
-@pytest.mark.parametrize("name", actuators_of_the_table())
-def test_the_assumptions_are_those_of_today(name):
-    """What the ledger says of the split (2) of each actuator."""
-    kept = RECORD.loc[RECORD["actuator"] == name, "assumption"]
-    assert set(kept) == {assumption(actuators_of_the_table()[name])}
-
-
-@pytest.mark.parametrize("name", ["DeadZone", "Saturation", "DeadZoneInverse", "Relay"])
-def test_lines_are_runs_of_today(name):
-    """One that meets the spec, one beyond (2), one that chatters, one that diverges."""
-    (kept,) = RECORD.query("example == 'example_1' and actuator == @name").to_dict("records")
-    today = actuator_run("example_1", name)
+@pytest.mark.parametrize(
+    ("label", "name"),
+    [
+        ("paper", "DeadZone"),
+        ("paper", "Saturation"),
+        ("paper", "DeadZoneInverse"),
+        ("paper", "Relay"),
+        ("funnel", "Backlash"),
+        ("dynamic surface", "Lag"),
+    ],
+)
+def test_lines_are_runs_of_today(label, name):
+    """One that meets the spec, one beyond (2), that chatters, that diverges; two of rivals."""
+    own = "example == 'example_1' and controller == @label and actuator == @name"
+    (kept,) = RECORD.query(own).to_dict("records")
+    today = actuator_run("example_1", name, label)
     assert today["status"] == kept["status"]
     for column in ("time", "error", "peak"):
         assert np.isclose(today[column], kept[column], rtol=1e-3, equal_nan=True)
+
+
+def test_bounds_and_reasons_are_formulas():
+    """v = k u: the split is k itself."""
+    told = r"$2 \times 10^{-5} \leq k \leq 2 \times 10^{-5}$, $\lvert \varepsilon_u \rvert \leq 0$"
+    assert assumption(Gain(k=2e-5)).startswith(told)
+    assert r"$v = k(u, t)\, u + \varepsilon_u$" in assumption(Lag())
 
 
 def test_a_run_that_does_not_reach_its_end_has_no_numbers():
@@ -46,5 +68,22 @@ def test_a_run_that_does_not_reach_its_end_has_no_numbers():
     assert np.array_equal(np.isfinite(RECORD["peak"]), ended)
 
 
-def test_the_page_has_the_table_of_the_record():
-    assert table_text(RECORD) in PAGE.read_text(encoding="utf-8")
+@pytest.mark.parametrize("example", paper.EXAMPLES)
+def test_the_page_has_the_tables_of_the_record(example):
+    """What is known of each split (2) is found today."""
+    page = PAGE.read_text(encoding="utf-8")
+    assert controllers_text(RECORD, example) in page
+    assert assumption_text() in page
+
+
+@pytest.mark.parametrize("example", paper.EXAMPLES)
+def test_the_figure_has_a_mark_for_every_run(example):
+    """Hollow where the spec is violated; those that did not reach 20 s stand apart."""
+    own = RECORD[RECORD["example"] == example]
+    (ax,) = actuator_errors(own, meets_the_spec, BAND).axes
+    marks = [c for c in ax.collections if isinstance(c, PathCollection) and c.get_offsets().size]
+    assert sum(len(c.get_offsets()) for c in marks) == len(own)
+    faces = np.concatenate([c.get_facecolors() for c in marks])
+    assert (faces[:, 3] > 0).sum() == meets_the_spec(own).sum()
+    apart = sum((np.asarray(c.get_offsets())[:, 0] > 20).sum() for c in marks)
+    assert apart == (own["status"] != "OK").sum()

@@ -1,11 +1,24 @@
 """The comparison of the paper's controller with its rivals: what is tuned, and on what."""
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 import pytest
 from places import ROOT
 
 import nlctl
 from analysis.metrics import Metric, absolute_integral, peak
+from analysis.paper.limits.rivals import (
+    RIVAL_ACTUATORS,
+    RIVALS_RECORD,
+    beaten_by,
+    checked_rivals,
+    rival_rows,
+    rivals_study,
+    rivals_text,
+)
+from analysis.paper.page.rivals import rivals_section
 from analysis.paper.rivals import (
     KNOWLEDGE,
     behind,
@@ -15,7 +28,8 @@ from analysis.paper.rivals import (
     rival_searches,
 )
 from analysis.paper.tuning import tune
-from analysis.studies import read_study, shipped
+from analysis.report.document import Table
+from analysis.studies import read_study, run, shipped
 
 EXAMPLES = sorted(nlctl.paper.EXAMPLES)
 
@@ -113,3 +127,77 @@ def test_of_several_samples_the_mean_cost_and_the_worst_limit_count():
     assert found.cost == pytest.approx(np.abs(starts).mean() / 3.0, rel=1e-3)
     assert found.limited <= 6.0
     assert found.runs % 3 == 0
+
+
+PAGE = ROOT / "docs/explanation/rivals.md"
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_the_record_is_of_the_study(example):
+    """All controllers behind all actuators on the samples that the file asks for; the page too."""
+    record = checked_rivals()
+    own = record[record["example"] == example]
+    pairs = [(a, c) for a in rival_actuators(example) for c in rival_controllers(example)]
+    assert list(zip(own["actuator"], own["controller"], strict=True)) == pairs
+    assert list(RIVAL_ACTUATORS) == list(rival_actuators(example))
+    assert set(own["samples"]) == {a.runs for a in read_study(rivals_study(example)).study.analysis}
+    assert rivals_text(record, example) in PAGE.read_text(encoding="utf-8")
+
+
+def test_a_record_of_another_study_is_refused(tmp_path):
+    """With the command that makes it again."""
+    record = pd.read_csv(RIVALS_RECORD)
+    record.loc[record["example"] == "example_2", "study"] = "another"
+    record.to_csv(tmp_path / "record.csv", index=False)
+    with pytest.raises(ValueError, match=r"example_2.*python -m analysis\.paper\.limits\.rivals"):
+        checked_rivals(tmp_path / "record.csv")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_lines_of_the_record_are_runs_of_today(example, tmp_path):
+    """Two controllers behind the actuator of their training, on all samples."""
+    file = read_study(rivals_study(example))
+    actuator = {"example_1": "dead-zone", "example_2": "backlash"}[example]
+    (asked,) = [a for a in file.study.analysis if a.key == actuator]
+    fewer = asked.model_copy(update={"only": ("paper", "funnel")})
+    study = file.study.model_copy(update={"analysis": (fewer,)})
+    today = rival_rows(run(replace(file, study=study), tmp_path / "run"), example)
+    record = checked_rivals()
+    columns = ["example", "actuator", "controller"]
+    kept = today[columns].merge(record, on=columns, how="left")
+    for column in today.columns.difference([*columns, "study"]):
+        np.testing.assert_allclose(today[column], kept[column], rtol=1e-3, atol=1e-9)
+
+
+def test_who_beats_whom_is_a_matter_of_violations_and_an_interval():
+    """Fewer violations do not excuse a larger error, nor a smaller error more violations."""
+    lines = {
+        "paper": (5, 0.0, 0.0),
+        "better": (5, 0.1, 0.2),
+        "less sure": (5, -0.1, 0.2),
+        "violates more": (6, 0.1, 0.2),
+        "worse": (5, -0.2, -0.1),
+        "violates less": (4, -0.2, -0.1),
+    }
+    record = pd.DataFrame.from_dict(
+        lines, orient="index", columns=["violations", "less_low", "less_high"]
+    )
+    record = record.rename_axis("controller").reset_index().assign(example="e", actuator="a")
+    found = beaten_by(record, "e")
+    assert found == {"a": {"beaten by": ("better",), "beats": ("worse",)}}
+
+
+def test_the_papers_page_says_who_beats_it():
+    """Every line of the record, and what each controller has to know."""
+    record = checked_rivals()
+    section = rivals_section(record)
+    winners, *lines, knowledge = [item for item in section.items if isinstance(item, Table)]
+    assert sum(len(table.rows) for table in lines) == len(record)
+    assert dict(knowledge.rows) == KNOWLEDGE
+    found = beaten_by(record, "example_2")["backlash"]
+    (row,) = [r for r in winners.rows if r[:2] == ("Example 2", "backlash")]
+    assert "funnel" in found["beaten by"]
+    assert row[2].replace("itself tuned", "paper, tuned") == ", ".join(found["beaten by"])
+    assert row[3] == ", ".join(found["beats"])
+    assert "super-twisting, funnel, and better than none" in section.items[1].text

@@ -7,6 +7,8 @@ from command_line import nlctl_here
 from studies_example import HEAD, ROWS, write
 
 from analysis.studies import StudyError, read_study
+from analysis.studies.file.resolve import loop_function
+from nlctl.errors import ParameterError
 
 MARK = "import pathlib\npathlib.Path({mark!r}).touch()\n"
 COMPARE = """
@@ -258,3 +260,10 @@ def test_help_says_that_code_is_run(command):
     assert "--trust" in told
     assert "run" in told
     assert "code" in told
+
+
+def test_a_diagram_in_the_place_of_its_function_is_told_so(tmp_path):
+    """With what to write instead: a script with `loop = nlctl.interconnect(...)` is a first try."""
+    (tmp_path / "loop.py").write_text("import nlctl\nloop = nlctl.paper.example_1()\n")
+    with pytest.raises(ParameterError, match="needs a function that returns a diagram, got the"):
+        loop_function("loop.py:loop", tmp_path)

@@ -1,12 +1,15 @@
-"""The paper's controller, unchanged, through every actuator of nlctl: a kept record.
+"""The paper's controller, unchanged, and its rivals through every actuator of nlctl: a kept record.
 
-``python -m analysis.paper.limits.actuators`` makes it again, in a minute, and prints the table of
-``docs/explanation/actuators.md``.  Friction is left out: it takes a velocity and makes a force, and
-is not an actuator of the form v = k(u, t) u + eps_u (2) between the controller and the plant.
+``python -m analysis.paper.limits.actuators FOLDER`` makes it again, in five minutes, prints the
+tables of ``docs/explanation/actuators.md`` and draws its figures into FOLDER.  Friction is left
+out: it takes a velocity and makes a force, and is not an actuator of the form
+v = k(u, t) u + eps_u (2) between the controller and the plant.
 """
 
 from __future__ import annotations
 
+import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +21,25 @@ from nlctl.native import Status
 from nlctl.response import input_output_response
 
 from ...lyapunov.bounds.decomposition import DecompositionError, decompose
+from ...report.svg import svg_files
 from ..cases import HORIZON, TAIL
-from ..sampling_limits import meets_the_spec
+from ..figures import actuator_errors
+from ..rivals import rival_controllers
+from ..sampling_limits import BAND, meets_the_spec
 
-__all__ = ["ACTUATOR_RECORD", "actuator_run", "actuators_of_the_table", "assumption", "table_text"]
+__all__ = [
+    "ACTUATOR_RECORD",
+    "actuator_run",
+    "actuators_of_the_table",
+    "assumption",
+    "assumption_text",
+    "controllers_text",
+]
 
 ACTUATOR_RECORD = Path(__file__).with_name("actuator-limits.csv")
-_COLUMNS = ["example", "actuator", "status", "time", "error", "peak", "assumption"]
+_COLUMNS = ["example", "controller", "actuator", "status", "time", "error", "peak"]
 _LOOK = 1e-3  # s: between samples
-_EFFORT = 3_000_000  # steps of a run
+_EFFORT = 1_000_000  # steps of a run
 _BOUND = 60.0  # largest |u| over which eps_u is bounded, as the ledger has it
 
 
@@ -45,17 +58,35 @@ def _fits(record: type) -> bool:
 
 
 def assumption(actuator: Any) -> str:
-    """Return the bounds of the split (2) of an actuator, or why it has none."""
+    """Return the bounds of the split (2) of an actuator, or why it has none, with formulas."""
     try:
         split = decompose(actuator, u_max=_BOUND)
     except DecompositionError as error:
         words = str(error).removesuffix("; replace the actuator")
-        return words.removeprefix(f"{type(actuator).__name__} is ")
-    eps = max(abs(split.eps_low), abs(split.eps_high))
-    return f"{split.k_1:.3g} <= k <= {split.k_2:.3g}, abs(eps_u) <= {eps:.3g} ({split.provenance})"
+        words = words.removeprefix(f"{type(actuator).__name__} is ")
+        for plain, formula in _FORMULAS.items():
+            words = words.replace(plain, formula)
+        return words
+    eps = _latex(max(abs(split.eps_low), abs(split.eps_high)))
+    bounds = rf"{_latex(split.k_1)} \leq k \leq {_latex(split.k_2)}"
+    return rf"${bounds}$, $\lvert \varepsilon_u \rvert \leq {eps}$ ({split.provenance})"
 
 
-def actuator_run(example: str, name: str) -> dict[str, Any]:
+_FORMULAS = {  # of the reasons of `decompose`
+    "v = k(u, t) u + eps_u": r"$v = k(u, t)\, u + \varepsilon_u$",
+    "k >= k_1 > 0": r"$k \geq k_1 > 0$",
+    "keeps eps_u": r"keeps $\varepsilon_u$",
+}
+
+
+def _latex(value: float) -> str:
+    """Return a number to three digits, with its power of ten as a formula has it."""
+    return re.sub(
+        r"e([+-])0*(\d+)", lambda m: rf" \times 10^{{{m[1].strip('+')}{m[2]}}}", f"{value:.3g}"
+    )
+
+
+def actuator_run(example: str, name: str, label: str = "paper") -> dict[str, Any]:
     """Run an example with one actuator in the place of its own.
 
     Parameters
@@ -63,24 +94,26 @@ def actuator_run(example: str, name: str) -> dict[str, Any]:
     example : {"example_1", "example_2"}
     name : str
         Of `actuators_of_the_table`.
+    label : str, optional
+        Controller, of `analysis.paper.rivals.rival_controllers`.
 
     Returns
     -------
     dict
-        example, actuator, status, time (s, at which the run ended), error (largest abs(y - yd)
-        from 10 s on), peak (largest abs(u)), assumption; error and peak are NaN where the run does
+        example, controller, actuator, status, time (s, at which the run ended), error (largest
+        abs(y - yd) from 10 s on), peak (largest abs(u)); error and peak are NaN where the run does
         not reach its end.
     """
-    actuator = actuators_of_the_table()[name]
+    actuator, controller = actuators_of_the_table()[name], rival_controllers(example)[label]
     times = np.linspace(0, HORIZON, round(HORIZON / _LOOK) + 1)
-    loop = paper.EXAMPLES[example](actuator=actuator)
+    loop = paper.EXAMPLES[example](actuator=actuator, controller=controller)
     made: Any = native.uninterrupted(
         input_output_response(loop, times, ignore_errors=True, max_steps=_EFFORT)
     )
     row = {
-        "example": example, "actuator": name, "status": made.statistics.status.name,
-        "time": made.statistics.time, "error": np.nan, "peak": np.nan,
-        "assumption": assumption(actuator),
+        "example": example, "controller": label, "actuator": name,
+        "status": made.statistics.status.name, "time": made.statistics.time,
+        "error": np.nan, "peak": np.nan,
     }  # fmt: skip
     if made.statistics.status is Status.OK:
         y, yd, u = (made.outputs[loop.output_index[signal]] for signal in ("y", "yd", "u"))
@@ -89,36 +122,57 @@ def actuator_run(example: str, name: str) -> dict[str, Any]:
     return row
 
 
-def table_text(record: pd.DataFrame) -> str:
-    """Return the record as a table in Markdown, with the spec of reports/example-1.toml."""
-    lines = [
-        "| example | actuator | spec | error after 10 s | largest abs(u) | Assumption 1 and (2) |",
-        "|---|---|---|---|---|---|",
+def assumption_text() -> str:
+    """Return what is known of the split (2) of each actuator, as a table in Markdown."""
+    rows = [f"| {name} | {assumption(a)} |" for name, a in actuators_of_the_table().items()]
+    return "\n".join(["| actuator | Assumption 1 and (2) |", "|---|---|", *rows])
+
+
+def controllers_text(record: pd.DataFrame, example: str) -> str:
+    """Return the runs of an example, actuators x controllers, as a table in Markdown.
+
+    A cell has the error, then what of the spec of reports/example-1.toml it violates, or how and
+    when the run ended.
+    """
+    own: Any = record[record["example"] == example]
+    cells = [
+        _cell(row, ok) for row, ok in zip(own.to_dict("records"), meets_the_spec(own), strict=True)
     ]
-    for row, meets in zip(record.to_dict("records"), meets_the_spec(record), strict=True):
-        number = row["example"][-1]
-        if row["status"] == Status.OK.name:
-            ended = "met" if meets else "violated"
-            numbers = f"{row['error']:.3g} | {row['peak']:.3g}"
-        else:
-            how = row["status"].lower().replace("_", " ")
-            ended, numbers = f"{how} at {row['time']:.3g} s", "- | -"
-        lines.append(
-            f"| {number} | {row['actuator']} | {ended} | {numbers} | {row['assumption']} |"
-        )
-    return "\n".join(lines)
+    labels = list(dict.fromkeys(own["controller"]))
+    table = own.assign(cell=cells).pivot(index="actuator", columns="controller", values="cell")
+    rows = [f"| {name} | {' | '.join(table.loc[name, labels])} |" for name in table.index]
+    head = f"| actuator | {' | '.join(labels)} |"
+    return "\n".join([head, "|---" * (len(labels) + 1) + "|", *rows])
+
+
+def _cell(row: dict[str, Any], meets: bool) -> str:
+    if row["status"] != Status.OK.name:
+        return f"{row['status'].lower().replace('_', ' ')} at {row['time']:.3g} s"
+    if meets:
+        return f"{row['error']:.3g}"
+    error = f"{row['error']:.3g}"
+    return f"**{error}**" if row["error"] > BAND else f"{error}, **u {row['peak']:.3g}**"
 
 
 def _main() -> None:
-    """Make the record again."""
+    """Make the record again, print its tables, and draw its figures where a folder is named."""
     rows = [
-        actuator_run(example, name)
+        actuator_run(example, name, label)
         for example in paper.EXAMPLES
+        for label in rival_controllers(example)
         for name in actuators_of_the_table()
     ]
     made = pd.DataFrame(rows).reindex(columns=_COLUMNS)
     made.to_csv(ACTUATOR_RECORD, index=False, float_format="%.6g")
-    print(table_text(made))
+    kept = pd.read_csv(ACTUATOR_RECORD)
+    print(assumption_text())
+    for example in paper.EXAMPLES:
+        print("\n" + controllers_text(kept, example))
+        own: Any = kept[kept["example"] == example]
+        for folder in sys.argv[1:]:
+            figure = actuator_errors(own, meets_the_spec, BAND)
+            place = Path(folder) / f"actuators-{example[-1]}.svg"
+            place.write_bytes(svg_files([figure])[0])
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from . import text as text
 from .claims import paper_claims, paper_verdict, proof_claims
 from .closing import closing_sections, metric_table
 from .proof import Evidence, lyapunov_sections
+from .rivals import rivals_section
 from .sampling import sampling_section
 
 __all__ = ["paper_report", "paper_sections"]
@@ -36,6 +37,7 @@ def paper_report(
     studies: Sequence[Section] = (),
     numerics: pd.DataFrame | None = None,
     sampling: pd.DataFrame | None = None,
+    rivals: pd.DataFrame | None = None,
     sections: Sequence[Section] | None = None,
 ) -> Report:
     """Compose the reproduction report from the runs of `analysis.paper.CASES`.
@@ -54,6 +56,8 @@ def paper_report(
         Result of `analysis.paper.numerics`.
     sampling : pandas.DataFrame, optional
         Result of `analysis.paper.sampling_limits.checked_record`.
+    rivals : pandas.DataFrame, optional
+        Result of `analysis.paper.limits.rivals.checked_rivals`.
     sections : sequence of Section, optional
         What `paper_sections` makes of the same; by default it is made here.
 
@@ -73,6 +77,7 @@ def paper_report(
         sections=[
             *sections,
             *([] if sampling is None else [sampling_section(sampling)]),
+            *([] if rivals is None else [rivals_section(rivals)]),
             *studies,
             *closing_sections(runs, numerics),
         ],

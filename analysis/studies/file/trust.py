@@ -178,6 +178,11 @@ def check_function(function: Any, name: str) -> None:
     ParameterError
         With the rule.
     """
+    if isinstance(function, ct.InputOutputSystem):
+        raise ParameterError(
+            f"'{name}' needs a function that returns a diagram, got the diagram itself: write "
+            "'def make(): return ...' and name that"
+        )
     plain = _plain(function)
     if not isinstance(plain, FunctionType | type) or _is_standard(plain.__module__):
         where = getattr(plain, "__module__", None) or type(plain).__name__

@@ -1,0 +1,167 @@
+"""What the studies ``reports/rivals-1.toml`` and ``rivals-2.toml`` found: a kept record.
+
+``python -m analysis.paper.limits.rivals`` runs both again, in six minutes, and prints the tables
+of ``docs/explanation/rivals.md``.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from nlctl import paper
+
+from ...studies import Result, read_study, run, shipped
+from ...studies.origin import plain_study
+
+__all__ = [
+    "RIVALS_RECORD",
+    "RIVAL_ACTUATORS",
+    "beaten_by",
+    "checked_rivals",
+    "failed_text",
+    "rival_rows",
+    "rivals_study",
+    "rivals_text",
+    "study_key",
+]
+
+RIVALS_RECORD = Path(__file__).with_name("rivals.csv")
+RIVAL_ACTUATORS = {"ideal": "no nonlinearity"} | {
+    name: name for name in ("dead zone", "backlash", "saturation")
+}
+"""What tables call the actuators of `analysis.paper.rivals.rival_actuators`."""
+
+
+def rivals_study(example: str) -> Path:
+    """Return the study file of an example."""
+    return shipped(f"rivals-{example[-1]}")
+
+
+def study_key(example: str) -> str:
+    """Return a key of all that the study file of an example asks."""
+    asked = plain_study(read_study(rivals_study(example)).study)
+    return sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def rival_rows(result: Result, example: str) -> pd.DataFrame:
+    """Return what a run of the study found, a line for each controller behind each actuator.
+
+    Parameters
+    ----------
+    result : Result
+        Of ``reports/rivals-1.toml`` or ``rivals-2.toml``, or of parts of them.
+    example : {"example_1", "example_2"}
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns example, study (`study_key`), actuator, controller, samples, violations, failed
+        (of which did not reach their end), late_rms (RMS of e from 10 s on), iae (s), peak_u,
+        energy (s), all medians; less, less_low, less_high: median of the late_rms of the paper's
+        controller minus this one on the same samples, and its exact interval.
+    """
+    rows = []
+    for finding in result.findings:
+        pairs = finding.tables["differences"].loc["late_rms"]
+        actuator = result.asked[finding.key].options["actuator"]
+        ranking = finding.tables["ranking"]
+        for label in ("paper", *pairs.loc["paper"].index):
+            own: Any = ranking.loc[label]
+            less = (0.0,) * 3 if label == "paper" else pairs.loc[("paper", label)]
+            rows.append(
+                {"example": example, "study": study_key(example), "actuator": actuator}
+                | {"controller": label, "samples": finding.numbers["samples"]}
+                | {key: int(own[key]) for key in ("violations", "failed")}
+                | {key: own[f"median {key}"] for key in ("late_rms", "iae", "peak_u", "energy")}
+                | dict(zip(("less", "less_low", "less_high"), tuple(less)[:3], strict=True))
+            )
+    return pd.DataFrame(rows)
+
+
+def checked_rivals(path: Path = RIVALS_RECORD) -> pd.DataFrame:
+    """Return the record, if it is of the study files of today.
+
+    Raises
+    ------
+    ValueError
+        If a study file has another content than the one of which the record was made.
+    """
+    record = pd.read_csv(path)
+    for example in paper.EXAMPLES:
+        made = set(record.loc[record["example"] == example, "study"])
+        if made != {study_key(example)}:
+            raise ValueError(
+                f"the record of rivals in '{example}' is of another study than "
+                f"reports/rivals-{example[-1]}.toml: make it again with "
+                "'python -m analysis.paper.limits.rivals'"
+            )
+    return record
+
+
+def beaten_by(record: pd.DataFrame, example: str) -> dict[str, dict[str, tuple[str, ...]]]:
+    """Return who beats the paper's controller as printed, and whom it beats, by actuator.
+
+    One beats another with no more violations of the spec and a smaller RMS of e from 10 s on: the
+    exact interval of the median difference on the same samples is on one side of 0.
+
+    Returns
+    -------
+    dict
+        ``{actuator: {"beaten by": labels, "beats": labels}}``
+    """
+    found = {}
+    for actuator, own in record[record["example"] == example].groupby("actuator", sort=False):
+        lines: list[dict[str, Any]] = own.to_dict("records")  # type: ignore[assignment]
+        (printed,) = (line for line in lines if line["controller"] == "paper")
+        limit = printed["violations"]
+        better = [r for r in lines if r["less_low"] > 0 and r["violations"] <= limit]
+        worse = [r for r in lines if r["less_high"] < 0 and r["violations"] >= limit]
+        found[str(actuator)] = {
+            "beaten by": tuple(r["controller"] for r in better),
+            "beats": tuple(r["controller"] for r in worse),
+        }
+    return found
+
+
+def rivals_text(record: pd.DataFrame, example: str) -> str:
+    """Return the record of an example as a table in Markdown, controllers x actuators.
+
+    A cell has violations (of which did not end), median RMS of e and median largest abs(u).
+    """
+    own: Any = record[record["example"] == example]
+    cells = [
+        f"{failed_text(r)}; {r['late_rms']:.4f}; {r['peak_u']:.1f}" for r in own.to_dict("records")
+    ]
+    table = own.assign(cell=cells).pivot(index="controller", columns="actuator", values="cell")
+    labels = list(dict.fromkeys(own["controller"]))
+    rows = [f"| {a} | {' | '.join(table.loc[a, list(RIVAL_ACTUATORS)])} |" for a in labels]
+    head = f"| controller | {' | '.join(RIVAL_ACTUATORS.values())} |"
+    return "\n".join([head, "|---" * (len(RIVAL_ACTUATORS) + 1) + "|", *rows])
+
+
+def failed_text(row: dict[str, Any]) -> str:
+    """Return how many runs violate the spec, and in brackets how many of them did not end."""
+    return f"{row['violations']}" + (f" ({row['failed']})" if row["failed"] else "")
+
+
+def _main() -> None:
+    """Make the record again."""
+    made = []
+    with tempfile.TemporaryDirectory() as folder:
+        for example in paper.EXAMPLES:
+            result = run(read_study(rivals_study(example)), Path(folder) / example)
+            made.append(rival_rows(result, example))
+    record = pd.concat(made)
+    record.to_csv(RIVALS_RECORD, index=False, float_format="%.6g")
+    for example in paper.EXAMPLES:
+        print(rivals_text(record, example) + "\n")
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,0 +1,109 @@
+"""The part of the paper's page on rival controllers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from ...report.document import Paragraph, Section, Table
+from .. import TAIL
+from ..limits.rivals import RIVAL_ACTUATORS, beaten_by, failed_text
+from ..rivals import KNOWLEDGE
+
+__all__ = ["rivals_section"]
+
+_TITLES = {"example_1": "Example 1", "example_2": "Example 2"}
+
+
+def rivals_section(record: pd.DataFrame) -> Section:
+    """Return the section on the paper's controller and its rivals.
+
+    Parameters
+    ----------
+    record : pandas.DataFrame
+        Of `analysis.paper.limits.rivals.checked_rivals`.
+    """
+    return Section(
+        key="rivals",
+        title="Rivals",
+        items=[
+            Paragraph(
+                text="The plants of both examples with other controllers, each with gains found by "
+                "the same budget on the same training samples of the example's own actuator, and "
+                "compared on fresh samples, the same for all. Every rival takes the sign of the "
+                "input gain as known; the paper's controller finds it. That is the price of each "
+                "of them, and the last table has the rest."
+            ),
+            *(Paragraph(text=_sentence(record, example)) for example in _TITLES),
+            _winners(record),
+            *(_table(record, example) for example in _TITLES),
+            Table(
+                caption="What each controller has to know.",
+                columns=("controller", "knowledge"),
+                rows=list(KNOWLEDGE.items()),
+                folded=True,
+            ),
+            Paragraph(
+                text="These are medians of a kept record. The studies behind it, with all pairs, "
+                "differences and intervals, are run by nlctl run reports/rivals-1.toml and "
+                "reports/rivals-2.toml; the command that makes the record again:",
+                code="python -m analysis.paper.limits.rivals",
+            ),
+        ],
+    )
+
+
+def _sentence(record: pd.DataFrame, example: str) -> str:
+    """Say who beats the paper's controller behind every actuator, and whom it beats."""
+    found = beaten_by(record, example).values()
+    beaten, beats = (
+        tuple(x for x in KNOWLEDGE if all(x in each[key] for each in found))
+        for key in ("beaten by", "beats")
+    )
+    return (
+        f"{_TITLES[example]}: behind every one of the actuators the paper's controller as printed "
+        f"is beaten by {_listed(beaten)}, and better than {_listed(beats)}."
+    )
+
+
+def _winners(record: pd.DataFrame) -> Table:
+    return Table(
+        caption="Who beats the paper's controller as printed, and whom it beats: with no more "
+        f"violations and a smaller RMS of e for t ≥ {TAIL:g} s, the exact interval of the median "
+        "difference on the same samples on one side of 0.",
+        columns=("example", "actuator", "beaten by", "better than"),
+        rows=[
+            (title, RIVAL_ACTUATORS[name], _listed(each["beaten by"]), _listed(each["beats"]))
+            for example, title in _TITLES.items()
+            for name, each in beaten_by(record, example).items()
+        ],
+    )
+
+
+def _listed(labels: tuple[str, ...]) -> str:
+    return ", ".join("itself tuned" if x == "paper, tuned" else x for x in labels) or "none"
+
+
+def _table(record: pd.DataFrame, example: str) -> Table:
+    own: Any = record[record["example"] == example]
+    return Table(
+        caption=f"{_TITLES[example]}: violations of |e| ≤ 0.15 for t ≥ {TAIL:g} s or |u| ≤ 15 in "
+        f"{own['samples'].iloc[0]} runs (in brackets those that did not reach their end), and "
+        "medians of the RMS of e, of the largest |u|, and of the energy of u. Less than the "
+        "paper: median difference in the RMS of e on the same samples, with its exact interval.",
+        columns=(
+            "actuator", "controller", "violations", "RMS of e", "largest |u|", "energy of u",
+            "less than the paper", "from", "to",
+        ),
+        rows=[
+            (
+                RIVAL_ACTUATORS[row["actuator"]], row["controller"], failed_text(row),
+                *(float(f"{row[key]:.3g}") for key in (
+                    "late_rms", "peak_u", "energy", "less", "less_low", "less_high",
+                )),
+            )
+            for row in own.to_dict("records")
+        ],
+        folded=True,
+    )  # fmt: skip
