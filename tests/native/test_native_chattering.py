@@ -179,7 +179,8 @@ def oscillation(actuator):
 def test_a_relay_with_hysteresis_oscillates_with_the_period_of_its_width(actuator, width, rtol):
     """A sawtooth: x rises at 3/2 and falls at 1/2 between the thresholds, 16 h / 3 a period.
 
-    A switch is located to 10 rtol of a step, and errors of switches add up: half a hundred periods.
+    A switch is located to 10 rtol of a step.  Of 4 h / 3 and 4 h that comes to 320 rtol h / 3 of
+    time in a period, with the ways back: after 50 periods, 8000 rtol h of x at most.
     """
     loop, start = oscillation(actuator(width))
     first, rise, period = 2 * (1 + width), 4 * width / 3, 16 * width / 3
@@ -190,7 +191,7 @@ def test_a_relay_with_hysteresis_oscillates_with_the_period_of_its_width(actuato
     phase = (times - first) % period
     exact = np.where(phase < rise, -width + 1.5 * phase, width - 0.5 * (phase - rise))
     found = made.states[[name.startswith("plant") for name in made.state_labels], 1:][0]
-    np.testing.assert_allclose(found, exact, rtol=0, atol=1e3 * rtol * width)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=8e3 * rtol * width)
 
 
 def test_members_of_an_ensemble_chatter_whatever_is_beside_them():
