@@ -271,7 +271,7 @@ class Report:
     >>> from analysis.report import Claim, Paragraph, Report, Section, render_html
     >>> shown = Section(key="one", title="A sum", items=[Paragraph(text="Two and two are four.")])
     >>> claim = Claim(text="2 + 2 = 4", measured="4", limit="4", holds=True, evidence="one")
-    >>> report = Report(title="Sums", verdict="Known.", claims=[claim], sections=[shown], command="")
+    >>> report = Report(title="Sum", verdict="Known.", claims=[claim], sections=[shown], command="")
     >>> page = render_html(report)
     >>> "Two and two are four." in page, "https://" in page
     (True, False)

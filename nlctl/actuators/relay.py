@@ -24,6 +24,16 @@ def kept_side(side):
 
 
 @equation
+def held_side(side):
+    """Side that a relay outputs: its memory's, never that of its input.
+
+    Behind a threshold a loop may lead back before the memory has switched, and would never leave
+    it.  Beyond 1 a memory counts as it stands: it jumps, and nothing carries it along.
+    """
+    return kept_side(side) * np.maximum(1.0, np.abs(side))
+
+
+@equation
 def relay_side(u, side, on, off):
     """Side of relays: +1 where u >= on, -1 where u <= off, in between that of the memory."""
     free = np.where(u >= on, 1.0, np.where(u <= off, -1.0, u))
@@ -57,9 +67,8 @@ class Relay:
     Multiple-Input Describing Functions, 1968, appendix B).
 
     It does not obey (2): |v| = height for all u.  In python-control the memory relaxes onto the
-    side with the rate given, and its sign counts: a swing back that comes sooner than ln(2) / rate
-    after a switch is missed, everything else is exact but for the places of the jumps, which
-    a solver of SciPy does not locate.
+    side with the rate given, and its sign counts: the output switches ln(2) / rate after the input
+    has met a threshold, and a swing back that comes sooner is missed.
 
     Parameters
     ----------
@@ -69,10 +78,9 @@ class Relay:
     Examples
     --------
     >>> relay = nlctl.block(nlctl.Relay(on=1.0, off=-1.0), "relay")
-    >>> [float(relay.output(0, [side], [0.5])[0]) for side in (-1.0, 1.0)]
-    [-1.0, 1.0]
-    >>> print(relay.output(0, [-1.0], [1.0]))
-    [1.]
+    >>> response = nlctl.input_output_response(relay, [0, 1, 2, 3], [-2.0, 0.5, 2.0, 0.5])
+    >>> print(response.outputs)
+    [-1. -1.  1.  1.]
     """
 
     on: float = param(1.0, unit="1", meaning="input from which the relay is on")
@@ -85,7 +93,7 @@ class Relay:
     outputs = ("v",)
     states = ("side",)
     memory = ("side",)
-    feedthrough = True
+    feedthrough = False
     no_split = BOUNDED_OUTPUT
 
     @property
@@ -112,7 +120,7 @@ class Relay:
     def output(t, x, u, p):
         """The side, with its height."""
         (side,) = x
-        return (p.height * relay_side(u[0], side, p.on, p.off),)
+        return (p.height * held_side(side),)
 
     @staticmethod
     @equation
@@ -187,8 +195,9 @@ class Preisach:
 
     >>> record = nlctl.Preisach(alpha=(0.5, 1.0), beta=(-0.5, -1.0), w=(0.5, 0.5))
     >>> hysteresis = nlctl.block(record, "actuator")
-    >>> [float(hysteresis.output(0, [-1.0, -1.0], [u])[0]) for u in (0.0, 0.6, 1.1)]
-    [-1.0, 0.0, 1.0]
+    >>> response = nlctl.input_output_response(hysteresis, [0, 1, 2, 3], [0.0, 0.6, 1.1, 0.0])
+    >>> print(response.outputs)
+    [-1.  0.  1.  1.]
     """
 
     alpha: tuple[float, ...] = param(_GRID[0], unit="1", meaning="inputs from which relays are on")
@@ -199,7 +208,7 @@ class Preisach:
 
     inputs = ("u",)
     outputs = ("v",)
-    feedthrough = True
+    feedthrough = False
     vector = True
     no_split = BOUNDED_OUTPUT
 
@@ -241,7 +250,7 @@ class Preisach:
     @equation
     def output(t, x, u, p):
         """The weighted sum of the sides."""
-        return (np.sum(p.w * relay_side(u[0], x, p.alpha, p.beta)),)
+        return (np.sum(p.w * held_side(x)),)
 
     @staticmethod
     @equation

@@ -118,15 +118,10 @@ def test_the_block_inside_of_a_loop_is_named(actuator, jump):
     assert abs(float(one) - float(other)) == pytest.approx(jump, rel=1e-4)
 
 
-def test_a_memory_that_switches_is_named():
+@pytest.mark.parametrize("width", [1e-9, 1e-12, 1e-14])
+def test_a_memory_that_switches_is_named(width):
     """A relay whose thresholds coincide to below the tolerance."""
-    relay = nlctl.Relay(on=1e-12, off=-1e-12)
-    plant = ct.nlsys(
-        lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0], states=1, inputs=["v"],
-        outputs=["u"], name="plant",
-    )  # fmt: skip
-    loop = nlctl.interconnect({"relay": relay, "plant": plant})
-    made = run(loop, {"plant.x[0]": 1.0})
+    made = run(*oscillation(nlctl.Relay(on=width, off=-width)))
     assert made.statistics.status is Status.CHATTERING
     assert "of block 'relay' jumps between" in made.message
 
@@ -160,6 +155,43 @@ def test_a_hysteresis_that_the_tolerance_resolves_is_integrated(width):
     assert made.statistics.status is Status.OK
     assert np.max(np.abs(made.states[1])) <= 1.001 * width
     assert made.states[2, -1] == pytest.approx(end / 2, abs=5 * width)
+
+
+def oscillation(actuator):
+    """x' = 1/2 - v from 1 with a relay for v: it goes on where x falls to its threshold."""
+    plant = ct.nlsys(
+        lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0], states=1, inputs=["v"],
+        outputs=["u"], name="plant",
+    )  # fmt: skip
+    return nlctl.interconnect({"relay": actuator, "plant": plant}), {"plant.x[0]": 1.0}
+
+
+@pytest.mark.parametrize("width", [1e-1, 1e-2, 1e-3])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+@pytest.mark.parametrize(
+    "actuator",
+    [
+        lambda h: nlctl.Relay(on=h, off=-h),
+        lambda h: nlctl.Preisach(alpha=(h,), beta=(-h,), w=(1.0,)),
+    ],
+    ids=["Relay", "Preisach"],
+)
+def test_a_relay_with_hysteresis_oscillates_with_the_period_of_its_width(actuator, width, rtol):
+    """A sawtooth: x rises at 3/2 and falls at 1/2 between the thresholds, 16 h / 3 a period.
+
+    A switch is located to 10 rtol of a step.  Of 4 h / 3 and 4 h that comes to 320 rtol h / 3 of
+    time in a period, with the ways back: after 50 periods, 8000 rtol h of x at most.
+    """
+    loop, start = oscillation(actuator(width))
+    first, rise, period = 2 * (1 + width), 4 * width / 3, 16 * width / 3
+    times = first + period * np.arange(0.1, 50, 0.37)
+    made = nlctl.input_output_response(
+        loop, np.append(0.0, times), 0, start, rtol=rtol, atol=rtol * width
+    )
+    phase = (times - first) % period
+    exact = np.where(phase < rise, -width + 1.5 * phase, width - 0.5 * (phase - rise))
+    found = made.states[[name.startswith("plant") for name in made.state_labels], 1:][0]
+    np.testing.assert_allclose(found, exact, rtol=0, atol=8e3 * rtol * width)
 
 
 def test_members_of_an_ensemble_chatter_whatever_is_beside_them():
