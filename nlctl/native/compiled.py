@@ -80,6 +80,15 @@ class Compiled(StandIn):
         """The diagram that was compiled."""
         return self.schedule.system
 
+    def _refused(self, *_: Any, **__: Any) -> Any:
+        raise UsageError(
+            f"'{self.system.name}' is compiled already: copy or rename its diagram, .system, and "
+            "compile that"
+        )
+
+    # what would give it other names or sizes
+    copy = update_names = set_inputs = set_outputs = set_states = _refused
+
     @property
     def source(self) -> str:
         """What runs for one member: LLVM IR, in which comments say what each value is.

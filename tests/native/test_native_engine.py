@@ -121,3 +121,22 @@ def test_a_wrong_number_of_values_is_an_error(result):
     short = np.array(result)
     with pytest.raises(nlctl.CompileError, match=rf"'decay' returns {len(result)} .* needs 1"):
         nlctl.compile(decay(lambda t, x, u, params: short))
+
+
+@pytest.mark.parametrize(
+    "rename",
+    [
+        lambda c: c.copy(name="other"),
+        lambda c: c.update_names(name="other"),
+        lambda c: c.set_inputs(["w"]),
+        lambda c: c.set_outputs(["w"]),
+        lambda c: c.set_states(["w"]),
+    ],
+    ids=["copy", "update_names", "set_inputs", "set_outputs", "set_states"],
+)
+def test_a_compiled_diagram_keeps_its_names(rename):
+    """It is machine code of the diagram as it was."""
+    compiled = nlctl.compile(nlctl.block(nlctl.Lag(), "lag"))
+    with pytest.raises(nlctl.errors.UsageError, match=r"compiled already: .*\.system"):
+        rename(compiled)
+    assert (compiled.name, compiled.input_labels, compiled.state_labels) == ("lag", ["u"], ["v"])
