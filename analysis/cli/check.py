@@ -111,6 +111,7 @@ def repeat_command(
     start: Mapping[str, Any],
     member: int,
     engine: str = "auto",
+    k: tuple[float, float] | None = None,
 ) -> str:
     """Return the command that repeats one run of an ensemble, to the last digit.
 
@@ -125,6 +126,8 @@ def repeat_command(
         Initial states: a number, or an array with one entry per run.
     member : int
     engine : str, optional
+    k : tuple of 2 floats, optional
+        Bounds of the actuator's gain, where they were given.
     """
     params = [text for text in settings if not text.partition("=")[0].strip().endswith("(0)")]
     states = [
@@ -133,6 +136,7 @@ def repeat_command(
     ]
     options = [part for text in (*params, *states) for part in ("--set", text)]
     options += [] if engine == "auto" else ["--engine", engine]
+    options += ["--k", *map(repr, k)] if k else []
     return shlex.join(["nlctl", "check", example, "--until", f"{horizon:.17g}", *options])
 
 

@@ -133,6 +133,14 @@ def check(
             "auto: machine code alone."
         ),
     ] = "auto",
+    k: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            metavar="K_1 K_2",
+            help="Bounds that the actuator's gain k of (2) shall have, 0 < K_1 <= K_2; by default "
+            "those that the actuator knows.",
+        ),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
     """Check the assumptions and inequalities of the paper's proof, line by line.
@@ -169,7 +177,7 @@ def check(
     run: Any = horizon
     if engine == "python-control":
         run, settings = interpreted_runs(diagram, horizon, start, params), {}
-    found = ledger(diagram, run, **settings, max_steps=steps)
+    found = ledger(diagram, run, **settings, k=k, max_steps=steps)
     if json:
         print(found.to_json())
     else:
@@ -177,7 +185,7 @@ def check(
         print(ledger_summary(found))
         for line in worst_lines(found) if ensemble else ():
             print(f"run {line.member}, worst in {line.key}, again (with constants of its own):")
-            print(f"  {repeat_command(loop, horizon, set_ or [], start, line.member, engine)}")
+            print(f"  {repeat_command(loop, horizon, set_ or [], start, line.member, engine, k)}")
     if found.answer in UNPROVED:
         raise typer.Exit(UNPROVED[found.answer])
 

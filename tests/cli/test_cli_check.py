@@ -74,6 +74,12 @@ def test_runs_of_python_control_are_reproduced_and_give_the_same_ledger():
     assert (code, "nearest: 'python-control'" in said) == (2, True)
 
 
+def test_bounds_of_the_actuators_gain_can_be_given():
+    """k of (2): the proof is made with these, or says that they are none."""
+    code, _, said = check("example-1", "--until", "0.1", "--k", "1.2", "0.7")
+    assert (code, "0 < k_1 <= k_2" in said) == (2, True)
+
+
 def test_a_violation_is_exit_code_1():
     """Without sigma-modification the decay rate of (31) is zero."""
     code, said, _ = check("example-1", "--set", "robust.sigma_2=0", "--until", "5")
@@ -150,6 +156,8 @@ def test_replay_keeps_every_digit_and_every_kind_of_parameter():
     assert "--engine" not in parts
     again = shlex.split(repeat_command("example-1", 0.1, typed, start, 1, "python-control"))
     assert again == [*parts, "--engine", "python-control"]
+    bounded = shlex.split(repeat_command("example-1", 0.1, typed, start, 1, k=(0.6, 1 / 3)))
+    assert [float(x) for x in bounded[bounded.index("--k") + 1 :]] == [0.6, 1 / 3]
 
 
 def test_worst_lines_hold_every_run_that_violates_something(found):
