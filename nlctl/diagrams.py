@@ -275,11 +275,16 @@ def known_system(who: str, system: Any) -> Any:
     """
     inner = getattr(system, "system", system)
     if not isinstance(inner, ct.InputOutputSystem):
-        raise ParameterError(
-            f"{who} needs a block or diagram, got {type(system).__name__}: nlctl.block makes a "
-            "block of a record"
-        )
+        raise ParameterError(not_a_system(who, system))
     return inner
+
+
+def not_a_system(who: str, thing: Any) -> str:
+    """Return the sentence that refuses what is neither a block nor a diagram."""
+    return (
+        f"{who} needs a block or diagram, got {type(thing).__name__}: nlctl.block makes a block of "
+        "a record"
+    )
 
 
 def state_names(system: ct.InputOutputSystem) -> list[str]:

@@ -13,7 +13,7 @@ import cloudpickle
 import control as ct
 import numpy as np
 
-from ..diagrams import check_read
+from ..diagrams import check_read, not_a_system
 from ..errors import CompileError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
@@ -314,10 +314,7 @@ def compile(  # noqa: A001 (what it does)
             f"'{system.name}' is compiled already: give its diagram, .system, to compile it anew"
         )
     if not is_system(system):
-        raise CompileError(
-            f"compile needs a diagram or a block, got {type(system).__name__}: nlctl.block makes "
-            "a block of a record"
-        )
+        raise CompileError(not_a_system("compile", system))
     check_read(system, checked_params(params))
     set_parameters(system, params)
     if algebraic_loops not in LOOPS:

@@ -8,6 +8,7 @@ import control as ct
 
 from ..arguments import number, one_of
 from ..blocks import memory_states
+from ..diagrams import not_a_system
 from ..errors import ParameterError
 from ..upstream.control_internals import is_system
 from .rebuilt import rebuilt
@@ -48,10 +49,7 @@ def discretise(system: Any, dt: float, method: str = "euler") -> Any:
     number("discretise", "dt", dt, above=0)
     one_of("discretise", "method", method, _METHODS)
     if not is_system(system):
-        raise ParameterError(
-            f"discretise needs a block or diagram, got {type(system).__name__}: nlctl.block makes "
-            "a block of a record"
-        )
+        raise ParameterError(not_a_system("discretise", system))
     if isinstance(system, ct.InterconnectedSystem):
         return rebuilt(system, lambda part: _discretised(part, dt, method), dt)
     return _discretised(system, dt, method)
