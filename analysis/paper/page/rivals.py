@@ -56,14 +56,14 @@ def rivals_section(record: pd.DataFrame) -> Section:
 
 def _sentence(record: pd.DataFrame, example: str) -> str:
     """Say who beats the paper's controller behind every actuator, and whom it beats."""
-    found = beaten_by(record, example).values()
+    found, alone = beaten_by(record, example).values(), "no single controller"
     beaten, beats = (
         tuple(x for x in KNOWLEDGE if all(x in each[key] for each in found))
         for key in ("beaten by", "beats")
     )
     return (
-        f"{_TITLES[example]}: behind every one of the actuators the paper's controller as printed "
-        f"is beaten by {_listed(beaten)}, and better than {_listed(beats)}."
+        f"{_TITLES[example]}: behind all of the actuators alike, the paper's controller as printed "
+        f"is beaten by {_listed(beaten, alone)}, and better than {_listed(beats, alone)}."
     )
 
 
@@ -81,8 +81,8 @@ def _winners(record: pd.DataFrame) -> Table:
     )
 
 
-def _listed(labels: tuple[str, ...]) -> str:
-    return ", ".join("itself tuned" if x == "paper, tuned" else x for x in labels) or "none"
+def _listed(labels: tuple[str, ...], nobody: str = "none") -> str:
+    return ", ".join("itself tuned" if x == "paper, tuned" else x for x in labels) or nobody
 
 
 def _table(record: pd.DataFrame, example: str) -> Table:
