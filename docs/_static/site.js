@@ -1,0 +1,13 @@
+// Tables that are wider than their page scroll by themselves: with the keyboard, too.
+function reachable() {
+  for (const table of document.querySelectorAll(".bd-article table")) {
+    if (table.scrollWidth > table.clientWidth) table.tabIndex = 0;
+    else table.removeAttribute("tabindex");
+  }
+}
+addEventListener("load", () => {
+  reachable();
+  // its own words are its name
+  for (const button of document.querySelectorAll(".search-button__button")) button.removeAttribute("aria-label");
+});
+addEventListener("resize", reachable);
