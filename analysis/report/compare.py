@@ -64,7 +64,20 @@ def compare_contents(
 
     Examples
     --------
-    See `write_report`.
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from analysis.report import Report, compare_contents, write_report
+    >>> def arm(e):
+    ...     return Report(
+    ...         title="Arm", verdict="", claims=[], sections=[], command="", numbers={"e": e}
+    ...     )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     one, other = Path(folder, "one"), Path(folder, "other")
+    ...     _ = write_report(arm(0.14), one), write_report(arm(0.15), other)
+    ...     print(*compare_contents(one, other))
+    ...     print(compare_contents(one, other, rtol=0.1))
+    numbers.e: 0.14 -> 0.15
+    []
     """
     if not 0 <= rtol < math.inf:
         raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")

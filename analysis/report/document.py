@@ -220,7 +220,17 @@ class Claim:
 
     Examples
     --------
-    See `Report`.
+    A claim of ours that does not hold has failed, one of somebody else is refuted:
+
+    >>> from analysis.report import Claim, Report, render_html
+    >>> def verdict(by=""):
+    ...     claim = Claim(
+    ...         text="|e| <= 0.1", measured="0.2", limit="0.1", holds=False, evidence="", by=by
+    ...     )
+    ...     report = Report(title="Arm", verdict="", claims=[claim], sections=[], command="")
+    ...     return render_html(report).split("<strong>")[1].split("</strong>")[0]
+    >>> verdict(), verdict("the paper")
+    ('1 of 1 claims fails.', '1 claim of the paper is refuted.')
     """
 
     text: str

@@ -132,7 +132,14 @@ def render_json(report: Report) -> str:
 
     Examples
     --------
-    See `Equation`.
+    >>> import json, math
+    >>> from analysis.report import Report, render_json
+    >>> numbers = {"e": 0.14, "settling": math.inf}
+    >>> report = Report(
+    ...     title="Arm", verdict="", claims=[], sections=[], command="", numbers=numbers
+    ... )
+    >>> json.loads(render_json(report))["numbers"]
+    {'e': 0.14, 'settling': 'inf'}
     """
     content = {
         "title": report.title,
