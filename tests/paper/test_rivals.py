@@ -153,9 +153,12 @@ def test_a_record_of_another_study_is_refused(tmp_path):
         checked_rivals(tmp_path / "record.csv")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    "example", ["example_1", pytest.param("example_2", marks=pytest.mark.weekly)]
+    "example",
+    [
+        pytest.param("example_1", marks=pytest.mark.slow),
+        pytest.param("example_2", marks=pytest.mark.weekly),
+    ],
 )
 def test_lines_of_the_record_are_runs_of_today(example, tmp_path):
     """Two controllers behind the actuator of their training, on all samples."""
