@@ -59,7 +59,23 @@ class Asked(Strict):
 
     Examples
     --------
-    See `Kind`.
+    The keys of a table of one's own, checked as those of nlctl's kinds are:
+
+    >>> from pydantic import Field
+    >>> from analysis.studies import Asked
+    >>> class Spread(Asked):
+    ...     of: str = Field("spec", description="Column of the main table.")
+    ...     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
+    ...     @property
+    ...     def claim(self):
+    ...         return "" if self.limit is None else f"the spread is at most {self.limit:g}"
+    >>> Spread(kind="spread", limit=0.5).claim
+    'the spread is at most 0.5'
+    >>> Spread(kind="spread", limit=-1.0)
+    Traceback (most recent call last):
+    pydantic_core._pydantic_core.ValidationError: 1 validation error for Spread
+    limit
+      Input should be greater than 0 ...
     """
 
     key: str = Field(
@@ -82,12 +98,13 @@ class Varied(Asked):
 
     Examples
     --------
-    >>> from typing import Literal
     >>> from analysis.studies import Varied
-    >>> class Spread(Varied):
-    ...     kind: Literal["spread"] = "spread"
-    >>> Spread(quantities=("lag.T",)).quantities
+    >>> class Corners(Varied):
+    ...     levels: int = 2
+    >>> Corners(kind="corners", quantities=["lag.T"]).quantities
     ('lag.T',)
+    >>> Corners(kind="corners").quantities  # all
+    ()
     """
 
     quantities: Names = Field((), description="What is varied, the rest nominal; all by default.")
@@ -113,7 +130,17 @@ class Setup:
 
     Examples
     --------
-    See `Kind`.
+    What Morris' screening takes is known before anything runs: with r trajectories of k quantities
+    r (k + 1) simulations.
+
+    >>> from analysis.studies import Setup, read_study, shipped
+    >>> file = read_study(shipped("example-1-quick"))
+    >>> setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
+    >>> (asked,) = [asked for asked in file.study.analysis if asked.kind == "morris"]
+    >>> asked.trajectories, len(setup.experiment.space.names)
+    (4, 5)
+    >>> asked.definition.planned(asked, setup)
+    24
     """
 
     study: Study
@@ -255,22 +282,44 @@ class Kind:
 
     Examples
     --------
-    A kind that looks at the main table, here one of two runs:
+    A file ``failures.py`` beside the study has the kind, and the study names it.  A lag with
+    T = 0.5 s is at 1 - exp(-2) = 0.86 after 1 s, so that one corner of the box fails:
 
-    >>> from types import SimpleNamespace
-    >>> from typing import Literal
-    >>> import numpy as np
-    >>> from analysis.studies import Asked, Kind, made
-    >>> class Tally(Asked):
-    ...     kind: Literal["tally"] = "tally"
-    ...     limit: int = 0
-    >>> def tally(asked, ground):
-    ...     _, margins = ground.main
-    ...     return made(asked, f"{int((margins <= asked.limit).sum())} runs violate the spec.")
-    >>> kind = Kind(name="tally", schema=Tally, run=tally, title="Tally", needs_rows=True)
-    >>> ground = SimpleNamespace(main=(None, np.array([0.1, -0.2])))
-    >>> kind.run(Tally(), ground).sentence
-    '1 runs violate the spec.'
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from analysis.studies import read_study, run
+    >>> code = '''
+    ... from analysis.studies import Asked, Kind, made
+    ...
+    ... class Failures(Asked):
+    ...     pass
+    ...
+    ... def count(asked, ground):
+    ...     design, margins = ground.main
+    ...     found = int((margins <= 0).sum())
+    ...     return made(asked, f"{found} of {design.size} rows fail.", numbers={"failing": found})
+    ...
+    ... failures = Kind(
+    ...     name="failures", schema=Failures, run=count, title="Failing rows", needs_rows=True
+    ... )
+    ... '''
+    >>> text = '''
+    ... loop = "nlctl:block"
+    ... options = { spec = { block = "Lag" }, name = "lag" }
+    ... study = { title = "A lag", seed = 1 }
+    ... space."lag.T" = { bounds = [0.05, 0.5] }
+    ... inputs.u = 1.0
+    ... spec.rises = "always from 1 s on v >= 0.9"
+    ... time = { end = 1.2, step = 0.1 }
+    ... runs.design = "corners"
+    ... analysis = [{ kind = "failures.py:failures" }]
+    ... '''
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "failures.py").write_text(code, encoding="utf-8")
+    ...     _ = Path(folder, "lag.toml").write_text(text, encoding="utf-8")
+    ...     result = run(read_study(Path(folder, "lag.toml")), Path(folder, "run"))
+    >>> result["failures"].sentence, result["failures"].numbers
+    ('1 of 2 rows fail.', {'failing': 1})
     """
 
     name: str
@@ -361,7 +410,14 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
 
     Examples
     --------
-    See `Kind`.
+    >>> from analysis.studies import Asked, made
+    >>> asked = Asked(kind="spread")
+    >>> found = made(asked, "The spread is 0.5.", runs=100, numbers={"spread": 0.5})
+    >>> found.kind, found.numbers["spread"], found.holds
+    ('spread', 0.5, None)
+    >>> claimed = made(asked, "The spread is 0.5.", claim="at most 1", answer="shown")
+    >>> claimed.holds, claimed.told
+    (True, 'shown')
     """
     parts = {"claim": asked.claim} | parts
     return Finding(key="", kind=asked.kind, title="", sentence=sentence, **parts)
