@@ -81,6 +81,17 @@ class Ball(NumPyFunctions):
     gradient : tuple of flint.arb
         Derivatives with respect to the coordinates of a box; empty for a constant.  Where a
         function has a corner they enclose its generalised gradient (Clarke).
+
+    Examples
+    --------
+    An equation takes it in the place of a number, and its derivative comes along:
+
+    >>> from flint import arb
+    >>> from analysis.intervals.arithmetic import Ball
+    >>> x = Ball(arb(3.0), (arb(1.0),))
+    >>> y = x * x + 1
+    >>> float(y.value), float(y.gradient[0])
+    (10.0, 6.0)
     """
 
     __slots__ = ("gradient", "value")
@@ -234,7 +245,16 @@ def common(a: arb, b: arb) -> arb:
 
 
 def power(x: arb, n: int) -> arb:
-    """Return x^n for n >= 0 from the ends of x (flint's own power of a ball around 0 is NaN)."""
+    """Return x^n for n >= 0 from the ends of x (flint's own power of a ball around 0 is NaN).
+
+    Examples
+    --------
+    >>> from flint import arb
+    >>> from analysis.intervals.arithmetic import power
+    >>> square = power(arb(0, 2), 2)  # of [-2, 2]
+    >>> abs(float(square.lower())) < 1e-6 and 4.0 <= float(square.upper()) < 4.0001
+    True
+    """
     if not x.is_finite():
         return arb.nan() if x.is_nan() else arb(1) if n == 0 else arb(0, "inf")
     low, high = x.lower() ** n, x.upper() ** n
@@ -243,7 +263,14 @@ def power(x: arb, n: int) -> arb:
 
 
 def as_ball(x: Any) -> Any:
-    """Return a number as a ball without width; NotImplemented for what is not a number."""
+    """Return a number as a ball without width; NotImplemented for what is not a number.
+
+    Examples
+    --------
+    >>> from analysis.intervals.arithmetic import as_ball
+    >>> float(as_ball(0.5).value), as_ball("x")
+    (0.5, NotImplemented)
+    """
     if isinstance(x, Ball):
         return x
     if isinstance(x, arb):

@@ -251,7 +251,15 @@ def _supremum(
 
 
 def upper(ball: Any) -> float:
-    """Return the upper end of a ball as a float, rounded up; infinite for what is not a number."""
+    """Return the upper end of a ball as a float, rounded up; infinite for what is not a number.
+
+    Examples
+    --------
+    >>> from flint import arb
+    >>> from analysis.intervals.branch_and_bound import upper
+    >>> 1.0 <= upper(arb(1.0)) < 1.0 + 1e-12, upper(arb("nan"))
+    (True, inf)
+    """
     end = as_ball(ball).value.upper()
     if not end.is_finite():
         return np.inf

@@ -16,7 +16,18 @@ BRANCHES = 64  # ways through an equation on one box, beyond which the box is sp
 
 
 class Undecided(ArithmeticError):  # noqa: N818
-    """A comparison that a ball cannot decide: the box must be split."""
+    """A comparison that a ball cannot decide: the box must be split.
+
+    Examples
+    --------
+    A comparison of a box that is true in parts of it only, where the equation is not divided:
+
+    >>> from flint import arb
+    >>> from analysis.intervals.arithmetic import Ball
+    >>> bool(Ball(arb(0, 1)) > 0)
+    Traceback (most recent call last):
+    analysis.intervals.paths.Undecided: ...
+    """
 
 
 @dataclass

@@ -13,11 +13,11 @@ import cloudpickle
 import control as ct
 import numpy as np
 
-from ..diagrams import check_read, not_a_system
+from ..diagrams import not_a_system, override
 from ..errors import CompileError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
-from ..upstream.control_internals import StandIn, is_system, set_parameters
+from ..upstream.control_internals import StandIn, is_system
 from .codegen.blocks import Equations, equations
 from .codegen.lower import Lowered, lower
 from .codegen.program import Program, program
@@ -134,9 +134,8 @@ class Compiled(StandIn):
                 f"'{other.name}' was {_short(other.then)} when '{self.system.name}' was compiled "
                 f"and is {_short(other.now)} now: compile again, or make it a parameter"
             )
-        check_read(self.system, params)
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks
-            set_parameters(self.system, params)
+            override(self.system, params)
             return packed(self.schedule.holders, self.program.layout, self.program.fixed)
 
     def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
@@ -315,8 +314,7 @@ def compile(  # noqa: A001 (what it does)
         )
     if not is_system(system):
         raise CompileError(not_a_system("compile", system))
-    check_read(system, checked_params(params))
-    set_parameters(system, params)
+    override(system, checked_params(params))
     if algebraic_loops not in LOOPS:
         raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
     read = schedule(system, solve_loops=algebraic_loops == "solve")

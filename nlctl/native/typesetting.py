@@ -15,12 +15,12 @@ import control as ct
 import numpy as np
 
 from ..blocks import Block
+from ..diagrams import override
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
 from ..expressions.graph import Expr, Graph, needed
 from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol, with_index
 from ..params import declared_params
-from ..upstream.control_internals import set_parameters
 from .codegen.blocks import Reader
 from .diagram.feedthrough import feedthrough
 from .diagram.schedule import Node, Schedule, Signal, schedule
@@ -99,7 +99,7 @@ def typeset(
     u = -\\kappa \\left(\\beta r + W_{\\psi} + \\mathrm{robust} + Y_{d}\\right)
     """
     system = ct.ss(system) if isinstance(system, ct.TransferFunction) else system
-    set_parameters(system, params)
+    override(system, params)
     read = schedule(system, solve_loops=True)
     return tuple(_block(read, node, values) for node in read.nodes)
 

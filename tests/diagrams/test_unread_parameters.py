@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import nlctl
+from analysis.lyapunov import read_parts
 
 TIMES = np.array([0.0, 0.1])
 
@@ -34,6 +35,7 @@ RUNS = {
         d, TIMES, 1.0, params=p, engine="python-control"
     ),
     "compile": lambda d, p: nlctl.compile(d, params=p),
+    "typeset": lambda d, p: nlctl.typeset(d, params=p),
     "compiled": lambda d, p: nlctl.compile(d).output(0.0, np.zeros(d.nstates or 0), [1.0], p),
 }
 
@@ -47,6 +49,12 @@ def test_what_nothing_reads_is_refused(run, name):
     for diagram in (loop(), loop(linear), nlctl.block(nlctl.Gain(), "gain"), held):
         with pytest.raises(nlctl.UnknownNameError, match=rf"unknown parameter '{name[:3]}"):
             run(diagram, {name: 1.0})
+
+
+def test_the_proof_refuses_it_too():
+    """Whatever reads a loop for the ledger, a certificate or constants reads its parts first."""
+    with pytest.raises(nlctl.UnknownNameError, match="unknown parameter 'gain'"):
+        read_parts(nlctl.paper.example_1(), params={"gain": 1.0})
 
 
 @pytest.mark.parametrize("engine", ["native", "python-control"])

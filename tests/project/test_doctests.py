@@ -7,13 +7,12 @@ import pkgutil
 import re
 
 import pytest
-from places import ROOT
+from reference import documented_names
 from rows import each_row
 
 import analysis
 import nlctl
 
-PUBLIC = re.compile(r"^\.\. public:: (\S+)\n\n((?:   .*\n?)+)", re.MULTILINE)
 REFERS = re.compile(r"\nExamples\n--------\nSee `(\w+)`\.$")
 
 
@@ -68,15 +67,11 @@ def functions(package):
 
 
 def documented():
-    """Every name of the reference, by the package that offers it."""
-    for page in sorted((ROOT / "docs" / "reference").glob("*.rst")):
-        for home, names in PUBLIC.findall(page.read_text(encoding="utf-8")):
-            for name in names.split():
-                made = getattr(importlib.import_module(home), name)
-                if callable(made) and home.startswith(
-                    ("nlctl", "analysis.robustness", "analysis.lyapunov")
-                ):
-                    yield f"{home}.{name}", made
+    """Every name of the reference that is not a value, by the package that offers it."""
+    for home, name in documented_names():
+        made = getattr(importlib.import_module(home), name)
+        if callable(made):
+            yield f"{home}.{name}", made
 
 
 def has_example(made):

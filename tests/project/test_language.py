@@ -76,3 +76,15 @@ def test_there_is_text_to_look_at(everything):
         "## The paper",
     ):
         assert part in whole
+
+
+def test_no_file_has_both_sides_of_a_merge():
+    """`git` leaves marks where two changes meet, and pages are read by nobody but readers."""
+    marks = tuple(mark * 7 + " " for mark in "<>")
+    homes = [ROOT, *(ROOT / name for name in ("nlctl", "analysis", "tests", "docs", "benchmarks"))]
+    kinds = (".md", ".py", ".toml", ".rst", ".js", ".css", ".jinja", ".html", ".csv")
+    paths = [p for home in homes for p in (home.glob if home == ROOT else home.rglob)("*")]
+    texts = [p for p in paths if p.suffix in kinds and p.is_file()]
+    assert ROOT / "CHANGELOG.md" in texts
+    split = [p for p in texts if any(s.startswith(marks) for s in p.read_text("utf-8").split("\n"))]
+    assert split == []

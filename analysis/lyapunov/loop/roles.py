@@ -16,12 +16,11 @@ import numpy as np
 
 from nlctl.blocks import Block
 from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
-from nlctl.diagrams import Place, initial_state, interconnect
+from nlctl.diagrams import Place, initial_state, interconnect, override
 from nlctl.errors import CompileError, DiagramError
 from nlctl.native.diagram.wiring import Combination, Signal, Wiring
 from nlctl.native.thirdparty.checks import check_functions, check_sizes
 from nlctl.plants import coordinate_names
-from nlctl.upstream.control_internals import set_parameters
 
 from ..bounds.final_bound import Gains
 
@@ -397,7 +396,7 @@ def read_parts(
             f"external input {names} is added to the plant's v: the proof needs its bound, and "
             "takes one in certify(loop, inputs={...}) only"
         )
-    set_parameters(loop, dict(params or {}))
+    override(loop, dict(params or {}))
     specs = {part: roles.spec(part) for part in roles.places}
     x0 = initial_state(loop, start)
     own = {p: x0[f.state_offset :][: f.system.nstates or 0] for p, f in roles.places.items()}

@@ -26,6 +26,7 @@ from ..cases import HORIZON, TAIL
 from ..figures import actuator_errors
 from ..rivals import rival_controllers
 from ..sampling_limits import BAND, meets_the_spec
+from .markdown import markdown_table
 
 __all__ = [
     "ACTUATOR_RECORD",
@@ -124,8 +125,8 @@ def actuator_run(example: str, name: str, label: str = "paper") -> dict[str, Any
 
 def assumption_text() -> str:
     """Return what is known of the split (2) of each actuator, as a table in Markdown."""
-    rows = [f"| {name} | {assumption(a)} |" for name, a in actuators_of_the_table().items()]
-    return "\n".join(["| actuator | Assumption 1 and (2) |", "|---|---|", *rows])
+    rows = ((name, assumption(actuator)) for name, actuator in actuators_of_the_table().items())
+    return markdown_table(("actuator", "Assumption 1 and (2)"), rows)
 
 
 def controllers_text(record: pd.DataFrame, example: str) -> str:
@@ -140,9 +141,8 @@ def controllers_text(record: pd.DataFrame, example: str) -> str:
     ]
     labels = list(dict.fromkeys(own["controller"]))
     table = own.assign(cell=cells).pivot(index="actuator", columns="controller", values="cell")
-    rows = [f"| {name} | {' | '.join(table.loc[name, labels])} |" for name in table.index]
-    head = f"| actuator | {' | '.join(labels)} |"
-    return "\n".join([head, "|---" * (len(labels) + 1) + "|", *rows])
+    rows = ((name, *table.loc[name, labels]) for name in table.index)
+    return markdown_table(("actuator", *labels), rows)
 
 
 def _cell(row: dict[str, Any], meets: bool) -> str:

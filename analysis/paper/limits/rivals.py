@@ -18,6 +18,7 @@ from nlctl import paper
 
 from ...studies import Result, read_study, run, shipped
 from ...studies.origin import plain_study
+from .markdown import markdown_table
 
 __all__ = [
     "RIVALS_RECORD",
@@ -140,9 +141,8 @@ def rivals_text(record: pd.DataFrame, example: str) -> str:
     ]
     table = own.assign(cell=cells).pivot(index="controller", columns="actuator", values="cell")
     labels = list(dict.fromkeys(own["controller"]))
-    rows = [f"| {a} | {' | '.join(table.loc[a, list(RIVAL_ACTUATORS)])} |" for a in labels]
-    head = f"| controller | {' | '.join(RIVAL_ACTUATORS.values())} |"
-    return "\n".join([head, "|---" * (len(RIVAL_ACTUATORS) + 1) + "|", *rows])
+    rows = ((label, *table.loc[label, list(RIVAL_ACTUATORS)]) for label in labels)
+    return markdown_table(("controller", *RIVAL_ACTUATORS.values()), rows)
 
 
 def failed_text(row: dict[str, Any]) -> str:

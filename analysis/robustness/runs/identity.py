@@ -34,7 +34,7 @@ __all__ = [
 VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
 COMPUTING = {
     Path(errors.__file__).parent: ("**/*.py",),
-    Path(__file__).parents[2]: ("robustness/**/*.py", "studies/**/*.py", "metrics.py"),
+    Path(__file__).parents[2]: ("robustness/**/*.py", "studies/**/*.py", "metrics/*.py"),
 }
 TOLD = ("drawing", "page")  # they compute nothing
 PROBES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])

@@ -1,0 +1,39 @@
+"""Diagrams: connecting blocks by signal name, and addressing what is inside."""
+
+from .connecting import as_system, interconnect, reconnected
+from .parameters import (
+    all_parameter_rows,
+    check_read,
+    override,
+    parameter_names,
+    parameters,
+    samplings,
+)
+from .places import (
+    Place,
+    initial_state,
+    known_system,
+    leaves,
+    not_a_system,
+    places,
+    state_names,
+)
+
+__all__ = [
+    "Place",
+    "all_parameter_rows",
+    "as_system",
+    "check_read",
+    "initial_state",
+    "interconnect",
+    "known_system",
+    "leaves",
+    "not_a_system",
+    "override",
+    "parameter_names",
+    "parameters",
+    "places",
+    "reconnected",
+    "samplings",
+    "state_names",
+]

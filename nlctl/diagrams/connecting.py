@@ -1,0 +1,253 @@
+"""Connecting blocks by the names of their signals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import control as ct
+
+from ..blocks import block, within
+from ..errors import DiagramError
+from ..names import Parameters, unknown
+from ..upstream.control_internals import StandIn, is_system
+from .places import leaves
+
+
+def as_system(thing: Any, name: str) -> ct.InputOutputSystem:
+    """Return a record as a block called `name`; a python-control system under that name.
+
+    Parameters
+    ----------
+    thing : record or control.InputOutputSystem
+    name : str
+        Its name in the diagram.
+
+    Returns
+    -------
+    control.InputOutputSystem
+        The same object where it has that name already.
+
+    Raises
+    ------
+    DiagramError
+        If it is compiled already.
+    """
+    _check_not_compiled(thing, name)
+    if is_system(thing):
+        return thing if thing.name == name else thing.copy(name=name)
+    return block(thing, name)
+
+
+def _check_not_compiled(thing: Any, name: str) -> None:
+    if isinstance(thing, StandIn):
+        raise DiagramError(
+            f"'{name}' is compiled already: connect its diagram, .system, and compile the whole"
+        )
+
+
+def interconnect(
+    blocks: Mapping[str, Any] | Sequence[ct.InputOutputSystem],
+    *,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] | None = None,
+    name: str | None = None,
+) -> ct.InterconnectedSystem:
+    """Connect blocks by the names of their signals: `control.interconnect` that refuses mistakes.
+
+    An input is fed by the output of the same name.  The result is an ordinary
+    `control.InterconnectedSystem`; what is added are checks (a misspelt signal is an error, not
+    a warning) and, when the diagram is nested in another one, its name in front of the names of
+    its parameters.
+
+    Parameters
+    ----------
+    blocks : mapping or sequence
+        ``{"plant": record or python-control system, ...}``, or a list of systems.  List them in
+        the order of the signal flow: python-control then needs the fewest passes.
+    inputs : sequence of str, optional
+        Signals that come from outside.
+    outputs : sequence of str, optional
+        Outputs of the diagram; by default every output of every block.
+    name : str, optional
+        Name of the diagram.
+
+    Returns
+    -------
+    control.InterconnectedSystem
+
+    Raises
+    ------
+    DiagramError
+        If two blocks share a name, have the same output, or an input is fed by nothing or
+        twice, if one block stands in the diagram twice, or if a controller is for plants of a
+        lower order than the one that it is connected to.
+    UnknownNameError
+        If `outputs` names a signal that is the output of no block, or `inputs` one that none takes.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> loop = nlctl.interconnect({"limit": nlctl.Saturation(limit=2)}, inputs=["u"], outputs=["v"])
+    >>> print(loop.output(0, [], [3.0]))
+    [2.]
+    """
+    if not isinstance(blocks, Mapping | Sequence) or isinstance(blocks, str) or not len(blocks):
+        raise DiagramError(
+            "interconnect needs blocks with their names, {'plant': ...}, got "
+            f"{'none' if isinstance(blocks, Mapping | Sequence) else type(blocks).__name__}"
+        )
+    if isinstance(blocks, Mapping):
+        systems = [as_system(thing, key) for key, thing in blocks.items()]
+    else:
+        systems = list(blocks)
+    inputs = [inputs] if isinstance(inputs, str) else list(inputs)
+    outputs = [outputs] if isinstance(outputs, str) else outputs
+    _check_blocks(systems)
+    sources = _signal_sources(systems)
+    _check_inputs(systems, sources, inputs)
+    _check_orders(systems, sources)
+    outputs = list(sources) if outputs is None else list(outputs)
+    for signal in outputs:
+        if signal not in sources:
+            raise unknown("output signal", signal, sources)
+    diagram = ct.interconnect(
+        systems,
+        inputs=inputs,
+        inplist=[[f"{s.name}.{i}" for s in systems if i in s.input_labels] for i in inputs],
+        outputs=outputs,
+        outlist=[f"{sources[signal]}.{signal}" for signal in outputs],
+        name=name,
+        check_unused=False,  # our own checks above raise where python-control warns
+    )
+    if isinstance(diagram.params, Parameters):
+        diagram.params.scope = diagram
+    return diagram
+
+
+def _check_blocks(systems: Sequence[Any]) -> None:
+    """Every block has its own name, and stands in its own place only."""
+    names: set[str] = set()
+    places: dict[int, str] = {}
+    for system in systems:
+        _check_not_compiled(system, getattr(system, "name", ""))
+        if not is_system(system):
+            raise DiagramError(
+                f"interconnect needs systems in a list, got a {type(system).__name__}; give "
+                "records with their names: {'plant': ...}"
+            )
+        if system.name in names:
+            raise DiagramError(f"two blocks are called '{system.name}'; give each its own name")
+        names.add(system.name)
+        for leaf in leaves(system):
+            nested = isinstance(system, ct.InterconnectedSystem)
+            path = f"{system.name}.{leaf.path}" if nested else leaf.path
+            if id(leaf.system) in places:
+                raise DiagramError(
+                    f"one block stands in two places, '{places[id(leaf.system)]}' and '{path}', "
+                    "and would share its parameters: use a copy, block.copy(name=...)"
+                )
+            places[id(leaf.system)] = path
+
+
+def _signal_sources(systems: Sequence[ct.InputOutputSystem]) -> dict[str, str]:
+    """Return ``{signal: name of the block whose output it is}``."""
+    sources: dict[str, str] = {}
+    for system in systems:
+        for signal in system.output_labels:
+            if signal in sources:
+                raise DiagramError(
+                    f"signal '{signal}' is an output of '{sources[signal]}' and of "
+                    f"'{system.name}'; rename one, or add them in a ct.summing_junction"
+                )
+            sources[signal] = system.name
+    return sources
+
+
+def _check_inputs(
+    systems: Sequence[ct.InputOutputSystem], sources: Mapping[str, str], inputs: Sequence[str]
+) -> None:
+    taken = {signal for system in systems for signal in system.input_labels}
+    for i, signal in enumerate(inputs):
+        if signal in sources:
+            raise DiagramError(
+                f"signal '{signal}' is an external input and an output of "
+                f"'{sources[signal]}'; rename one"
+            )
+        if signal in inputs[:i]:
+            raise DiagramError(f"external input '{signal}' is listed twice")
+        if signal not in taken:
+            raise unknown("input signal", signal, taken)
+    for system in systems:
+        for signal in system.input_labels:
+            if signal not in sources and signal not in inputs:
+                error = unknown("signal", signal, [*sources, *inputs])
+                raise DiagramError(
+                    f"block '{system.name}' takes a signal that no block outputs: {error}"
+                )
+
+
+def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str, str]) -> None:
+    """A controller that is made for plants of one order must not drive one of a higher order."""
+    for system in systems:
+        for leaf in leaves(system):
+            order = getattr(getattr(within(leaf.system), "spec", None), "plant_order", None)
+            if not isinstance(order, int):
+                continue
+            above = f"x{order + 1}"
+            taken = f"x{order}" in system.input_labels
+            if taken and above in sources and sources[above] == sources[f"x{order}"]:
+                raise DiagramError(
+                    f"'{system.name}' is a controller for plants of order {order}, and "
+                    f"'{sources[above]}' has a state {above} that it would not see: make a "
+                    f"controller of its order, such as nlctl.adaptive_neural(order={order + 1})"
+                )
+
+
+def reconnected(before: Any, parts: Sequence[Any], maps: Any, dt: Any) -> ct.InterconnectedSystem:
+    """Return parts connected by maps in the place of a diagram: with its signals and parameters.
+
+    Parameters
+    ----------
+    before : control.InterconnectedSystem
+        It stays as it is.
+    parts : sequence of control.InputOutputSystem
+        In the places of its own, others behind them.
+    maps : tuple of ndarray
+        ``connect_map``, ``input_map`` and ``output_map``.
+    dt : float, bool or None
+        Timebase.
+
+    Returns
+    -------
+    control.InterconnectedSystem
+    """
+    made = ct.InterconnectedSystem(
+        parts,
+        inputs=list(before.input_labels) or 0,
+        outputs=list(before.output_labels) or 0,
+        states=_state_labels(before, parts),
+        name=before.name,
+        dt=dt,
+        connection_type=before.connection_type,
+        warn_duplicate=False,
+    )
+    made.connect_map, made.input_map, made.output_map = maps
+    for name, value in before.params.items():
+        dict.__setitem__(made.params, name, value)
+    if isinstance(made.params, Parameters) and isinstance(before.params, Parameters):
+        made.params.scope = None if before.params.scope is None else made
+    return made
+
+
+def _state_labels(before: Any, parts: Sequence[Any]) -> list[str]:
+    """Return the labels that states had, and those of parts that have more states now."""
+    labels: list[str] = []
+    for i, part in enumerate(parts):
+        had = before.syslist[i].nstates if i < len(before.syslist) else -1
+        if part.nstates == had:
+            offset = before.state_offset[i]
+            labels += before.state_labels[offset : offset + had]
+        else:
+            labels += [f"{part.name}_{label}" for label in part.state_labels]
+    return labels

@@ -1,0 +1,219 @@
+"""Where blocks stand in a diagram: their paths, and their states in its state vector."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..blocks import default_state
+from ..errors import ParameterError
+from ..names import Parameters, find_name
+from ..params import as_numbers
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Place:
+    """Where a block or diagram stands: one system may stand in a diagram twice.
+
+    Attributes
+    ----------
+    path : str
+        Names of the diagrams around it and its own, separated by dots; empty for the outermost
+        diagram.
+    parameter_path : str
+        The same without diagrams that do not put their name in front of their parameters'
+        (those made with plain ``ct.interconnect``).
+    system : control.InputOutputSystem
+    state_offset : int
+        Where its states begin in the outermost diagram's state vector.
+    parent : Place or None
+        The diagram around it, and ...
+    position : int
+        ... its position in that diagram's ``syslist``.
+    """
+
+    path: str
+    parameter_path: str
+    system: Any  # a diagram or a block; only diagrams have maps and offsets
+    state_offset: int
+    parent: Place | None
+    position: int
+
+
+def places(
+    system: Any, parent: Place | None = None, position: int = 0, offset: int = 0
+) -> Iterator[Place]:
+    """Yield a system's place and then, in the order of the state vector, those of its parts.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram or a block.
+    parent : Place, optional
+        That of the diagram around it; none for the outermost.
+    position, offset : int, optional
+        Its position in the ``syslist`` around it, and where its states begin.
+
+    Yields
+    ------
+    Place
+    """
+    nested = isinstance(system, ct.InterconnectedSystem)
+    outer, outer_parameters = ("", "") if parent is None else (parent.path, parent.parameter_path)
+    own = "" if nested and parent is None else system.name
+    silent = nested and not _is_scoped(system)
+    here = Place(
+        path=f"{outer}.{own}" if outer else own,
+        parameter_path=".".join(p for p in (outer_parameters, "" if silent else own) if p),
+        system=system,
+        state_offset=offset,
+        parent=parent,
+        position=position,
+    )
+    yield here
+    for i, part in enumerate(system.syslist if nested else ()):
+        yield from places(part, here, i, offset)
+        offset += part.nstates or 0
+
+
+def leaves(system: ct.InputOutputSystem) -> Iterator[Place]:
+    """Yield the blocks of a diagram in the order of its state vector, nested ones flattened.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram or a block.
+
+    Yields
+    ------
+    Place
+        Of a block; diagrams are left out.
+    """
+    for place in places(system):
+        if not isinstance(place.system, ct.InterconnectedSystem):
+            yield place
+
+
+def _is_scoped(diagram: ct.InterconnectedSystem) -> bool:
+    """Whether a diagram puts its name in front of its parameters' names."""
+    return isinstance(diagram.params, Parameters) and diagram.params.scope is not None
+
+
+def known_system(who: str, system: Any) -> Any:
+    """Return a block or diagram; of a compiled diagram that which was compiled.
+
+    Parameters
+    ----------
+    who : str
+        Who asks, for the error.
+    system : control.InputOutputSystem or Compiled
+
+    Returns
+    -------
+    control.InputOutputSystem
+
+    Raises
+    ------
+    ParameterError
+        If it is neither.
+    """
+    inner = getattr(system, "system", system)
+    if not isinstance(inner, ct.InputOutputSystem):
+        raise ParameterError(not_a_system(who, system))
+    return inner
+
+
+def not_a_system(who: str, thing: Any) -> str:
+    """Return the sentence that refuses what is neither a block nor a diagram.
+
+    Parameters
+    ----------
+    who : str
+        Who asks.
+    thing : object
+        What was given.
+
+    Returns
+    -------
+    str
+    """
+    return (
+        f"{who} needs a block or diagram, got {type(thing).__name__}: nlctl.block makes a block of "
+        "a record"
+    )
+
+
+def state_names(system: ct.InputOutputSystem) -> list[str]:
+    """Return the qualified names of all states, ``"controller.law.zeta"``, in vector order.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram or a block.
+
+    Returns
+    -------
+    list of str
+        One for each state.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> state_names(nlctl.block(nlctl.Backlash(), "actuator"))
+    ['actuator.memory']
+    """
+    system = known_system("state_names", system)
+    return [f"{leaf.path}.{s}" for leaf in leaves(system) for s in leaf.system.state_labels]
+
+
+def initial_state(
+    system: ct.InputOutputSystem, values: Mapping[str, float] | None = None
+) -> np.ndarray:
+    """Return the initial state of a block or diagram.
+
+    Every block starts from what its record declares (the paper's values), states of third-party
+    blocks start from 0; `values` replaces some of them.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        Block or diagram.
+    values : mapping, optional
+        ``{"plant.x1": 0.8}``.  A name is the path of blocks to the state, or the end of one.
+
+    Returns
+    -------
+    ndarray of shape (nstates,)
+        For ``ct.input_output_response(system, timepts, 0, initial_state(system))``.
+
+    Raises
+    ------
+    UnknownNameError, AmbiguousNameError
+        If a name is not that of exactly one state.
+    ParameterError
+        If a value is not a finite number.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> print(initial_state(nlctl.block(nlctl.Backlash(v0=0.2), "actuator")))
+    [0.2]
+    """
+    system = known_system("initial_state", system)
+    if not isinstance(values, Mapping | None):
+        raise ParameterError(
+            f"initial_state needs values by name, {{'plant.x1': 0.8}}, got {type(values).__name__}"
+        )
+    x = np.concatenate([default_state(leaf.system) for leaf in leaves(system)])
+    index = {name: i for i, name in enumerate(state_names(system))}
+    for name, value in (values or {}).items():
+        full = find_name("state", name, index)
+        number = as_numbers(value)
+        if number is None or number.ndim or not np.isfinite(number):
+            raise ParameterError(f"state '{full}' needs a finite initial value, got {value!r}")
+        x[index[full]] = number
+    return x
