@@ -1,4 +1,4 @@
-"""Time and accuracy of competitors, measured side by side."""
+"""Time and accuracy of competitors, measured in one run."""
 
 from __future__ import annotations
 

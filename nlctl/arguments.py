@@ -12,12 +12,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .errors import ParameterError
-from .params import as_numbers, whole_number
+from .params import as_numbers, integer
 
 __all__ = [
     "a_function",
     "flag",
     "fraction",
+    "integer",
     "number",
     "of_type",
     "one_of",
@@ -25,7 +26,6 @@ __all__ = [
     "text",
     "tuple_of",
     "vector",
-    "whole_number",
 ]
 
 _T = TypeVar("_T")
@@ -49,7 +49,7 @@ def one_of(who: str, name: str, value: Any, options: Iterable[str]) -> Any:
     raise ParameterError(f"{who} needs {name} to be {rule}, got {value!r}{hint}")
 
 
-def pairs(who: str, takes: tuple[str, ...], delivers: tuple[str, ...]) -> None:
+def pairs(who: str, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> None:
     """Check that a block's signals come in pairs, one before it for each behind it.
 
     Raises
@@ -57,10 +57,8 @@ def pairs(who: str, takes: tuple[str, ...], delivers: tuple[str, ...]) -> None:
     ParameterError
         If they do not, or there are none.
     """
-    if len(takes) != len(delivers) or not takes:
-        raise ParameterError(
-            f"{who} needs as many signals in takes as in delivers, got {takes} and {delivers}"
-        )
+    if len(inputs) != len(outputs) or not inputs:
+        raise ParameterError(f"{who} needs as many inputs as outputs, got {inputs} and {outputs}")
 
 
 def number(

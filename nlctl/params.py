@@ -275,7 +275,7 @@ def as_numbers(value: Any) -> np.ndarray | None:
     return array.astype(float) if array.dtype.kind in "iuf" else None
 
 
-def whole_number(who: str, name: str, value: Any, at_least: int) -> int:
+def integer(who: str, name: str, value: Any, at_least: int) -> int:
     """Return `value` as an int.
 
     Raises
@@ -283,9 +283,10 @@ def whole_number(who: str, name: str, value: Any, at_least: int) -> int:
     ParameterError
         If it is not an integer, or below `at_least`.
     """
-    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not (is_whole and value >= at_least):
-        raise ParameterError(f"{who} needs {name} >= {at_least}, got {value!r}")
+    is_integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not (is_integer and value >= at_least):
+        named = name if is_integer else f"an integer {name.removeprefix('an ')}"
+        raise ParameterError(f"{who} needs {named} >= {at_least}, got {value!r}")
     return int(value)
 
 

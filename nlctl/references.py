@@ -16,7 +16,7 @@ from .arguments import pairs
 from .equations import equation
 from .errors import ParameterError
 from .functions import noise_spectrum, noise_value
-from .params import param, record, whole_number
+from .params import integer, param, record
 
 __all__ = ["BandLimitedNoise", "FilteredStep", "FunctionReference", "SumOfSines"]
 
@@ -28,7 +28,7 @@ def derivative_names(order: int) -> tuple[str, ...]:
 
 def _check_order(spec: Any) -> None:
     """A reference has an integer number of derivatives."""
-    order = whole_number(type(spec).__name__, "an order", spec.order, at_least=0)
+    order = integer(type(spec).__name__, "an order", spec.order, at_least=0)
     object.__setattr__(spec, "order", order)
 
 
@@ -223,21 +223,21 @@ class BandLimitedNoise:
 
     Parameters
     ----------
-    takes, delivers : tuple of str
+    inputs, outputs : tuple of str
         Names of the signals before and after, pairwise.
 
     Examples
     --------
     The same function of time in every run; nothing of it depends on a step size:
 
-    >>> sensor = nlctl.block(nlctl.BandLimitedNoise(takes=("y",), delivers=("ym",)), "sensor")
+    >>> sensor = nlctl.block(nlctl.BandLimitedNoise(inputs=("y",), outputs=("ym",)), "sensor")
     >>> once, again = sensor.output(0.3, [], [1.0]), sensor.output(0.3, [], [1.0])
     >>> print(bool(once == again), bool(0 < abs(once[0] - 1.0) < 0.1))
     True True
     """
 
-    takes: tuple[str, ...] = ("x1", "x2")
-    delivers: tuple[str, ...] = ("x1_measured", "x2_measured")
+    inputs: tuple[str, ...] = ("x1", "x2")
+    outputs: tuple[str, ...] = ("x1_measured", "x2_measured")
     rms: float = param(0.01, unit="1", meaning="root mean square of each noise", at_least=0)
     low: float = param(0.0, unit="rad/s", meaning="lower end of the band", at_least=0)
     high: float = param(50.0, unit="rad/s", meaning="upper end of the band", above=0)
@@ -250,27 +250,17 @@ class BandLimitedNoise:
 
     def check(self) -> None:
         """Signals come in pairs; a band has two ends."""
-        pairs("BandLimitedNoise", self.takes, self.delivers)
+        pairs("BandLimitedNoise", self.inputs, self.outputs)
         if not self.low < self.high:
             raise ParameterError(
                 f"BandLimitedNoise needs low < high, got {self.low:g} and {self.high:g}"
             )
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """The signals before the noise."""
-        return self.takes
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """The signals after it."""
-        return self.delivers
-
     def derived(self) -> dict[str, Any]:
         """Frequencies and phases, one row per signal."""
         spectra = [
             noise_spectrum(self.low, self.high, [self.seed, i], self.components)
-            for i in range(len(self.takes))
+            for i in range(len(self.inputs))
         ]
         return {
             "spectrum": np.array([s[0] for s in spectra]),

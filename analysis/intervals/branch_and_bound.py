@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from nlctl.arguments import a_function, of_type, whole_number
+from nlctl.arguments import a_function, integer, of_type
 from nlctl.errors import ParameterError
 
 from .arithmetic import Ball, as_ball, common
@@ -132,7 +132,7 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     of_type("enclose", "box", box, Box, "Box.of(x1=(-1, 1))")
     if not tol > 0:  # infinite: the first box will do
         raise ParameterError(f"enclose needs tol > 0, got {tol}")
-    whole_number("enclose", "max_boxes", max_boxes, at_least=1)
+    integer("enclose", "max_boxes", max_boxes, at_least=1)
     start = time.perf_counter()
     high, greatest, n, lost = _supremum(function, box, tol, max_boxes)
     low, least, m, missed = _supremum(lambda x: -as_ball(function(x)), box, tol, max_boxes)
@@ -192,7 +192,7 @@ def prove(
     """
     a_function("prove", "function", function)
     of_type("prove", "box", box, Box, "Box.of(x1=(-1, 1))")
-    whole_number("prove", "max_boxes", max_boxes, at_least=1)
+    integer("prove", "max_boxes", max_boxes, at_least=1)
     if not low <= high:  # refuses NaN, too
         raise ParameterError(f"prove needs low <= high, got {low} and {high}")
     start, queue, boxes = time.perf_counter(), [box.cell], 0

@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native
-from nlctl.arguments import one_of, whole_number
+from nlctl.arguments import integer, one_of
 
 from ..intervals.box import Box, visited_box
 from .bounds.constants import constants
@@ -135,7 +135,7 @@ def examine(
     --------
     See `ledger`.
     """
-    max_steps = whole_number("examine", "max_steps", max_steps, at_least=1)
+    max_steps = integer("examine", "max_steps", max_steps, at_least=1)
     if isinstance(W, str):
         one_of("examine", "W", W, ["tightest"])
     members = members_of(loop, run, step, start, params)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from nlctl import native
-from nlctl.arguments import number, whole_number
+from nlctl.arguments import integer, number
 from nlctl.errors import DivergedError, ParameterError
 from nlctl.names import unknown
 from nlctl.plants import coordinate_names
@@ -176,7 +176,7 @@ def tighten(
         raise unknown("bound", bound, _BOUNDS)
     u_limit = number("tighten", "u_limit", u_limit, above=0)
     horizon = number("tighten", "horizon", horizon, above=0)
-    evaluations = whole_number("tighten", "evaluations", evaluations, at_least=1)
+    evaluations = integer("tighten", "evaluations", evaluations, at_least=1)
     parts = read_parts(loop)
     split = sharpest(decompose(parts.actuator, k=k, u_max=U_MAX))
     search = _Search(

@@ -158,7 +158,7 @@ def sensor(example: str, rms: float = 0.01, seed: int = 0) -> BandLimitedNoise:
     """Return measurement noise on all states of an example, 0 to 50 rad/s."""
     states = part_of(_build(example)(), "plant").spec.states
     return BandLimitedNoise(
-        takes=states, delivers=tuple(f"{x}_measured" for x in states), rms=rms, seed=seed
+        inputs=states, outputs=tuple(f"{x}_measured" for x in states), rms=rms, seed=seed
     )
 
 

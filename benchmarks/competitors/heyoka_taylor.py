@@ -1,7 +1,7 @@
-"""heyoka: Taylor's method compiled by LLVM, corners as events; four members side by side.
+"""heyoka: Taylor's method compiled by LLVM, corners as events; four members batched.
 
 The branch of the dead zone is a parameter that terminal events switch, so every step is smooth.
-Example 2 is left out: where its backlash turns round, u' = 0, is no function that heyoka is given.
+Example 2 is left out: heyoka is not given where its backlash reverses, u' = 0.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def solvers(problem: Problem) -> list[Solver]:
     except ImportError:
         raise UnavailableError("heyoka is not installed (pip install heyoka)") from None
     if problem.example != 1:
-        raise UnavailableError("where a backlash turns round is no event of heyoka's here")
+        raise UnavailableError("heyoka is not given where a backlash reverses")
     if problem.nodes > LARGEST:
         raise UnavailableError(f"more than {LARGEST} nodes take it minutes to compile")
     variables, rates, u = _loop(heyoka, problem.centres)

@@ -7,6 +7,6 @@ FLAGS = ("-O3", "-march=native", "-ffast-math", "-fopenmp-simd")
 
 
 def solvers(problem: Problem) -> list[Solver]:
-    """Return the tuned program; its ensembles run eight members side by side."""
+    """Return the tuned program; its ensembles run eight members batched."""
     flags = (*FLAGS, f"-DNODE_COUNT={problem.nodes}")
     return [solver(problem, built("tuned", flags), "C++ tuned", 8)]

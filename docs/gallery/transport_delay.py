@@ -20,7 +20,7 @@ loop = nlctl.interconnect(
     {
         "plant": ct.ss(0, 1, 1, 0, inputs="late", outputs="x", name="plant"),
         "law": ct.ss([], [], [], -a, inputs="x", outputs="u", name="law"),
-        "network": nlctl.TransportDelay(takes=("u",), delivers=("late",), delay=1.0),
+        "network": nlctl.TransportDelay(inputs=("u",), outputs=("late",), delay=1.0),
     },
     outputs=["x"],
 )

@@ -9,7 +9,7 @@ import control as ct
 from ..diagrams import as_system, interconnect
 from ..equations import equation
 from ..errors import ParameterError
-from ..params import record, whole_number
+from ..params import integer, record
 from ..plants import coordinate_names
 from ..references import derivative_names
 from .filtered_error import FilteredError, binomial_lambdas
@@ -103,7 +103,7 @@ def adaptive_neural(
     >>> controller.input_labels
     ['x1', 'x2', 'yd', 'yd1', 'yd2']
     """
-    order = whole_number("adaptive_neural", "an order", order, at_least=2)
+    order = integer("adaptive_neural", "an order", order, at_least=2)
     if filtered_error is None:
         lambdas = FilteredError.lambdas if order == 2 else binomial_lambdas(order)
         filtered_error = FilteredError(lambdas=lambdas)

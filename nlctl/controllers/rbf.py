@@ -9,7 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..arguments import number, tuple_of, whole_number
+from ..arguments import integer, number, tuple_of
 from ..diagrams import as_system
 from ..equations import equation
 from ..errors import ParameterError
@@ -33,10 +33,10 @@ def _rows(array: np.ndarray) -> Matrix:
 
 
 def _checked(who: str, count: int, inputs: int, low: float, high: float) -> int:
-    whole_number(who, "inputs", inputs, at_least=1)
+    integer(who, "inputs", inputs, at_least=1)
     number(who, "low", low)
     number(who, "high", high)
-    return whole_number(who, "count", count, at_least=1)
+    return integer(who, "count", count, at_least=1)
 
 
 def diagonal_centres(count: int, inputs: int, low: float = -10, high: float = 10) -> Matrix:
@@ -137,7 +137,7 @@ def latin_hypercube_centres(
     [-2, -1, 0, 1]
     """
     count = _checked("latin_hypercube_centres", count, inputs, low, high)
-    whole_number("latin_hypercube_centres", "seed", seed, at_least=0)
+    integer("latin_hypercube_centres", "seed", seed, at_least=0)
     from scipy.stats import qmc
 
     unit = qmc.LatinHypercube(inputs, rng=seed).random(count)
@@ -232,7 +232,7 @@ class NetworkWeights:
 
     def check(self) -> None:
         """A network has nodes."""
-        nodes = whole_number(type(self).__name__, "nodes", self.nodes, at_least=1)
+        nodes = integer(type(self).__name__, "nodes", self.nodes, at_least=1)
         object.__setattr__(self, "nodes", nodes)
 
     @property

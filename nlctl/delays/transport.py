@@ -24,7 +24,7 @@ class TransportDelay:
 
     Parameters
     ----------
-    takes, delivers : tuple of str
+    inputs, outputs : tuple of str
         Names of the signals before and after, pairwise.
     history : callable, optional
         ``history(t)`` for t <= t_0 instead of `before`: a number, or one for each signal.  It is
@@ -33,7 +33,7 @@ class TransportDelay:
     Examples
     --------
     >>> import control as ct
-    >>> wire = nlctl.block(nlctl.TransportDelay(takes=("x",), delivers=("y",), delay=1.0), "wire")
+    >>> wire = nlctl.block(nlctl.TransportDelay(inputs=("x",), outputs=("y",), delay=1.0), "wire")
     >>> plant = ct.ss(0, -1, 1, 0, inputs="y", outputs="x", name="plant")
     >>> loop = ct.interconnect([wire, plant], inputs=[], outputs=["x"], inplist=[])
     >>> run = nlctl.input_output_response(loop, [0, 1, 2], 0, {"plant.x[0]": 1.0})
@@ -41,8 +41,8 @@ class TransportDelay:
     [1.0, 1.0, 0.0]
     """
 
-    takes: tuple[str, ...] = ("u",)
-    delivers: tuple[str, ...] = ("y",)
+    inputs: tuple[str, ...] = ("u",)
+    outputs: tuple[str, ...] = ("y",)
     delay: float = param(0.1, unit="s", meaning="time from input to output", above=0, symbol="tau")
     before: float = param(0.0, unit="1", meaning="signals before the run")
     history: Callable[[float], Any] | None = None
@@ -53,22 +53,12 @@ class TransportDelay:
 
     def check(self) -> None:
         """Signals come in pairs; a history is a function."""
-        pairs("TransportDelay", self.takes, self.delivers)
+        pairs("TransportDelay", self.inputs, self.outputs)
         if self.history is not None and not callable(self.history):
             raise ParameterError(
                 "TransportDelay needs a function of time for history, got "
                 f"{self.history!r}: a constant is called before"
             )
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """The signals before the delay."""
-        return self.takes
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """The signals after it."""
-        return self.delivers
 
     def earlier(self, t: float) -> np.ndarray:
         """Return the signals at a time before the run.
@@ -78,7 +68,7 @@ class TransportDelay:
         ParameterError
             If `history` does not return a finite number, or one for each signal.
         """
-        count = len(self.takes)
+        count = len(self.inputs)
         if self.history is None:
             return np.full(count, self.before)
         try:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import number, text, whole_number
+from ..arguments import integer, number, text
 from ..delays import TransportDelay
 from ..errors import ParameterError
 from ..names import unknown
@@ -138,7 +138,7 @@ class Fault:
             raise ParameterError(f"{self._who} needs a value, its {NEEDS[self.kind]}, got none")
         if self.kind == "delay":
             number(self._who, "value", self.value, above=0)
-        whole_number(self._who, "seed", self.seed, at_least=0)
+        integer(self._who, "seed", self.seed, at_least=0)
 
     def _check_trigger(self) -> None:
         """A fault begins at a time, by a condition or at random, and ends after it has begun."""
@@ -203,7 +203,7 @@ class Fault:
         """The record of the block that delays its signal."""
         if self.kind != "delay" or self.value is None:
             return None
-        return TransportDelay(takes=("signal",), delivers=("late",), delay=self.value)
+        return TransportDelay(inputs=("signal",), outputs=("late",), delay=self.value)
 
     @property
     def latch(self) -> Latch | None:

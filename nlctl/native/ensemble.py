@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import ParameterError
 from ..host.notebook import table_html
 from ..names import unknown
-from ..params import checked_times, whole_number
+from ..params import checked_times, integer
 from ..responses.arguments import checked_params, input_array
 from .audit import Audit, Trial
 from .audit import audit as compare
@@ -192,7 +192,7 @@ def ensemble_response(
     if not isinstance(compiled, Compiled):
         compiled = compile_diagram(compiled)
     if threads is not None:
-        threads = whole_number("ensemble_response", "threads", threads, at_least=1)
+        threads = integer("ensemble_response", "threads", threads, at_least=1)
     for metric in metrics:
         if not (hasattr(metric, "signals") and hasattr(metric, "function")):
             raise ParameterError(

@@ -137,7 +137,7 @@ def _before(compiled: Compiled) -> Callable[[float, np.ndarray], np.ndarray]:
                 found.append(spec.earlier(max(t, float(earliest[row]))))
             except ParameterError as error:
                 raise ParameterError(f"{error} (block '{nodes[i].path}')") from None
-            row += len(spec.takes)
+            row += len(spec.inputs)
         return np.concatenate(found)
 
     return values

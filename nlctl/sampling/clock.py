@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arguments import number
 from ..errors import ParameterError
-from ..params import whole_number
+from ..params import integer
 
 _MOST = 50_000_000  # instants of one run
 
@@ -62,7 +62,7 @@ class Clock:
         number("Clock", "dt", self.dt, above=0)
         for name in ("offset", "delay", "jitter"):
             number("Clock", name, getattr(self, name), at_least=0)
-        whole_number("Clock", "seed", self.seed, at_least=0)
+        integer("Clock", "seed", self.seed, at_least=0)
         if self.jitter >= self.dt:
             raise ParameterError(
                 f"Clock needs jitter < dt, got {self.jitter:g} and {self.dt:g} s: samples would "

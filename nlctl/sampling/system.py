@@ -14,7 +14,7 @@ from ..arguments import number
 from ..blocks import block, default_state
 from ..errors import ParameterError, UsageError
 from ..names import Parameters
-from ..params import whole_number
+from ..params import integer
 from ..upstream.control_internals import (
     Around,
     current_parameters,
@@ -394,7 +394,7 @@ def _sampled(system: Any, spec: Sampling, euler: bool) -> Any:
 def _waiting(dt: float, delay: float, waiting: int | None) -> int:
     """Return how many samples may be on their way."""
     least = Clock(dt=dt, delay=delay).pending
-    return least if waiting is None else whole_number("sampled", "waiting", waiting, at_least=least)
+    return least if waiting is None else integer("sampled", "waiting", waiting, at_least=least)
 
 
 def _through(

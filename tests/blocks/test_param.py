@@ -138,7 +138,7 @@ class TestKinds:
         ],
     )
     def test_a_value_of_the_wrong_kind_is_refused(self, name, value, told):
-        """Shapes, text, fractions for whole numbers: the message tells rule and value."""
+        """Shapes, text, fractions for integers: the message tells rule and value."""
         with pytest.raises(
             ParameterError, match=re.escape("Mixed needs ") + f".*{re.escape(told)}"
         ):
@@ -151,7 +151,7 @@ class TestKinds:
                 Mixed(**{name: None})
 
     def test_numbers_are_normalised(self):
-        """Arrays and lists become nested tuples of floats, whole numbers int, switches bool."""
+        """Arrays and lists become nested tuples of floats, integers int, switches bool."""
         made = Mixed(
             x=np.int32(2),
             vector=np.array([1, 2], dtype=np.float32),
@@ -261,7 +261,7 @@ class TestOverrides:
         ("name", "bad"), [("count", 1.5), ("count", np.nan), ("flag", 1), ("x", "3"), ("x", None)]
     )
     def test_overrides_obey_the_kind(self, name, bad):
-        """Whole numbers and switches stay such when overridden."""
+        """Integers and switches stay such when overridden."""
         with pytest.raises(ParameterError, match=rf"Mixed needs .*{name}.*\(block 'b'\)"):
             with_overrides(Mixed(), {name: bad}, "b")
 

@@ -147,7 +147,7 @@ class TestFunctionReference:
             (1, lambda t: (t, 1.0, 0.0), "2 values .*, got 3"),
             (1, lambda t: t, "2 values .*, got 1"),
             (-1, lambda t: (), "order >= 0, got -1"),
-            (1.0, lambda t: (t, 1.0), "order >= 0, got 1.0"),
+            (1.0, lambda t: (t, 1.0), "an integer order >= 0, got 1.0"),
         ],
     )
     def test_too_few_or_too_many_values_are_refused(self, order, function, told):
@@ -179,7 +179,7 @@ class TestBandLimitedNoise:
 
     def test_every_solver_sees_the_same_noise(self):
         """An integral of the noise does not depend on method and step, but on the tolerance."""
-        spec = nlctl.BandLimitedNoise(takes=("a",), delivers=("b",), rms=1.0, high=10.0, seed=2)
+        spec = nlctl.BandLimitedNoise(inputs=("a",), outputs=("b",), rms=1.0, high=10.0, seed=2)
         integral = ct.tf(1, [1, 0], inputs="b", outputs="y", name="integral")
         diagram = ct.interconnect([nlctl.block(spec, "n"), integral], inputs=["a"], outputs=["y"])
         ends = [
@@ -201,8 +201,8 @@ class TestBandLimitedNoise:
     @each_row(
         ("changed", "told"),
         [
-            ({"takes": ("x1",)}, "as many signals in takes as in delivers"),
-            ({"takes": (), "delivers": ()}, "as many signals in takes as in delivers"),
+            ({"inputs": ("x1",)}, "as many inputs as outputs"),
+            ({"inputs": (), "outputs": ()}, "as many inputs as outputs"),
             ({"low": 50.0}, "low < high, got 50 and 50"),
             ({"high": 0.0}, "high > 0, got 0"),
             ({"low": -1.0}, "low >= 0, got -1"),

@@ -16,7 +16,7 @@ def delayed_integrator(a=1.0, *, x0=1.0, **fields):
     """x' = -a x(t - tau)."""
     return nlctl.interconnect(
         {
-            "wire": nlctl.TransportDelay(takes=("x",), delivers=("late",), **fields),
+            "wire": nlctl.TransportDelay(inputs=("x",), outputs=("late",), **fields),
             "plant": ct.ss(0, -a, 1, 0, inputs="late", outputs="x", name="plant"),
         },
         outputs=["x", "late"],
@@ -100,8 +100,8 @@ def chain(first=0.3, second=0.45):
     return nlctl.interconnect(
         {
             "source": Step(),
-            "first": nlctl.TransportDelay(takes=("w",), delivers=("w1",), delay=first),
-            "second": nlctl.TransportDelay(takes=("w1",), delivers=("w2",), delay=second),
+            "first": nlctl.TransportDelay(inputs=("w",), outputs=("w1",), delay=first),
+            "second": nlctl.TransportDelay(inputs=("w1",), outputs=("w2",), delay=second),
             "plant": ct.ss(0, 1, 1, 0, inputs="w2", outputs="x", name="plant"),
         },
         outputs=["x"],
@@ -142,7 +142,7 @@ def test_a_delay_breaks_a_ring_of_feedthrough(engine):
     loop = nlctl.interconnect(
         {
             "half": ct.ss([], [], [], [[0.5, 1.0]], inputs=["late", "one"], outputs="y"),
-            "wire": nlctl.TransportDelay(takes=("y",), delivers=("late",), delay=1.0),
+            "wire": nlctl.TransportDelay(inputs=("y",), outputs=("late",), delay=1.0),
             "counted": ct.ss(0, 1, 1, 0, inputs="y", outputs="x", name="counted"),
         },
         inputs=["one"], outputs=["x", "y"],
@@ -187,7 +187,7 @@ def test_a_delayed_program_is_a_program_with_a_delay():
     one = nlctl.interconnect(
         {
             "law": nlctl.sampled(law),
-            "wire": nlctl.TransportDelay(takes=("u",), delivers=("v",), delay=0.04),
+            "wire": nlctl.TransportDelay(inputs=("u",), outputs=("v",), delay=0.04),
             "plant": plant,
         },
         outputs=["y", "v"],
@@ -215,13 +215,13 @@ def test_engines_agree_on_a_nonlinear_loop_with_two_delays():
         {
             "plant": nlctl.PureFeedback(order=2, f=pendulum, initial={"x1": 1.0}),
             "sensor": nlctl.TransportDelay(
-                takes=("x1", "x2"), delivers=("m1", "m2"), delay=0.11, before=1.0
+                inputs=("x1", "x2"), outputs=("m1", "m2"), delay=0.11, before=1.0
             ),
             "law": ct.nlsys(
                 None, lambda t, x, u, p: [-2 * u[0] - np.tanh(u[1])],
                 inputs=["m1", "m2"], outputs=["u"],
             ),
-            "network": nlctl.TransportDelay(takes=("u",), delivers=("v",), delay=0.07),
+            "network": nlctl.TransportDelay(inputs=("u",), outputs=("v",), delay=0.07),
         },
         outputs=["x1", "v"],
     )  # fmt: skip
@@ -256,7 +256,7 @@ def test_a_delay_longer_than_the_run_shows_the_history_alone():
         ({"delay": np.inf}, "TransportDelay needs a finite delay, got inf"),
         ({"delay": np.sin}, "TransportDelay needs numbers for delay"),
         ({"history": 1.0}, "a constant is called before"),
-        ({"takes": ("a", "b")}, "as many signals in takes as in delivers"),
+        ({"inputs": ("a", "b")}, "as many inputs as outputs"),
     ],
 )
 def test_bad_fields_are_refused_in_one_sentence(fields, message):

@@ -1,11 +1,11 @@
-"""Diagrams: their defaults, foreign blocks in them, initial states, tables, both examples."""
+"""Diagrams: their defaults, third-party blocks in them, initial states, tables, both examples."""
 
 import control as ct
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_systems import chain, foreign, gain, out
+from small_systems import chain, gain, out, third_party
 
 import nlctl
 from nlctl import AmbiguousNameError, UnknownNameError
@@ -69,7 +69,7 @@ class TestForeignBlocks:
     def test_bare_names_reach_them_at_any_depth(self, join, declared, depth):
         """A dict parameter of another toolbox's block keeps its bare name beside ours."""
         parts = [
-            foreign("theirs", "q", 2.0, "u", "m", declared),
+            third_party("theirs", "q", 2.0, "u", "m", declared),
             gain("ours", 3.0, "m", "y"),
         ]
         system = join(parts, inputs=["u"], outputs=["y"], name="d0")
@@ -83,11 +83,11 @@ class TestForeignBlocks:
 
     @makers
     def test_their_equal_names_are_python_controls_affair(self, join):
-        """Two foreign blocks with one name share the last default, as without our blocks."""
+        """Two third-party blocks with one name share the last default, as without our blocks."""
         parts = [
-            foreign("f", "q", 2.0, "u", "m"),
+            third_party("f", "q", 2.0, "u", "m"),
             gain("ours", 1.0, "m", "n"),
-            foreign("g", "q", 5.0, "n", "y"),
+            third_party("g", "q", 5.0, "n", "y"),
         ]
         with_ours = join(parts, inputs=["u"], outputs=["y"])
         parts[1] = ct.nlsys(None, lambda t, x, u, p: u, inputs=["m"], outputs=["n"], name="ours")
@@ -97,7 +97,7 @@ class TestForeignBlocks:
 
 
 def two_controllers():
-    """Make a diagram with states on two levels, some of them foreign."""
+    """Make a diagram with states on two levels, some of them third-party."""
     one = nlctl.interconnect({"law": nlctl.NussbaumLaw()}, inputs=LAW, outputs=["u"], name="c1")
     two = one.copy(name="c2")
     two.update_names(inputs=[f"{s}2" for s in LAW], outputs=["u2"])
@@ -124,7 +124,7 @@ class TestInitialState:
                 assert names[leaf.state_offset :][: len(ours)] == ours
 
     def test_defaults_are_what_the_records_declare(self):
-        """Declared values, 0 for the rest and for foreign blocks."""
+        """Declared values, 0 for the rest and for third-party blocks."""
         x = nlctl.initial_state(two_controllers())
         np.testing.assert_array_equal(x, [1, 1, 0, 0, 0, 3])
         np.testing.assert_array_equal(
@@ -254,7 +254,7 @@ class TestExamples:
     def test_a_sensor_changes_what_the_controller_sees(self, order):
         """e = y + n_1 - yd with the noise of signal 1, and y itself as before."""
         takes = tuple(f"x{i + 1}" for i in range(order))
-        names = {"takes": takes, "delivers": tuple(f"{s}_measured" for s in takes)}
+        names = {"inputs": takes, "outputs": tuple(f"{s}_measured" for s in takes)}
         sensors = (nlctl.BandLimitedNoise(**names, seed=5, rms=rms) for rms in (0.1, 0.0))
         noisy, silent = (probe(PAPER[order](sensor=sensor))[0] for sensor in sensors)
         clean, _, _ = probe(PAPER[order]())
@@ -263,7 +263,7 @@ class TestExamples:
         assert noisy["e"] - clean["e"] == pytest.approx(n)
         assert (noisy["y"], silent) == (clean["y"], clean)
 
-    def test_foreign_plant_and_actuator(self):
+    def test_third_party_plant_and_actuator(self):
         """Somebody else's blocks take the place of ours, and keep their dict parameters."""
         plant = ct.nlsys(
             lambda t, x, u, p: [x[1], -p["stiffness"] * x[0] + u[0]],

@@ -180,7 +180,7 @@ def test_a_visited_box_contains_what_was_visited():
 
 
 def test_a_loop_outside_the_proof_is_refused_by_name():
-    """A sensor, no robust term, a foreign diagram, saturation."""
+    """A sensor, no robust term, a third-party diagram, saturation."""
     with pytest.raises(DiagramError, match="block 'sensor'"):
         constants(example(1, sensor=nlctl.BandLimitedNoise()), BOX_1)
     silent = nlctl.Zero(outputs=("robust", "delta_hat"))

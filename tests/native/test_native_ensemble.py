@@ -159,7 +159,7 @@ def test_interrupt_returns_what_is_finished(loop):
     np.testing.assert_array_equal(made.table["plant.x1(0)"], x0[made.table.index])
 
 
-def test_foreign_parameters_vary_by_their_bare_names():
+def test_third_party_parameters_vary_by_their_bare_names():
     """A ct.nlsys parameter is an array over the members as well."""
     lag = ct.nlsys(
         lambda t, x, u, params: [-params["a"] * x[0]],

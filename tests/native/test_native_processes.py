@@ -14,7 +14,7 @@ import nlctl
 TIMES = np.linspace(0, 1, 11)
 
 
-def foreign_loop():
+def third_party_loop():
     """Lambdas, a closure over an array and over a function, and a linear block."""
     weights = np.array([0.3, -1.2])
 
@@ -40,7 +40,7 @@ def run(compiled, initial, params):
 CASES = {
     "example 1": (nlctl.paper.example_1, {"plant.x1": 0.7}, {"actuator.b_r": 0.6}),
     "example 2": (nlctl.paper.example_2, None, None),
-    "foreign": (foreign_loop, [0.1, 0.2, 0.3], {"b": 3.0}),
+    "third-party": (third_party_loop, [0.1, 0.2, 0.3], {"b": 3.0}),
 }
 
 
@@ -84,7 +84,7 @@ def test_an_error_in_a_copy_still_names_the_parameter():
 
 def test_threads_resolve_parameters_without_disturbing_each_other():
     """python-control keeps overrides in the blocks; every thread still gets its own."""
-    compiled = nlctl.compile(foreign_loop())
+    compiled = nlctl.compile(third_party_loop())
     expected = {b: compiled.parameter_vector({"b": b}) for b in np.arange(40.0)}
     with ThreadPoolExecutor(8) as pool:
         for _ in range(5):

@@ -7,7 +7,7 @@ import control as ct
 import numpy as np
 import pytest
 from rows import each_row
-from small_systems import chain, foreign, gain, out
+from small_systems import chain, gain, out, third_party
 
 import nlctl
 from nlctl import AmbiguousNameError, DiagramError, ParameterError, UnknownNameError
@@ -166,10 +166,10 @@ class TestNames:
 
     @makers
     def test_a_bare_name_is_answered_with_the_full_ones(self, join):
-        """k alone says nothing, unless a foreign block has it."""
+        """k alone says nothing, unless a third-party block has it."""
         with refused(UnknownNameError, "'k'", "'first.k' or 'second.k'"):
             out(chain(join), {"k": 1.0})
-        parts = [foreign("f", "k", 2.0, "u", "m"), gain("g", 3.0, "m", "y")]
+        parts = [third_party("f", "k", 2.0, "u", "m"), gain("g", 3.0, "m", "y")]
         assert out(join(parts, inputs=["u"], outputs=["y"]), {"k": 7.0}) == 21.0
 
     def test_parameters_and_states_of_an_example(self):

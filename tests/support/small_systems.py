@@ -36,7 +36,7 @@ def gain(name, k=1.0, takes="u", delivers="y", **kwargs):
     return nlctl.block(Affine(k=k, takes=takes, delivers=delivers, **kwargs), name)
 
 
-def foreign(name, key="q", default=2.0, takes="u", delivers="y", declared=True):
+def third_party(name, key="q", default=2.0, takes="u", delivers="y", declared=True):
     """Return somebody else's gain, with a dict of parameters."""
     return ct.nlsys(
         None,

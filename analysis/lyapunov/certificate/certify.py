@@ -23,7 +23,7 @@ import numpy as np
 from flint import arb
 
 from nlctl.errors import ParameterError
-from nlctl.params import whole_number
+from nlctl.params import integer
 
 from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
@@ -200,7 +200,7 @@ def certify(
     >>> print(found.holds, abs(found.C_0 - known) < 1e-9)
     True True
     """
-    max_iterations = whole_number("certify", "max_iterations", max_iterations, at_least=1)
+    max_iterations = integer("certify", "max_iterations", max_iterations, at_least=1)
     for name, value in (("u_max", u_max), ("tol", tol)):
         if not 0 < value < np.inf:
             raise ParameterError(f"certify needs a finite {name} > 0, got {value}")

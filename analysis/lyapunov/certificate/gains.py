@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from nlctl.arguments import number, whole_number
+from nlctl.arguments import integer, number
 from nlctl.errors import DivergedError, ParameterError
 from nlctl.native import compile as compiled_loop
 from nlctl.response import input_output_response
@@ -153,8 +153,8 @@ def design(
     """
     u_limit = number("design", "u_limit", u_limit, above=0)
     horizon = number("design", "horizon", horizon, above=0)
-    evaluations = whole_number("design", "evaluations", evaluations, at_least=1)
-    max_steps = whole_number("design", "max_steps", max_steps, at_least=1)
+    evaluations = integer("design", "evaluations", evaluations, at_least=1)
+    max_steps = integer("design", "max_steps", max_steps, at_least=1)
     read = read_loop(loop)
     if read.nodes and not read.parts.gains.sigma_1 > 0:
         raise ParameterError("design needs sigma_1 > 0, otherwise alpha_1 = 0; got sigma_1 = 0")

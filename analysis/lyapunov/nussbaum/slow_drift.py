@@ -26,7 +26,7 @@ import numpy as np
 from scipy.integrate import quad, trapezoid
 
 from nlctl import functions
-from nlctl.arguments import number, of_type, whole_number
+from nlctl.arguments import integer, number, of_type
 from nlctl.errors import ParameterError
 
 from ..loop.response_of_loop import law_of_response
@@ -265,7 +265,7 @@ def slow_drift(
     N = N if loop is None else law_of_response(loop, response)
     run = drift(response, N)
     number("slow_drift", "window", window, above=0)
-    whole_number("slow_drift", "skip", skip, at_least=0)
+    integer("slow_drift", "skip", skip, at_least=0)
     lobe = lobe_around(float(run.zeta[-1]), N)
     rates, inverse = _windows(run, N, lobe, window, skip)
     balance = _fitted(rates, inverse)

@@ -16,7 +16,7 @@ from typing import Any
 
 import pandas as pd
 
-from nlctl.arguments import of_type, whole_number
+from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -203,7 +203,7 @@ def sweep(
     below True False
     """
     _check(prepared, design, executor, threads, resume and folder is None)
-    chunk = _chunk_size(design) if chunk is None else whole_number("a sweep", "chunk", chunk, 1)
+    chunk = _chunk_size(design) if chunk is None else integer("a sweep", "chunk", chunk, 1)
     tally, frames, notes = Tally(design), [], []
     keep: Callable[[pd.DataFrame], object] = frames.append
     with ExitStack() as stack:
@@ -247,7 +247,7 @@ def _check(
     if executor is not None:
         of_type("a sweep", "executor", executor, Executor, "concurrent.futures")
     if threads is not None:
-        whole_number("a sweep", "threads", threads, at_least=1)
+        integer("a sweep", "threads", threads, at_least=1)
     if nothing_kept:
         raise ParameterError("a sweep needs a folder to resume, got none")
     _check_space(prepared, design)

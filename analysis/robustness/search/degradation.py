@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from nlctl.arguments import flag, of_type, vector, whole_number
+from nlctl.arguments import flag, integer, of_type, vector
 from nlctl.errors import ParameterError
 
 from ..statistics.guarantee import Violation, checked_confidence, violation_probability
@@ -131,7 +131,7 @@ def degradation_curve(
     sizes = vector("a degradation curve", "factors", factors).tolist()
     if not sizes:
         raise ParameterError("a degradation curve needs at least one factor, got none")
-    runs = whole_number("a degradation curve", "runs", runs, at_least=1)
+    runs = integer("a degradation curve", "runs", runs, at_least=1)
     of_type("a degradation curve", "space", space, Space)
     entropy = checked_entropy(entropy)
     each = 1 - (1 - confidence) / len(sizes) if simultaneous else confidence

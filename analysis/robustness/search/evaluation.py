@@ -84,7 +84,7 @@ def towards_nominal(
 
     def nearer(quantity: Uncertain) -> float:
         value = moved(middle[quantity.name], row[quantity.name], factor)
-        return float(np.rint(value)) if quantity.is_whole else float(value)
+        return float(np.rint(value)) if quantity.is_integer else float(value)
 
     return dict(row) | {
         q.name: nearer(q) for q in space.quantities if names is None or q.name in names

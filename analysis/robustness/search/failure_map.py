@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import Delaunay
 
-from nlctl.arguments import number, of_type, whole_number
+from nlctl.arguments import integer, number, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -132,9 +132,9 @@ def failure_map(
     who = "a failure map"
     of_type(who, "space", space, Space)
     given = _given(space, (x, y), {} if at is None else of_type(who, "at", at, Mapping))
-    cells = whole_number(who, "cells", cells, at_least=1)
-    levels = whole_number(who, "levels", levels, at_least=0)
-    most = whole_number(who, "most", most, at_least=0)
+    cells = integer(who, "cells", cells, at_least=1)
+    levels = integer(who, "levels", levels, at_least=0)
+    most = integer(who, "most", most, at_least=0)
     if levels > _FINEST:
         raise ParameterError(f"{who} needs levels <= {_FINEST}, got {levels}")
     affordable("the first grid of a failure map", (cells + 1) ** 2, len(space.names) + _WORK)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl.arguments import fraction, number, of_type, whole_number
+from nlctl.arguments import fraction, integer, number, of_type
 from nlctl.errors import UsageError
 
 from ..statistics.guarantee import Violation, violation_probability
@@ -191,8 +191,8 @@ def robustness_radius(
     """
     who = "a robustness radius"
     of_type(who, "space", space, Space)
-    runs = whole_number(who, "runs", runs, at_least=1)
-    draws = whole_number(who, "draws", draws, at_least=0)
+    runs = integer(who, "runs", runs, at_least=1)
+    draws = integer(who, "draws", draws, at_least=0)
     fraction(who, "tolerance", tolerance)
     fraction(who, "confidence", confidence)
     number(who, "largest", largest, above=0)

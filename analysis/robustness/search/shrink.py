@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from nlctl.arguments import of_type, whole_number
+from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
 
 from ..uncertainty.space import Space, checked_row, nominal
@@ -123,8 +123,8 @@ def shrink(
     ('a',) 0.5 1.0 True
     """
     of_type("shrinking", "space", space, Space)
-    steps = whole_number("shrinking", "steps", steps, at_least=0)
-    most = whole_number("shrinking", "most", most, at_least=0)
+    steps = integer("shrinking", "steps", steps, at_least=0)
+    most = integer("shrinking", "most", most, at_least=0)
     first = checked_row(space, row)
     task = _Task(evaluate, space)
     margin = task.margins([first])[0]

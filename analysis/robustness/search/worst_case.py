@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nlctl.arguments import number, of_type, whole_number
+from nlctl.arguments import integer, number, of_type
 
 from ..uncertainty.design import Design, checked_entropy, listed
 from ..uncertainty.space import Space
@@ -153,7 +153,7 @@ def worst_case(
     -0.5 {'a': 0.5, 'b': 0.5}
     """
     of_type("a worst case", "space", space, Space)
-    runs = whole_number("a worst case", "runs", runs, at_least=1)
+    runs = integer("a worst case", "runs", runs, at_least=1)
     if target is not None and not (isinstance(target, float) and np.isinf(target)):
         number("a worst case", "target", target)
     entropy = checked_entropy(entropy)

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nlctl.arguments import fraction, of_type, one_of, whole_number
+from nlctl.arguments import fraction, integer, of_type, one_of
 from nlctl.errors import ParameterError, UsageError
 
 from ..stl.spec import violates
@@ -192,8 +192,8 @@ def checked_counts(violations: int, runs: int) -> tuple[int, int]:
     ParameterError
         If not 0 <= violations <= runs with at least one run and at most `MOST_RUNS`.
     """
-    n = whole_number("a probability", "runs", runs, at_least=1)
-    k = whole_number("a probability", "violations", violations, at_least=0)
+    n = integer("a probability", "runs", runs, at_least=1)
+    k = integer("a probability", "violations", violations, at_least=0)
     if n > MOST_RUNS:
         raise ParameterError(
             f"a probability needs runs <= {MOST_RUNS:.0e}, beyond which its bounds lose digits, "
@@ -236,7 +236,7 @@ def runs_needed(probability: float, confidence: float = 0.99, violations: int = 
     >>> runs_needed(0.01, confidence=0.99)  # ln 0.01 / ln 0.99, rounded upwards
     459
     """
-    k = whole_number("a plan", "violations", violations, at_least=0)
+    k = integer("a plan", "violations", violations, at_least=0)
     a = 1 - checked_confidence(confidence)
     probability = fraction("a plan", "probability", probability)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nlctl.arguments import of_type, whole_number
+from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
 
 from ..stl.spec import FAILED
@@ -102,9 +102,9 @@ def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None
             f"screening walks along numbers, and {[c.name for c in space.choices]} are choices: "
             "screen each combination on its own, or use saltelli"
         )
-    r = whole_number("screening", "trajectories", trajectories, at_least=2)
+    r = integer("screening", "trajectories", trajectories, at_least=2)
     affordable("screening", r * (len(space.names) + 1), len(space.names))
-    if whole_number("screening", "levels", levels, at_least=2) % 2:
+    if integer("screening", "levels", levels, at_least=2) % 2:
         raise ParameterError(f"screening needs an even number of levels, got {levels}")
     d, entropy = len(space.names), checked_entropy(entropy)
     rng = np.random.default_rng(entropy)
@@ -211,7 +211,7 @@ def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
     d, entropy = len(space.names), checked_entropy(entropy)
     if d < 2:
         raise ParameterError(f"shares of the variance need two quantities, got {space.names}")
-    affordable(_WHO, whole_number(_WHO, "size", size, at_least=1) * (d + 2), d)
+    affordable(_WHO, integer(_WHO, "size", size, at_least=1) * (d + 2), d)
     both = sobol_points(2 * d, size, entropy)
     a, b = both[:, :d], both[:, d:]
     mixed = np.tile(a, (d, 1, 1))
@@ -263,7 +263,7 @@ def sobol_indices(
     [0.1, 0.9]
     """
     y = _checked(design, values, "Saltelli", "saltelli")
-    resamples = whole_number(_WHO, "resamples", resamples, at_least=1)
+    resamples = integer(_WHO, "resamples", resamples, at_least=1)
     d, n = len(design.space.names), design.details["size"]
     f_a, f_b, f_ab = y[:n], y[n : 2 * n], y[2 * n :].reshape(d, 1, n)
 

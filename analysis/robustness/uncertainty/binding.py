@@ -88,9 +88,9 @@ def _parameter(quantity: Uncertain, system: Any) -> Uncertain:
     owner = owner_of(system, full + suffix)
     if owner is not None:
         block, key = owner
-        for end in map(np.rint, quantity.box) if quantity.is_whole else quantity.box:
+        for end in map(np.rint, quantity.box) if quantity.is_integer else quantity.box:
             with_overrides(block.current_spec, {key: end}, full.rpartition(".")[0])
-        _check_whole(quantity, full in rows and isinstance(value, int))
+        _check_integer(quantity, full in rows and isinstance(value, int))
     if suffix:
         value = np.asarray(value)[tuple(int(k) for k in re.findall(r"\d+", suffix))]
     if np.ndim(value):
@@ -122,8 +122,8 @@ def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Block, str] | Non
     return None if made is None else (made, name.removeprefix(f"{path}."))
 
 
-def _check_whole(quantity: Uncertain, wanted: bool) -> None:
-    if wanted and not quantity.is_whole:
+def _check_integer(quantity: Uncertain, wanted: bool) -> None:
+    if wanted and not quantity.is_integer:
         raise SpaceError(
             f"'{quantity.name}' is an integer and needs a law of integers, such as "
             f"scipy.stats.randint(0, 10), got {quantity.law_text}"

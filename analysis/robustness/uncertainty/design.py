@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
-from nlctl.arguments import flag, of_type, whole_number
+from nlctl.arguments import flag, integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -110,7 +110,7 @@ def row_seed(design: Design, row: int) -> np.random.SeedSequence:
     >>> np.random.default_rng(once).random() == np.random.default_rng(again).random()
     True
     """
-    row = whole_number("a design", "row", row, at_least=0)
+    row = integer("a design", "row", row, at_least=0)
     return np.random.SeedSequence(design.entropy, spawn_key=(row,))
 
 
@@ -190,7 +190,7 @@ def checked_entropy(entropy: int | None) -> int:
     """Return the entropy, or fresh one."""
     if entropy is None:
         return int(np.random.SeedSequence().entropy)  # type: ignore[arg-type]
-    return whole_number("a design", "entropy", entropy, at_least=0)
+    return integer("a design", "entropy", entropy, at_least=0)
 
 
 def independent(space: Space, size: int, entropy: int | None = None) -> Design:
@@ -220,7 +220,7 @@ def independent(space: Space, size: int, entropy: int | None = None) -> Design:
     (True, True)
     """
     of_type("a design", "space", space, Space)
-    size = whole_number("a design", "size", size, at_least=1)
+    size = integer("a design", "size", size, at_least=1)
     if size > _MOST_ROWS:
         raise ParameterError(f"a design needs size <= {_MOST_ROWS:.0e}, got {size}")
     return Design(
@@ -371,7 +371,7 @@ def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
 
 def sobol_points(dimension: int, size: int, entropy: int) -> np.ndarray:
     """Return `size` scrambled Sobol' points of the unit cube, see `sobol`."""
-    size = whole_number("a Sobol' design", "size", size, at_least=1)
+    size = integer("a Sobol' design", "size", size, at_least=1)
     if size & (size - 1):
         raise ParameterError(
             f"a Sobol' design needs a power of 2 as its size, got {size}: take "
@@ -407,7 +407,7 @@ def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Desi
     >>> sorted(int(a) for a in drawn["a"])  # one in each quarter
     [0, 1, 2, 3]
     """
-    size = whole_number("a Latin hypercube", "size", size, at_least=1)
+    size = integer("a Latin hypercube", "size", size, at_least=1)
     affordable("a Latin hypercube", size, len(space.names))
     entropy = checked_entropy(entropy)
     unit = qmc.LatinHypercube(len(space.names), rng=entropy).random(size)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from nlctl.arguments import of_type, whole_number
+from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -54,7 +54,7 @@ def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = No
         if name not in names:
             raise unknown("quantity", str(name), names)
     counts = [
-        whole_number("a grid", f"levels of '{name}'", given.get(name), at_least=1) for name in names
+        integer("a grid", f"levels of '{name}'", given.get(name), at_least=1) for name in names
     ]
     affordable("a grid", math.prod([*counts, *_options(space)]), len(space.names))
     axes = [np.linspace(0, 1, n) if n > 1 else np.array([0.5]) for n in counts]
@@ -139,7 +139,7 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
     >>> rows(one_at_a_time(Space(quantities=(a, b))), range(5)).values.tolist()
     [[0.5, 2.5], [0.0, 2.5], [1.0, 2.5], [0.5, 2.0], [0.5, 3.0]]
     """
-    levels = whole_number("one at a time", "levels", levels, at_least=2)
+    levels = integer("one at a time", "levels", levels, at_least=2)
     affordable("a design", levels * len(space.names), len(space.names))
     middle = nominal(space)
     made, varied = [middle], [""]

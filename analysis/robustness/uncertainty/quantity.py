@@ -106,7 +106,7 @@ class Uncertain:
         return _interval(self.name, ends if self.bounds is None else self.bounds)
 
     @property
-    def is_whole(self) -> bool:
+    def is_integer(self) -> bool:
         """Whether the law is one of integers."""
         return isinstance(self.law.dist, stats.rv_discrete)
 

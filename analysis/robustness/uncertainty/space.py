@@ -215,7 +215,7 @@ def _table(space: Space, unit: np.ndarray, value: Any) -> pd.DataFrame:
         values = value(quantity, u)
         if space.scale != 1:
             values = moved(_nominal_of(quantity), values, space.scale)
-        columns[quantity.name] = np.rint(values) if quantity.is_whole else values
+        columns[quantity.name] = np.rint(values) if quantity.is_integer else values
     for choice, u in zip(space.choices, unit.T[len(space.quantities) :], strict=True):
         edges = np.cumsum(choice.weights)[:-1]
         columns[choice.name] = np.array(list(choice.options))[np.searchsorted(edges, u, "right")]
@@ -260,7 +260,7 @@ def arguments(space: Space, table: pd.DataFrame) -> dict[str, dict[str, np.ndarr
         if quantity.is_initial:
             states[quantity.name.removesuffix("(0)")] = values
         else:
-            params[quantity.name] = values.astype(int) if quantity.is_whole else values
+            params[quantity.name] = values.astype(int) if quantity.is_integer else values
     return {"params": params, "initial_state": states}
 
 

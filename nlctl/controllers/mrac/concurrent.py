@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arguments import whole_number
+from ...arguments import integer
 from ...equations import equation
 from ...params import param, record
 from ..rbf import NetworkWeights, network_output, regressor_names, weight_inputs
@@ -73,7 +73,7 @@ class HistoryStack:
     def check(self) -> None:
         """A network has nodes, and a record room."""
         for name in ("nodes", "points"):
-            value = whole_number("HistoryStack", name, getattr(self, name), at_least=1)
+            value = integer("HistoryStack", name, getattr(self, name), at_least=1)
             object.__setattr__(self, name, value)
 
     def derived(self) -> dict[str, int]:

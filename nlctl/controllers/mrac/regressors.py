@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arguments import whole_number
+from ...arguments import integer
 from ...equations import equation
 from ...params import record
 from ...plants import coordinate_names, wing_rock_regressor
@@ -31,7 +31,7 @@ class _StateRegressor:
 
     def check(self) -> None:
         """An order."""
-        order = whole_number(type(self).__name__, "an order", self.order, at_least=1)
+        order = integer(type(self).__name__, "an order", self.order, at_least=1)
         object.__setattr__(self, "order", order)
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arguments import whole_number
+from ...arguments import integer
 from ...equations import equation
 from ...params import param, record
 from ...plants import coordinate_names
@@ -63,7 +63,7 @@ class FunnelControl:
 
     def check(self) -> None:
         """A relative degree."""
-        order = whole_number("FunnelControl", "an order", self.order, at_least=1)
+        order = integer("FunnelControl", "an order", self.order, at_least=1)
         object.__setattr__(self, "order", order)
 
     @property

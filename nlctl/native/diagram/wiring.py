@@ -24,11 +24,11 @@ class AlgebraicLoopError(UsageError):
     ...     return 1 + 0.5 * u
     >>> half = ct.nlsys(None, half, inputs="v", outputs="w", name="half")
     >>> same = ct.nlsys(None, lambda t, x, u, params: u, inputs="w", outputs="v", name="same")
-    >>> ring = ct.interconnect([half, same], outputs="w", name="ring")
-    >>> nlctl.compile(ring)
+    >>> loop = ct.interconnect([half, same], outputs="w", name="loop")
+    >>> nlctl.compile(loop)
     Traceback (most recent call last):
     nlctl.native.diagram.wiring.AlgebraicLoopError: ...
-    >>> print(nlctl.compile(ring, algebraic_loops="solve").output(0, []))  # w = 1 + w / 2
+    >>> print(nlctl.compile(loop, algebraic_loops="solve").output(0, []))  # w = 1 + w / 2
     [2.]
     """
 

@@ -98,7 +98,7 @@ def held(t, x, u, params):
 @functools.cache
 def behind_a_delay(name):
     """Return an actuator behind u = t + what jumps, 0.15 s later."""
-    line = nlctl.TransportDelay(takes=("w",), delivers=("h",), delay=0.15)
+    line = nlctl.TransportDelay(inputs=("w",), outputs=("h",), delay=0.15)
     total = ct.summing_junction(["y", "h"], "u", name="sum")
     loop = {
         "clock": Jumps(), "jumps": Jumps(slope=0.0, delivers="w"), "line": line, "sum": total,

@@ -48,7 +48,7 @@ def channels(kind):
     )
 
 
-@pytest.mark.parametrize("kind", ["linear", "foreign"])
+@pytest.mark.parametrize("kind", ["linear", "third-party"])
 @pytest.mark.parametrize("native", [False, True])
 def test_channels_through_one_block_are_no_loop(kind, native):
     """A block that feeds itself through separate channels runs, as it does in python-control."""

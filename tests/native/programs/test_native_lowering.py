@@ -62,7 +62,7 @@ def check(system, lanes=2, *, native=False, params=None, given=None, seed=0):
 
 
 def static(function, inputs=1, outputs=1, **params):
-    """A foreign block without states."""
+    """A third-party block without states."""
     return ct.nlsys(None, function, inputs=inputs, outputs=outputs, name="b", params=params)
 
 

@@ -16,7 +16,7 @@ from nlctl.native.diagram.schedule import AlgebraicLoopError, schedule
 
 
 def lag(name, k):
-    """A foreign first-order block without feedthrough."""
+    """A third-party first-order block without feedthrough."""
     return ct.nlsys(
         lambda t, x, u, params: [-params["k"] * x[0] + np.sin(u[0]) + 0.1 * t],
         lambda t, x, u, params: x,
@@ -25,7 +25,7 @@ def lag(name, k):
 
 
 def curve(name, k):
-    """A foreign static block, which reads a parameter that it does not declare."""
+    """A third-party static block, which reads a parameter that it does not declare."""
     return ct.nlsys(
         None,
         lambda t, x, u, params: np.array([np.tanh(u[0]) * params.get("gain", k)]),
@@ -113,7 +113,7 @@ def test_random_diagrams_agree_with_python_control(diagram, seed):
 
 @settings(max_examples=many(60))
 @given(diagrams(), st.floats(-3, 3), st.floats(0.1, 5))
-def test_flat_parameters_of_foreign_blocks_resolve_as_in_python_control(diagram, gain, k):
+def test_flat_parameters_of_third_party_blocks_resolve_as_in_python_control(diagram, gain, k):
     """'k' and the undeclared 'gain' reach the same blocks, nested ones too."""
     compare(diagram, params={"gain": gain, "k": k}, points=1)
 
@@ -127,8 +127,8 @@ def test_examples_in_machine_code(make):
     compare(loop, native=True, params={"law.beta": 3.5, "plant.d_amplitude": 0.3}, points=3)
 
 
-def test_foreign_blocks_in_machine_code():
-    """Arrays, lists, tuples and dict parameters of foreign functions compile as they stand."""
+def test_third_party_blocks_in_machine_code():
+    """Arrays, lists, tuples and dict parameters of third-party functions compile as they stand."""
     parts = [lag("b0", 1.3), curve("b1", 0.7), linear("b2", 0.4)]
     parts.append(
         ct.nlsys(
@@ -258,7 +258,7 @@ def test_an_algebraic_loop_prints_its_ring():
 
 
 def test_a_function_that_ignores_its_inputs_closes_no_loop():
-    """Feedthrough of a foreign function is found out: one that mentions u but does not use it."""
+    """Feedthrough of a third-party function is found: one that mentions u but does not use it."""
     state = ct.nlsys(
         lambda t, x, u, params: u,
         lambda t, x, u, params: x + 0 * len(u),

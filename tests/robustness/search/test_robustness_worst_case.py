@@ -90,7 +90,7 @@ class TestWorstCase:
         assert worst_case(evaluated, space, 5, entropy=1).design.size <= 5
 
     def test_whole_numbers_stay_whole(self):
-        """A law of whole numbers has no points between them."""
+        """A law of integers has no points between them."""
         space = Space(
             quantities=(
                 Uncertain(name="n", law=stats.randint(0, 10), nominal=1),

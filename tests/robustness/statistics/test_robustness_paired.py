@@ -43,7 +43,7 @@ def test_mcnemar_is_the_published_example():
 
 @given(st.integers(0, 40), st.integers(0, 40))
 def test_mcnemar_is_the_sum_of_binomial_terms(b, c):
-    """2 sum over k <= min(b, c) of C(b + c, k) / 2^(b + c), at most 1, in whole numbers."""
+    """2 sum over k <= min(b, c) of C(b + c, k) / 2^(b + c), at most 1, in integers."""
     n = b + c
     exact = min(1.0, 2 * sum(comb(n, k) for k in range(min(b, c) + 1)) / 2**n)
     assert mcnemar(*discordant(b, c)).p.iloc[0] == pytest.approx(exact, rel=1e-12)

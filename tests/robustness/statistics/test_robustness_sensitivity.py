@@ -79,7 +79,7 @@ def test_an_interaction_shows_as_spread():
 
 
 def test_whole_numbers_are_screened_by_the_steps_they_take():
-    """A linear function of a whole number has one effect, though levels are rounded."""
+    """A linear function of an integer has one effect, though levels are rounded."""
     space = Space(quantities=(Uncertain(name="n", law=stats.randint(0, 6)),))
     design = morris(space, 10, 4, entropy=0)
     got = elementary_effects(design, 3 * design.table.n)

@@ -108,7 +108,7 @@ def test_a_sobol_design_is_balanced():
 
 
 def test_a_grid_crosses_everything():
-    """Ends included; whole numbers stay whole; one level is the middle."""
+    """Ends included; integers stay integers; one level is the middle."""
     space = Space(quantities=(A, SEED), choices=(ARM,))
     table = grid(space, {"a": 3, "seed": 5}).table
     assert len(table) == len(table.drop_duplicates()) == 45

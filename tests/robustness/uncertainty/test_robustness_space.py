@@ -84,7 +84,7 @@ def test_a_whole_number_needs_a_law_of_whole_numbers():
     assert arguments(space, table)["params"]["sensor.seed"].dtype.kind == "i"
 
 
-def test_parameters_of_foreign_blocks_go_by_their_bare_names():
+def test_parameters_of_third_party_blocks_go_by_their_bare_names():
     """A ct.nlsys with a dict of parameters; a vector is refused."""
     lag = ct.nlsys(
         lambda t, x, u, params: [-params["a"] * x[0] * params["v"][0]],

@@ -1,4 +1,4 @@
-"""Rings of blocks: an algebraic loop is one of signals, not of blocks; python-control's numbers."""
+"""Circles of blocks: an algebraic loop is one of signals, not of blocks."""
 
 import graphlib
 
@@ -73,12 +73,12 @@ def test_a_ring_of_blocks_is_an_algebraic_loop_where_its_signals_are(made):
 
 
 def test_an_input_that_nothing_depends_on_closes_no_loop():
-    """y = sin(u[1]) in a ring with a gain of 2, through u[0]; it was a KeyError."""
+    """y = sin(u[1]) in a circle with a gain of 2, through u[0]; it was a KeyError."""
     one = static("b0", [[False, True]])
     two = static("b1", [[True]])
-    ring = ct.interconnect(
+    circle = ct.interconnect(
         [one, two], connections=[["b0.u[0]", "b1.y[0]"], ["b1.u[0]", "b0.y[0]"]],
         inplist=["b0.u[1]"], inputs=["r"], outlist=["b1.y[0]"], outputs=["y"],
     )  # fmt: skip
-    found = nlctl.compile(ring).output(0.0, [], [0.7])
-    np.testing.assert_allclose(found, ring.output(0.0, [], [0.7]), rtol=1e-15)
+    found = nlctl.compile(circle).output(0.0, [], [0.7])
+    np.testing.assert_allclose(found, circle.output(0.0, [], [0.7]), rtol=1e-15)

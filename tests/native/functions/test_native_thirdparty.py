@@ -20,7 +20,7 @@ class Tank:
 
     def __init__(self, rate):
         self.rate = rate
-        self.matrix = np.array([[0, 1], [-2, -3]])  # whole numbers
+        self.matrix = np.array([[0, 1], [-2, -3]])  # integers
 
     def update(self, t, x, u, params):
         a, b = x
