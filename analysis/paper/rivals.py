@@ -6,6 +6,7 @@ controllers on fresh samples behind one actuator after the other; `tuned_rivals`
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -129,6 +130,7 @@ def _prescribed(example: str, gains: Mapping[str, float]) -> PrescribedPerforman
     return PrescribedPerformance(k=k, rho_0=rho_0, rho_inf=rho_inf, decay=decay)
 
 
+@functools.cache
 def _order(example: str) -> int:
     return part_of(published_controller(example), "filtered_error").spec.plant_order
 
@@ -253,12 +255,35 @@ def rival_controllers(example: str) -> dict[str, Any]:
     UnknownNameError
         If there is no such example.
     """
+    labels = ("paper", *_gains(example))
+    return {label: rival_controller(example, label) for label in labels}
+
+
+def rival_controller(example: str, label: str) -> Any:
+    """Return one of `rival_controllers`.
+
+    Parameters
+    ----------
+    example : {"example_1", "example_2"}
+    label : str
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such example or controller.
+    """
+    gains = _gains(example)
+    if label == "paper":
+        return published_controller(example)
+    if label not in gains:
+        raise unknown("controller", label, ("paper", *gains))
+    return _rivals(example)[label].make(example, gains[label])
+
+
+def _gains(example: str) -> dict[str, dict[str, float]]:
     if example not in RIVAL_GAINS:
         raise unknown("example", example, RIVAL_GAINS)
-    tuned = {
-        label: r.make(example, RIVAL_GAINS[example][label]) for label, r in _rivals(example).items()
-    }
-    return {"paper": published_controller(example), **tuned}
+    return RIVAL_GAINS[example]
 
 
 def rival_searches(
@@ -283,7 +308,7 @@ def behind(example: str, actuator: str) -> dict[str, str]:
     """Return ``{controller: pair}`` for one actuator: the options of a comparison."""
     if actuator not in rival_actuators(example):
         raise unknown("actuator", actuator, rival_actuators(example))
-    return {label: f"{label} / {actuator}" for label in ("paper", *_rivals(example))}
+    return {label: f"{label} / {actuator}" for label in ("paper", *_gains(example))}
 
 
 def rival_loop(
@@ -305,12 +330,10 @@ def rival_loop(
         If there is no such example, controller or actuator.
     """
     label, _, actuator = pair.partition(" / ")
-    controllers, actuators = rival_controllers(example), rival_actuators(example)
-    if label not in controllers:
-        raise unknown("controller", label, controllers)
+    controller, actuators = rival_controller(example, label), rival_actuators(example)
     if actuator not in actuators:
         raise unknown("actuator", actuator, actuators)
-    return _with(example, controllers[label], actuators[actuator], noise)
+    return _with(example, controller, actuators[actuator], noise)
 
 
 def _with(example: str, controller: Any, actuator: Any, noise: float) -> ct.InterconnectedSystem:

@@ -1,5 +1,6 @@
 """The comparison of the paper's controller with its rivals: what is tuned, and on what."""
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -132,10 +133,16 @@ def test_of_several_samples_the_mean_cost_and_the_worst_limit_count():
 PAGE = ROOT / "docs/explanation/rivals.md"
 
 
+@functools.cache
+def checked():
+    """The record, found to be of today."""
+    return checked_rivals()
+
+
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_the_record_is_of_the_study(example):
     """All controllers behind all actuators on the samples that the file asks for; the page too."""
-    record = checked_rivals()
+    record = checked()
     own = record[record["example"] == example]
     pairs = [(a, c) for a in rival_actuators(example) for c in rival_controllers(example)]
     assert list(zip(own["actuator"], own["controller"], strict=True)) == pairs
@@ -144,12 +151,17 @@ def test_the_record_is_of_the_study(example):
     assert rivals_text(record, example) in PAGE.read_text(encoding="utf-8")
 
 
-def test_a_record_of_another_study_is_refused(tmp_path):
-    """With the command that makes it again."""
+@pytest.mark.parametrize("column", ["study", "parameters", "rates"])
+def test_a_record_of_another_study_or_loop_is_refused(tmp_path, column):
+    """With the command that makes it again; of the last line, what it says of the loop is false."""
     record = pd.read_csv(RIVALS_RECORD)
-    record.loc[record["example"] == "example_2", "study"] = "another"
+    kind = "study" if column == "study" else "loop of 'funnel' behind 'saturation'"
+    other = 1.0001 * record["rates"].iloc[-1] if column == "rates" else "another"
+    record.loc[record.index[-1], column] = other
     record.to_csv(tmp_path / "record.csv", index=False)
-    with pytest.raises(ValueError, match=r"example_2.*python -m analysis\.paper\.limits\.rivals"):
+    with pytest.raises(
+        ValueError, match=rf"example_2' is of another {kind}.*python -m analysis\.paper\.limits\.r"
+    ):
         checked_rivals(tmp_path / "record.csv")
 
 
@@ -168,7 +180,7 @@ def test_lines_of_the_record_are_runs_of_today(example, tmp_path):
     fewer = asked.model_copy(update={"only": ("paper", "funnel")})
     study = file.study.model_copy(update={"analysis": (fewer,)})
     today = rival_rows(run(replace(file, study=study), tmp_path / "run"), example)
-    record = checked_rivals()
+    record = checked()
     columns = ["example", "actuator", "controller"]
     kept = today[columns].merge(record, on=columns, how="left")
     for column in today.columns.difference([*columns, "study"]):

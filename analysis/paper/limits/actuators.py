@@ -24,7 +24,7 @@ from ...lyapunov.bounds.decomposition import DecompositionError, decompose
 from ...report.svg import svg_files
 from ..cases import HORIZON, TAIL
 from ..figures import actuator_errors
-from ..rivals import rival_controllers
+from ..rivals import rival_controller, rival_controllers
 from ..sampling_limits import BAND, meets_the_spec
 from .markdown import markdown_table
 
@@ -105,7 +105,7 @@ def actuator_run(example: str, name: str, label: str = "paper") -> dict[str, Any
         abs(y - yd) from 10 s on), peak (largest abs(u)); error and peak are NaN where the run does
         not reach its end.
     """
-    actuator, controller = actuators_of_the_table()[name], rival_controllers(example)[label]
+    actuator, controller = actuators_of_the_table()[name], rival_controller(example, label)
     times = np.linspace(0, HORIZON, round(HORIZON / _LOOK) + 1)
     loop = paper.EXAMPLES[example](actuator=actuator, controller=controller)
     made: Any = native.uninterrupted(

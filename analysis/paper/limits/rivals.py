@@ -7,6 +7,7 @@ of ``docs/explanation/rivals.md``.
 from __future__ import annotations
 
 import json
+import math
 import tempfile
 from hashlib import sha256
 from pathlib import Path
@@ -16,8 +17,10 @@ import pandas as pd
 
 from nlctl import paper
 
+from ...robustness.runs.loop_record import loop_facts, loop_values
 from ...studies import Result, read_study, run, shipped
 from ...studies.origin import plain_study
+from ..rivals import rival_loop
 from .markdown import markdown_table
 
 __all__ = [
@@ -26,6 +29,7 @@ __all__ = [
     "beaten_by",
     "checked_rivals",
     "failed_text",
+    "loop_key",
     "rival_rows",
     "rivals_study",
     "rivals_text",
@@ -33,6 +37,7 @@ __all__ = [
 ]
 
 RIVALS_RECORD = Path(__file__).with_name("rivals.csv")
+KEY = ["parameters", "rates"]
 RIVAL_ACTUATORS = {"ideal": "no nonlinearity"} | {
     name: name for name in ("dead zone", "backlash", "saturation")
 }
@@ -50,6 +55,30 @@ def study_key(example: str) -> str:
     return sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:12]
 
 
+def loop_key(example: str, controller: str, actuator: str) -> tuple[str, float]:
+    """Return what tells the loop of a pair from another one.
+
+    Parameters
+    ----------
+    example, controller, actuator : str
+        See `analysis.paper.rivals.rival_loop`.
+
+    Returns
+    -------
+    parameters : str
+        A key of the nominal parameters and the initial state.
+    rates : float
+        Size of python-control's rates and outputs at some points, without those that the
+        controller refuses.
+    """
+    loop = rival_loop(example, f"{controller} / {actuator}")
+    facts = loop_facts(loop)
+    held = json.dumps([facts["parameters"], facts["initial_state"]], sort_keys=True)
+    values = loop_values(loop, 20.0).values()
+    size = sum(abs(value) for value in values if not isinstance(value, str))
+    return sha256(held.encode()).hexdigest()[:12], size
+
+
 def rival_rows(result: Result, example: str) -> pd.DataFrame:
     """Return what a run of the study found, a line for each controller behind each actuator.
 
@@ -62,12 +91,13 @@ def rival_rows(result: Result, example: str) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Columns example, study (`study_key`), actuator, controller, samples, violations, failed
-        (of which did not reach their end), late_rms (RMS of e from 10 s on), iae (s), peak_u,
-        energy (s), all medians; less, less_low, less_high: median of the late_rms of the paper's
-        controller minus this one on the same samples, and its exact interval.
+        Columns example, study (`study_key`), actuator, controller, parameters and
+        rates (`loop_key`), samples, violations, failed (of which did not reach their end),
+        late_rms (RMS of e from 10 s on), iae (s), peak_u, energy (s), all medians; less, less_low,
+        less_high: median of the late_rms of the paper's controller minus this one on the same
+        samples, and its exact interval.
     """
-    rows = []
+    rows, key = [], study_key(example)
     for finding in result.findings:
         pairs = finding.tables["differences"].loc["late_rms"]
         actuator = result.asked[finding.key].options["actuator"]
@@ -76,8 +106,10 @@ def rival_rows(result: Result, example: str) -> pd.DataFrame:
             own: Any = ranking.loc[label]
             less = (0.0,) * 3 if label == "paper" else pairs.loc[("paper", label)]
             rows.append(
-                {"example": example, "study": study_key(example), "actuator": actuator}
-                | {"controller": label, "samples": finding.numbers["samples"]}
+                {"example": example, "study": key, "actuator": actuator}
+                | {"controller": label}
+                | dict(zip(KEY, loop_key(example, label, actuator), strict=True))
+                | {"samples": finding.numbers["samples"]}
                 | {key: int(own[key]) for key in ("violations", "failed")}
                 | {key: own[f"median {key}"] for key in ("late_rms", "iae", "peak_u", "energy")}
                 | dict(zip(("less", "less_low", "less_high"), tuple(less)[:3], strict=True))
@@ -86,21 +118,33 @@ def rival_rows(result: Result, example: str) -> pd.DataFrame:
 
 
 def checked_rivals(path: Path = RIVALS_RECORD) -> pd.DataFrame:
-    """Return the record, if it is of the study files of today.
+    """Return the record, if it is of the study files and of the loops of today.
 
     Raises
     ------
     ValueError
-        If a study file has another content than the one of which the record was made.
+        If a study file has another content than the one of which the record was made, or a loop
+        has other parameters or other rates.
     """
     record = pd.read_csv(path)
+    again = "make it again with 'python -m analysis.paper.limits.rivals'"
     for example in paper.EXAMPLES:
         made = set(record.loc[record["example"] == example, "study"])
         if made != {study_key(example)}:
             raise ValueError(
                 f"the record of rivals in '{example}' is of another study than "
-                f"reports/rivals-{example[-1]}.toml: make it again with "
-                "'python -m analysis.paper.limits.rivals'"
+                f"reports/rivals-{example[-1]}.toml: {again}"
+            )
+    asked = ["example", "controller", "actuator"]
+    for example, controller, actuator, held, rates in record[[*asked, *KEY]].itertuples(
+        index=False
+    ):
+        now = loop_key(example, controller, actuator)
+        if now[0] != held or not math.isclose(now[1], rates, rel_tol=1e-5):
+            raise ValueError(
+                f"the record of rivals in '{example}' is of another loop of '{controller}' behind "
+                f"'{actuator}' (parameters {held}, rates {rates:.6g}; now {now[0]}, {now[1]:.6g}): "
+                + again
             )
     return record
 

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import control as ct
+import numpy as np
 import pytest
 import source_text
 from places import ROOT
@@ -232,11 +233,20 @@ def test_a_record_is_the_same_in_another_process():
     assert json.loads(there) == [loop_facts(loop), loop_values(loop, 20.0)]
 
 
-def test_a_function_that_raises_has_its_error_as_value():
-    """The points are not the user's: his function may refuse them."""
+def test_points_at_which_a_function_raises_are_left_out_and_told():
+    """The points are not the user's: his function may refuse some of them."""
 
-    def update(t, x, u, params):
-        raise ZeroDivisionError
+    def loop(gain, least):
+        def update(t, x, u, params):
+            if x[0] < least:
+                raise ZeroDivisionError
+            return gain * x
 
-    system = ct.nlsys(update, None, states=1, outputs=1, inputs=0)
-    assert loop_values(system, 1.0) == {"raises": "ZeroDivisionError"}
+        return ct.nlsys(update, None, states=1, outputs=1, inputs=0)
+
+    every = ", ".join(f"ZeroDivisionError at point {k}" for k in range(6))
+    assert loop_values(loop(1.0, np.inf), 1.0)["raises"] == every
+    one, other = (loop_values(loop(gain, 0.0), 1.0) for gain in (1.0, 2.0))
+    assert one["raises"] == other["raises"]
+    assert 0 < one["raises"].count("at point") < 6
+    assert len([name for name in values_differ(one, other) if name.endswith("'")]) == 1
