@@ -6,7 +6,9 @@ import itertools
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import copy_context
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -111,10 +113,15 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     inputs = tuple({Signal(None, j): 1.0} for j in range(len(node.inputs)))
     alone = replace(node, state_offset=0, inputs=inputs, sampled=None, direct=feedthrough(system))
     reader = Reader(graph=Graph(), layout={0: slots}, blocks=[alone])
-    with np.errstate(all="ignore"), _local_names() as names:
-        found = {"x": reader.derivatives(0), "y": reader.outputs(0, ())}
-        if node.sampled and node.sampled.euler:
-            found["x"] = _euler(reader, node.sampled, slots, values)
+
+    def traced() -> tuple[dict[str, Any], dict[Expr, str]]:
+        with np.errstate(all="ignore"), _local_names() as names:
+            found = {"x": reader.derivatives(0), "y": reader.outputs(0, ())}
+            if node.sampled and node.sampled.euler:
+                found["x"] = _euler(reader, node.sampled, slots, values)
+        return found, names
+
+    found, names = _beside_a_profiler(traced)
     for call in reader.calls.values():
         raise CompileError(f"block '{node.path}' has no formula: {call.reason}")
     leaf = _symbols(system, slots)
@@ -236,11 +243,21 @@ def _entry(name: str, slot: Slot, index: Index) -> str:
     return with_index(name, f"{first},{second}")
 
 
+def _beside_a_profiler(function: Callable[[], Any]) -> Any:
+    """Return what a function returns that sets a profiler of its own, as `_local_names` does.
+
+    Where one is at work, such as cProfile's, which Python cannot set again, in another thread.
+    """
+    if sys.getprofile() is None:
+        return function()
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(copy_context().run, function).result()
+
+
 @contextmanager
 def _local_names() -> Iterator[dict[Expr, str]]:
     """Note how functions that are traced meanwhile call what they compute."""
     found: dict[Expr, str] = {}
-    before = sys.getprofile()
 
     def noted(frame: Any, event: str, _: Any) -> None:
         if event != "return" or frame.f_code.co_filename.startswith(_OWN):
@@ -253,7 +270,7 @@ def _local_names() -> Iterator[dict[Expr, str]]:
     try:
         yield found
     finally:
-        sys.setprofile(before)
+        sys.setprofile(None)
 
 
 def _known(

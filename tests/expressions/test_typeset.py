@@ -1,6 +1,8 @@
 """Formulas are what is run: they are read back as numbers, and converted to MathML."""
 
+import cProfile
 import re
+import sys
 
 import control as ct
 import numpy as np
@@ -44,6 +46,25 @@ def test_no_symbol_has_two_subscripts():
             continue
         for line in (*shown.equations, *shown.where):
             assert not re.search(r"_\{(?:[^{}]|\{[^{}]*\})*\}_", line), (name, line)
+
+
+@pytest.mark.parametrize("profiler", [cProfile.Profile().enable, lambda: sys.setprofile(print_not)])
+def test_a_profiler_changes_no_formula_and_goes_on(profiler):
+    """Names of intermediate values are found by one, and Python cannot set cProfile's again."""
+    loop = nlctl.paper.example_1()
+    alone = nlctl.typeset(loop)
+    profiler()
+    before = sys.getprofile()
+    try:
+        assert nlctl.typeset(loop) == alone
+        assert before is not None
+        assert sys.getprofile() is before
+    finally:
+        sys.setprofile(None)
+
+
+def print_not(frame, event, value):
+    """A profiler that notes nothing."""
 
 
 def test_numbers():
