@@ -206,6 +206,7 @@ def test_a_delayed_program_is_a_program_with_a_delay():
         np.testing.assert_allclose(run.outputs[0], exact[0], rtol=0, atol=tolerance)
 
 
+@pytest.mark.slow
 def test_engines_agree_on_a_nonlinear_loop_with_two_delays():
     @nlctl.equation
     def pendulum(x, v):

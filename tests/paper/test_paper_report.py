@@ -67,7 +67,7 @@ def test_only_runs_are_cleared(folder, tmp_path):
         clear(tmp_path, ["run"])
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_the_whole_begins_with_the_reproduction(tmp_path):
     """With a short proof, no far runs and no studies: every step is watched, nothing is written."""
     watched = Watched()

@@ -165,13 +165,8 @@ def test_a_record_of_another_study_or_loop_is_refused(tmp_path, column):
         checked_rivals(tmp_path / "record.csv")
 
 
-@pytest.mark.parametrize(
-    "example",
-    [
-        pytest.param("example_1", marks=pytest.mark.slow),
-        pytest.param("example_2", marks=pytest.mark.weekly),
-    ],
-)
+@pytest.mark.weekly
+@pytest.mark.parametrize("example", ["example_1", "example_2"])
 def test_lines_of_the_record_are_runs_of_today(example, tmp_path):
     """Two controllers behind the actuator of their training, on all samples."""
     file = read_study(rivals_study(example))

@@ -66,13 +66,8 @@ def test_the_section_says_what_the_record_says():
     assert len(shown.rows) == sum(len(compared_controllers(example)) for example in paper.EXAMPLES)
 
 
-@pytest.mark.parametrize(
-    "example",
-    [
-        pytest.param("example_1", marks=pytest.mark.slow),
-        pytest.param("example_2", marks=pytest.mark.weekly),
-    ],
-)
+@pytest.mark.weekly
+@pytest.mark.parametrize("example", ["example_1", "example_2"])
 def test_every_controllers_line_is_one_of_today(example):
     """Where its run ends well, at the least value of each quantity."""
     record = pd.read_csv(SAMPLING_RECORD)

@@ -33,6 +33,9 @@ from analysis.report import Figure, Paragraph, Report, Section, Table, render_ht
 from analysis.report.outline import claim_status, light, summary
 
 
+pytestmark = pytest.mark.slow
+
+
 @functools.cache
 def found():
     """Both examples; Example 2 over a shorter run."""

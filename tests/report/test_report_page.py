@@ -208,6 +208,7 @@ def test_control_characters_and_broken_characters_cost_no_report(tmp_path):
     assert "a\ufffdb\ufffd\\ud800" in page
 
 
+@pytest.mark.slow
 @given(st.lists(st.text(max_size=8), min_size=1, max_size=6))
 def test_anchors_are_unique_and_harmless_whatever_the_keys(keys):
     """Letters, digits, dots, dashes; equal keys get a number."""
@@ -490,7 +491,7 @@ def test_hashes_are_those_of_the_files(tmp_path):
     assert hashlib.sha256((tmp_path / "report.json").read_bytes()).hexdigest() in shown
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_every_kind_is_the_same_bytes_in_another_process(tmp_path):
     """Neither hash seeds nor time leave a trace, in claims, tables, formulas or figures."""
     code = (

@@ -69,7 +69,7 @@ EDITS = {
     "equation": ("p.gain * x[0] ** 3", "p.gain * x[0] ** 2"),
     "option": ('"wild": Lag(gain=0.4)', '"wild": Lag(gain=0.5)'),
 }
-EACH_SORT = (4, 10, 16, 19, 22, 25, 28)  # of every process, study and edit
+EACH_SORT = (10, 16, 19, 22, 25)  # of every study and edit, without and with a worker
 
 REFUSED = 2
 

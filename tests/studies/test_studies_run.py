@@ -217,6 +217,7 @@ def test_a_replay_tells_a_difference(result):
         replay(result.folder, 0, "regional")
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_goes_on_to_the_same_result(result, folder):
     """Whatever is missing is run again: the same numbers, bit for bit."""
     path = write(folder, HEAD, EVERY_KIND)

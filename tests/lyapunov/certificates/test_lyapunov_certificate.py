@@ -187,6 +187,7 @@ class TestCertify:
         """sigma_2 = 0 makes alpha_1 = 0: no bound for all time."""
         assert not certified(example_1(sigma_2=0.0)).holds
 
+    @pytest.mark.slow
     def test_parameters_of_the_run_count(self):
         """The same override that a run takes changes the proof."""
         loop = example_1()

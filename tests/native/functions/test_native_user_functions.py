@@ -11,7 +11,7 @@ PURE = [entry for entry in ENTRIES.values() if entry.pure]
 IMPURE = [entry for entry in ENTRIES.values() if not entry.pure]
 # in the everyday tests the size at which arrays become loops
 SIZES = [n if n == 9 else pytest.param(n, marks=pytest.mark.slow) for n in user_functions.SIZES]
-GROUPS = 16  # of entries that are compiled one by one
+GROUPS = 48  # of entries that are compiled one by one
 
 machine_code = pytest.mark.skipif(
     getattr(config, "DISABLE_JIT", False), reason="nothing is compiled without JIT"

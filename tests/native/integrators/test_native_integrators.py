@@ -126,7 +126,7 @@ def results():
     yield nlctl.input_output_response(loop, times, u, audit=False).states
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_the_same_bits_as_by_numba(monkeypatch):
     """Another order of passes and no vectors of the host, but no liberties with arithmetic."""
     ours = [array.tobytes() for array in results()]

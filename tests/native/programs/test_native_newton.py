@@ -213,7 +213,7 @@ def test_many_signals_in_a_loop(n):
     assert y == pytest.approx(brentq(lambda v: np.cos(v) - v, 0, 1, xtol=1e-15), rel=1e-14)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_a_program_is_the_same_in_every_process():
     """What a search is given goes by the order of the expressions, not by addresses."""
     script = (

@@ -35,6 +35,7 @@ def client(distributed):
         yield client
 
 
+@pytest.mark.weekly
 def test_a_killed_worker_loses_nothing(client, tmp_path):
     """SIGKILL in the middle: its chunks are computed by others, and the table is the same."""
     made = prepare(experiment())
