@@ -80,8 +80,8 @@ def interconnect(
     ------
     DiagramError
         If two blocks share a name, have the same output, or an input is fed by nothing or
-        twice, if one block stands in the diagram twice, or if a controller is for plants of a
-        lower order than the one that it is connected to.
+        twice, if one block stands in the diagram twice, if timebases differ, or if a controller is
+        for plants of a lower order than the one that it is connected to.
     UnknownNameError
         If `outputs` names a signal that is the output of no block, or `inputs` one that none takes.
 
@@ -104,6 +104,7 @@ def interconnect(
     inputs = [inputs] if isinstance(inputs, str) else list(inputs)
     outputs = [outputs] if isinstance(outputs, str) else outputs
     _check_blocks(systems)
+    _check_timebases(systems)
     sources = _signal_sources(systems)
     _check_inputs(systems, sources, inputs)
     _check_orders(systems, sources)
@@ -148,6 +149,29 @@ def _check_blocks(systems: Sequence[Any]) -> None:
                     "and would share its parameters: use a copy, block.copy(name=...)"
                 )
             places[id(leaf.system)] = path
+
+
+def _check_timebases(systems: Sequence[Any]) -> None:
+    """One timebase for all: what samples among others says so."""
+    first = None
+    for system in systems:
+        if system.dt is None:  # any
+            continue
+        if first is not None:
+            try:
+                ct.common_timebase(first.dt, system.dt)
+            except ValueError:
+                slow = system if system.dt else first
+                raise DiagramError(
+                    f"'{first.name}' {_timebase(first.dt)} and '{system.name}' "
+                    f"{_timebase(system.dt)}: nlctl.sampled({slow.name}, dt) is connected with "
+                    "others, continuous or of another rate"
+                ) from None
+        first = first if first is not None and first.dt is not True else system
+
+
+def _timebase(dt: Any) -> str:
+    return f"is in discrete time (dt = {dt})" if dt else "is in continuous time"
 
 
 def _signal_sources(systems: Sequence[ct.InputOutputSystem]) -> dict[str, str]:

@@ -54,6 +54,14 @@ CASES = {
         lambda: nlctl.compile(ring()),
         r"algebraic loop: (law\.u|other\.y) -> .* -> ",
     ),
+    "two timebases": (
+        lambda: nlctl.interconnect([PLANT, LAW]),
+        r"'plant' is in continuous time and 'law' .*\(dt = 0\.1\): nlctl\.sampled\(law, dt\)",
+    ),
+    "two rates": (
+        lambda: nlctl.interconnect([LAW, ct.ss([], [], [], 1.0, 0.2, inputs="u", outputs="y")]),
+        r"'law' is in discrete time \(dt = 0\.1\) and .*\(dt = 0\.2\): nlctl\.sampled\(",
+    ),
     "an unknown signal": (with_fault, "'actuator.w'.*nearest.*'actuator.v'"),
     "an unknown parameter": (
         lambda: run(loop(nlctl.sampled(LAW)), **{"law.sampling.dtt": 1.0}),
@@ -71,3 +79,11 @@ def test_bad_input_ends_in_one_sentence(call, words):
     with pytest.raises(UsageError, match=words) as raised:
         call()
     assert "\n" not in str(raised.value)
+
+
+def test_the_advice_on_two_timebases_makes_the_loop():
+    """A gain behind a hold of 0.1 s: y[k+1] = e^(-0.1) y[k] - (1 - e^(-0.1)) y[k]."""
+    loop = nlctl.interconnect([PLANT, nlctl.sampled(LAW)])
+    found = nlctl.input_output_response(loop, np.linspace(0, 1, 11), 0, {"plant.x[0]": 1.0})
+    wanted = (2 * np.exp(-0.1) - 1) ** np.arange(11)
+    np.testing.assert_allclose(found.outputs[0], wanted, rtol=1e-7)
