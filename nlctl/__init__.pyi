@@ -103,6 +103,7 @@ from .plants import ForcedDuffing, Genesio, PureFeedback, WingRock
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
 from .sampling import Clock, Sampled, Sampling, discretise, sampled
+from .sliding import IdealRelay
 
 __all__ = [
     "PID",
@@ -151,6 +152,7 @@ __all__ = [
     "GaussianBasis",
     "Genesio",
     "HistoryStack",
+    "IdealRelay",
     "KnownSignLaw",
     "Lag",
     "LeakyNussbaumLaw",

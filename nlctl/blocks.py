@@ -59,6 +59,9 @@ class Spec(Protocol):
     delayed : bool, optional
         True of `nlctl.TransportDelay`, whose outputs are its inputs at earlier times: they follow
         from a run, not from `output`.
+    sliding : bool, optional
+        True of `nlctl.IdealRelay`, whose equations get two more numbers behind the input: a and b
+        of the rate u' = a + b v that the whole diagram gives its input with an output v.
 
     Notes
     -----
@@ -116,7 +119,7 @@ class ParameterRow:
 
 @dataclass(kw_only=True)
 class DelayLine:
-    """What leaves a transport delay at an instant, and what arrives there then.
+    """What leaves a block at an instant that it alone does not know, and what arrives there then.
 
     Attributes
     ----------
@@ -135,16 +138,28 @@ _PAST: ContextVar[Mapping[int, DelayLine] | None] = ContextVar("nlctl_past", def
 
 @contextmanager
 def past(lines: Mapping[Any, DelayLine]) -> Iterator[None]:
-    """Say what leaves transport delays at the instant at which a diagram is evaluated.
+    """Say what leaves transport delays and ideal relays where a diagram is evaluated.
 
-    Python-control then finds the signals of the present, and what arrives at the delays is left in
-    `lines`, which goes by block.
+    Python-control then finds the signals of the present, and what arrives at these blocks is left
+    in `lines`, which goes by block.
     """
     token = _PAST.set({id(made): line for made, line in lines.items()})
     try:
         yield
     finally:
         _PAST.reset(token)
+
+
+_DELAYS = (
+    "delays its signals, and python-control does not keep the past: use "
+    "nlctl.input_output_response (engine='python-control' is the reference); to linearize, put "
+    "ct.ss(ct.tf(*ct.pade(delay, n))) in its place"
+)
+_SLIDES = (
+    "is an ideal relay, whose output while it slides follows from the rates of the whole diagram, "
+    "and python-control does not look at these: use nlctl.input_output_response(diagram, ...) in "
+    "machine code and nlctl.compile(diagram).linearize, or nlctl.Relay, which has hysteresis"
+)
 
 
 class Block(OwnParameters):
@@ -190,16 +205,12 @@ class Block(OwnParameters):
             set_parameters(self, None)
 
     def answer(self, t: float, x: Any, u: Any) -> Any:
-        """Return its outputs; of a transport delay what `past` says, see there."""
-        if not is_delayed(self):
+        """Return its outputs; of transport delays and ideal relays what `past` says, see there."""
+        if not (is_delayed(self) or slides(self)):
             return super().answer(t, x, u)
         line = (_PAST.get() or {}).get(id(self))
         if line is None:
-            raise UsageError(
-                f"block '{self.name}' delays its signals, and python-control does not keep the "
-                "past: use nlctl.input_output_response (engine='python-control' is the reference); "
-                "to linearize, put ct.ss(ct.tf(*ct.pade(delay, n))) in its place"
-            )
+            raise UsageError(f"block '{self.name}' {_SLIDES if slides(self) else _DELAYS}")
         line.arriving = np.array(u, dtype=float).reshape(-1)
         return line.leaving(float(t))
 
@@ -383,6 +394,11 @@ def is_delayed(system: Any) -> bool:
     return bool(getattr(getattr(system, "spec", None), "delayed", False))
 
 
+def slides(system: Any) -> bool:
+    """Whether a block's equations ask for the rate that the diagram gives its input."""
+    return bool(getattr(getattr(system, "spec", None), "sliding", False))
+
+
 def sampling_of(system: Any) -> Any:
     """Return the block with the parameters of a sampled block's sampling; None of any other."""
     return getattr(system, "sampling", None)
@@ -397,14 +413,14 @@ def event_count(made: Block) -> int:
     """Return the number of switching functions that a block declares."""
     if not hasattr(made.spec, "corners"):
         return 0
-    u = np.full(made.ninputs or 0, 0.25)
+    u = np.full((made.ninputs or 0) + 2 * slides(made), 0.25)
     return len(made.spec.corners(0.0, default_state(made), u, current_parameters(made)))
 
 
 def _probe(made: Block) -> None:
     """Call the equations once: sizes must match, and feedthrough must be declared truly."""
     spec, who = made.spec, f"{type(made.spec).__name__} (block '{made.name}')"
-    if is_delayed(made):
+    if is_delayed(made) or slides(made):
         return
     x, u, p = default_state(made), np.full(made.ninputs or 0, 0.25), current_parameters(made)
     with np.errstate(all="ignore"):

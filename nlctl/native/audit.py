@@ -179,6 +179,7 @@ def _close(a: np.ndarray, b: np.ndarray, relative: float = _ROUNDING, absolute: 
 def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> Values:
     system, given = compiled.system, {"params": dict(trial.params)} if trial.params else {}
     lines, point = _lines(compiled, point)
+    lines |= _relays(compiled, trial.p, point)
     with past(lines), happening():
         rates = system.dynamics(*point, **given) if system.nstates else np.empty(0)
         outputs = system.output(*point, **given) if system.noutputs else np.empty(0)

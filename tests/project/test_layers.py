@@ -11,7 +11,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl._version", "nlctl.host", "nlctl.upstream"],
     ["nlctl.errors", "nlctl.names", "nlctl.arguments", "nlctl.params", "nlctl.equations"],
     ["nlctl.blocks", "nlctl.diagrams", "nlctl.functions", "nlctl.drawing", "nlctl.responses"]
-    + ["nlctl.sampling", "nlctl.delays"],
+    + ["nlctl.sampling", "nlctl.delays", "nlctl.sliding"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers", "nlctl.faults"],
     ["nlctl.paper"],
     ["nlctl.expressions"],

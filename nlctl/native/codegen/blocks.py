@@ -30,6 +30,7 @@ from ..diagram.schedule import (
 )
 from ..machine.called import call_of
 from ..parameters import length
+from ..sliding.reading import with_sliding
 from .calls import Call
 from .newton import inside, solver
 from .program import count_switching_functions, memory
@@ -104,6 +105,7 @@ def equations(
         lines={line: (system.ninputs or 0) + k for k, line in enumerate(schedule.lines)},
     )  # fmt: skip
     with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
+        reader = with_sliding(reader, schedule)
         reader.read(schedule)
         results = {
             "dx": [(n.state_offset, reader.derivatives(i)) for i, n in enumerate(schedule.nodes)],
@@ -190,6 +192,8 @@ class Reader:
         Outputs of transport delays, and which input stands for each.
     samplings : mapping
         Where in the layout the parameters of a sampling are, by its identity.
+    relays, moving : mapping
+        Outputs of ideal relays, and a and b of the rates u' = a + b v of their inputs.
     """
 
     graph: Graph
@@ -205,6 +209,8 @@ class Reader:
     what: Happening = frozenset()
     lines: Mapping[Signal, int] = field(default_factory=dict)
     samplings: Mapping[int, int] = field(default_factory=dict)
+    relays: Mapping[int, Tracer] = field(default_factory=dict)
+    moving: Mapping[int, Tracer] = field(default_factory=dict)
 
     def read(self, schedule: Schedule) -> None:
         """Read all blocks in their order, and solve the loops."""
@@ -291,6 +297,8 @@ class Reader:
         node, system = self.blocks[i], self.blocks[i].system
         if Signal(i, 0) in self.lines:
             return leaf_vector(self.graph, "u", self.lines[Signal(i, 0)], (system.noutputs,))
+        if i in self.relays:
+            return self.relays[i]
         linear = isinstance(system, ct.StateSpace)
         if not linear and (system.outfcn is None or not system.noutputs):
             return self._states(node)[: system.noutputs or 0]
@@ -307,6 +315,10 @@ class Reader:
         if linear:
             return self._linear(node, system.C, system.D, inputs)
         return self._function(i, "output", [system.outfcn], inputs, system.noutputs)
+
+    def relay_output(self, i: int, known: Tracer) -> Tracer:
+        """Return the output of an ideal relay whose input, and a and b of its rate, are known."""
+        return self._function(i, "output", [self.blocks[i].system.outfcn], known, 1)
 
     def derivatives(self, i: int) -> Tracer:
         """Return the derivatives of a block's states; those of sampled ones stand still."""
@@ -367,6 +379,8 @@ class Reader:
         used = [("corners", count_switching_functions(node)), ("commit", len(memory(node)))]
         functions = [getattr(spec, name) for name, count in used if count]
         inputs = self.wired(node.inputs)
+        if i in self.moving:
+            inputs = concatenated(self.graph, [inputs, self.moving[i]])
         return self._function(i, "events", functions, inputs, sum(count for _, count in used))
 
     def wired(self, combinations: Sequence[Combination | None]) -> Tracer:

@@ -1,0 +1,175 @@
+"""The rate that a diagram gives the input of an ideal relay, as a function of the relay's output.
+
+The relay's output v is a leaf, read as if it came from outside.  Along x' the relay's input has the
+derivative u' = a + b v, where b is its derivative by v, and a its value at v = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ...errors import CompileError
+from ...expressions.derivatives import tangents
+from ...expressions.graph import Expr, Graph, Untraceable, needed
+
+OUTPUTS = "v"  # the array of leaves that stand for the relays' outputs
+_SMOOTH = "smooth the jump over a small width, or give it hysteresis (nlctl.Relay)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingInput:
+    """The input of an ideal relay of a diagram.
+
+    Attributes
+    ----------
+    name : str
+        Of the relay's block.
+    leaf : Expr
+        What stands for the relay's output.
+    given : Expr
+        The input, an expression.
+    """
+
+    name: str
+    leaf: Expr
+    given: Expr
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """How a diagram moves: its derivatives, row by row, and what is kept within a step.
+
+    Attributes
+    ----------
+    rates : sequence of Expr
+        One for each state.
+    solutions : mapping
+        As `fixed_points` of `nlctl.expressions.derivatives.tangents`.
+    """
+
+    rates: Sequence[Expr]
+    solutions: Mapping[str, Sequence[Expr]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingRate:
+    """Drift a and gain b of the rate u' = a + b v of a relay's input, and the relay's output v."""
+
+    drift: Expr
+    gain: Expr
+    output: Expr
+
+
+def sliding_rates(
+    graph: Graph,
+    relays: Sequence[SlidingInput],
+    motion: Motion,
+    output: Callable[[int, tuple[Expr, Expr, Expr]], Expr],
+) -> list[SlidingRate]:
+    """Return a and b of every relay's u' = a + b v, and its output.
+
+    Parameters
+    ----------
+    graph : Graph
+    relays : sequence of SlidingInput
+    motion : Motion
+    output : callable
+        Takes the number of a relay and its u, a, b; returns its output.
+
+    Raises
+    ------
+    CompileError
+        If there is no such rate, or relays act on each other's.
+    """
+    rates = [_rate(graph, relay, motion) for relay in relays]
+    leaves = [relay.leaf for relay in relays]
+    made: dict[int, SlidingRate] = {}
+    while len(made) < len(relays):
+        known = {leaves[i]: one.output for i, one in made.items()}
+        ready = [
+            i
+            for i, (rate, _) in enumerate(rates)
+            if i not in made and _read(rate, leaves) <= {leaves[i], *known}
+        ]
+        if not ready:
+            names = ", ".join(f"'{r.name}'" for i, r in enumerate(relays) if i not in made)
+            raise CompileError(
+                f"the ideal relays {names} act on the rates of each other's inputs: what slides "
+                f"where both inputs are 0 has no one answer; of one {_SMOOTH}"
+            )
+        for i in ready:
+            without = known | {leaves[i]: graph.const(0.0)}
+            drift, gain = replaced_parts(graph, rates[i], without)
+            v = output(i, (relays[i].given, drift, gain))
+            made[i] = SlidingRate(drift=drift, gain=gain, output=v)
+    return [made[i] for i in range(len(relays))]
+
+
+def replaced_parts(graph: Graph, exprs: Sequence[Expr], instead: Mapping[Expr, Expr]) -> list[Expr]:
+    """Return expressions with others in the places of some of their parts."""
+    new: dict[Expr, Expr] = {}
+    for node in needed(exprs, instead):
+        args = tuple(new.get(a, a) for a in node.args)
+        if node in instead:
+            new[node] = instead[node]
+        elif args != node.args:
+            new[node] = graph.node(
+                node.op, *args, data=node.data, size=node.size, kind=node.kind, value=node.value,
+            )  # fmt: skip
+    return [new.get(e, e) for e in exprs]
+
+
+def _rate(graph: Graph, relay: SlidingInput, motion: Motion) -> tuple[Expr, Expr]:
+    """Return u' of a relay, and its derivative by the relay's output."""
+    who = f"the ideal relay '{relay.name}'"
+    parts = needed([relay.given])
+    read = {e.data[0] for e in parts if e.op == "leaf"}
+    if OUTPUTS in read:
+        raise CompileError(
+            f"the input of {who} depends on the output of an ideal relay at the same instant, and "
+            f"jumps with it: put a state between them, or {_SMOOTH}"
+        )
+    if "u" in read:
+        raise CompileError(
+            f"the input of {who} depends on an input of the diagram or a delayed signal at the "
+            "same instant, whose rate is not known: put the signal into the diagram as a block "
+            f"(nlctl.SumOfSines, nlctl.FunctionReference) or a lag before it, or {_SMOOTH}"
+        )
+    states = graph.joined([(rate, 1) for rate in motion.rates]) if motion.rates else None
+
+    def along(leaf: Expr) -> Expr | None:
+        array, start, step = leaf.data
+        if array == "t":
+            return graph.const(1.0)
+        if array != "x" or states is None:
+            return None
+        if leaf.size is None:
+            return motion.rates[start]
+        return graph.part(states, start, step, leaf.size)
+
+    try:
+        (rate,) = tangents(graph, [relay.given], along, motion.solutions)
+        rate = rate or graph.const(0.0)
+        (gain,) = tangents(
+            graph, [rate], lambda leaf: graph.const(1.0) if leaf is relay.leaf else None,
+            motion.solutions,
+        )  # fmt: skip
+    except Untraceable as error:
+        raise CompileError(f"the input of {who} has no rate: {error}; {_SMOOTH}") from None
+    gain = gain or graph.const(0.0)
+    if relay.leaf in needed([gain]):
+        raise CompileError(
+            f"the output v of {who} does not enter the rate u' of its input as a + b v: what "
+            f"slides then depends on how the jump is made; {_SMOOTH}"
+        )
+    if any(e.op == "solve" and relay.leaf in needed(e.args) for e in needed([rate])):
+        raise CompileError(
+            f"the output of {who} is in an algebraic loop that is solved for: put a state into the "
+            f"loop, or {_SMOOTH}"
+        )
+    return rate, gain
+
+
+def _read(expr: Expr, leaves: Sequence[Expr]) -> set[Expr]:
+    return set(needed([expr])) & set(leaves)

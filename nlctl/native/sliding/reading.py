@@ -1,0 +1,68 @@
+"""Ideal relays of a diagram that is being read as expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ...blocks import slides
+from ...expressions.arrays import Tracer, concatenated, scalar
+from ...expressions.graph import Expr, Graph
+from ..codegen.program import memory
+from .rates import OUTPUTS, Motion, SlidingInput, sliding_rates
+
+if TYPE_CHECKING:
+    from ..codegen.blocks import Reader
+    from ..diagram.schedule import Schedule
+
+
+def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
+    """Return a reader that knows outputs and rates of ideal relays, if there are any.
+
+    The diagram is read once more for that, with their outputs as if they came from outside.
+
+    Raises
+    ------
+    CompileError
+        If the input of a relay has no rate of the form a + b v.
+    """
+    graph, blocks = reader.graph, reader.blocks
+    places = [i for i, node in enumerate(blocks) if slides(node.system)]
+    if not places:
+        return reader
+    leaves = [graph.leaf(OUTPUTS, k, None) for k in range(len(places))]
+    own = {i: _array(graph, [leaf]) for i, leaf in zip(places, leaves, strict=True)}
+    first = replace(
+        reader, relays=own, signals={}, solved=[], solvers={}, fixed_points={}, calls={}
+    )
+    first.read(schedule)
+    relays = [
+        SlidingInput(name=blocks[i].path, leaf=leaf, given=first.wired(blocks[i].inputs)[0].only)
+        for i, leaf in zip(places, leaves, strict=True)
+    ]
+
+    def output(k: int, known: Sequence[Expr]) -> Expr:
+        return first.relay_output(places[k], _array(graph, known))[0].only
+
+    motion = Motion(rates=_rates(first), solutions=first.fixed_points)
+    found = sliding_rates(graph, relays, motion, output)
+    return replace(
+        reader,
+        relays={i: _array(graph, [f.output]) for i, f in zip(places, found, strict=True)},
+        moving={i: _array(graph, [f.drift, f.gain]) for i, f in zip(places, found, strict=True)},
+    )
+
+
+def _array(graph: Graph, parts: Sequence[Expr]) -> Tracer:
+    return concatenated(graph, [scalar(graph, part).reshape(1) for part in parts])
+
+
+def _rates(reader: Reader) -> list[Expr]:
+    """Return the derivatives of all states within a step, in which memories stand still."""
+    arrays = [reader.derivatives(i) for i in range(len(reader.blocks))]
+    found = [array[k].only for array in arrays for k in range(array.size)]
+    for node in reader.blocks:
+        for m in memory(node):
+            found[m] = reader.graph.const(0.0)
+    return found

@@ -1,0 +1,124 @@
+"""The relay without hysteresis, and its sliding motion."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..equations import equation
+from ..params import param, record
+
+
+@equation
+def kept_mode(mode):
+    """1, -1 or 0: what a memory of modes stands for."""
+    return np.where(mode < -0.5, -1.0, np.where(mode > 0.5, 1.0, 0.0 * mode))  # NaN stays
+
+
+@equation
+def rates_beside(u, p):
+    """u' with an output of +height and of -height."""
+    _, drift, gain = u
+    return drift + gain * p.height, drift - gain * p.height
+
+
+@equation
+def relay_mode(u, mode, p):
+    """1 or -1 on a side; 0 while it slides, that is where u' leads back from both sides."""
+    above, below = rates_beside(u, p)
+    kept = kept_mode(mode)
+    side = np.where(u[0] == 0, kept, np.sign(u[0]))
+    one_way = np.where((above > 0) & (below >= 0), 1.0, np.where((above <= 0) & (below < 0), -1.0, side))
+    crossing = np.where((above < 0) & (below > 0), 0.0 * above, one_way + 0.0 * (above + below))
+    near = np.where(kept * u[0] > 0, kept, crossing)
+    return np.where(np.abs(u[0]) > p.rest, np.sign(u[0]), near + 0.0 * u[0])
+
+
+@record
+class IdealRelay:
+    """Relay without hysteresis, with Filippov's sliding motion where it would chatter.
+
+        v = height sign(u)                 u != 0
+            -(a + rate u) / b              it slides: u' = a + b v leads to u = 0 from both sides
+
+    a and b are those of the whole diagram, by exact derivatives of its equations.  Where
+    a + b height < 0 < a - b height at u = 0, no solution in the usual sense goes on; Filippov's
+    goes along u = 0, with the one v of [-height, height] that keeps u' = 0 (Filippov,
+    Differential Equations with Discontinuous Righthand Sides, 1988, section 4; where v enters as
+    here, it is the equivalent control of Utkin, Sliding Modes in Control and Optimization, 1992,
+    section 2).  It ends where |v| reaches the height.  Entry and end are located as events.
+
+    What is left of u where the entry is located, and by rounding, decays with `rate` while it
+    slides.  Beyond `rest` it slides no longer: something else has made u jump.
+
+    It runs in machine code.  `nlctl.compile` refuses it where u jumps with v, where v enters u'
+    otherwise than as a + b v, where u depends on an input of the diagram or a delayed signal, whose
+    rates nobody knows, and where several such relays act on each other's u'.  With b = 0
+    (relative degree above one) it never slides; switches that accumulate end as chattering.
+
+    Examples
+    --------
+    x' = 1/2 - sign(x) from 1 comes to 0 at t = 2, and stays there with v = 1/2:
+
+    >>> import control as ct
+    >>> plant = ct.nlsys(
+    ...     lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0], states=1, inputs=["v"],
+    ...     outputs=["u"], name="plant",
+    ... )
+    >>> relay = nlctl.IdealRelay()
+    >>> loop = nlctl.interconnect({"relay": relay, "plant": plant}, outputs=["u", "v"])
+    >>> run = nlctl.input_output_response(loop, [0, 1, 2.5, 3], 0, {"plant.x[0]": 1.0})
+    >>> print(run.outputs.round(6) + 0.0)
+    [[1.  0.5 0.  0. ]
+     [1.  1.  0.5 0.5]]
+    """
+
+    height: float = param(1.0, unit="1", meaning="output |v| beside u = 0", above=0)
+    rest: float = param(1e-6, unit="1", meaning="input up to which it may slide", above=0)
+    rate: float = param(1.0, unit="1/s", meaning="rate at which u decays in sliding", at_least=0)
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ("mode",)
+    memory = ("mode",)
+    feedthrough = False
+    sliding = True
+    no_split = "its output jumps at u = 0: |v| = height for all u, so |v| <= k u + eps has no k"
+
+    @staticmethod
+    @equation
+    def update(t: float, x: Any, u: Any, p: Any) -> Any:
+        """The mode changes at events only."""
+        (mode,) = x
+        return (0.0 * mode,)
+
+    @staticmethod
+    @equation
+    def output(t: float, x: Any, u: Any, p: Any) -> Any:
+        """Beside u = 0 the side, with its height; on it what keeps u' = 0.
+
+        A mode beyond 1 counts as it stands: it jumps, and nothing carries it along.
+        """
+        (mode,) = x
+        _, drift, gain = u
+        keeping = np.where(gain == 0, 0.0, -(drift + p.rate * u[0]) / gain)
+        beside = p.height * kept_mode(mode) * np.maximum(1.0, np.abs(mode))
+        return (np.where(kept_mode(mode) == 0, keeping, beside),)
+
+    @staticmethod
+    @equation
+    def commit(t: float, x: Any, u: Any, p: Any) -> Any:
+        """The mode."""
+        (mode,) = x
+        return (relay_mode(u, mode, p),)
+
+    @staticmethod
+    @equation
+    def corners(t: float, x: Any, u: Any, p: Any) -> Any:
+        """Where u is 0; while it slides, where it jumps away and where one rate leads away."""
+        (mode,) = x
+        above, below = rates_beside(u, p)
+        slides = kept_mode(mode) == 0
+        beyond = np.where(slides, p.rest - np.abs(u[0]), u[0])
+        return beyond, np.where(slides, above, 1.0), np.where(slides, below, 1.0)
