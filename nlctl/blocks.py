@@ -155,7 +155,7 @@ _DELAYS = (
     "nlctl.input_output_response (engine='python-control' is the reference); to linearize, put "
     "ct.ss(ct.tf(*ct.pade(delay, n))) in its place"
 )
-_SLIDES = (
+SLIDES = (
     "is an ideal relay, whose output while it slides follows from the rates of the whole diagram, "
     "and python-control does not look at these: use nlctl.input_output_response(diagram, ...) in "
     "machine code and nlctl.compile(diagram).linearize, or nlctl.Relay, which has hysteresis"
@@ -210,7 +210,7 @@ class Block(OwnParameters):
             return super().answer(t, x, u)
         line = (_PAST.get() or {}).get(id(self))
         if line is None:
-            raise UsageError(f"block '{self.name}' {_SLIDES if slides(self) else _DELAYS}")
+            raise UsageError(f"block '{self.name}' {SLIDES if slides(self) else _DELAYS}")
         line.arriving = np.array(u, dtype=float).reshape(-1)
         return line.leaving(float(t))
 

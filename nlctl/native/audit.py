@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Literal
 
 import control as ct
 import numpy as np
 
-from ..blocks import DelayLine, is_delayed, past
+from ..blocks import DelayLine, is_delayed, past, slides
 from ..delays.lines import delayed_blocks
 from ..errors import ParameterError, UsageError
 from ..sampling.system import Happening, happening
@@ -32,6 +32,8 @@ from .machine.routine import lowered_code
 
 _POINTS = 5  # of a trajectory, its start and end among them
 _ROUNDING = 1e-10  # relative difference that rounding explains without a closer look
+_DIFFERENCES = 1e-4  # part of a rate that differences may miss
+_APART = 1e-5  # way, relative to the state, over which a rate is taken
 SHAKEN = 1e-13  # relative change of states and inputs that shows what rounding does to a value
 _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
 
@@ -60,6 +62,8 @@ class Trial:
         Members that the machine code of the run takes.
     meetings : tuple of frozenset
         What may happen to sampled blocks in that machine code.
+    relays : mapping
+        What ideal relays output at a point, by block.
     """
 
     time: np.ndarray
@@ -69,6 +73,7 @@ class Trial:
     params: Mapping[str, Any] | None
     width: int
     meetings: tuple[Happening, ...] = ()
+    relays: Mapping[Any, float] = field(default_factory=dict)
 
 
 def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
@@ -101,8 +106,11 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
             return
         done.append(code)
         evaluated, trial = _evaluated(compiled, code, c), replace(trial, meetings=code.meetings)
+        relays = any(slides(node.system) for node in compiled.schedule.nodes)
+        outputs = every_output(compiled, trial.p) if relays else None
         for point in _points(trial):
-            _compare(compiled, trial, evaluated, point)
+            known = _with_relays(compiled, trial, outputs, point) if outputs else trial
+            _compare(compiled, known, evaluated, point)
 
 
 def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
@@ -178,12 +186,11 @@ def _close(a: np.ndarray, b: np.ndarray, relative: float = _ROUNDING, absolute: 
 
 def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> Values:
     system, given = compiled.system, {"params": dict(trial.params)} if trial.params else {}
-    lines, point = _lines(compiled, point)
-    lines |= _relays(compiled, trial.p, point)
+    lines, point = _lines(compiled, trial, point)
     with past(lines), happening():
         rates = system.dynamics(*point, **given) if system.nstates else np.empty(0)
         outputs = system.output(*point, **given) if system.noutputs else np.empty(0)
-    arriving = [line.arriving for line in lines.values()]
+    arriving = [line.arriving for made, line in lines.items() if is_delayed(made)]
     after, rows = [], list(compiled.program.sampled)
     for what in trial.meetings:
         with past(lines), happening(what):
@@ -192,17 +199,84 @@ def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> Values:
     return tuple(np.asarray(v, dtype=float).reshape(-1) for v in (rates, outputs, *after))
 
 
-def _lines(compiled: Compiled, point: Any) -> tuple[dict[Any, DelayLine], Any]:
-    """Return what leaves transport delays, and the point with the diagram's own inputs."""
+def _with_relays(
+    compiled: Compiled, trial: Trial, outputs: Callable[[Any], np.ndarray], point: Any
+) -> Trial:
+    """Return a trial with what ideal relays output at a point, after a look at those that slide.
+
+    Python-control's right-hand side is compared with these outputs.  That they keep the relays'
+    inputs where they are is seen before, from its own rates.
+    """
+    nodes, found = compiled.schedule.nodes, outputs(point)
+    starts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
+    relays = [(node, float(found[k])) for node, k in zip(nodes, starts[:-1], strict=True)
+              if slides(node.system)]  # fmt: skip
+    trial = replace(trial, relays={node.system: v for node, v in relays})
+    for node, v in relays:
+        if point[1][node.state_offset] == 0 and np.isfinite(found).all():
+            _compare_sliding(compiled, trial, (node, v), point)
+    return trial
+
+
+def _compare_sliding(
+    compiled: Compiled, trial: Trial, relay: tuple[Any, float], point: Any
+) -> None:
+    """Compare the rate of a sliding relay's input with the one that it is to have."""
+    node, v = relay
+    made = node.system
+
+    def moving(output: float) -> np.ndarray:
+        """Return the input's rate, behind the point, around it and before it."""
+        with_output = replace(trial, relays={**trial.relays, made: output})
+        return _rates_of_input(compiled, with_output, made, point)
+
+    now = moving(v)
+    spec = made.current_spec  # python-control has resolved the run's parameters by now
+    scale = sum(np.abs(moving(side * spec.height)).max() for side in (-1.0, 1.0))
+    wanted = -spec.rate * float(_arriving(compiled, trial, made, point))
+    if np.all(np.abs(now - wanted) > _DIFFERENCES * scale):  # at a kink one of them may be right
+        raise AuditError(
+            f"while ideal relay '{node.path}' slides with an output of {v:.6g}, its input has the "
+            f"rate {wanted:.6g} in machine code and {now[1]:.6g} in python-control, by "
+            f"differences, at t = {point[0]:.6g} s; nothing was returned"
+        )
+
+
+def _rates_of_input(compiled: Compiled, trial: Trial, made: Any, point: Any) -> np.ndarray:
+    """Return how fast a relay's input changes along python-control's own rates."""
     t, x, u = point
-    own, lines = compiled.system.ninputs or 0, {}
+    rates = _by_python_control(compiled, point, trial)[0]
+    rates[list(compiled.program.memory)] = 0.0  # they stand still within a step
+    part = _APART * (1.0 + np.abs(x).max()) / (1.0 + np.abs(rates).max())
+    ends = [(t + k * part, x + k * part * rates, u) for k in (-1, 0, 1)]
+    before, here, after = (_arriving(compiled, trial, made, end) for end in ends)
+    return np.array([here - before, 0.5 * (after - before), after - here]) / part
+
+
+def _arriving(compiled: Compiled, trial: Trial, made: Any, point: Any) -> float:
+    """Return what python-control finds at the input of an ideal relay."""
+    lines, point = _lines(compiled, trial, point)
+    given = {"params": dict(trial.params)} if trial.params else {}
+    with past(lines), happening():
+        compiled.system.dynamics(*point, **given)
+    return float(lines[made].arriving[0])
+
+
+def _lines(compiled: Compiled, trial: Trial, point: Any) -> tuple[dict[Any, DelayLine], Any]:
+    """Return what leaves transport delays and relays, and the point with the diagram's inputs."""
+    t, x, u = point
+    own = compiled.system.ninputs or 0
+    lines = {made: _line(np.array([v])) for made, v in trial.relays.items()}
     at = own
     for made in delayed_blocks(compiled.system) if compiled.schedule.lines else ():
         count = made.noutputs or 0
         values = u[at : at + count]
-        line = DelayLine(leaving=lambda t, values=values: values, arriving=np.full(count, np.nan))
-        lines[made], at = line, at + count
+        lines[made], at = _line(values), at + count
     return lines, (t, x, u[:own])
+
+
+def _line(values: np.ndarray) -> DelayLine:
+    return DelayLine(leaving=lambda t: values, arriving=np.full(values.size, np.nan))
 
 
 def _rounded(t: float, trial: Trial) -> float:
@@ -247,7 +321,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
     given = list(block_inputs(compiled.system, u[: compiled.system.ninputs or 0], outputs))
     for i in dict.fromkeys((*compiled.schedule.order, *range(len(nodes)))):
         node, (block, inputs) = nodes[i], given[i]
-        if is_delayed(block):
+        if is_delayed(block) or slides(block):
             continue
         own = slice(node.state_offset, node.state_offset + (block.nstates or 0))
         pairs = [(outputs[i], outputs_now, block.output_labels)]
@@ -264,19 +338,28 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
 
 def block_outputs(compiled: Compiled, p: np.ndarray, point: Any) -> np.ndarray:
     """Return the outputs of all blocks, from the generator that the run's program is from."""
+    return every_output(compiled, p)(point)
+
+
+def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], np.ndarray]:
+    """Return what computes the outputs of all blocks at a point."""
     nodes = compiled.schedule.nodes
     counts = [node.system.noutputs or 0 for node in nodes]
     every = tuple({Signal(i, k): 1.0} for i, count in enumerate(counts) for k in range(count))
     schedule = replace(compiled.schedule, outputs=every)
-    t, x, u = point
-    y = np.empty((len(every), 1))
     found = equations(schedule, compiled.program.layout, p)
     lowered = lower(schedule, compiled.program, 1, found)
     prepare, _, out = lowered_code(lowered)
     c = np.zeros((lowered.size, 1))
     prepare(np.ascontiguousarray(p[:, None]), c)
-    out(np.array([t]), x[:, None], u[:, None], c, y)
-    return y[:, 0]
+
+    def outputs(point: Any) -> np.ndarray:
+        t, x, u = point
+        y = np.empty((len(every), 1))
+        out(np.array([t]), x[:, None], u[:, None], c, y)
+        return y[:, 0]
+
+    return outputs
 
 
 def _difference(label: str, block: str, values: tuple[Any, Any], t: float) -> AuditError:

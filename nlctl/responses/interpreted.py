@@ -11,11 +11,13 @@ import control as ct
 import numpy as np
 from scipy.integrate import OdeSolver
 
+from ..blocks import SLIDES
 from ..delays.lines import delayed_blocks
 from ..diagrams import check_read, leaves
-from ..errors import DivergedError, ParameterError
+from ..errors import DivergedError, ParameterError, UsageError
 from ..names import unknown
 from ..sampling.system import Sampled
+from ..sliding.blocks import sliding_blocks
 from .arguments import RunArguments, evaluation_array, input_array, state_array
 from .delayed import Past, by_steps, with_delays
 from .sampled import from_sample_to_sample
@@ -44,6 +46,8 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     """
     system, times, params, solver = run.system, run.times, run.params, run.solver
     check_read(system, params)
+    for made in sliding_blocks(system):
+        raise UsageError(f"block '{made.name}' {SLIDES}")
     # a function that declares no numbers of inputs or states gets what it is given
     inputs = run.inputs if system.ninputs is None else input_array(system, run.inputs, times)
     whole = system.nstates is None and run.initial_state is not None

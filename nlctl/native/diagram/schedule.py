@@ -20,6 +20,7 @@ from ...blocks import is_delayed, within
 from ...delays.lines import delayed_blocks
 from ...diagrams import places, samplings
 from ...sampling.system import Happening, Sampled
+from ...sliding.blocks import sliding_blocks
 from ..thirdparty.captured import Captured, noted
 from ..thirdparty.checks import check_functions
 from .feedthrough import closer_feedthrough, feedthrough
@@ -185,6 +186,7 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
         for place, one, reading in zip(wiring.blocks, blocks, readings, strict=True)
     )
     delayed_blocks(system)  # whether each can be
+    sliding_blocks(system)
     lines = tuple(
         Signal(i, k)
         for i, node in enumerate(nodes)
