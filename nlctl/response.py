@@ -16,6 +16,7 @@ from .names import unknown
 from .params import checked_times
 from .responses.arguments import RunArguments, checked_params, unified, with_aliases
 from .responses.interpreted import SOLVE_IVP_METHODS, python_control_response
+from .sliding.blocks import sliding_blocks
 from .upstream.control_internals import is_system
 
 if TYPE_CHECKING:
@@ -224,7 +225,7 @@ def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
     try:
         return _native(run)
     except (CompileError, AlgebraicLoopError, AuditError) as error:
-        if engine != "auto" or not interpretable:
+        if engine != "auto" or not interpretable or sliding_blocks(run.system):
             raise
         warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=3)
     return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}))

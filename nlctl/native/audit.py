@@ -63,7 +63,7 @@ class Trial:
     meetings : tuple of frozenset
         What may happen to sampled blocks in that machine code.
     relays : mapping
-        What ideal relays output at a point, by block.
+        What ideal relays output at a point, by the number of their blocks.
     """
 
     time: np.ndarray
@@ -73,7 +73,7 @@ class Trial:
     params: Mapping[str, Any] | None
     width: int
     meetings: tuple[Happening, ...] = ()
-    relays: Mapping[Any, float] = field(default_factory=dict)
+    relays: Mapping[int, float] = field(default_factory=dict)
 
 
 def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
@@ -109,8 +109,8 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
         relays = any(slides(node.system) for node in compiled.schedule.nodes)
         outputs = every_output(compiled, trial.p) if relays else None
         for point in _points(trial):
-            known = _with_relays(compiled, trial, outputs, point) if outputs else trial
-            _compare(compiled, known, evaluated, point)
+            known = _relay_outputs(compiled, outputs(point)) if outputs else {}
+            _compare(compiled, replace(trial, relays=known), evaluated, point)
 
 
 def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
@@ -165,6 +165,7 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
                 f"python-control's own values of '{system.name}' differ from call to call at "
                 f"t = {point[0]:.6g} s: a block has a memory or draws random numbers"
             )
+    _compare_sliding(compiled, trial, point)
     if all(np.all(_close(a, b)) for a, b in zip(ours, theirs, strict=True)):
         return
     shaken = _shaken(compiled, point, trial, theirs)
@@ -199,74 +200,65 @@ def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> Values:
     return tuple(np.asarray(v, dtype=float).reshape(-1) for v in (rates, outputs, *after))
 
 
-def _with_relays(
-    compiled: Compiled, trial: Trial, outputs: Callable[[Any], np.ndarray], point: Any
-) -> Trial:
-    """Return a trial with what ideal relays output at a point, after a look at those that slide.
-
-    Python-control's right-hand side is compared with these outputs.  That they keep the relays'
-    inputs where they are is seen before, from its own rates.
-    """
-    nodes, found = compiled.schedule.nodes, outputs(point)
+def _relay_outputs(compiled: Compiled, found: np.ndarray) -> dict[int, float]:
+    """Return what ideal relays output, by the number of their blocks, of all blocks' outputs."""
+    nodes = compiled.schedule.nodes
     starts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
-    relays = [(node, float(found[k])) for node, k in zip(nodes, starts[:-1], strict=True)
-              if slides(node.system)]  # fmt: skip
-    trial = replace(trial, relays={node.system: v for node, v in relays})
-    for node, v in relays:
-        if point[1][node.state_offset] == 0 and np.isfinite(found).all():
-            _compare_sliding(compiled, trial, (node, v), point)
-    return trial
+    return {i: float(found[starts[i]]) for i, node in enumerate(nodes) if slides(node.system)}
 
 
-def _compare_sliding(
-    compiled: Compiled, trial: Trial, relay: tuple[Any, float], point: Any
-) -> None:
-    """Compare the rate of a sliding relay's input with the one that it is to have."""
-    node, v = relay
-    made = node.system
+def _compare_sliding(compiled: Compiled, trial: Trial, point: Any) -> None:
+    """Compare the rates of sliding relays' inputs with those that they are to have.
 
-    def moving(output: float) -> np.ndarray:
-        """Return the input's rate, behind the point, around it and before it."""
-        with_output = replace(trial, relays={**trial.relays, made: output})
-        return _rates_of_input(compiled, with_output, made, point)
+    Python-control's right-hand side is compared with the relays' outputs as machine code has them.
+    That these keep the inputs where they are is seen here, from python-control's own rates.
+    """
+    for i, v in trial.relays.items():
+        node = compiled.schedule.nodes[i]
+        spec = node.system.current_spec  # python-control has resolved the run's parameters by now
+        if point[1][node.state_offset] != 0:
+            continue
+        sides = [replace(trial, relays={**trial.relays, i: k * spec.height}) for k in (-1, 1)]
+        scale = sum(np.abs(_rates_of_input(compiled, each, i, point)).max() for each in sides)
+        wanted = -spec.rate * _arriving(compiled, trial, i, point)
+        now = _rates_of_input(compiled, trial, i, point)
+        if np.all(np.abs(now - wanted) > _DIFFERENCES * scale):  # at a kink one of them holds
+            raise AuditError(
+                f"while ideal relay '{node.path}' slides with an output of {v:.6g}, its input has "
+                f"the rate {wanted:.6g} in machine code and {now[1]:.6g} in python-control, by "
+                f"differences, at t = {point[0]:.6g} s; nothing was returned"
+            )
 
-    now = moving(v)
-    spec = made.current_spec  # python-control has resolved the run's parameters by now
-    scale = sum(np.abs(moving(side * spec.height)).max() for side in (-1.0, 1.0))
-    wanted = -spec.rate * float(_arriving(compiled, trial, made, point))
-    if np.all(np.abs(now - wanted) > _DIFFERENCES * scale):  # at a kink one of them may be right
-        raise AuditError(
-            f"while ideal relay '{node.path}' slides with an output of {v:.6g}, its input has the "
-            f"rate {wanted:.6g} in machine code and {now[1]:.6g} in python-control, by "
-            f"differences, at t = {point[0]:.6g} s; nothing was returned"
-        )
 
+def _rates_of_input(compiled: Compiled, trial: Trial, i: int, point: Any) -> np.ndarray:
+    """Return how fast a relay's input changes along python-control's own rates.
 
-def _rates_of_input(compiled: Compiled, trial: Trial, made: Any, point: Any) -> np.ndarray:
-    """Return how fast a relay's input changes along python-control's own rates."""
+    By differences before the point, around it and behind it.
+    """
     t, x, u = point
     rates = _by_python_control(compiled, point, trial)[0]
     rates[list(compiled.program.memory)] = 0.0  # they stand still within a step
     part = _APART * (1.0 + np.abs(x).max()) / (1.0 + np.abs(rates).max())
     ends = [(t + k * part, x + k * part * rates, u) for k in (-1, 0, 1)]
-    before, here, after = (_arriving(compiled, trial, made, end) for end in ends)
+    before, here, after = (_arriving(compiled, trial, i, end) for end in ends)
     return np.array([here - before, 0.5 * (after - before), after - here]) / part
 
 
-def _arriving(compiled: Compiled, trial: Trial, made: Any, point: Any) -> float:
+def _arriving(compiled: Compiled, trial: Trial, i: int, point: Any) -> float:
     """Return what python-control finds at the input of an ideal relay."""
     lines, point = _lines(compiled, trial, point)
     given = {"params": dict(trial.params)} if trial.params else {}
     with past(lines), happening():
         compiled.system.dynamics(*point, **given)
-    return float(lines[made].arriving[0])
+    return float(lines[compiled.schedule.nodes[i].system].arriving[0])
 
 
 def _lines(compiled: Compiled, trial: Trial, point: Any) -> tuple[dict[Any, DelayLine], Any]:
     """Return what leaves transport delays and relays, and the point with the diagram's inputs."""
     t, x, u = point
     own = compiled.system.ninputs or 0
-    lines = {made: _line(np.array([v])) for made, v in trial.relays.items()}
+    nodes = compiled.schedule.nodes
+    lines = {nodes[i].system: _line(np.array([v])) for i, v in trial.relays.items()}
     at = own
     for made in delayed_blocks(compiled.system) if compiled.schedule.lines else ():
         count = made.noutputs or 0

@@ -16,7 +16,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..blocks import Block
+from ..blocks import Block, slides
 from ..diagrams import override
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
@@ -29,6 +29,7 @@ from .diagram.schedule import Node, Schedule, Signal, schedule
 from .parameters import Slot, slots_of
 
 _OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
+_RATE = ("a", "b")  # of the rate a + b v of an ideal relay's input
 WORTH = 12  # parts from which an expression that is used twice gets a letter
 
 
@@ -116,7 +117,7 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
 
     def traced() -> tuple[dict[str, Any], dict[Expr, str]]:
         with np.errstate(all="ignore"), _local_names() as names:
-            found = {"x": reader.derivatives(0), "y": reader.outputs(0, ())}
+            found = {"x": reader.derivatives(0), "y": _outputs(reader, system)}
             if node.sampled and node.sampled.euler:
                 found["x"] = _euler(reader, node.sampled, slots, values)
         return found, names
@@ -138,6 +139,13 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
         where=tuple(_definitions(writer)),
         inputs=tuple(_connections(read, node)),
     )
+
+
+def _outputs(reader: Reader, system: Any) -> Tracer:
+    """Return the outputs; of an ideal relay with letters for a and b of its input's rate."""
+    if slides(system):
+        return reader.relay_output(0, leaf_vector(reader.graph, "u", 0, (1 + len(_RATE),)))
+    return reader.outputs(0, ())
 
 
 def _euler(reader: Reader, sampled: Any, slots: dict[str, Slot], values: bool) -> Tracer:
@@ -209,7 +217,8 @@ def _vector(names: list[str], at: int) -> tuple[Callable[[str], str], int]:
 
 def _symbols(system: Any, slots: Mapping[str, Slot]) -> Callable[[str, Index], str]:
     """Return what names a place in one of the arrays that a block reads."""
-    labels = {"x": _names(system.state_labels), "u": _names(system.input_labels)}
+    inputs = [*system.input_labels, *(_RATE if slides(system) else ())]
+    labels = {"x": _names(system.state_labels), "u": _names(inputs)}
     declared = declared_params(system.spec) if isinstance(system, Block) else {}
 
     def leaf(array: str, index: Index) -> str:

@@ -92,8 +92,7 @@ class IdealRelay:
     @equation
     def update(t: float, x: Any, u: Any, p: Any) -> Any:
         """The mode changes at events only."""
-        (mode,) = x
-        return (0.0 * mode,)
+        return (0.0,)
 
     @staticmethod
     @equation

@@ -14,6 +14,7 @@ from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 
 OUTPUTS = "v"  # the array of leaves that stand for the relays' outputs
+_LINEAR = ("add", "sub", "neg", "sum", "item", "slice", "concat")
 _SMOOTH = "smooth the jump over a small width, or give it hysteresis (nlctl.Relay)"
 
 
@@ -123,19 +124,7 @@ def replaced_parts(graph: Graph, exprs: Sequence[Expr], instead: Mapping[Expr, E
 def _rate(graph: Graph, relay: SlidingInput, motion: Motion) -> tuple[Expr, Expr]:
     """Return u' of a relay, and its derivative by the relay's output."""
     who = f"the ideal relay '{relay.name}'"
-    parts = needed([relay.given])
-    read = {e.data[0] for e in parts if e.op == "leaf"}
-    if OUTPUTS in read:
-        raise CompileError(
-            f"the input of {who} depends on the output of an ideal relay at the same instant, and "
-            f"jumps with it: put a state between them, or {_SMOOTH}"
-        )
-    if "u" in read:
-        raise CompileError(
-            f"the input of {who} depends on an input of the diagram or a delayed signal at the "
-            "same instant, whose rate is not known: put the signal into the diagram as a block "
-            f"(nlctl.SumOfSines, nlctl.FunctionReference) or a lag before it, or {_SMOOTH}"
-        )
+    _check_input(who, relay)
     states = graph.joined([(rate, 1) for rate in motion.rates]) if motion.rates else None
 
     def along(leaf: Expr) -> Expr | None:
@@ -157,18 +146,53 @@ def _rate(graph: Graph, relay: SlidingInput, motion: Motion) -> tuple[Expr, Expr
         )  # fmt: skip
     except Untraceable as error:
         raise CompileError(f"the input of {who} has no rate: {error}; {_SMOOTH}") from None
-    gain = gain or graph.const(0.0)
-    if relay.leaf in needed([gain]):
+    if not _is_affine(rate, relay.leaf):
         raise CompileError(
-            f"the output v of {who} does not enter the rate u' of its input as a + b v: what "
-            f"slides then depends on how the jump is made; {_SMOOTH}"
+            f"the output v of {who} does not enter the rate u' of its input as a + b v that can be "
+            f"read off: what slides depends on how the jump is made; {_SMOOTH}"
         )
-    if any(e.op == "solve" and relay.leaf in needed(e.args) for e in needed([rate])):
+    return rate, gain or graph.const(0.0)
+
+
+def _is_affine(expr: Expr, leaf: Expr) -> bool:
+    """Whether an expression is a + b v for all values, as it is written."""
+    depends: set[Expr] = {leaf}
+    for node in needed([expr]):
+        by = [arg in depends for arg in node.args]
+        if not any(by):
+            continue
+        linear = (
+            node.op in _LINEAR
+            or (node.op == "mul" and sum(by) == 1)
+            or (node.op == "div" and not by[1])
+            or (node.op == "select" and not by[0])
+        )
+        if not linear:
+            return False
+        depends.add(node)
+    return True
+
+
+def _check_input(who: str, relay: SlidingInput) -> None:
+    """Refuse a relay's input that jumps, or whose rate nobody knows."""
+    parts = needed([relay.given])
+    for call in (e for e in parts if e.op == "call"):
         raise CompileError(
-            f"the output of {who} is in an algebraic loop that is solved for: put a state into the "
-            f"loop, or {_SMOOTH}"
+            f"the input of {who} has no rate: {call.data[0]} is called as it stands, and has no "
+            f"derivative; {_SMOOTH}"
         )
-    return rate, gain
+    read = {e.data[0] for e in parts if e.op == "leaf"}
+    if OUTPUTS in read:
+        raise CompileError(
+            f"the input of {who} depends on the output of an ideal relay at the same instant, and "
+            f"jumps with it: put a state between them, or {_SMOOTH}"
+        )
+    if "u" in read:
+        raise CompileError(
+            f"the input of {who} depends on an input of the diagram or a delayed signal at the "
+            "same instant, whose rate is not known: put the signal into the diagram as a block "
+            f"(nlctl.SumOfSines, nlctl.FunctionReference) or a lag before it, or {_SMOOTH}"
+        )
 
 
 def _read(expr: Expr, leaves: Sequence[Expr]) -> set[Expr]:
