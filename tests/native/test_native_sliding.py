@@ -1,0 +1,360 @@
+"""Filippov's sliding motion of ideal relays, against closed forms and smaller and smaller hysteresis."""
+
+import control as ct
+import numpy as np
+import pytest
+from rows import each_row
+from scipy.interpolate import CubicSpline
+
+import nlctl
+from nlctl.native import AuditError, CompileError, Status
+
+TABLE = CubicSpline(np.linspace(-2, 2, 9), np.linspace(-2, 2, 9) ** 3)
+TIMES = np.linspace(0, 10, 201)
+FULLER = np.sqrt((np.sqrt(33) - 1) / 24)  # of its optimal switching curve x = -C x' |x'|
+
+
+def plant(update, output, states=1, inputs=("v",)):
+    return ct.nlsys(update, output, states=states, inputs=list(inputs), outputs=["u"], name="plant")
+
+
+def loop(update, output, states=1, *, relay=None, **more):
+    """A relay from the plant's output u to its input v, and what else is connected."""
+    inputs = ["v", *(label for block in more.values() for label in block.outputs)]
+    blocks = {"relay": relay or nlctl.IdealRelay(), "plant": plant(update, output, states, inputs)}
+    outputs = ["u", "v"]
+    return nlctl.interconnect(blocks | more, outputs=outputs)
+
+
+def first(t, x, u, p):
+    return x[0]
+
+
+def run(system, start, times=TIMES, **given):
+    x0 = {f"plant.x[{i}]": value for i, value in enumerate(start)}
+    return nlctl.input_output_response(system, times, 0, x0, **given)
+
+
+def of_plant(made):
+    return made.states[[label.startswith("plant") for label in made.state_labels]]
+
+
+@nlctl.record
+class StepAt:
+    """0, and 1 from a time on."""
+
+    time: float = nlctl.param(4.0, unit="s", meaning="time of the step")
+    inputs, outputs, states, feedthrough = (), ("r",), (), False
+
+    @staticmethod
+    @nlctl.equation
+    def output(t, x, u, p):
+        return (np.where(t >= p.time, 1.0, 0.0),)
+
+    @staticmethod
+    @nlctl.equation
+    def corners(t, x, u, p):
+        return (t - p.time,)
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
+@pytest.mark.parametrize("c", [-0.9, 0.0, 0.5])
+def test_what_comes_to_the_jump_stays_with_the_output_that_holds_it(c, method):
+    """x' = c - sign(x) from 1: at 0 after 1 / (1 - c), then v = c."""
+    system = loop(lambda t, x, u, p: p["c"] - u[0], first)
+    made = nlctl.input_output_response(
+        system, TIMES, 0, {"plant.x[0]": 1.0}, params={"c": c}, method=method
+    )
+    after = 1 / (1 - c)
+    x = np.maximum(1 - (1 - c) * TIMES, 0.0)
+    np.testing.assert_allclose(made.outputs[0], x, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(made.outputs[1], np.where(after > TIMES, 1.0, c), rtol=0, atol=1e-6)
+
+
+def sliding_mode(t, x, u, p):
+    return np.array([x[1], 0.7 * np.sin(3 * t) - u[0]])
+
+
+@pytest.mark.parametrize("settings", [{}, {"method": "rodas5p"}, {"rtol": 1e-5, "atol": 1e-7}])
+def test_a_sliding_mode_is_exponential_whatever_the_disturbance_is(settings):
+    """x'' = d - v with u = x + x': on u = 0 x' = -x, and the equivalent control is d + x'."""
+    system = loop(
+        sliding_mode, lambda t, x, u, p: x[0] + x[1], 2, relay=nlctl.IdealRelay(height=2.0)
+    )
+    made = run(system, [1.0, 0.0], **settings)
+    late = TIMES >= 3
+    t, (x, rate), (u, v) = TIMES[late], of_plant(made)[:, late], made.outputs[:, late]
+    rtol = settings.get("rtol", 1e-8)
+    np.testing.assert_allclose(u, 0, atol=10 * rtol)
+    np.testing.assert_allclose(x, x[0] * np.exp(-(t - t[0])), rtol=0, atol=10 * rtol)
+    np.testing.assert_allclose(v, 0.7 * np.sin(3 * t) + rate, rtol=0, atol=100 * rtol)
+    assert made.statistics.events <= 3
+
+
+def test_sliding_ends_where_the_output_would_have_to_be_beyond_the_height():
+    """x' = r t - v: at rest until r t = 1, then x = r (t - 1 / r)^2 / 2."""
+    r = 0.4
+    made = run(loop(lambda t, x, u, p: 0.4 * t - u[0], first), [0.0])
+    exact = np.where(1 / r < TIMES, r * (TIMES - 1 / r) ** 2 / 2, 0.0)
+    np.testing.assert_allclose(made.outputs[0], exact, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(made.outputs[1], np.minimum(r * TIMES, 1), rtol=0, atol=1e-7)
+
+
+def test_it_slides_and_leaves_again_and_again():
+    """x' = A sin(t) - v is play: it moves A (cos a - cos t) - (t - a) from where A sin(a) = 1."""
+    A, period = 1.5, 2 * np.pi
+    times = np.linspace(0, 3 * period, 601)
+    made = run(loop(lambda t, x, u, p: 1.5 * np.sin(t) - u[0], first), [0.0], times)
+    begin = np.arcsin(1 / A)
+    moved = np.maximum(A * (np.cos(begin) - np.cos(times)) - (times - begin), 0.0)
+    here = (times >= begin) & (times <= np.pi)
+    np.testing.assert_allclose(made.outputs[0, here], moved[here], rtol=0, atol=1e-6)
+    odd = made.outputs[0, :501] + made.outputs[0, 100:]  # half a period later the other way
+    np.testing.assert_allclose(odd, 0, atol=1e-5)
+    assert np.sum(np.abs(made.outputs[0]) < 1e-6) > 60
+
+
+def test_it_converges_with_the_order_of_the_method_where_it_slides():
+    """x' = y, u = y + sin(x): on u = 0 tan(x / 2) falls as exp(-t)."""
+    system = loop(
+        lambda t, x, u, p: np.array([x[1], 0.5 * np.cos(x[0]) - 3 * u[0]]),
+        lambda t, x, u, p: x[1] + np.sin(x[0]),
+        2,
+    )
+    exact = 2 * np.arctan(np.tan(0.5) * np.exp(-2.0))
+    steps = np.array([0.2, 0.1, 0.05])
+    errors = [
+        abs(of_plant(run(system, [1.0, -np.sin(1.0)], [0.0, 2.0], step=h))[0, -1] - exact)
+        for h in steps
+    ]
+    order = np.log2(np.array(errors[:-1]) / errors[1:])
+    np.testing.assert_allclose(order, 5.0, atol=0.6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_hysteresis_converges_to_it_with_its_width(seed):
+    """Planar systems x' = A x + d - b v, u = c x with c b > 0, at random: apart by O(width)."""
+    rng = np.random.default_rng(seed)
+    A, d = rng.normal(size=(2, 2)) - np.eye(2), 0.2 * rng.normal(size=2)
+    c = rng.normal(size=2)
+    b = c / (c @ c) + 0.5 * rng.normal() * np.array([-c[1], c[0]])
+    system = ct.ss(A, np.column_stack([-b, d]), c[None, :], 0, inputs=["v", "one"], outputs=["u"])
+    one = ct.nlsys(None, lambda t, x, u, p: 1.0, inputs=0, outputs=["one"], name="one")
+    times = np.linspace(0, 3, 31)
+
+    def path(relay):
+        made = nlctl.interconnect({"relay": relay, "plant": system, "one": one}, outputs=["u"])
+        return of_plant(run(made, [1.0, -0.5], times))
+
+    ideal = path(nlctl.IdealRelay(height=2.0))
+    sizes = np.array([1e-2, 1e-3])
+    apart = [np.abs(path(nlctl.Relay(on=h, off=-h, height=2.0)) - ideal).max() for h in sizes]
+    assert np.all(np.array(apart) <= 10 * sizes * np.linalg.norm(b))
+    assert apart[1] < apart[0] / 4
+
+
+def test_friction_on_a_belt_is_that_of_stick_and_slip():
+    """x'' = -x - F(x' - belt): it sticks up to the force F, then slips, and sticks for good."""
+
+    def moved(t, x, u, p):
+        return np.array([x[1], -x[0] - u[0]])
+
+    slides = run(
+        loop(moved, lambda t, x, u, p: x[1] - 0.3, 2, relay=nlctl.IdealRelay(height=1.0)),
+        [0.0, 0.0],
+    )
+    body = ct.nlsys(
+        lambda t, x, u, p: np.array([x[1], -x[0] - u[0]]),
+        lambda t, x, u, p: np.array([x[1] - 0.3, -x[0]]),
+        states=2, inputs=["force"], outputs=["velocity", "applied"], name="plant",
+    )  # fmt: skip
+    friction = nlctl.StickSlip(F_c=1.0, F_s=1.0, sigma_2=0.0, v0=-1.0)
+    sticks = run(nlctl.interconnect({"friction": friction, "plant": body}), [0.0, 0.0])
+    np.testing.assert_allclose(of_plant(slides), of_plant(sticks), rtol=0, atol=1e-6)
+    assert np.sum(np.abs(slides.outputs[0]) < 1e-7) > 10  # it has stuck for a while
+
+
+def test_fullers_problem_ends_as_chattering():
+    """Relative degree two on a curve that it reaches by ever shorter arcs; closed-form end."""
+    system = loop(
+        lambda t, x, u, p: np.array([x[1], -u[0]]),
+        lambda t, x, u, p: x[0] + FULLER * x[1] * abs(x[1]),
+        2,
+    )
+    made = run(system, [1.0, 0.0], ignore_errors=True)
+    start = np.sqrt(2 / (1 + 2 * FULLER))
+    ratio = np.sqrt((1 - 2 * FULLER) / (1 + 2 * FULLER))
+    assert made.statistics.status is Status.CHATTERING
+    end = start + start * (1 + ratio) / (1 - ratio)
+    assert made.statistics.time == pytest.approx(end, abs=1e-3)
+    assert "'mode' of block 'relay' jumps between -1 and 1" in made.message
+
+
+def test_with_relative_degree_two_it_switches():
+    """x'' = -sign(x): parabolas |x| + x'^2 / 2 = 1."""
+    made = run(loop(lambda t, x, u, p: np.array([x[1], -u[0]]), first, 2), [1.0, 0.0])
+    x, rate = of_plant(made)
+    np.testing.assert_allclose(np.abs(x) + rate**2 / 2, 1, rtol=0, atol=1e-5)
+    assert made.statistics.events >= 4
+
+
+class TestJumps:
+    """u = x - r with a step of r while it slides: x goes after it at 1 + 1/2."""
+
+    exact = np.where(TIMES < 4, np.maximum(1 - TIMES / 2, 0), np.minimum(1.5 * (TIMES - 4), 1))
+
+    def test_a_reference_that_jumps_ends_the_sliding(self):
+        system = loop(lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0] - u[1], step=StepAt())
+        np.testing.assert_allclose(of_plant(run(system, [1.0]))[0], self.exact, rtol=0, atol=1e-6)
+
+    def test_so_does_a_held_signal(self):
+        """Sampled every second, from the diagram's input."""
+        gain = nlctl.block(nlctl.Saturation(limit=9.0), "hold")
+        hold = nlctl.sampled(gain, 1.0)
+        hold = hold.copy(name="hold")
+        blocks = {
+            "hold": hold,
+            "relay": nlctl.IdealRelay(),
+            "plant": plant(
+                lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0] - u[1], 1, ("v", "r")
+            ),
+        }
+        system = ct.interconnect(
+            [nlctl.diagrams.connecting.as_system(one, name) for name, one in blocks.items()],
+            connections=[["relay.u", "plant.u"], ["plant.v", "relay.v"], ["plant.r", "hold.v"]],
+            inplist=["hold.u"], inputs=["u"], outlist=["plant.u"], outputs=["e"],
+        )  # fmt: skip
+        made = nlctl.input_output_response(
+            system, TIMES, np.where(TIMES > 3.5, 1.0, 0.0), {"plant.x[0]": 1.0}
+        )
+        np.testing.assert_allclose(of_plant(made)[0], self.exact, rtol=0, atol=1e-6)
+
+
+def cascade(coupling):
+    """Two integrators with a relay each; the second relay acts on the first one, too."""
+
+    def update(t, x, u, p):
+        return np.array([0.3 - u[0] - 0.4 * u[1], 0.2 * np.cos(t) - u[1]])
+
+    def both(t, x, u, p):
+        return np.array([0.3 - u[0] - 0.4 * u[1], 0.2 * np.cos(t) - u[1] - 0.1 * u[0]])
+
+    names = {"inputs": ["v1", "v2"], "outputs": ["u1", "u2"], "name": "plant", "states": 2}
+    middle = ct.nlsys(both if coupling else update, lambda t, x, u, p: x, **names)
+    relays = [nlctl.block(nlctl.IdealRelay(), name) for name in ("r1", "r2")]
+    wires = [[f"r{k}.u", f"plant.u{k}"] for k in (1, 2)] + [
+        [f"plant.v{k}", f"r{k}.v"] for k in (1, 2)
+    ]
+    return ct.interconnect(
+        [*relays, middle], connections=wires, inplist=[], outlist=["r1.v", "r2.v"],
+        outputs=["v1", "v2"],
+    )  # fmt: skip
+
+
+def test_two_relays_slide_at_once_where_one_acts_on_the_other():
+    """v2 = 0.2 cos t and v1 = 0.3 - 0.4 v2."""
+    v1, v2 = run(cascade(False), [1.0, -1.5]).outputs[:, TIMES > 5]
+    t = TIMES[TIMES > 5]
+    np.testing.assert_allclose(v2, 0.2 * np.cos(t), rtol=0, atol=1e-7)
+    np.testing.assert_allclose(v1, 0.3 - 0.08 * np.cos(t), rtol=0, atol=1e-7)
+
+
+def test_two_that_act_on_each_other_are_refused():
+    with pytest.raises(CompileError, match="relays 'r1', 'r2' act on the rates of each other's"):
+        nlctl.compile(cascade(True))
+
+
+@each_row(
+    ("update", "output", "told"),
+    [
+        (lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0] + u[0], "jumps with it"),
+        (lambda t, x, u, p: 0.5 - u[0] ** 3, first, "does not enter the rate u' .* as a + b v"),
+        (lambda t, x, u, p: 0.5 - np.floor(u[0]), first, "does not enter the rate"),
+        (lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: TABLE(x[0]), "is called as it stands"),
+        (lambda t, x, u, p: TABLE(x[0]) - u[0], first, "has no rate"),
+    ],
+)  # fmt: skip
+def test_what_has_no_rate_is_refused(update, output, told):
+    """At once, with advice, and without another engine taking over."""
+    with pytest.raises(
+        CompileError, match=rf"ideal relay 'relay' .*{told}.*nlctl\.Relay"
+    ) as caught:
+        run(loop(update, output), [1.0])
+    assert "hysteresis" in str(caught.value)
+
+
+def test_an_input_of_unknown_rate_is_refused():
+    """A signal from outside, and a delayed one; behind a lag both are taken."""
+    follows = plant(lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0] - u[1], 1, ("v", "r"))
+    relay = nlctl.IdealRelay()
+    with pytest.raises(CompileError, match="an input of the diagram or a delayed signal"):
+        nlctl.compile(nlctl.interconnect({"relay": relay, "plant": follows}, inputs=["r"]))
+    delay = nlctl.TransportDelay(inputs=("w",), outputs=("r",), delay=0.1)
+    with pytest.raises(CompileError, match="an input of the diagram or a delayed signal"):
+        nlctl.compile(
+            nlctl.interconnect({"relay": relay, "plant": follows, "delay": delay}, inputs=["w"])
+        )
+    lag = ct.ss(-1, 1, 1, 0, inputs=["w"], outputs=["r"], name="lag")
+    system = nlctl.interconnect({"relay": relay, "plant": follows, "lag": lag}, inputs=["w"])
+    made = nlctl.input_output_response(system, TIMES, 1.0, 0)
+    np.testing.assert_allclose(of_plant(made)[0], 1 - np.exp(-TIMES), rtol=0, atol=1e-6)
+
+
+def test_python_control_does_not_run_it_wrongly():
+    """No engine of its own may switch where nobody looks."""
+    system = loop(lambda t, x, u, p: 0.5 - u[0], first)
+    for asked in (
+        lambda: nlctl.input_output_response(system, TIMES, 0, 0, engine="python-control"),
+        lambda: ct.input_output_response(system, TIMES, 0),
+        lambda: ct.linearize(system, [0.0, 0.0], []),
+    ):
+        with pytest.raises(nlctl.errors.UsageError, match="'relay' is an ideal relay.*nlctl.Relay"):
+            asked()
+
+
+def test_a_relay_that_is_sampled_or_stands_twice_is_refused():
+    with pytest.raises(nlctl.ParameterError, match="has a memory, 'mode'"):
+        nlctl.sampled(nlctl.block(nlctl.IdealRelay(), "relay"), 0.1, method="euler")
+
+
+@nlctl.record
+class Wrong(nlctl.IdealRelay):
+    """An ideal relay that does not keep its input where it is."""
+
+    @staticmethod
+    @nlctl.equation
+    def output(t, x, u, p):
+        return (np.where(x[0] == 0, 0.1 - u[1] / u[2], p.height * x[0]),)
+
+
+def test_the_audit_sees_an_output_that_does_not_hold():
+    """Against python-control's own rates."""
+    system = loop(lambda t, x, u, p: 0.5 - u[0], first, relay=Wrong())
+    with pytest.raises(AuditError, match="while ideal relay 'relay' slides with an output of 0.6"):
+        run(system, [0.0], [0.0, 1e-7])
+
+
+def test_the_linearization_where_it_slides_is_that_of_the_sliding_motion():
+    """Of x'' = -v with u = c x + x': eigenvalues -c, the relay's rate, and 0 of its mode."""
+    system = loop(
+        lambda t, x, u, p: np.array([x[1], -u[0]]), lambda t, x, u, p: 2 * x[0] + x[1], 2,
+        relay=nlctl.IdealRelay(rate=5.0), more=nlctl.FilteredStep(order=0),
+    )  # fmt: skip
+    found = nlctl.compile(system).linearize(np.zeros(system.nstates)).A
+    assert {-2.0, -5.0, 0.0} <= set(np.linalg.eigvals(found).round(9).real)
+
+
+def test_members_of_an_ensemble_slide_as_they_do_alone():
+    """x' = 1/2 - v from 1 for nine heights: those above 1/2 come to rest."""
+    compiled = nlctl.compile(loop(lambda t, x, u, p: 0.5 - u[0], first))
+    heights, start = np.linspace(0.2, 2.0, 10), {"plant.x[0]": 1.0}
+    together = nlctl.ensemble_response(compiled, TIMES, 0, start, params={"relay.height": heights})
+    u = np.array([together[k].outputs[0] for k in range(10)])
+    exact = 1 + np.multiply.outer(0.5 - heights, TIMES)
+    exact = np.where(heights[:, None] > 0.5, np.maximum(exact, 0), exact)
+    np.testing.assert_allclose(u, exact, rtol=0, atol=1e-6)
+    for k in (0, 9):
+        alone = nlctl.input_output_response(
+            compiled, TIMES, 0, start, params={"relay.height": heights[k]}
+        )
+        np.testing.assert_allclose(u[k], alone.outputs[0], rtol=1e-12, atol=1e-12)
