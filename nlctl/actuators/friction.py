@@ -41,8 +41,8 @@ class Coulomb:
         force = F_c sign(velocity) + sigma_2 velocity
 
     A force law for velocities that keep their sign, or change it.  It does not hold a mass at
-    rest: there the sign chatters, and a run ends at the limit of its steps; `StickSlip` and `LuGre`
-    stick.
+    rest: there the sign chatters, and a run ends as that; `StickSlip` and `LuGre` stick, and so
+    does `nlctl.IdealRelay` in the place of the sign.
 
     Examples
     --------

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...blocks import slides
 from ...upstream.control_internals import rates_now, set_parameters
 from ..audit import block_outputs
 from ..codegen.program import count_switching_functions, memory
@@ -40,9 +41,11 @@ def chattering_words(
     jump : Jump
         Where the run chatters.
     """
+    relays = any(slides(node.system) for node in compiled.schedule.nodes)
     advice = (
         "the run comes back to it with each of the shortest steps: smooth the jump over a small "
         "width, give it hysteresis, or sample the controller (nlctl.sampled)"
+        + ("" if relays else "; a sign slides as a block of its own, nlctl.IdealRelay")
     )
     found = _committed(compiled, p, jump) or _changed(compiled, p, params, jump)
     return f"{found}; {advice}"
