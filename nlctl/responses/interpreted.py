@@ -43,11 +43,12 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
         If the state becomes infinite or NaN.
     ParameterError
         If inputs, initial state or times are refused.
+    UsageError
+        If a block is an ideal relay, which it would run wrongly.
     """
     system, times, params, solver = run.system, run.times, run.params, run.solver
     check_read(system, params)
-    for made in sliding_blocks(system):
-        raise UsageError(f"block '{made.name}' {SLIDES}")
+    _refuse_sliding(system)
     # a function that declares no numbers of inputs or states gets what it is given
     inputs = run.inputs if system.ninputs is None else input_array(system, run.inputs, times)
     whole = system.nstates is None and run.initial_state is not None
@@ -87,6 +88,11 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     if not np.all(np.isfinite(response.y)):
         raise _diverged(system, watch.reached)
     return as_response(response)
+
+
+def _refuse_sliding(system: Any) -> None:
+    for made in sliding_blocks(system):
+        raise UsageError(f"block '{made.name}' {SLIDES}")
 
 
 def _between(simulate: Any, system: Any) -> Any:

@@ -46,10 +46,9 @@ class IdealRelay:
 
     a and b are those of the whole diagram, by exact derivatives of its equations.  Where
     a + b height < 0 < a - b height at u = 0, no solution in the usual sense goes on; Filippov's
-    goes along u = 0, with the one v of [-height, height] that keeps u' = 0 (Filippov,
-    Differential Equations with Discontinuous Righthand Sides, 1988, section 4; where v enters as
-    here, it is the equivalent control of Utkin, Sliding Modes in Control and Optimization, 1992,
-    section 2).  It ends where |v| reaches the height.  Entry and end are located as events.
+    goes along u = 0, with the one v of [-height, height] that keeps u' = 0: what Utkin calls the
+    equivalent control (the books of both were not read; of a hysteresis whose width tends to 0 it
+    is the mean output).  It ends where |v| reaches the height.  Entry and end are events.
 
     What is left of u where the entry is located, and by rounding, decays with `rate` while it
     slides.  Beyond `rest` it slides no longer: something else has made u jump.
