@@ -28,11 +28,10 @@ def relay_mode(u, mode, p):
     """1 or -1 on a side; 0 while it slides, that is where u' leads back from both sides."""
     above, below = rates_beside(u, p)
     kept = kept_mode(mode)
-    side = np.where(u[0] == 0, kept, np.sign(u[0]))
-    one_way = np.where(
-        (above > 0) & (below >= 0), 1.0, np.where((above <= 0) & (below < 0), -1.0, side)
-    )
-    crossing = np.where((above < 0) & (below > 0), 0.0 * above, one_way + 0.0 * (above + below))
+    here = np.where(u[0] == 0, kept, np.sign(u[0]))  # both lead away from u = 0: it goes on
+    down = np.where((above <= 0) & (below < 0), -1.0, here)
+    through = np.where((above > 0) & (below >= 0), 1.0, down)
+    crossing = np.where((above < 0) & (below > 0), 0.0, through) + 0.0 * (above + below)
     near = np.where(kept * u[0] > 0, kept, crossing)
     return np.where(np.abs(u[0]) > p.rest, np.sign(u[0]), near + 0.0 * u[0])
 

@@ -317,8 +317,65 @@ def test_python_control_does_not_run_it_wrongly():
 
 
 def test_a_relay_that_is_sampled_or_stands_twice_is_refused():
+    relay = nlctl.block(nlctl.IdealRelay(), "relay")
     with pytest.raises(nlctl.ParameterError, match="has a memory, 'mode'"):
-        nlctl.sampled(nlctl.block(nlctl.IdealRelay(), "relay"), 0.1, method="euler")
+        nlctl.sampled(relay, 0.1, method="euler")
+    ends = {"inplist": ["relay.u"], "outlist": ["relay.v"], "check_unused": False}
+    inner = ct.interconnect([relay], name="inner", **ends)
+    twice = ct.interconnect([relay, inner], name="outer", **ends)
+    with pytest.raises(nlctl.DiagramError, match="stands in 'outer' twice"):
+        nlctl.compile(twice)
+
+
+def test_a_delayed_signal_may_reach_the_rate():
+    """x' = w(t - 1) - v with w = sin(t) / 2, and 0 before: v = sin(t - 1) / 2 from t = 1 on."""
+    wave = ct.nlsys(None, lambda t, x, u, p: 0.5 * np.sin(t), inputs=0, outputs=["w"], name="wave")
+    delay = nlctl.TransportDelay(inputs=("w",), outputs=("late",), delay=1.0)
+    follows = plant(lambda t, x, u, p: u[1] - u[0], first, 1, ("v", "late"))
+    blocks = {"wave": wave, "delay": delay, "relay": nlctl.IdealRelay(), "plant": follows}
+    made = run(nlctl.interconnect(blocks, outputs=["u", "v"]), [0.0])
+    exact = np.where(TIMES > 1, 0.5 * np.sin(TIMES - 1), 0.0)
+    np.testing.assert_allclose(made.outputs[0], 0, atol=1e-7)
+    np.testing.assert_allclose(made.outputs[1], exact, rtol=0, atol=1e-6)
+
+
+def looped(law):
+    """x' = 1/2 - v + w / 10 with w solved for in a loop: w = law(w, u, v)."""
+    static = ct.nlsys(None, law, inputs=["w", "u", "v"], outputs=["w"], name="static")
+    middle = plant(lambda t, x, u, p: 0.5 - u[0] + 0.1 * u[1], first, 1, ("v", "w"))
+    blocks = {"relay": nlctl.IdealRelay(), "plant": middle, "static": static}
+    return nlctl.compile(
+        nlctl.interconnect(blocks, outputs=["u", "v", "w"]), algebraic_loops="solve"
+    )
+
+
+def test_an_algebraic_loop_beside_it_is_solved_and_one_through_it_refused():
+    """w = tanh(w + x + 1) / 2; on x = 0 v = 1/2 + w / 10."""
+    made = run(looped(lambda t, x, u, p: 0.5 * np.tanh(u[0] + u[1] + 1)), [1.0])
+    u, v, w = made.outputs[:, -1]
+    assert abs(u) < 1e-8
+    assert w == pytest.approx(0.5 * np.tanh(w + u + 1), abs=1e-12)
+    assert v == pytest.approx(0.5 + 0.1 * w, abs=1e-7)
+    with pytest.raises(CompileError, match="in an algebraic loop"):
+        looped(lambda t, x, u, p: 0.5 * np.tanh(u[0] + u[2] + 1))
+
+
+def test_where_both_sides_lead_away_it_goes_on():
+    """x' = 1/4 + sign(x): up from above 0, down from below."""
+    system = loop(lambda t, x, u, p: 0.25 + u[0], first)
+    for start in (1e-3, -1e-3):
+        x = of_plant(run(system, [start], [0.0, 1.0]))[0, -1]
+        assert x == pytest.approx(start + 0.25 + np.sign(start), abs=1e-9)
+
+
+def test_nan_travels():
+    """Through every equation: an undefined rate or input is no side, and no sliding."""
+    spec, p = nlctl.IdealRelay(), nlctl.params.equation_arguments(nlctl.IdealRelay())
+    for i in range(3):
+        u = np.where(np.arange(3) == i, np.nan, [0.0, 0.2, -1.0])
+        assert np.isnan(spec.commit(0.0, (1.0,), u, p)).all()
+        assert np.isnan(spec.output(0.0, (0.0,), u, p)).all()
+    assert np.isnan(spec.output(0.0, (np.nan,), (0.0, 0.2, -1.0), p)).all()
 
 
 @nlctl.record

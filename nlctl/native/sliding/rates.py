@@ -13,7 +13,7 @@ from ...errors import CompileError
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 
-OUTPUTS = "v"  # the array of leaves that stand for the relays' outputs
+OUTPUTS = "relays"  # the array of leaves that stand for the relays' outputs
 _LINEAR = ("add", "sub", "neg", "sum", "item", "slice", "concat")
 _SMOOTH = "smooth the jump over a small width, or give it hysteresis (nlctl.Relay)"
 
@@ -146,6 +146,11 @@ def _rate(graph: Graph, relay: SlidingInput, motion: Motion) -> tuple[Expr, Expr
         )  # fmt: skip
     except Untraceable as error:
         raise CompileError(f"the input of {who} has no rate: {error}; {_SMOOTH}") from None
+    if any(e.op == "solve" and _reads(e, OUTPUTS) for e in needed([rate])):
+        raise CompileError(
+            f"the input of {who} has a rate in which the output of an ideal relay is in an "
+            f"algebraic loop: put a state into the loop, or {_SMOOTH}"
+        )
     if not _is_affine(rate, relay.leaf):
         raise CompileError(
             f"the output v of {who} does not enter the rate u' of its input as a + b v that can be "
@@ -181,18 +186,21 @@ def _check_input(who: str, relay: SlidingInput) -> None:
             f"the input of {who} has no rate: {call.data[0]} is called as it stands, and has no "
             f"derivative; {_SMOOTH}"
         )
-    read = {e.data[0] for e in parts if e.op == "leaf"}
-    if OUTPUTS in read:
+    if _reads(relay.given, OUTPUTS):
         raise CompileError(
             f"the input of {who} depends on the output of an ideal relay at the same instant, and "
             f"jumps with it: put a state between them, or {_SMOOTH}"
         )
-    if "u" in read:
+    if _reads(relay.given, "u"):
         raise CompileError(
             f"the input of {who} depends on an input of the diagram or a delayed signal at the "
             "same instant, whose rate is not known: put the signal into the diagram as a block "
             f"(nlctl.SumOfSines, nlctl.FunctionReference) or a lag before it, or {_SMOOTH}"
         )
+
+
+def _reads(expr: Expr, array: str) -> bool:
+    return any(e.op == "leaf" and e.data[0] == array for e in needed([expr]))
 
 
 def _read(expr: Expr, leaves: Sequence[Expr]) -> set[Expr]:
