@@ -155,6 +155,38 @@ def test_a_hysteresis_converges_to_it_with_its_width(seed):
     assert apart[1] < apart[0] / 4
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_what_holds_of_every_relay(order):
+    """Random linear plants and disturbances, u held to and pushed off 0: what v and u may be."""
+    wave = ct.nlsys(
+        None, lambda t, x, u, p: np.sin(p["f"] * t), inputs=0, outputs=["w"], name="wave",
+        params={"f": 1.0},
+    )  # fmt: skip
+    slid = 0
+    for seed in range(8):
+        rng = np.random.default_rng([order, seed])
+        A = rng.normal(size=(order, order)) - 0.8 * np.eye(order)
+        b, c, d = rng.normal(size=(3, order))
+        b *= np.sign(c @ b) if seed % 4 else 1.0
+        system = ct.ss(
+            A, np.column_stack([-b, d]), c[None, :], 0, inputs=["v", "w"], outputs=["u"],
+            name="plant",
+        )  # fmt: skip
+        made = nlctl.interconnect(
+            {"relay": nlctl.IdealRelay(), "wave": wave, "plant": system}, outputs=["u", "v"]
+        )
+        method = ("tsit5", "rodas5p", "auto")[seed % 3]
+        found = run(made, rng.normal(size=order), params={"f": rng.uniform(0.5, 4)}, method=method)
+        mode, (u, v) = found.states[0], found.outputs
+        slid += np.sum(mode == 0)
+        assert np.all(np.abs(v) <= 1 + 1e-6)
+        assert np.all(v[mode != 0] == mode[mode != 0])
+        assert np.all(np.abs(u[mode == 0]) <= 1e-6)
+        assert np.all(mode * u >= -1e-7)
+    assert slid > 50
+
+
 def test_friction_on_a_belt_is_that_of_stick_and_slip():
     """x'' = -x - F(x' - belt): it sticks up to the force F, then slips, and sticks for good."""
 
