@@ -1,4 +1,4 @@
 """Sliding motion of ideal relays: what a diagram gives the rates of their inputs.
 
-`rates` derives these from a diagram's expressions.
+`reading` reads a diagram for them, `rates` derives them from its expressions.
 """

@@ -39,12 +39,12 @@ class SlidingInput:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """How a diagram moves: its derivatives, row by row, and what is kept within a step.
+    """How a diagram moves within a step.
 
     Attributes
     ----------
     rates : sequence of Expr
-        One for each state.
+        The derivative of each state; of memories 0.
     solutions : mapping
         As `fixed_points` of `nlctl.expressions.derivatives.tangents`.
     """
@@ -85,14 +85,11 @@ def sliding_rates(
     """
     rates = [_rate(graph, relay, motion) for relay in relays]
     leaves = [relay.leaf for relay in relays]
+    read = [set(leaves).intersection(needed([rate])) for rate, _ in rates]
     made: dict[int, SlidingRate] = {}
     while len(made) < len(relays):
         known = {leaves[i]: one.output for i, one in made.items()}
-        ready = [
-            i
-            for i, (rate, _) in enumerate(rates)
-            if i not in made and _read(rate, leaves) <= {leaves[i], *known}
-        ]
+        ready = [i for i in range(len(relays)) if i not in made and read[i] <= {leaves[i], *known}]
         if not ready:
             names = ", ".join(f"'{r.name}'" for i, r in enumerate(relays) if i not in made)
             raise CompileError(
@@ -116,7 +113,8 @@ def replaced_parts(graph: Graph, exprs: Sequence[Expr], instead: Mapping[Expr, E
             new[node] = instead[node]
         elif args != node.args:
             new[node] = graph.node(
-                node.op, *args, data=node.data, size=node.size, kind=node.kind, value=node.value,
+                node.op, *args, data=node.data, size=node.size, kind=node.kind,
+                varies=node.varies, value=node.value,
             )  # fmt: skip
     return [new.get(e, e) for e in exprs]
 
@@ -201,7 +199,3 @@ def _check_input(who: str, relay: SlidingInput) -> None:
 
 def _reads(expr: Expr, array: str) -> bool:
     return any(e.op == "leaf" and e.data[0] == array for e in needed([expr]))
-
-
-def _read(expr: Expr, leaves: Sequence[Expr]) -> set[Expr]:
-    return set(needed([expr])) & set(leaves)
