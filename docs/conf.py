@@ -45,7 +45,7 @@ suppress_warnings = ["config.cache"]  # functions among sphinx-gallery's setting
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"nlctl {version}"
-html_static_path = ["_static"]
+html_static_path = ["_static", "../analysis/report/fonts"]  # the reports' font for formulas
 html_css_files = ["site.css"]
 html_js_files = ["site.js"]
 html_show_sourcelink = False
