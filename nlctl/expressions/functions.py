@@ -139,6 +139,8 @@ _ROWS = (
     _row("power", "pow", r"{0}^{{{1}}}",
          lambda x, y: y * np.power(x, y - 1.0), lambda x, y: np.log(x) * np.power(x, y),
          math="pow"),
+    _row("heaviside", "own", r"\operatorname{{H}}_{{{1}}}\left({0}\right)",
+         _zero, lambda x, y: np.where(x == 0.0, 1.0, 0.0), math="-"),
     _row("logaddexp", "own", r"\ln\left(e^{{{0}}} + e^{{{1}}}\right)",
          lambda x, y: np.exp(x - np.logaddexp(x, y)), lambda x, y: np.exp(y - np.logaddexp(x, y)),
          math="-"),

@@ -289,6 +289,14 @@ def _sign(b: Body, x: Value) -> Value:
     return b.select(b.compare("ogt", x, 0.0), 1.0, below)
 
 
+def _heaviside(b: Body, x: Value, y: Value) -> Value:
+    """0 or 1, at 0 the second; NaN for NaN."""
+    x, y = b.same(x, y)
+    here = b.select(b.compare("oeq", x, 0.0), y, x)
+    below = b.select(b.compare("olt", x, 0.0), 0.0, here)
+    return b.select(b.compare("ogt", x, 0.0), 1.0, below)
+
+
 def _remainder(b: Body, x: Value, y: Value) -> Value:
     """NumPy's: it has the sign of the divisor, as Python's ``%``."""
     x, y = b.same(x, y)
@@ -314,5 +322,6 @@ INLINE = {
     "maximum": _extreme("ogt"),
     "logaddexp": _logaddexp,
     "sign": _sign,
+    "heaviside": _heaviside,
     "remainder": _remainder,
 }
