@@ -134,7 +134,7 @@ def input_output_response(
         Machine code: by default the first run of a program is compared with python-control's own
         right-hand side and outputs at some points of the run; with False none is, with
         "every run" each.
-    **aliases
+    **aliases : object
         python-control's short names: ``T``, ``U``, ``X0``, ``t_eval``, ``return_x``.
 
     Returns

@@ -152,12 +152,13 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
         A loop, or what `examine` found.
     run : float, control.TimeResponseData or sequence of them, optional
         Horizon (s), or responses of the loop.
-    **settings
+    **settings : object
         box, W, k, start, params, step, max_steps: as for `examine`.
 
     Returns
     -------
     Ledger
+        One line for each assumption and inequality, with its margin.
 
     Raises
     ------

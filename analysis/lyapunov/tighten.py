@@ -156,11 +156,14 @@ def tighten(
     Returns
     -------
     Tightened
+        The best gains with their bound, and all trials.
 
     Raises
     ------
     ParameterError
         If no gains that were looked at keep the limit, or it is not positive.
+    UnknownNameError
+        If there is no such `bound`.
 
     Examples
     --------

@@ -88,7 +88,9 @@ def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Re
     Parameters
     ----------
     folder : Path
+        Where `run` has kept its results.
     row : int
+        Number of the row, from 0.
     part : str, optional
         Key of an analysis that keeps rows of its own; by default the main table.
     trust : bool, optional

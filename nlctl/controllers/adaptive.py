@@ -88,6 +88,7 @@ def adaptive_neural(
     Returns
     -------
     control.InterconnectedSystem
+        The controller, in the place of one block.
 
     Raises
     ------

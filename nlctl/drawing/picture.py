@@ -78,6 +78,7 @@ def signal_graph(diagram: ct.InterconnectedSystem) -> tuple[tuple[_Block, ...], 
     Parameters
     ----------
     diagram : control.InterconnectedSystem
+        As in `draw`.
 
     Returns
     -------
@@ -158,6 +159,7 @@ def lay_out(diagram: ct.InterconnectedSystem) -> Layout:
     Parameters
     ----------
     diagram : control.InterconnectedSystem
+        As in `draw`.
 
     Returns
     -------
@@ -200,6 +202,7 @@ def draw(
         Any diagram made with `nlctl.interconnect`, `control.interconnect`, `control.feedback`
         of nonlinear systems, ...
     title : str, optional
+        Above the drawing; none by default.
     expand : bool, optional
         Show what is inside nested diagrams, each in a panel of its own below.
 

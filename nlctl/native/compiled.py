@@ -277,6 +277,7 @@ def compile(  # noqa: A001 (what it does)
     Returns
     -------
     Compiled
+        For `nlctl.input_output_response` and `nlctl.ensemble_response`, in place of `system`.
 
     Raises
     ------
@@ -285,6 +286,8 @@ def compile(  # noqa: A001 (what it does)
     CompileError
         If a block is of a wrong kind or size, a function depends on more than its arguments, or
         an algebraic loop goes through a function that has no expressions.
+    UnknownNameError
+        If there is no such choice for `algebraic_loops`, or no such parameter.
 
     Notes
     -----

@@ -149,6 +149,7 @@ def ensemble_response(
     threads : int, optional
         Number of threads; by default one per core.
     rtol, atol : float, optional
+        Tolerances of the integrator: relative (1), and absolute in the states' units.
     max_steps : int, optional
         A member that needs more steps ends with the status STEP_LIMIT, one that switches over and
         over again at a jump with CHATTERING.

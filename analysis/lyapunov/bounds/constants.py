@@ -35,6 +35,7 @@ def kappa() -> Proof:
     Returns
     -------
     Proof
+        Whether 0.2785 holds on [0, 10].
 
     Examples
     --------
@@ -63,6 +64,11 @@ def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float 
     -------
     Range
         In the unit of d, rounded outwards.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a box, `times` is not a pair in order, or `tol` is not positive.
 
     Examples
     --------
@@ -118,6 +124,7 @@ def constants(
     Returns
     -------
     Constants
+        Every constant with the proof that it rests on.
 
     Raises
     ------

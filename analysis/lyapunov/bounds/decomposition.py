@@ -191,6 +191,7 @@ def decompose(
     Returns
     -------
     Decomposition
+        The split with bounds of k and eps_u, and how they are known.
 
     Raises
     ------

@@ -173,10 +173,12 @@ def certify(
     tol : float, optional
         Relative tolerance of the proved suprema.
     max_iterations : int, optional
+        Rounds C -> box -> C after which the proof is given up.
 
     Returns
     -------
     Certificate
+        The proved bound with its constants and box, or why there is none.
 
     Raises
     ------

@@ -134,9 +134,11 @@ def until_decided(
     Parameters
     ----------
     design : Design
+        The independent draws that are swept.
     threshold : float
         Probability of a violation.
     confidence : float, optional
+        That the decision is right, between 0 and 1.
 
     Returns
     -------

@@ -95,6 +95,7 @@ def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
     Returns
     -------
     Sweep
+        With the rows that are finished.
 
     Raises
     ------
@@ -146,6 +147,7 @@ def sweep(
     Parameters
     ----------
     prepared : Prepared
+        The experiment, compiled: what `prepare` returns.
     design : Design
         Of the space of ``prepared.experiment``.
     folder : path, optional
@@ -180,6 +182,8 @@ def sweep(
         no folder to resume.
     StoreError
         As in `store.claimed`, or if a chunk cannot be written; those before it are kept.
+    UnknownNameError
+        If the design has a quantity that the experiment lacks.
 
     Examples
     --------

@@ -82,11 +82,17 @@ def crossed(design: Design, choice: Choice) -> pd.DataFrame:
     design : Design
         Its space may hold the choice already; the labels that were drawn are then replaced.
     choice : Choice
+        The options that are compared.
 
     Returns
     -------
     pandas.DataFrame
         For `experiment.evaluate`, or as `design.from_table` of a space with the choice.
+
+    Raises
+    ------
+    ParameterError
+        If `choice` is not a `Choice`.
 
     Examples
     --------
@@ -132,10 +138,12 @@ def compare(
     spec : str, optional
         Column of the margin that decides about violations.
     confidence : float, optional
+        Of each interval by itself, between 0 and 1.
 
     Returns
     -------
     Comparison
+        Ranking, violations, paired differences and wins, with their intervals.
 
     Raises
     ------

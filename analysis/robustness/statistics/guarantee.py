@@ -157,6 +157,7 @@ def clopper_pearson(
     violations, runs : int
         k and n, at most 10^9.
     confidence : float, optional
+        That the bounds hold, between 0 and 1.
     side : {"upper", "lower", "both"}, optional
         The bound that is left out is 0 or 1.
 
@@ -287,11 +288,14 @@ def violation_probability(
     Parameters
     ----------
     design : Design
+        Independent draws.
     margins : sequence of length ``design.size``
         Margin of every row in order; a run violates the spec unless its margin is > 0, so NaN is a
         violation.  A Series goes by its index.
-    confidence, side
-        As in `clopper_pearson`.
+    confidence : float, optional
+        That the bounds hold, between 0 and 1.
+    side : {"upper", "lower", "both"}, optional
+        The bound that is left out is 0 or 1.
 
     Returns
     -------

@@ -45,6 +45,7 @@ def differences(
     confidence : float, optional
         Of each interval by itself.
     better : {"smaller", "larger"}, optional
+        Which number is the better one.
 
     Returns
     -------
@@ -117,6 +118,11 @@ def wins(
     -------
     pandas.DataFrame
         Counts, controllers in rows and columns.
+
+    Raises
+    ------
+    ParameterError
+        If there are less than two controllers, or numbers are missing.
 
     Examples
     --------

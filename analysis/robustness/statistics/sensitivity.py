@@ -38,10 +38,12 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
 
     Returns
     -------
-    values : ndarray
+    values : ndarray of shape (rows,)
+        The margins, with `least` for the runs that failed.
     failed : int
         Number of rows that count as `least`.
     least : float
+        The least margin of the runs that reached their end, at most -1.
 
     Raises
     ------
@@ -83,10 +85,12 @@ def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None
     levels : int, optional
         An even number.
     entropy : int, optional
+        Of the rows' seeds; drawn if left out.
 
     Returns
     -------
     Design
+        The rows of all trajectories, one trajectory after the other.
 
     Raises
     ------
@@ -194,10 +198,12 @@ def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
     size : int
         A power of 2.
     entropy : int, optional
+        Of the rows' seeds; drawn if left out.
 
     Returns
     -------
     Design
+        The rows of A and B, and of A with one column of B at a time.
 
     Raises
     ------
@@ -238,6 +244,7 @@ def sobol_indices(
     confidence : float, optional
         Of the bootstrap intervals (percentiles; rows of all sets resampled together).
     resamples : int, optional
+        Number of bootstrap samples.
 
     Returns
     -------

@@ -69,10 +69,12 @@ def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tup
     violations, runs : int
         Of the first runs in the order of the design.
     confidence : float, optional
+        That the bounds hold at every moment, between 0 and 1.
 
     Returns
     -------
     lower, upper : float
+        Between 0 and 1.
 
     Raises
     ------
@@ -150,6 +152,7 @@ def confidence_sequence(
     Parameters
     ----------
     design : Design
+        Independent draws.
     margins : sequence of at most ``design.size`` numbers
         Margin of the first rows in order, see `guarantee.violation_probability`.
     confidence : float, optional

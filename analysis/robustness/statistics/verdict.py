@@ -55,6 +55,7 @@ def bound_verdict(statement: Violation, limit: float) -> Verdict:
     statement : Violation
         From `guarantee.violation_probability`.
     limit : float
+        Between 0 and 1.
 
     Returns
     -------
