@@ -83,8 +83,9 @@ def input_output_response(
     ----------
     system : control.NonlinearIOSystem or Compiled
         A diagram, or what `nlctl.compile` made of it.
-    timepts : array_like of shape (m,)
-        Times in s at which the inputs are given and the response is computed.  Also ``T``.
+    timepts : array_like of shape (m,), optional
+        Times in s at which the inputs are given and the response is computed; they are needed,
+        under this name or as ``T``.
     inputs : array_like, list or float, optional
         Inputs over `timepts`, linear in between: a number for all; an array of shape (ninputs, m),
         or (m,) for one input; or a list, whose entries follow each other: a number is one input,

@@ -1,45 +1,46 @@
-"""Docstrings of public functions: each argument has a type and a description, what is returned
-has a description, and each exception that the function raises by itself is named."""
+"""Public functions tell what their arguments are, what they return and what they raise."""
 
 import ast
 import importlib
 import inspect
 import textwrap
 
+from reference import entries, offered
 from rows import each_row
-from test_doctests import offered, section
 
+import nlctl
+from analysis import lyapunov
 from nlctl import arguments, names, params
 from nlctl.diagrams import places
-from nlctl.errors import BlockError, ParameterError, UnknownNameError
+from nlctl.errors import AmbiguousNameError, DiagramError, ParameterError, UnknownNameError
 
 CHECKERS = (arguments, names, params, places)  # modules of what checks an argument
+REQUIRED = inspect.Parameter.empty
 OFFERED = sorted(dict(offered()).items())
-
-
-def entries(made, title):
-    """The entries of a section: the line that begins each, and its description."""
-    found = []
-    for line in section(made, title) or []:
-        if line and not line.startswith(" "):
-            found.append((line, []))
-        elif line.strip() and found:
-            found[-1][1].append(line.strip())
-    return [(head, " ".join(told)) for head, told in found]
 
 
 @each_row(("name", "made"), OFFERED)
 def test_arguments_have_a_type_and_a_description(name, made):
-    """``name : type``, and below it what it is."""
-    told = entries(made, "Parameters")
-    assert [head for head, text in told if " : " not in head or not text] == [], name
+    """``name : type``, optional where there is a default, and below it what it is."""
+    known, told = inspect.signature(made).parameters, set()
+    for head, text in entries(made, "Parameters"):
+        of, _, kind = head.partition(" : ")
+        these = {one.strip(" *") for one in of.split(",")}
+        optional = all(known[one].default is not REQUIRED for one in these)
+        assert (bool(kind and text), "optional" in kind) == (True, optional), f"{name}: {head}"
+        told |= these
+    assert told == set(known), name
 
 
 @each_row(("name", "made"), OFFERED)
 def test_what_is_returned_has_a_description(name, made):
-    """Each value that is returned or yielded."""
+    """Each value that is returned or yielded; a class of ours is that of the signature."""
     told = entries(made, "Returns") + entries(made, "Yields")
     assert [head for head, text in told if not text] == [], name
+    returned = inspect.signature(made).return_annotation
+    assert bool(told) == (returned not in (None, "None")), name
+    if returned != "Any" and inspect.isclass(made.__globals__.get(returned)):
+        assert returned in told[0][0], name
 
 
 def own_nodes(node):
@@ -64,44 +65,51 @@ def raised_by(thing):
     return {thing} if inspect.isclass(thing) and issubclass(thing, BaseException) else set()
 
 
-def checked_by(thing):
-    """The exceptions that a check of an argument raises, by its own docstring."""
-    thing = inspect.unwrap(thing) if callable(thing) else thing
-    if not inspect.isfunction(thing) or inspect.getmodule(thing) not in CHECKERS:
+def called(made, thing):
+    """The exceptions of a check, by its docstring, or of a private function of the module."""
+    if not inspect.isfunction(thing) or thing is made:
         return set()
-    known = inspect.getmodule(thing).__dict__
-    return {known[head] for head, _ in entries(thing, "Raises")}
+    if inspect.getmodule(thing) in CHECKERS:
+        return {thing.__globals__[head] for head, _ in entries(thing, "Raises")}
+    beside = thing.__module__ == made.__module__ and thing.__name__.startswith("_")
+    return raises(thing) if beside else set()
 
 
 def raises(made):
-    """The exceptions that a function raises itself, or by a check that it calls itself."""
-    made = inspect.unwrap(made)
-    tree = ast.parse(textwrap.dedent(inspect.getsource(made))).body[0]
-    known = dict(made.__globals__)
-    for node in own_nodes(tree):
-        if isinstance(node, ast.ImportFrom):  # inside the function
-            home = importlib.import_module(
-                "." * node.level + (node.module or ""), known["__package__"]
-            )
-            known |= {alias.asname or alias.name: getattr(home, alias.name) for alias in node.names}
-    found = set()
-    for node in own_nodes(tree):
+    """The exceptions that a function raises itself, or by a check of its arguments."""
+    made, found = inspect.unwrap(made), set()
+    known = made.__globals__
+    nodes = list(own_nodes(ast.parse(textwrap.dedent(inspect.getsource(made))).body[0]))
+    for node in nodes:
+        if isinstance(node, ast.ImportFrom):
+            path = "." * node.level + (node.module or "")
+            known = vars(importlib.import_module(path, made.__globals__["__package__"])) | known
+    for node in nodes:
         if isinstance(node, ast.Raise) and node.exc is not None:
             told = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
             found |= raised_by(resolved(told, known))
         elif isinstance(node, ast.Call):
-            found |= checked_by(resolved(node.func, known))
+            found |= called(made, resolved(node.func, known))
     return found
-
-
-def untold(made):
-    """The exceptions that a function raises, and no section Raises names them or their kind."""
-    told = {name.strip() for head, _ in entries(made, "Raises") for name in head.split(",")}
-    return {error for error in raises(made) if not told & {kind.__name__ for kind in error.mro()}}
 
 
 @each_row(("name", "made"), OFFERED)
 def test_what_is_raised_is_told(name, made):
-    """A section Raises names each exception of the function's own body and of its checks."""
-    assert untold(made) == set(), name
-    assert [head for head, text in entries(made, "Raises") if not text] == [], name
+    """A section Raises has each exception, or its base, and says when it is raised."""
+    told = entries(made, "Raises")
+    assert [head for head, text in told if not text] == [], name
+    named = {one.strip().rpartition(".")[2] for head, _ in told for one in head.split(",")}
+    missing = [e.__name__ for e in raises(made) if not named & {kind.__name__ for kind in e.mro()}]
+    assert missing == [], name
+
+
+EXAMPLES = [  # by a private function of its module, by a function that makes it, by a check
+    (nlctl.interconnect, {DiagramError, UnknownNameError}),
+    (names.find_name, {AmbiguousNameError, UnknownNameError}),
+    (lyapunov.disturbance, {ParameterError}),
+]
+
+
+@each_row(("made", "errors"), EXAMPLES)
+def test_exceptions_are_found(made, errors):
+    assert raises(made) == errors
