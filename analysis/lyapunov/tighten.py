@@ -16,6 +16,7 @@ from nlctl.errors import DivergedError, ParameterError
 from nlctl.names import unknown
 from nlctl.plants import coordinate_names
 from nlctl.response import input_output_response
+from nlctl.wording import counted
 
 from ..intervals.box import Box, visited_box
 from ..metrics import peak
@@ -214,8 +215,8 @@ def _best(
     allowed = [t for t in trials if t.u <= u_limit and np.isfinite(getattr(t, bound))]
     if not allowed:
         raise ParameterError(
-            f"none of {len(trials)} sets of gains keeps max |u| <= {u_limit:g}: the least is "
-            f"{min(t.u for t in trials):.4g}; raise u_limit or evaluations"
+            f"none of {counted(len(trials), 'set')} of gains keeps max |u| <= {u_limit:g}: the "
+            f"least is {min(t.u for t in trials):.4g}; raise u_limit or evaluations"
         )
     best, horizon = min(allowed, key=lambda t: getattr(t, bound)), float(search.times[-1])
     study = examine(search.loop, horizon, k=k, params=best.gains)

@@ -16,6 +16,7 @@ from ..errors import ParameterError
 from ..functions import gaussian
 from ..params import param, record
 from ..plants import coordinate_names
+from ..wording import counted
 
 __all__ = [
     "AdaptiveWeights",
@@ -180,8 +181,8 @@ class GaussianBasis:
         """One width, or one per centre."""
         if len(self.widths) not in (1, len(self.centres)):
             raise ParameterError(
-                f"GaussianBasis needs 1 or {len(self.centres)} widths for its "
-                f"{len(self.centres)} centres, got {len(self.widths)}"
+                f"GaussianBasis needs 1 or {counted(len(self.centres), 'width')}, one for each "
+                f"centre, got {len(self.widths)}"
             )
 
     @property

@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Polygon, Rectangle
 
+from ..wording import counted
 from .figure import Drawing
 from .records import (
     FONT,
@@ -121,7 +122,7 @@ def _block(system: Any, name: str) -> _Block:
 def _kind(system: Any) -> str:
     """What a block is, in a word; a static sum or gain as its formula."""
     if isinstance(system, ct.InterconnectedSystem):
-        return f"{len(system.syslist)} block" + "s" * (len(system.syslist) != 1)
+        return counted(len(system.syslist), "block")
     if hasattr(system, "spec"):
         return type(system.spec).__name__
     if not isinstance(system, ct.StateSpace):

@@ -18,6 +18,7 @@ from ..errors import CompileError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
 from ..upstream.control_internals import StandIn, is_system
+from ..wording import counted
 from .codegen.blocks import Equations, equations
 from .codegen.lower import Lowered, lower
 from .codegen.program import Program, program
@@ -239,7 +240,9 @@ class Compiled(StandIn):
         x, u = (np.array(v, dtype=float).reshape(-1) for v in (x, u))
         for what, given, wanted in (("x", x, self.system.nstates), ("u", u, self.system.ninputs)):
             if given.size != (wanted or 0):
-                raise ParameterError(f"{what} needs {wanted or 0} values, got {given.size}")
+                raise ParameterError(
+                    f"{what} needs {counted(wanted or 0, 'value')}, got {given.size}"
+                )
         result = np.empty(size or 0)
         function(float(t), x, u, self.parameter_vector(params), result, *more)
         return result

@@ -12,6 +12,7 @@ from nlctl.arguments import number, of_type, vector
 from nlctl.errors import ParameterError
 from nlctl.functions import smooth_sign
 from nlctl.plants import coordinate_names
+from nlctl.wording import counted
 
 from ...intervals.arithmetic import as_ball
 from ...intervals.box import Box, visited_box
@@ -186,7 +187,7 @@ def _outcome(bound: float) -> Provenance:
 
 
 def _sector_entries(bounds: Sector, box: Box, n: int) -> list[Constant]:
-    how = f"F/v, {bounds.boxes} boxes"
+    how = f"F/v, {counted(bounds.boxes, 'box', 'boxes')}"
     notes = {"m1": "v >= 0", "m2": "v >= 0", "m3": "v < 0, upper", "m4": "v < 0, lower"}
     return [
         Constant(
@@ -231,7 +232,7 @@ def _error_entries(
             value=found.magnitude,
             unit=per_second(n),
             provenance=_outcome(found.magnitude),
-            how=f"{how}, {found.boxes} boxes",
+            how=f"{how}, {counted(found.boxes, 'box', 'boxes')}",
             over=over,
         )
         for symbol, found, how, over in rows

@@ -13,6 +13,7 @@ from scipy import stats
 from nlctl.arguments import fraction, of_type, one_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
+from nlctl.wording import counted, some_of
 
 from ..stl.spec import violates
 from ..uncertainty.design import Design
@@ -66,7 +67,8 @@ class Comparison:
     def __str__(self) -> str:
         first = self.ranking.to_string(float_format=lambda x: f"{x:.4g}")
         return (
-            f"{len(self.ranking)} options of {self.choice} on the same {self.size} samples "
+            f"{len(self.ranking)} options of {self.choice} on the same "
+            f"{counted(self.size, 'sample')} "
             f"(intervals at {100 * self.confidence:g} %, each by itself)\n{first}"
         )
 
@@ -219,8 +221,9 @@ def _check_rows(wanted: pd.DataFrame, table: pd.DataFrame, choice: str) -> None:
     if len(missing):
         label = wanted.loc[missing[0], choice]
         raise ParameterError(
-            f"a comparison needs every sample with every {choice}: {len(missing)} of "
-            f"{len(wanted)} rows are missing, the first is row {missing[0]} ('{label}')"
+            f"a comparison needs every sample with every {choice}: "
+            f"{some_of(len(missing), len(wanted), 'row', 'is', 'are')} missing, the first is row "
+            f"{missing[0]} ('{label}')"
         )
     if len(beyond):
         raise ParameterError(

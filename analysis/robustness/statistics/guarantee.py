@@ -12,6 +12,7 @@ from scipy import stats
 
 from nlctl.arguments import fraction, integer, of_type, one_of
 from nlctl.errors import ParameterError, UsageError
+from nlctl.wording import counted, some_of
 
 from ..stl.spec import violates
 from ..uncertainty.design import Design
@@ -90,8 +91,8 @@ class Violation:
 
     def __str__(self) -> str:
         return (
-            f"{self.violations} of {self.runs} runs violate the spec. {self.bounds} "
-            f"({self.method}). Assumed: {'; '.join(self.assumptions)}."
+            f"{some_of(self.violations, self.runs, 'run', 'violates', 'violate')} the spec. "
+            f"{self.bounds} ({self.method}). Assumed: {'; '.join(self.assumptions)}."
         )
 
     @property
@@ -367,7 +368,8 @@ def violations_of(design: Design, margins: Margins) -> np.ndarray:
         )
     if not 0 < series.size <= design.size:
         raise NoGuaranteeError(
-            f"the design has {design.size} rows, got margins of {series.size} runs"
+            f"the design has {counted(design.size, 'row')}, got margins of "
+            f"{counted(series.size, 'run')}"
         )
     return violates(series)
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy import optimize, special
 
 from nlctl.arguments import fraction
+from nlctl.wording import counted
 
 from ..uncertainty.design import Design
 from .guarantee import (
@@ -136,7 +137,7 @@ class SequentialTest:
     statement: Violation
 
     def __str__(self) -> str:
-        runs = f"after {self.statement.runs} runs"
+        runs = f"after {counted(self.statement.runs, 'run')}"
         if self.decision == "undecided":
             return f"Undecided {runs} whether it is below {self.threshold:g}. {self.statement}"
         return f"Decided {runs}: {self.decision} {self.threshold:g}. {self.statement}"
