@@ -200,7 +200,8 @@ def inequality_lines(run: MemberRun, found: Constants) -> list[Line]:
         return lines
     for margin in inequalities(run.signals, printed):
         if margin.equation in LITERAL:
-            broken = f"{100 * margin.share_violated:.3g} % of {counted(margin.t.size, 'sample')} violate it"
+            samples = counted(margin.t.size, "sample")
+            broken = f"{100 * margin.share_violated:.3g} % of {samples} violate it"
             line = _line(margin, run.signals, "checked", broken)
             why = (
                 "q cos(w t) is not a function of x; counted to d instead, the corrected line holds."

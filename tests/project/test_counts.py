@@ -29,18 +29,15 @@ def test_a_number_agrees_with_noun_and_verb(text, expected):
 
 
 def nouns():
-    """The last words of what the modules count, in the plural."""
-    for tree in MODULES.values():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-                place = {"counted": 1, "some_of": 2}.get(node.func.id)
-                if place and isinstance(node.args[place], ast.Constant):
-                    many = node.args[2:] if place == 1 else []
-                    yield (
-                        many[0].value.split()[0]
-                        if many
-                        else f"{node.args[place].value.split()[-1]}s"
-                    )
+    """The nouns that the modules count, in the plural."""
+    calls = (node for tree in MODULES.values() for node in ast.walk(tree))
+    for call in (node for node in calls if isinstance(node, ast.Call)):
+        words = [one.value for one in call.args if isinstance(one, ast.Constant)]
+        match getattr(call.func, "id", ""), words:
+            case "counted", [_, many]:
+                yield many.split()[0]
+            case ("counted", [one]) | ("some_of", [one, _, _]):
+                yield f"{one.split()[-1]}s"
 
 
 def counts(tree):

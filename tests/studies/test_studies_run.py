@@ -385,8 +385,8 @@ def test_a_metric_that_failed_rows_lack_has_no_sensitivity(failing, key):
     failed = int(solution(table, 2.0).isna().sum())
     assert 0 < failed < len(table)
     assert found[key].sentence == (
-        f"Not answered: {failed} of {len(table)} rows did not reach their end and have no finite "
-        "'iae': take a margin, such as of = \"spec\", which every row has, or a space without "
+        f"Not answered: {failed} of {len(table)} rows have no finite 'iae', as runs did not "
+        'reach their end: take a margin, such as of = "spec", which every row has, or a space without '
         "such rows."
     )
     assert (found[key].holds, found[key].runs) == (False, len(table))

@@ -82,9 +82,9 @@ def response(of: str, ground: Ground, done: Sweep) -> tuple[np.ndarray, str, dic
     if lacking:
         failed = int(np.count_nonzero(column(done, "status") != Status.OK.name))
         lack = some_of(failed or lacking, done.done, "row", "has", "have")
-        why = " (the run did not reach its end)" if failed else ""
+        why = ", as runs did not reach their end" if failed else ""
         raise ParameterError(
-            f"{lack} no finite '{of}'{why}: take a margin, such "
-            'as of = "spec", which every row has, or a space without such rows'
+            f"{lack} no finite '{of}'{why}: take a margin, such as "
+            'of = "spec", which every row has, or a space without such rows'
         )
     return values, "", {}
