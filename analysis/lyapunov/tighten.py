@@ -215,7 +215,7 @@ def _best(
     allowed = [t for t in trials if t.u <= u_limit and np.isfinite(getattr(t, bound))]
     if not allowed:
         raise ParameterError(
-            f"none of {counted(len(trials), 'set')} of gains keeps max |u| <= {u_limit:g}: the "
+            f"of {counted(len(trials), 'set')} of gains none keeps max |u| <= {u_limit:g}: the "
             f"least is {min(t.u for t in trials):.4g}; raise u_limit or evaluations"
         )
     best, horizon = min(allowed, key=lambda t: getattr(t, bound)), float(search.times[-1])

@@ -64,7 +64,7 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
     ended = values > -FAILED  # not of NaN
     if not ended.any():
         raise ParameterError(
-            f"none of {counted(values.size, 'row')} reached its end, so that their margins tell "
+            f"of {counted(values.size, 'row')} none reached its end, so that their margins tell "
             "nothing apart"
         )
     least = min(float(values[ended].min()), -1.0)
