@@ -133,7 +133,7 @@ def loop_report(
     >>> report.verdict
     "The loop 'actuator' has 2 blocks and 1 state."
     """
-    blocks, states = counted(len(list(leaves(loop))), "block"), counted(loop.nstates, "state")
+    blocks, states = counted(len(list(leaves(loop))), "block"), counted(loop.nstates or 0, "state")
     found = [f"The loop '{loop.name}' has {blocks} and {states}."]
     parts = _model(loop)
     if response is not None:
@@ -265,8 +265,8 @@ def _check_response(
     if list(curves) != list(loop.output_labels) or np.shape(response.x)[0] != loop.nstates:
         raise DiagramError(
             f"the response is not of '{loop.name}', whose outputs are "
-            f"{', '.join(loop.output_labels)} and which has {counted(loop.nstates, 'state')}: it "
-            f"has {', '.join(curves)} and {np.shape(response.x)[0]}"
+            f"{', '.join(loop.output_labels)} and which has "
+            f"{counted(loop.nstates or 0, 'state')}: it has {', '.join(curves)} and {np.shape(response.x)[0]}"
         )
     for place, values in _own_outputs(loop, response, params):
         for (name, y), own in zip(curves.items(), values, strict=True):

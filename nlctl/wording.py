@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import SupportsIndex
+
 __all__ = ["counted", "some_of"]
 
 
-def counted(number: int, one: str, many: str = "") -> str:
+def counted(number: SupportsIndex, one: str, many: str = "") -> str:
     """Return a number and its noun: ``"1 state"``, ``"2 states"``.
 
     Parameters
@@ -25,7 +27,7 @@ def counted(number: int, one: str, many: str = "") -> str:
     return f"{number} {one if number == 1 else many or f'{one}s'}"
 
 
-def some_of(count: int, total: int, one: str, verb: str, verbs: str) -> str:
+def some_of(count: SupportsIndex, total: SupportsIndex, one: str, verb: str, verbs: str) -> str:
     """Return how many do something: ``"1 of 3 runs violates"``, ``"2 of 3 runs violate"``.
 
     Parameters

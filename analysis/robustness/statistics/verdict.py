@@ -153,5 +153,6 @@ def better_verdict(wins: int, losses: int, p: float, level: float, tests: float 
         return 2 * one > all_ and bool(stats.binomtest(one, all_).pvalue * tests <= level)
 
     enough = least_count(decides, 0, 1)
+    assert enough is not None  # no count is too large
     needs = f"at least {counted(enough, 'more sample')}, won in every one"
     return Verdict(answer="not shown yet", needs=needs)
