@@ -266,7 +266,8 @@ def _check_response(
         raise DiagramError(
             f"the response is not of '{loop.name}', whose outputs are "
             f"{', '.join(loop.output_labels)} and which has "
-            f"{counted(loop.nstates or 0, 'state')}: it has {', '.join(curves)} and {np.shape(response.x)[0]}"
+            f"{counted(loop.nstates or 0, 'state')}: it has {', '.join(curves)} and "
+            f"{np.shape(response.x)[0]}"
         )
     for place, values in _own_outputs(loop, response, params):
         for (name, y), own in zip(curves.items(), values, strict=True):

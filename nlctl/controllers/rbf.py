@@ -181,8 +181,8 @@ class GaussianBasis:
         """One width, or one per centre."""
         if len(self.widths) not in (1, len(self.centres)):
             raise ParameterError(
-                f"GaussianBasis needs 1 or {counted(len(self.centres), 'width')}, one for each "
-                f"centre, got {len(self.widths)}"
+                "GaussianBasis needs one width or one for each of its "
+                f"{counted(len(self.centres), 'centre')}, got {len(self.widths)}"
             )
 
     @property
