@@ -32,7 +32,7 @@ def refused(error, *told):
         (
             "GaussianBasis",
             {"widths": (1.0, 2.0)},
-            ["one width or one for each of its 27 centres", "got 2"],
+            ["one for each of its 27 centres", "got 2"],
         ),
         ("GaussianBasis", {"centres": []}, ["centres", "(0,)"]),
         ("GaussianBasis", {"centres": np.zeros((0, 2))}, ["at least one value in centres"]),
