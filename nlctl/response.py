@@ -121,6 +121,10 @@ def input_output_response(
         ``return_x``.
     ignore_errors : bool, optional
         Return what was computed until then, with ``success = False``, instead of raising.
+    audit : bool or "every run", optional
+        Machine code: by default the first run of a program is compared with python-control's own
+        right-hand side and outputs at some points of the run; with False none is, with
+        "every run" each.
     solve_ivp_method : str, optional
         Another name of `method` in python-control; machine code has none of these methods.
     solve_ivp_kwargs : mapping, optional
@@ -131,10 +135,6 @@ def input_output_response(
         Machine code: a fixed step in s; 0 for error control.
     progress : callable, optional
         Called with the time after every accepted step (machine code: every 2000 steps).
-    audit : bool or "every run", optional
-        Machine code: by default the first run of a program is compared with python-control's own
-        right-hand side and outputs at some points of the run; with False none is, with
-        "every run" each.
     **aliases : object
         python-control's short names: ``T``, ``U``, ``X0``, ``t_eval``, ``return_x``.
 

@@ -169,6 +169,11 @@ def conservatism(
     Conservatism
         The terms of C_0, the run beside it, and bounds by direct comparison.
 
+    Raises
+    ------
+    DiagramError, DecompositionError, ParameterError, UnknownNameError
+        As `examine` does.
+
     Examples
     --------
     C_0^2 / 2 is the sum of its terms:

@@ -21,15 +21,15 @@ OFFERED = sorted(dict(offered()).items())
 
 @each_row(("name", "made"), OFFERED)
 def test_arguments_have_a_type_and_a_description(name, made):
-    """``name : type``, optional where there is a default, and below it what it is."""
-    known, told = inspect.signature(made).parameters, set()
+    """In order: ``name : type``, optional where there is a default, and below it what it is."""
+    known, told = inspect.signature(made).parameters, []
     for head, text in entries(made, "Parameters"):
         of, _, kind = head.partition(" : ")
-        these = {one.strip(" *") for one in of.split(",")}
+        these = [one.strip(" *") for one in of.split(",")]
         optional = all(known[one].default is not REQUIRED for one in these)
         assert (bool(kind and text), "optional" in kind) == (True, optional), f"{name}: {head}"
-        told |= these
-    assert told == set(known), name
+        told += these
+    assert told == list(known), name
 
 
 @each_row(("name", "made"), OFFERED)
