@@ -97,7 +97,15 @@ class Tightened:
     def table(self, bound: str = "C_0") -> pd.DataFrame:
         """Return the trade-off curve: trials that no other beats in max |u| and in the bound.
 
-        Sorted by u; columns u, C_0, ultimate and one per gain.
+        Parameters
+        ----------
+        bound : {"C_0", "ultimate"}, optional
+            The bound that is meant.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Sorted by u; columns u, C_0, ultimate and one per gain.
         """
         import pandas as pd
 

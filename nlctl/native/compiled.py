@@ -122,6 +122,16 @@ class Compiled(StandIn):
 
         Overrides are resolved by python-control itself.
 
+        Parameters
+        ----------
+        params : mapping, optional
+            Overrides by qualified name.
+
+        Returns
+        -------
+        ndarray of shape (k,)
+            The values of all k parameters, those of arrays one after the other.
+
         Raises
         ------
         UnknownNameError, ParameterError
@@ -140,12 +150,60 @@ class Compiled(StandIn):
             return packed(self.schedule.holders, self.program.layout, self.program.fixed)
 
     def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
-        """Return the right-hand side, as ``system.dynamics`` does."""
+        """Return the right-hand side, as ``system.dynamics`` does.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        x : array_like of shape (nstates,)
+            State.
+        u : array_like of shape (ninputs,), optional
+            Inputs; by default there are none.
+        params : mapping, optional
+            Overrides by qualified name.
+
+        Returns
+        -------
+        ndarray of shape (nstates,)
+            x' in the states' units per second, or the next x in discrete time.
+
+        Raises
+        ------
+        UsageError
+            If the diagram has a transport delay: its past is known in a run only.
+        ParameterError, UnknownNameError
+            If x or u has another length, or an override is refused.
+        """
         g = np.empty(self.program.events)
         return self._call(self.native[0], self.system.nstates, t, x, u, params, g)
 
     def output(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
-        """Return the outputs, as ``system.output`` does."""
+        """Return the outputs, as ``system.output`` does.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        x : array_like of shape (nstates,)
+            State.
+        u : array_like of shape (ninputs,), optional
+            Inputs; by default there are none.
+        params : mapping, optional
+            Overrides by qualified name.
+
+        Returns
+        -------
+        ndarray of shape (noutputs,)
+            In the outputs' units.
+
+        Raises
+        ------
+        UsageError
+            If the diagram has a transport delay: its past is known in a run only.
+        ParameterError, UnknownNameError
+            If x or u has another length, or an override is refused.
+        """
         return self._call(self.native[1], self.system.noutputs, t, x, u, params)
 
     @cached_property
@@ -178,7 +236,7 @@ class Compiled(StandIn):
         copy_names : bool, optional
             Whether it gets the diagram's names of states, inputs and outputs, or python-control's
             generic ones.
-        **names
+        **names : object
             Other names: `name`, `inputs`, `outputs` and `states` of ``ct.ss``.
 
         Returns
@@ -213,13 +271,19 @@ class Compiled(StandIn):
         ----------
         parameters : sequence of str
             Qualified names, such as ``"actuator.b_r"``; with an index for entries of arrays.
-        x0, u0, t, params
-            The point, as in `linearize`.
+        x0 : mapping, array_like or control.OperatingPoint
+            State, as in `linearize`.
+        u0 : array_like, optional
+            Inputs, of shape (ninputs,), as in `linearize`.
+        t : float, optional
+            Time in s.
+        params : mapping, optional
+            Parameters that are overridden.
 
         Returns
         -------
         tuple of ndarray
-            Of shapes (nstates, k) and (noutputs, k) for k parameters.
+            Their derivatives, of shapes (nstates, k) and (noutputs, k) for k parameters.
 
         Raises
         ------

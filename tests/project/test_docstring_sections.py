@@ -5,7 +5,7 @@ import importlib
 import inspect
 import textwrap
 
-from reference import entries, offered
+from reference import entries, methods, offered
 from rows import each_row
 
 import nlctl
@@ -17,12 +17,14 @@ from nlctl.errors import AmbiguousNameError, DiagramError, ParameterError, Unkno
 CHECKERS = (arguments, names, params, places)  # modules of what checks an argument
 REQUIRED = inspect.Parameter.empty
 OFFERED = sorted(dict(offered()).items())
+WITH_METHODS = [*OFFERED, *methods()]
 
 
-@each_row(("name", "made"), OFFERED)
+@each_row(("name", "made"), WITH_METHODS)
 def test_arguments_have_a_type_and_a_description(name, made):
     """In order: ``name : type``, optional where there is a default, and below it what it is."""
-    known, told = inspect.signature(made).parameters, []
+    known, told = dict(inspect.signature(made).parameters), []
+    known.pop("self", None)
     for head, text in entries(made, "Parameters"):
         of, _, kind = head.partition(" : ")
         these = [one.strip(" *") for one in of.split(",")]
@@ -32,7 +34,7 @@ def test_arguments_have_a_type_and_a_description(name, made):
     assert told == list(known), name
 
 
-@each_row(("name", "made"), OFFERED)
+@each_row(("name", "made"), WITH_METHODS)
 def test_what_is_returned_has_a_description(name, made):
     """Each value that is returned or yielded; a class of ours is that of the signature."""
     told = entries(made, "Returns") + entries(made, "Yields")
@@ -93,7 +95,7 @@ def raises(made):
     return found
 
 
-@each_row(("name", "made"), OFFERED)
+@each_row(("name", "made"), WITH_METHODS)
 def test_what_is_raised_is_told(name, made):
     """A section Raises has each exception, or its base, and says when it is raised."""
     told = entries(made, "Raises")

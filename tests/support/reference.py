@@ -57,3 +57,12 @@ def entries(made, title):
         elif line.strip():
             found[-1][1].append(line.strip())
     return [(head, " ".join(told)) for head, told in found]
+
+
+def methods():
+    """The methods of classes of the reference that have a section of parameters."""
+    for home, name in documented_names():
+        made = getattr(importlib.import_module(home), name)
+        for key, method in vars(made).items() if inspect.isclass(made) else ():
+            if inspect.isfunction(method) and entries(method, "Parameters"):
+                yield f"{home}.{name}.{key}", method

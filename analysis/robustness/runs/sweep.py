@@ -75,7 +75,18 @@ class Sweep:
         return self.columns()
 
     def columns(self, *names: str) -> pd.DataFrame:
-        """Return some columns of `table`, all by default; the others are not read."""
+        """Return some columns of `table`; the others are not read.
+
+        Parameters
+        ----------
+        *names : str
+            Names of columns; all by default.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row for each row that is finished.
+        """
         if self.folder is None:
             assert self.held is not None
             return self.held.filter(list(names)) if names else self.held
