@@ -215,7 +215,7 @@ class Sampled(Around):
         Returns
         -------
         list of array_like
-            The block's own states, the outputs that wait, and the one that is held.
+            The block's own states, outputs that wait where there is a delay, outputs held.
         """
         own, waiting, held = self.parts(x)
         held = due if self.releases(now) else held
