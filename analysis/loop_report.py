@@ -23,6 +23,7 @@ import numpy as np
 from nlctl.diagrams import leaves
 from nlctl.errors import DiagramError, ParameterError
 from nlctl.names import unknown
+from nlctl.wording import counted
 
 from .figures.axes import BLUE, stacked_axes
 from .lyapunov.ledger import Ledger
@@ -130,11 +131,10 @@ def loop_report(
     >>> run = nlctl.input_output_response(loop, np.linspace(0, 1, 101), 1.0)
     >>> report = loop_report(loop, title="A lag behind a dead zone", response=run)
     >>> report.verdict
-    "The loop 'actuator' has 2 blocks and 1 states."
+    "The loop 'actuator' has 2 blocks and 1 state."
     """
-    found = [
-        f"The loop '{loop.name}' has {len(list(leaves(loop)))} blocks and {loop.nstates} states."
-    ]
+    blocks, states = counted(len(list(leaves(loop))), "block"), counted(loop.nstates or 0, "state")
+    found = [f"The loop '{loop.name}' has {blocks} and {states}."]
     parts = _model(loop)
     if response is not None:
         _check_response(loop, response, params)
@@ -265,8 +265,9 @@ def _check_response(
     if list(curves) != list(loop.output_labels) or np.shape(response.x)[0] != loop.nstates:
         raise DiagramError(
             f"the response is not of '{loop.name}', whose outputs are "
-            f"{', '.join(loop.output_labels)} and which has {loop.nstates} states: it has "
-            f"{', '.join(curves)} and {np.shape(response.x)[0]}"
+            f"{', '.join(loop.output_labels)} and which has "
+            f"{counted(loop.nstates or 0, 'state')}: it has {', '.join(curves)} and "
+            f"{np.shape(response.x)[0]}"
         )
     for place, values in _own_outputs(loop, response, params):
         for (name, y), own in zip(curves.items(), values, strict=True):

@@ -16,6 +16,7 @@ from .host.notebook import table_html
 from .names import Parameters, base_name, unknown
 from .params import declared_params, ensure_checked, equation_arguments, is_checked, with_overrides
 from .upstream.control_internals import OwnParameters, current_parameters, set_parameters
+from .wording import counted
 
 
 class Spec(Protocol):
@@ -434,7 +435,8 @@ def _probe(made: Block) -> None:
             if got != wanted:
                 names = made.output_labels if what == "output" else made.state_labels
                 raise BlockError(
-                    f"{who} returns {got} values from {what}, needs {wanted}: {', '.join(names)}"
+                    f"{who} returns {counted(got, 'value')} from {what}, needs {wanted}: "
+                    f"{', '.join(names)}"
                 )
         # With NaN for an input, an output that it reaches turns NaN as well.
         if not spec.feedthrough and made.ninputs:

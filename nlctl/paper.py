@@ -27,6 +27,7 @@ from .errors import ParameterError
 from .names import unknown
 from .plants import ForcedDuffing, Genesio, coordinate_names
 from .references import SumOfSines
+from .wording import counted
 
 __all__ = ["EXAMPLES", "example_1", "example_2", "named_example", "paper_centres"]
 
@@ -241,8 +242,8 @@ def _closed_loop(
     delivered = len([s for s in blocks["reference"].output_labels if s.startswith("yd")])
     if delivered <= order:
         raise ParameterError(
-            f"the reference has {delivered - 1} derivatives, a plant of order {order} needs "
-            f"{order}: make it with order={order}"
+            f"the reference has {counted(delivered - 1, 'derivative')}, a plant of order {order} "
+            f"needs {order}: make it with order={order}"
         )
     if sensor is not None:
         blocks["sensor"] = as_system(sensor, "sensor")

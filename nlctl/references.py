@@ -17,6 +17,7 @@ from .equations import equation
 from .errors import ParameterError
 from .functions import noise_spectrum, noise_value
 from .params import integer, param, record
+from .wording import counted
 
 __all__ = ["BandLimitedNoise", "FilteredStep", "FunctionReference", "SumOfSines"]
 
@@ -191,7 +192,7 @@ class FunctionReference:
         if got != self.order + 1:
             raise ParameterError(
                 f"FunctionReference of order {self.order} needs a function that returns "
-                f"{self.order + 1} values ({', '.join(self.outputs)}), got {got}"
+                f"{counted(self.order + 1, 'value')} ({', '.join(self.outputs)}), got {got}"
             )
 
     @property

@@ -83,8 +83,9 @@ def input_output_response(
     ----------
     system : control.NonlinearIOSystem or Compiled
         A diagram, or what `nlctl.compile` made of it.
-    timepts : array_like of shape (m,)
-        Times in s at which the inputs are given and the response is computed.  Also ``T``.
+    timepts : array_like of shape (m,), optional
+        Times in s at which the inputs are given and the response is computed; they are needed,
+        under this name or as ``T``.
     inputs : array_like, list or float, optional
         Inputs over `timepts`, linear in between: a number for all; an array of shape (ninputs, m),
         or (m,) for one input; or a list, whose entries follow each other: a number is one input,
@@ -120,6 +121,10 @@ def input_output_response(
         ``return_x``.
     ignore_errors : bool, optional
         Return what was computed until then, with ``success = False``, instead of raising.
+    audit : bool or "every run", optional
+        Machine code: by default the first run of a program is compared with python-control's own
+        right-hand side and outputs at some points of the run; with False none is, with
+        "every run" each.
     solve_ivp_method : str, optional
         Another name of `method` in python-control; machine code has none of these methods.
     solve_ivp_kwargs : mapping, optional
@@ -130,11 +135,7 @@ def input_output_response(
         Machine code: a fixed step in s; 0 for error control.
     progress : callable, optional
         Called with the time after every accepted step (machine code: every 2000 steps).
-    audit : bool or "every run", optional
-        Machine code: by default the first run of a program is compared with python-control's own
-        right-hand side and outputs at some points of the run; with False none is, with
-        "every run" each.
-    **aliases
+    **aliases : object
         python-control's short names: ``T``, ``U``, ``X0``, ``t_eval``, ``return_x``.
 
     Returns

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nlctl.wording import counted
+
 from .studies import EXIT_CODES, INCOMPLETE, INTERRUPTED, Json, Trust, exit_codes, run_folder
 
 if TYPE_CHECKING:
@@ -251,8 +253,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
         return not found
     for difference in found:
         print(difference)
-    count = "no difference" if not found else f"{len(found)} differences"
-    print("1 difference" if len(found) == 1 else count)
+    print(counted(len(found), "difference") if found else "no difference")
     return not found
 
 

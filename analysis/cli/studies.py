@@ -18,6 +18,8 @@ from typing import Annotated, Any
 
 import typer
 
+from nlctl.wording import counted
+
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
 EXIT_CODES = {
     "refuted": FAILS,
@@ -127,10 +129,10 @@ def validate(
             return
         print(f"{study} is a valid study.")
         for key, count in found.runs.items():
-            print(f"  {key}: {'at most ' if key in found.at_most else ''}{count} runs")
+            print(f"  {key}: {'at most ' if key in found.at_most else ''}{counted(count, 'run')}")
         print(
-            f"In all {found.total} runs, about {_duration(found.seconds)} on this machine, and "
-            f"at most about {found.size / 1e6:.2g} MB on disk."
+            f"In all {counted(found.total, 'run')}, about {_duration(found.seconds)} on this "
+            f"machine, and at most about {found.size / 1e6:.2g} MB on disk."
         )
 
 

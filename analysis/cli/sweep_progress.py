@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from nlctl.wording import counted
+
 if TYPE_CHECKING:
     from analysis.robustness.runs.progress import Progress as SweepProgress
 
@@ -52,7 +54,7 @@ def sweep_bar(
                 task,
                 total=progress.total,
                 completed=progress.done,
-                rows=f"{progress.done}/{progress.total} rows, {progress.rate:.3g}/s",
+                rows=f"{progress.done}/{counted(progress.total, 'row')}, {progress.rate:.3g}/s",
                 found=found_text(progress, confidence),
             )
 

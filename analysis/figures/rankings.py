@@ -109,6 +109,7 @@ def paired_differences(table: pd.DataFrame, labels: Sequence[str], quantity: str
     table : DataFrame
         Columns median, median_low, median_high.
     labels : sequence of str
+        One for each row of `table`.
     quantity : str
         Name of the axis.
 

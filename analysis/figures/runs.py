@@ -165,6 +165,7 @@ def fans(
     Parameters
     ----------
     time : ndarray of shape (m,)
+        Times of the samples (s).
     signals : mapping
         Samples of shape (runs, m) by name, NaN after a run has ended.
     nominal, worst : mapping

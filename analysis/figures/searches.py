@@ -169,9 +169,11 @@ def failure_map_figure(
     triangles : ndarray of int, shape (k, 3)
         Rows of `points`.
     names : tuple of 2 str
+        Columns of `points` on the axes.
     labels : tuple of 2 str, optional
         Of the axes, with units.
     nominal : tuple of 2 floats, optional
+        Nominal values of both quantities, marked by a star; none by default.
     box : tuple of 2 pairs, optional
         What the study takes to be possible: ends of both quantities.
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
+from nlctl.wording import counted
 
 __all__ = ["Box", "Cell", "visited_box"]
 
@@ -55,7 +56,7 @@ class Box:
     def __post_init__(self) -> None:
         if not len(self.names) == len(self.low) == len(self.high):
             raise ParameterError(
-                f"Box needs low and high for each of {len(self.names)} sides, got "
+                f"Box needs low and high for each of {counted(len(self.names), 'side')}, got "
                 f"{len(self.low)} and {len(self.high)}"
             )
         for name, a, b in zip(self.names, self.low, self.high, strict=True):
@@ -141,7 +142,7 @@ def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
         if not np.all(np.isfinite(sides[name])):
             raise ParameterError(f"visited_box needs finite values, got {name} in {sides[name]}")
     start, end = (f([f(r.time) for r in responses]) for f in (np.min, np.max))
-    who = "one response" if len(responses) == 1 else f"{len(responses)} responses"
+    who = counted(len(responses), "response")
     how = f"visited by {who} in [{start:g}, {end:g}] s, and {100 * margin:.0f} % more"
     return dataclasses.replace(Box.of(**sides), provenance="sampled", how=how)
 

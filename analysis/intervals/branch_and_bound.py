@@ -105,6 +105,7 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
         ``function((x1, ..., xm)) -> value`` for the coordinates in the order of the box; plain
         Python and NumPy functions of scalars.
     box : Box
+        Where x lies: a lower and an upper bound of every coordinate.
     tol : float, optional
         Each end of the range is at most this far from a value that is attained.
     max_boxes : int, optional
@@ -113,6 +114,7 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     Returns
     -------
     Range
+        A proved lower and upper bound, in the unit of the function.
 
     Raises
     ------
@@ -162,8 +164,10 @@ def prove(
 
     Parameters
     ----------
-    function, box
-        As in `enclose`.
+    function : callable
+        ``function((x1, ..., xm)) -> value``, as in `enclose`.
+    box : Box
+        Where the claim is made.
     low, high : float, optional
         The claim.
     max_boxes : int, optional

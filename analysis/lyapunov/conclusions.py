@@ -13,6 +13,7 @@ from nlctl.errors import ParameterError
 from nlctl.params import equation_arguments
 from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
+from nlctl.wording import counted
 
 from .bounds.error_bounds import error_bounds, reference_bounds
 from .bounds.premises import Premises, premises
@@ -79,9 +80,10 @@ def _property(given: Premises) -> Line:
         seen = nussbaum_property(given.N)
     except ParameterError as error:
         return Line(key="(12)", statement=statement, status="undecided", evidence=str(error))
-    told = f"{len(seen.means)} lobes on [0, {seen.end:.4g}]"
+    told = f"{counted(len(seen.means), 'lobe')} on [0, {seen.end:.4g}]"
     if not seen.means:
-        told = f"{len(seen.lobes) - 1} changes of sign on [0, {seen.end:.4g}], no four lobes"
+        changes = counted(len(seen.lobes) - 1, "change of sign", "changes of sign")
+        told = f"{changes} on [0, {seen.end:.4g}], no four lobes"
     return Line(
         key="(12)",
         statement=statement,

@@ -96,7 +96,7 @@ class Conservatism:
         The same with the weights that make it smallest along the run.
     sqrt_2V : float
         max of sqrt(2 V): what is lost by bounding r by V alone.
-    comparisons : tuple of Comparison
+    comparisons : tuple of DirectBound
         From 1 s on, and over the second half of the run.
     e_1, tail_max_e_1 : float
         Bound tail max |r| / lambda_{n-1} of limsup |e_1| for real stable roots, and what
@@ -157,12 +157,22 @@ def conservatism(
 
     Parameters
     ----------
-    loop, run, **settings
-        As for `analysis.lyapunov.ledger`; of an ensemble the first member.
+    loop : control.InterconnectedSystem or Examination
+        A loop, or what `examine` found.
+    run : float, control.TimeResponseData or sequence of them, optional
+        Horizon (s), or responses of the loop; of an ensemble the first member counts.
+    **settings : object
+        box, W, k, start, params, step, max_steps: as for `examine`.
 
     Returns
     -------
     Conservatism
+        The terms of C_0, the run beside it, and bounds by direct comparison.
+
+    Raises
+    ------
+    DiagramError, DecompositionError, ParameterError, UnknownNameError
+        As `examine` does.
 
     Examples
     --------
@@ -269,12 +279,13 @@ def comparison(signals: Signals, given: Premises, start: float, end: float) -> D
     signals : Signals
         Of an observed run.
     given : Premises
+        Of the loop, see `premises`.
     start, end : float
         In s.
 
     Returns
     -------
-    Comparison
+    DirectBound
         With an infinite bound where k G N is not negative on the whole interval.
 
     Examples

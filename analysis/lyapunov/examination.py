@@ -121,6 +121,7 @@ def examine(
     Returns
     -------
     Examination
+        The loop, its runs, and the constants of the proof on the set that is used.
 
     Raises
     ------

@@ -13,6 +13,7 @@ import numpy as np
 from nlctl.errors import UnknownKeywordError
 from nlctl.host.notebook import table_html
 from nlctl.names import unknown
+from nlctl.wording import counted
 
 from ..json_values import as_json
 from ..metrics import peak
@@ -131,7 +132,7 @@ class Ledger:
         return table_html(str(self).splitlines()[0], columns, rows)
 
     def __str__(self) -> str:
-        runs = "one run" if self.members == 1 else f"{self.members} runs"
+        runs = counted(self.members, "run")
         head = f"Ledger of '{self.loop}', {runs} over {self.horizon:g} s, {self.constants.box}"
         width = max(len(line.key) for line in self.lines)
         rows = [head, *(line.text(width) for line in self.lines)]
@@ -152,12 +153,13 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
         A loop, or what `examine` found.
     run : float, control.TimeResponseData or sequence of them, optional
         Horizon (s), or responses of the loop.
-    **settings
+    **settings : object
         box, W, k, start, params, step, max_steps: as for `examine`.
 
     Returns
     -------
     Ledger
+        One line for each assumption and inequality, with its margin.
 
     Raises
     ------

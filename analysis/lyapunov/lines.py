@@ -8,6 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from nlctl.wording import counted
+
 from .assumptions import assumptions
 from .bounds.constants import kappa
 from .bounds.final_bound import alpha_1
@@ -189,7 +191,8 @@ def inequality_lines(run: MemberRun, found: Constants) -> list[Line]:
     given = premises(found, run.gains)
     margins = [*inequalities(run.signals, given), *([run.reference] if run.reference else [])]
     lines = [
-        _line(margin, run.signals, "checked", f"{margin.t.size} samples") for margin in margins
+        _line(margin, run.signals, "checked", counted(margin.t.size, "sample"))
+        for margin in margins
     ]
     lines = [_beyond_samples(line) for line in lines]
     printed = literal(given, found, run.parts.plant)
@@ -197,7 +200,8 @@ def inequality_lines(run: MemberRun, found: Constants) -> list[Line]:
         return lines
     for margin in inequalities(run.signals, printed):
         if margin.equation in LITERAL:
-            broken = f"{100 * margin.share_violated:.3g} % of {margin.t.size} samples violate it"
+            samples = counted(margin.t.size, "sample")
+            broken = f"{100 * margin.share_violated:.3g} % of {samples} violate it"
             line = _line(margin, run.signals, "checked", broken)
             why = (
                 "q cos(w t) is not a function of x; counted to d instead, the corrected line holds."
@@ -218,7 +222,7 @@ def _beyond_samples(line: Line) -> Line:
     """Return the line with what is known of it for all states, not at the samples only."""
     if line.key == "(29)" and line.status == "checked":
         proof = kappa()
-        how = f"all r, {proof.boxes} boxes"
+        how = f"all r, {counted(proof.boxes, 'box', 'boxes')}"
         return dataclasses.replace(line, status="proved", evidence=how) if proof.holds else line
     if line.key == "Young" and line.status == "checked":
         return dataclasses.replace(line, status="computed", evidence="completing the square")

@@ -16,6 +16,7 @@ from nlctl.errors import DivergedError, ParameterError
 from nlctl.names import unknown
 from nlctl.plants import coordinate_names
 from nlctl.response import input_output_response
+from nlctl.wording import counted
 
 from ..intervals.box import Box, visited_box
 from ..metrics import peak
@@ -96,7 +97,15 @@ class Tightened:
     def table(self, bound: str = "C_0") -> pd.DataFrame:
         """Return the trade-off curve: trials that no other beats in max |u| and in the bound.
 
-        Sorted by u; columns u, C_0, ultimate and one per gain.
+        Parameters
+        ----------
+        bound : {"C_0", "ultimate"}, optional
+            The bound that is meant.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Sorted by u; columns u, C_0, ultimate and one per gain.
         """
         import pandas as pd
 
@@ -156,11 +165,14 @@ def tighten(
     Returns
     -------
     Tightened
+        The best gains with their bound, and all trials.
 
     Raises
     ------
     ParameterError
         If no gains that were looked at keep the limit, or it is not positive.
+    UnknownNameError
+        If there is no such `bound`.
 
     Examples
     --------
@@ -211,8 +223,8 @@ def _best(
     allowed = [t for t in trials if t.u <= u_limit and np.isfinite(getattr(t, bound))]
     if not allowed:
         raise ParameterError(
-            f"none of {len(trials)} sets of gains keeps max |u| <= {u_limit:g}: the least is "
-            f"{min(t.u for t in trials):.4g}; raise u_limit or evaluations"
+            f"of {counted(len(trials), 'set')} of gains none keeps max |u| <= {u_limit:g}: the "
+            f"least is {min(t.u for t in trials):.4g}; raise u_limit or evaluations"
         )
     best, horizon = min(allowed, key=lambda t: getattr(t, bound)), float(search.times[-1])
     study = examine(search.loop, horizon, k=k, params=best.gains)

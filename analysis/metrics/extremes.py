@@ -181,7 +181,7 @@ def ultimate_bound(t, y, share=0.25):
         Sample times (s), increasing.
     y : ndarray, shape (n,)
         Samples.
-    share : float
+    share : float, optional
         Part of the time that counts as late, in (0, 1].
 
     Returns

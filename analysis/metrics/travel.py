@@ -131,7 +131,7 @@ def reversals(t, y, above=0.0):
         Sample times (s), increasing.
     y : ndarray, shape (n,)
         Samples.
-    above : float
+    above : float, optional
         Swings up to this size (in the unit of y) do not count.
 
     Returns

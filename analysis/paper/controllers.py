@@ -94,6 +94,7 @@ def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
     Parameters
     ----------
     example : {"example_1", "example_2"}
+        Name of the paper's example.
 
     Returns
     -------

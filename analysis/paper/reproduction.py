@@ -119,6 +119,7 @@ def run_case(case: Case) -> CaseRun:
     Parameters
     ----------
     case : Case
+        What is run.
 
     Returns
     -------
@@ -142,6 +143,7 @@ def measured(case: Case, time: np.ndarray, signals: Mapping[str, np.ndarray]) ->
     Parameters
     ----------
     case : Case
+        What was run.
     time : ndarray of shape (m,)
         Times (s).
     signals : mapping
@@ -150,6 +152,7 @@ def measured(case: Case, time: np.ndarray, signals: Mapping[str, np.ndarray]) ->
     Returns
     -------
     CaseRun
+        Signals and metrics.
     """
     metrics = {m.key: m.function(*over(time, signals[m.signal], m.start, m.end)) for m in METRICS}
     return CaseRun(case=case, time=time, signals=signals, metrics=metrics)
@@ -165,12 +168,14 @@ def run_all(
     Parameters
     ----------
     cases : iterable of Case
+        What is run, one after the other.
     done : callable, optional
         See above.
 
     Returns
     -------
     dict of str to CaseRun
+        Signals and metrics of each case by its key.
     """
     results = {}
     for case in cases:
@@ -186,6 +191,7 @@ def compile_cases_ahead(cases: Iterable[Case]) -> None:
     Parameters
     ----------
     cases : iterable of Case
+        Those that will be run.
     """
     for case in cases:
         native.compile_ahead(compile(case.diagram))
@@ -202,6 +208,7 @@ def checks(runs: Mapping[str, CaseRun]) -> list[Check]:
     Returns
     -------
     list of Check
+        One for each figure, with the value that the run has.
     """
     by_key = {m.key: m for m in METRICS}
     return [

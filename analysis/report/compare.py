@@ -47,7 +47,7 @@ def compare_contents(
     ----------
     first, second : path
         Files ``report.json``, or the folders that hold them.
-    rtol : float
+    rtol : float, optional
         Numbers closer than this, relative to the larger, count as equal.
 
     Returns

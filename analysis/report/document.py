@@ -230,7 +230,7 @@ class Claim:
     ...     report = Report(title="Arm", verdict="", claims=[claim], sections=[], command="")
     ...     return render_html(report).split("<strong>")[1].split("</strong>")[0]
     >>> verdict(), verdict("the paper")
-    ('1 of 1 claims fails.', '1 claim of the paper is refuted.')
+    ('1 of 1 claim fails.', '1 claim of the paper is refuted.')
     """
 
     text: str

@@ -76,6 +76,7 @@ def write_gallery(folder: str | os.PathLike[str], *, force: bool = False) -> Pat
     Parameters
     ----------
     folder : path
+        Where reports lie, at any depth.
     force : bool, optional
         Whether an ``index.html`` is replaced that is not a gallery.
 

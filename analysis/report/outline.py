@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from nlctl.wording import counted, some_of
+
 from .document import Claim, Figure, History, Item, Report, Section, Table
 
 __all__ = [
@@ -237,7 +239,7 @@ def summary(claims: Sequence[Claim]) -> tuple[str, str]:
     failed, refuted, open_ = (looks.count(look) for look in ("fail", "refuted", "caution"))
     total = len(claims)
     if failed:
-        return "fail", f"{failed} of {total} claims {'fails' if failed == 1 else 'fail'}."
+        return "fail", f"{some_of(failed, total, 'claim', 'fails', 'fail')}."
     kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
     kept = ", ".join(f"{number} {status}" for status, number in kinds.items())
     waiting = "not shown yet" if {status for status, _ in statuses} <= set(ANSWERS) else "open"
@@ -249,7 +251,7 @@ def summary(claims: Sequence[Claim]) -> tuple[str, str]:
         told += [f"{left} {holds}{f' ({kept})' if kept else ''}"] * bool(left)
         return "refuted", f"{'; '.join(told)}."
     if open_:
-        return "caution", f"{open_} of {total} claims {'is' if open_ == 1 else 'are'} {waiting}."
+        return "caution", f"{some_of(open_, total, 'claim', 'is', 'are')} {waiting}."
     if not claims:
         return "neutral", "No claims are made."
     hold = "The claim holds" if total == 1 else f"All {total} claims hold"
@@ -259,7 +261,7 @@ def summary(claims: Sequence[Claim]) -> tuple[str, str]:
 def _whose(claims: Sequence[Claim]) -> str:
     """Return how many claims are refuted, and whose they are if all are somebody's: 1 claim is."""
     of = [claim.by for claim in claims if claim_status(claim)[1] == "refuted"]
-    whose = f" of {of[0]}" if len(set(of)) == 1 and of[0] else f" of {len(claims)}" * (not any(of))
-    if whose.startswith(f" of {len(claims)}"):
-        return f"{len(of)}{whose} claims {'is' if len(of) == 1 else 'are'}"
-    return f"{len(of)} claim{'s' * (len(of) > 1)}{whose} {'is' if len(of) == 1 else 'are'}"
+    if not any(of):
+        return some_of(len(of), len(claims), "claim", "is", "are")
+    whose = f" of {of[0]}" if len(set(of)) == 1 else ""
+    return f"{counted(len(of), 'claim')}{whose} {'is' if len(of) == 1 else 'are'}"

@@ -51,6 +51,7 @@ def render_html(
     Parameters
     ----------
     report : Report
+        What is on the page.
     interactive : bool, optional
         Whether its `History` items become charts, drawn by a script inside the page.
     pool : concurrent.futures.Executor, optional
@@ -124,6 +125,7 @@ def render_json(report: Report) -> str:
     Parameters
     ----------
     report : Report
+        Whose numbers are written.
 
     Returns
     -------
@@ -187,6 +189,7 @@ def write_report(
     Parameters
     ----------
     report : Report
+        What is written.
     folder : path
         Made where it does not exist.
     interactive : bool, optional
@@ -194,6 +197,7 @@ def write_report(
     force : bool, optional
         Whether files of these names are replaced that no report has made.
     pool : concurrent.futures.Executor, optional
+        As in `render_html`.
     drawn : mapping, optional
         As in `render_html`.
 
@@ -263,10 +267,12 @@ def framed(report: Report) -> Framed:
     Parameters
     ----------
     report : Report
+        What is shown.
 
     Returns
     -------
     Framed
+        Shown by a notebook as HTML.
 
     Examples
     --------

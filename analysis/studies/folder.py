@@ -192,6 +192,7 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
     Parameters
     ----------
     folder : Path
+        Where `run` has kept its results.
     trust : bool, optional
         As in `read_study`.
 

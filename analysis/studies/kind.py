@@ -398,15 +398,17 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
     Parameters
     ----------
     asked : Asked
+        What the study file asks of the analysis.
     sentence : str
         What was found.
-    **parts
+    **parts : object
         Other fields of `Finding`: ``runs``, ``numbers``, ``tables``, and ``answer`` and ``needs``
         where `asked` claims something.
 
     Returns
     -------
     Finding
+        To be returned by the kind's `run`.
 
     Examples
     --------

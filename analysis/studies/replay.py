@@ -16,6 +16,7 @@ from analysis.robustness import Experiment, Prepared, evaluate, prepare
 from analysis.robustness.runs.experiment import by_diagram, simulate_rows
 from analysis.robustness.stl.formula import Band, parts_of
 from nlctl.errors import ParameterError
+from nlctl.wording import counted
 
 from .file.parse import StudyFile
 from .file.schema import keyed
@@ -76,9 +77,10 @@ class Replay:
             return f"{told} All {count} columns are those of the folder, bit for bit."
         first = self.differences[0]
         return (
-            f"{told} {len(self.differences)} columns differ from the folder, the first is "
-            f"'{first}', {self.stored[first]!r} there and {self.again[first]!r} now. The loop is "
-            f"the same; {self.versions or 'so are all versions: another processor?'}"
+            f"{told} {counted(len(self.differences), 'column differs', 'columns differ')} from the "
+            f"folder, the first is '{first}', {self.stored[first]!r} there and "
+            f"{self.again[first]!r} now. The loop is the same; "
+            f"{self.versions or 'so are all versions: another processor?'}"
         )
 
 
@@ -88,7 +90,9 @@ def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Re
     Parameters
     ----------
     folder : Path
+        Where `run` has kept its results.
     row : int
+        Number of the row, from 0.
     part : str, optional
         Key of an analysis that keeps rows of its own; by default the main table.
     trust : bool, optional
@@ -139,7 +143,7 @@ def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Re
     table = _table(folder, part)
     if row not in table.index:
         where = f"of '{part}'" if part else "of the main table"
-        raise ParameterError(f"row {row} {where} is not there: it has {len(table)} rows")
+        raise ParameterError(f"row {row} {where} is not there: it has {counted(len(table), 'row')}")
     wide = _widened(run.file, part)
     prepared = run.prepared if wide is None else prepare(wide)
     chosen = table.loc[[row], prepared.experiment.space.names]

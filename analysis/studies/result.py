@@ -12,6 +12,7 @@ import pandas as pd
 from analysis.robustness.runs.sweep import Sweep
 from nlctl.host.notebook import table_html
 from nlctl.names import unknown
+from nlctl.wording import counted, some_of
 
 from .file.schema import Study, keyed
 from .finding import Finding
@@ -98,8 +99,8 @@ class Result:
     def verdict(self) -> str:
         """The outcome in one sentence."""
         if not self.complete:
-            count = f"{len(self.findings)} of {len(self.study.analysis)} analyses are done"
-            return f"Incomplete: {count}."
+            planned = counted(len(self.study.analysis), "analysis", "analyses")
+            return f"Incomplete: {len(self.findings)} of {planned} done."
         if not self.claims:
             return "The study makes no claims."
         count = len(self.claims)
@@ -109,9 +110,9 @@ class Result:
         for answer in ("refuted", "not shown yet"):
             these = [finding for finding in self.claims if finding.answer == answer]
             names = [f.key + (f" (needs {f.needs})" if f.needs else "") for f in these]
-            verb = "is" if len(these) == 1 else "are"
             if these:
-                told.append(f"{len(these)} of {count} claims {verb} {answer}: {', '.join(names)}.")
+                which = some_of(len(these), count, "claim", "is", "are")
+                told.append(f"{which} {answer}: {', '.join(names)}.")
         return " ".join(told)
 
     def _repr_html_(self) -> str:

@@ -84,6 +84,7 @@ def run(
     Parameters
     ----------
     file : StudyFile
+        What `read_study` returns.
     folder : Path
         See `folder` for what is in it.
     resume : bool, optional

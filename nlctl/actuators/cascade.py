@@ -23,6 +23,7 @@ def cascade(stages: Mapping[str, Any], *, name: str = "actuator") -> ct.Intercon
         each has the input u and the output v.  Parameters are then
         ``"actuator.dead_zone.b_r"``.
     name : str, optional
+        Name of the diagram, in front of its parameters' names.
 
     Returns
     -------

@@ -34,5 +34,5 @@ def checked_start(spec: Any, count: int) -> np.ndarray:
     who = type(spec).__name__
     given = vector(who, "v0", np.atleast_1d(spec.v0))
     if given.size not in (1, count):
-        raise ParameterError(f"{who} needs v0 to be 1 or {count} numbers, got {given.size}")
+        raise ParameterError(f"{who} needs v0 to be one number or {count}, got {given.size}")
     return given

@@ -11,6 +11,7 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
+from ..wording import counted
 from .memories import checked_start, memory_names, started
 from .static import BOUNDED_OUTPUT
 
@@ -124,8 +125,8 @@ def check_weights(spec: Any, meaning: str) -> None:
     who = type(spec).__name__
     if len(spec.r) != len(spec.w):
         raise ParameterError(
-            f"{who} needs one weight for each threshold, got {len(spec.w)} weights w and "
-            f"{len(spec.r)} thresholds r"
+            f"{who} needs one weight for each threshold, got {counted(len(spec.w), 'weight')} w "
+            f"and {counted(len(spec.r), 'threshold')} r"
         )
     slopes = spec.w_0 + np.cumsum(spec.w)
     if not np.all(slopes > 0):

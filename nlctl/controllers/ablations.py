@@ -59,6 +59,7 @@ def replaced(controller: ct.InterconnectedSystem, **pieces: Any) -> ct.Interconn
     Returns
     -------
     control.InterconnectedSystem
+        With the same name, inputs and outputs.
 
     Raises
     ------

@@ -12,6 +12,7 @@ from ..errors import ParameterError
 from ..params import integer, record
 from ..plants import coordinate_names
 from ..references import derivative_names
+from ..wording import counted
 from .filtered_error import FilteredError, binomial_lambdas
 from .nussbaum import NussbaumLaw
 from .rbf import AdaptiveWeights, GaussianBasis, diagonal_centres
@@ -88,6 +89,7 @@ def adaptive_neural(
     Returns
     -------
     control.InterconnectedSystem
+        The controller, in the place of one block.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def adaptive_neural(
     basis = GaussianBasis(centres=diagonal_centres(27, order)) if basis is None else basis
     if isinstance(filtered_error, FilteredError) and filtered_error.order != order:
         raise ParameterError(
-            f"adaptive_neural of order {order} needs {order - 1} lambdas, got "
+            f"adaptive_neural of order {order} needs {counted(order - 1, 'lambda')}, got "
             f"{len(filtered_error.lambdas)} ({filtered_error.lambdas})"
         )
     if isinstance(basis, GaussianBasis) and len(basis.inputs) > order:
@@ -122,7 +124,7 @@ def adaptive_neural(
     if isinstance(weights, AdaptiveWeights) and weights.nodes != nodes:
         raise ParameterError(
             f"adaptive_neural needs as many weights as centres, got nodes={weights.nodes} for "
-            f"{nodes} centres"
+            f"{counted(nodes, 'centre')}"
         )
     pieces = {
         "filtered_error": filtered_error,

@@ -16,6 +16,7 @@ from ..errors import ParameterError
 from ..functions import gaussian
 from ..params import param, record
 from ..plants import coordinate_names
+from ..wording import counted
 
 __all__ = [
     "AdaptiveWeights",
@@ -180,8 +181,8 @@ class GaussianBasis:
         """One width, or one per centre."""
         if len(self.widths) not in (1, len(self.centres)):
             raise ParameterError(
-                f"GaussianBasis needs 1 or {len(self.centres)} widths for its "
-                f"{len(self.centres)} centres, got {len(self.widths)}"
+                "GaussianBasis needs one width or one for each of its "
+                f"{counted(len(self.centres), 'centre')}, got {len(self.widths)}"
             )
 
     @property

@@ -71,10 +71,12 @@ def sliding_mode(
     law : record, optional
         `SlidingModeLaw` by default; `SuperTwistingLaw` where u is to be continuous.
     name : str, optional
+        Name of the connected controller, in front of its parameters' names.
 
     Returns
     -------
     control.InterconnectedSystem
+        The controller, in the place of one block.
 
     Raises
     ------

@@ -10,6 +10,7 @@ import numpy as np
 from ..arguments import pairs
 from ..errors import ParameterError, UsageError
 from ..params import param, record
+from ..wording import counted
 
 
 @record
@@ -80,8 +81,8 @@ class TransportDelay:
             ) from error
         if found.size not in (1, count) or not np.all(np.isfinite(found)):
             raise ParameterError(
-                f"TransportDelay needs a history that returns {count} finite numbers, got "
-                f"{found.tolist()} at t = {t:g} s"
+                f"TransportDelay needs a history that returns {counted(count, 'finite number')}, "
+                f"got {found.tolist()} at t = {t:g} s"
             )
         return np.broadcast_to(found, (count,)).astype(float)
 

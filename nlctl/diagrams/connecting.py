@@ -20,6 +20,7 @@ def as_system(thing: Any, name: str) -> ct.InputOutputSystem:
     Parameters
     ----------
     thing : record or control.InputOutputSystem
+        What becomes a part of a diagram.
     name : str
         Its name in the diagram.
 
@@ -75,6 +76,7 @@ def interconnect(
     Returns
     -------
     control.InterconnectedSystem
+        To be simulated, compiled, drawn, or connected further.
 
     Raises
     ------
@@ -245,6 +247,7 @@ def reconnected(before: Any, parts: Sequence[Any], maps: Any, dt: Any) -> ct.Int
     Returns
     -------
     control.InterconnectedSystem
+        With the name, signals and parameters of `before`.
     """
     made = ct.InterconnectedSystem(
         parts,

@@ -132,6 +132,7 @@ def parameters(system: Any) -> pd.DataFrame:
     Parameters
     ----------
     system : control.InputOutputSystem, record or Compiled
+        Whose parameters are listed.
 
     Returns
     -------

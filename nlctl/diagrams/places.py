@@ -61,6 +61,7 @@ def places(
     Yields
     ------
     Place
+        The system itself first, parts in the order of ``syslist``.
     """
     nested = isinstance(system, ct.InterconnectedSystem)
     outer, outer_parameters = ("", "") if parent is None else (parent.path, parent.parameter_path)
@@ -111,10 +112,12 @@ def known_system(who: str, system: Any) -> Any:
     who : str
         Who asks, for the error.
     system : control.InputOutputSystem or Compiled
+        What was given.
 
     Returns
     -------
     control.InputOutputSystem
+        The same object, or that which a `Compiled` was made of.
 
     Raises
     ------
@@ -140,6 +143,7 @@ def not_a_system(who: str, thing: Any) -> str:
     Returns
     -------
     str
+        It says how a block is made of a record.
     """
     return (
         f"{who} needs a block or diagram, got {type(thing).__name__}: nlctl.block makes a block of "

@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Polygon, Rectangle
 
+from ..wording import counted
 from .figure import Drawing
 from .records import (
     FONT,
@@ -78,6 +79,7 @@ def signal_graph(diagram: ct.InterconnectedSystem) -> tuple[tuple[_Block, ...], 
     Parameters
     ----------
     diagram : control.InterconnectedSystem
+        As in `draw`.
 
     Returns
     -------
@@ -120,7 +122,7 @@ def _block(system: Any, name: str) -> _Block:
 def _kind(system: Any) -> str:
     """What a block is, in a word; a static sum or gain as its formula."""
     if isinstance(system, ct.InterconnectedSystem):
-        return f"{len(system.syslist)} block" + "s" * (len(system.syslist) != 1)
+        return counted(len(system.syslist), "block")
     if hasattr(system, "spec"):
         return type(system.spec).__name__
     if not isinstance(system, ct.StateSpace):
@@ -158,6 +160,7 @@ def lay_out(diagram: ct.InterconnectedSystem) -> Layout:
     Parameters
     ----------
     diagram : control.InterconnectedSystem
+        As in `draw`.
 
     Returns
     -------
@@ -200,6 +203,7 @@ def draw(
         Any diagram made with `nlctl.interconnect`, `control.interconnect`, `control.feedback`
         of nonlinear systems, ...
     title : str, optional
+        Above the drawing; none by default.
     expand : bool, optional
         Show what is inside nested diagrams, each in a panel of its own below.
 

@@ -72,6 +72,7 @@ def with_faults(diagram: Any, *faults: Fault) -> ct.InterconnectedSystem:
     diagram : control.InterconnectedSystem or Compiled
         Nested to any depth.  A `Compiled` stands for its diagram.
     *faults : Fault
+        On signals of the diagram; those on one signal in their order.
 
     Returns
     -------

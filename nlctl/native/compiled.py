@@ -18,6 +18,7 @@ from ..errors import CompileError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
 from ..upstream.control_internals import StandIn, is_system
+from ..wording import counted
 from .codegen.blocks import Equations, equations
 from .codegen.lower import Lowered, lower
 from .codegen.program import Program, program
@@ -121,6 +122,16 @@ class Compiled(StandIn):
 
         Overrides are resolved by python-control itself.
 
+        Parameters
+        ----------
+        params : mapping, optional
+            Overrides by qualified name.
+
+        Returns
+        -------
+        ndarray of shape (k,)
+            The values of all k parameters, those of arrays one after the other.
+
         Raises
         ------
         UnknownNameError, ParameterError
@@ -139,12 +150,60 @@ class Compiled(StandIn):
             return packed(self.schedule.holders, self.program.layout, self.program.fixed)
 
     def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
-        """Return the right-hand side, as ``system.dynamics`` does."""
+        """Return the right-hand side, as ``system.dynamics`` does.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        x : array_like of shape (nstates,)
+            State.
+        u : array_like of shape (ninputs,), optional
+            Inputs; by default there are none.
+        params : mapping, optional
+            Overrides by qualified name.
+
+        Returns
+        -------
+        ndarray of shape (nstates,)
+            x' in the states' units per second, or the next x in discrete time.
+
+        Raises
+        ------
+        UsageError
+            If the diagram has a transport delay: its past is known in a run only.
+        ParameterError, UnknownNameError
+            If x or u has another length, or an override is refused.
+        """
         g = np.empty(self.program.events)
         return self._call(self.native[0], self.system.nstates, t, x, u, params, g)
 
     def output(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
-        """Return the outputs, as ``system.output`` does."""
+        """Return the outputs, as ``system.output`` does.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        x : array_like of shape (nstates,)
+            State.
+        u : array_like of shape (ninputs,), optional
+            Inputs; by default there are none.
+        params : mapping, optional
+            Overrides by qualified name.
+
+        Returns
+        -------
+        ndarray of shape (noutputs,)
+            In the outputs' units.
+
+        Raises
+        ------
+        UsageError
+            If the diagram has a transport delay: its past is known in a run only.
+        ParameterError, UnknownNameError
+            If x or u has another length, or an override is refused.
+        """
         return self._call(self.native[1], self.system.noutputs, t, x, u, params)
 
     @cached_property
@@ -177,7 +236,7 @@ class Compiled(StandIn):
         copy_names : bool, optional
             Whether it gets the diagram's names of states, inputs and outputs, or python-control's
             generic ones.
-        **names
+        **names : object
             Other names: `name`, `inputs`, `outputs` and `states` of ``ct.ss``.
 
         Returns
@@ -212,13 +271,19 @@ class Compiled(StandIn):
         ----------
         parameters : sequence of str
             Qualified names, such as ``"actuator.b_r"``; with an index for entries of arrays.
-        x0, u0, t, params
-            The point, as in `linearize`.
+        x0 : mapping, array_like or control.OperatingPoint
+            State, as in `linearize`.
+        u0 : array_like, optional
+            Inputs, of shape (ninputs,), as in `linearize`.
+        t : float, optional
+            Time in s.
+        params : mapping, optional
+            Parameters that are overridden.
 
         Returns
         -------
         tuple of ndarray
-            Of shapes (nstates, k) and (noutputs, k) for k parameters.
+            Their derivatives, of shapes (nstates, k) and (noutputs, k) for k parameters.
 
         Raises
         ------
@@ -239,7 +304,9 @@ class Compiled(StandIn):
         x, u = (np.array(v, dtype=float).reshape(-1) for v in (x, u))
         for what, given, wanted in (("x", x, self.system.nstates), ("u", u, self.system.ninputs)):
             if given.size != (wanted or 0):
-                raise ParameterError(f"{what} needs {wanted or 0} values, got {given.size}")
+                raise ParameterError(
+                    f"{what} needs {counted(wanted or 0, 'value')}, got {given.size}"
+                )
         result = np.empty(size or 0)
         function(float(t), x, u, self.parameter_vector(params), result, *more)
         return result
@@ -277,6 +344,7 @@ def compile(  # noqa: A001 (what it does)
     Returns
     -------
     Compiled
+        For `nlctl.input_output_response` and `nlctl.ensemble_response`, in place of `system`.
 
     Raises
     ------
@@ -285,6 +353,8 @@ def compile(  # noqa: A001 (what it does)
     CompileError
         If a block is of a wrong kind or size, a function depends on more than its arguments, or
         an algebraic loop goes through a function that has no expressions.
+    UnknownNameError
+        If there is no such choice for `algebraic_loops`, or no such parameter.
 
     Notes
     -----

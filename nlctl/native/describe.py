@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
+from ..wording import counted
 from .codegen.program import Program, count_switching_functions, memory
 from .diagram.schedule import Node, signal_name
 from .jacobians import inexact
@@ -33,9 +34,9 @@ def described(compiled: Compiled) -> str:
     schedule, program, p = compiled.schedule, compiled.program, compiled.parameter_vector()
     system, nodes = schedule.system, schedule.nodes
     lines = [
-        f"Compiled '{system.name}', {_timebase(system)}: {_count(len(nodes), 'block')}, "
-        f"{_count(system.ninputs, 'input')}, {_count(system.nstates, 'state')}, "
-        f"{_count(system.noutputs, 'output')}",
+        f"Compiled '{system.name}', {_timebase(system)}: {counted(len(nodes), 'block')}, "
+        f"{counted(system.ninputs or 0, 'input')}, {counted(system.nstates or 0, 'state')}, "
+        f"{counted(system.noutputs or 0, 'output')}",
         f"  order        {' -> '.join(nodes[i].path for i in schedule.order)}",
         f"  run it by    {USE}",
     ]
@@ -104,7 +105,3 @@ def _value(slot: Slot, p: np.ndarray) -> str:
 def _listed(names: Sequence[str]) -> str:
     more = len(names) - _SHOWN
     return ", ".join(names if more <= 1 else [*names[:_SHOWN], f"and {more} more"])
-
-
-def _count(number: int | None, what: str) -> str:
-    return f"{number or 0} {what}{'' if number == 1 else 's'}"

@@ -17,6 +17,7 @@ from ..host.notebook import table_html
 from ..names import unknown
 from ..params import checked_times, integer
 from ..responses.arguments import checked_params, input_array
+from ..wording import counted
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.detection import new_paces
@@ -98,7 +99,8 @@ class Ensemble:
         how = ", ".join(f"{count} {status}" for status, count in ended.items()) or "none finished"
         kept = f"; kept: {', '.join(self.signals)}" if self.signals else ""
         return (
-            f"Ensemble of {len(self.table)} members: {how}; {self.time.size} times from "
+            f"Ensemble of {counted(len(self.table), 'member')}: {how}; "
+            f"{counted(self.time.size, 'time')} from "
             f"{self.time[0]:g} to {self.time[-1]:g} s{kept}\n{self.table.head(ROWS)}"
             + (f"\n... {len(self.table) - ROWS} more in .table" * (len(self.table) > ROWS))
         )
@@ -149,6 +151,7 @@ def ensemble_response(
     threads : int, optional
         Number of threads; by default one per core.
     rtol, atol : float, optional
+        Tolerances of the integrator: relative (1), and absolute in the states' units.
     max_steps : int, optional
         A member that needs more steps ends with the status STEP_LIMIT, one that switches over and
         over again at a jump with CHATTERING.

@@ -21,6 +21,7 @@ from ..params import declared_params, equation_arguments, with_overrides
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from ..sampling.system import clocks_of
+from ..wording import counted
 from .codegen.blocks import Equations
 from .codegen.lower import DIRECTION
 from .codegen.solver import searched
@@ -176,7 +177,9 @@ def _inputs(system: Any, u0: Any) -> np.ndarray:
     u = np.asarray(0.0 if u0 is None else u0, dtype=float)
     u = np.full(count, float(u)) if u.ndim == 0 else u.reshape(-1)
     if u.size != count or not np.all(np.isfinite(u)):
-        raise ParameterError(f"u0 needs {count} finite numbers for '{system.name}', got {u0!r}")
+        raise ParameterError(
+            f"u0 needs {counted(count, 'finite number')} for '{system.name}', got {u0!r}"
+        )
     return u
 
 

@@ -102,6 +102,7 @@ def uninterrupted(response: Any) -> Any:
     Raises
     ------
     KeyboardInterrupt
+        If Ctrl-C ended the run.
     """
     if response.statistics.status is Status.STOPPED:
         raise KeyboardInterrupt(response.message)

@@ -80,6 +80,7 @@ def typeset(
     Parameters
     ----------
     system : control.InputOutputSystem
+        Whose equations are written.
     values : bool, optional
         Write the values of parameters in the places of their names.
     params : mapping, optional
@@ -88,6 +89,7 @@ def typeset(
     Returns
     -------
     tuple of BlockEquations
+        Those of each block, in the order of the diagram.
 
     Raises
     ------

@@ -15,6 +15,7 @@ from ..diagrams import state_names
 from ..errors import ParameterError, UnknownKeywordError
 from ..names import unknown
 from ..params import as_numbers
+from ..wording import counted
 
 ALIASES = {  # python-control's short names
     **{"T": "timepts", "U": "inputs", "X0": "initial_state"},
@@ -213,7 +214,9 @@ def state_array(system: ct.InputOutputSystem, initial_state: Any = None) -> np.n
     if np.isscalar(initial_state):
         x = np.full(size, x[0])
     if x.size > size:
-        raise ParameterError(f"initial_state needs {size} values for '{system.name}', got {x.size}")
+        raise ParameterError(
+            f"initial_state needs {counted(size, 'value')} for '{system.name}', got {x.size}"
+        )
     if 0 < x.size < size and x[-1] != 0.0:
         warnings.warn("initial_state too short; padding with zeros", stacklevel=2)
     x = np.concatenate([x, np.zeros(size - x.size)])

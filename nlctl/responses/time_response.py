@@ -9,6 +9,7 @@ import control as ct
 import numpy as np
 
 from ..host.notebook import table_html
+from ..wording import counted
 
 _SHOWN = 6  # names that are listed before the rest is only counted
 
@@ -33,13 +34,16 @@ class Response(ct.TimeResponseData):
     def __repr__(self) -> str:
         t, run = np.atleast_1d(self.time), self.statistics
         lines = [
-            f"Response of '{self.sysname}': {t.size} times from {t[0]:g} to {t[-1]:g} s",
+            f"Response of '{self.sysname}': {counted(t.size, 'time')} from {t[0]:g} to {t[-1]:g} s",
             f"  outputs  {_names(self.output_labels)}",
             f"  inputs   {_names(self.input_labels)}",
             f"  states   {self.nstates or 'none'}",
         ]
         if run is not None:
-            steps = f"{run.accepted} steps, {run.rejected} rejected, {run.events} events"
+            steps = (
+                f"{counted(run.accepted, 'step')}, {run.rejected} rejected, "
+                f"{counted(run.events, 'event')}"
+            )
             lines.append(f"  run      {run.status.name}, {steps}")
         return "\n".join(lines)
 

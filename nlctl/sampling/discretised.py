@@ -22,6 +22,7 @@ def discretise(system: Any, dt: float, method: str = "euler") -> Any:
     Parameters
     ----------
     system : control.InputOutputSystem
+        In continuous time; it stays as it is.
     dt : float
         Sampling time (s).
     method : {"euler", "tustin", "zoh"}, optional

@@ -7,6 +7,7 @@ from typing import Any
 from ..equations import equation
 from ..errors import ParameterError
 from ..params import param, record
+from ..wording import counted
 from .clock import Clock
 
 
@@ -73,7 +74,10 @@ class Sampling:
         elif self.waiting and not pending:
             rule, advice = "delay > 0 where outputs wait", "no delay"
         elif pending > self.waiting:
-            rule = f"delay <= {self.waiting * self.dt:g}, at most {self.waiting} sampling times,"
+            rule = (
+                f"delay <= {self.waiting * self.dt:g}, at most "
+                f"{counted(self.waiting, 'sampling time')},"
+            )
             advice = f"waiting={pending}"
         else:
             return

@@ -204,12 +204,18 @@ class Sampled(Around):
         Parameters
         ----------
         now : frozenset of Moment
+            What happens.
         x : array_like of shape (nstates,)
             Numbers, or what stands for them.
         due : array_like of shape (noutputs,)
             Outputs that follow if any do, see `oldest`.
         computed : callable
             Returns what a sample makes: the block's own next states, and its outputs.
+
+        Returns
+        -------
+        list of array_like
+            The block's own states, outputs that wait where there is a delay, outputs held.
         """
         own, waiting, held = self.parts(x)
         held = due if self.releases(now) else held

@@ -268,8 +268,8 @@ def liar(**changes):
     [
         ({"output": staticmethod(lambda t, x, u, p: (x[0] + 0 * u[0],))}, "'y' depends on the in"),
         ({"output": staticmethod(lambda t, x, u, p: (u[0] > 0,))}, "'y' depends on the input"),
-        ({"outputs": ("y", "z")}, "returns 1 values from output, needs 2: y, z"),
-        ({"states": ("x", "w")}, "returns 1 values from update, needs 2: x, w"),
+        ({"outputs": ("y", "z")}, "returns 1 value from output, needs 2: y, z"),
+        ({"states": ("x", "w")}, "returns 1 value from update, needs 2: x, w"),
         ({"update": staticmethod(lambda t, x, u, p: (u[0], 0.0))}, "returns 2 values from update"),
         ({"outputs": None}, "is not a block: it lacks outputs"),
         ({"inputs": None, "feedthrough": None}, "is not a block: it lacks inputs, feedthrough"),

@@ -313,7 +313,7 @@ def test_in_python_control_the_memories_relax_onto_the_operator(kind):
         (lambda: nlctl.PrandtlIshlinskii(r=(0.2, 0.1, 0.3, 0.4)), "increasing thresholds r"),
         (lambda: nlctl.PrandtlIshlinskii(r=(0.2, 0.3)), "got 4 weights w and 2 thresholds r"),
         (lambda: nlctl.PrandtlIshlinskii(w=(-0.3, -0.4, 0, 0)), r"w_0 \+ w\[0\] .* > 0"),
-        (lambda: nlctl.PrandtlIshlinskii(v0=(0.0, 1.0)), "needs v0 to be 1 or 4 numbers, got 2"),
+        (lambda: nlctl.PrandtlIshlinskii(v0=(0.0, 1.0)), "needs v0 to be one number or 4, got 2"),
         (lambda: nlctl.Relay(on=-1.0), "Relay needs off < on, got -1 and -1"),
         (lambda: nlctl.Relay(v0=0.0), "Relay needs v0 of 1 and -1 only, got 0"),
         (lambda: nlctl.Relay(v0=(1.0, 1.0)), "Relay needs a number for v0"),

@@ -238,7 +238,7 @@ def test_without_a_box_it_is_what_the_run_visits():
     """A tenth of each side is added at both ends, so that a sixth of a half side is left."""
     found = ledger(example(1), 0.5, W=np.zeros(27))
     assert found["Omega"].least == pytest.approx(0.1 / 0.6)
-    assert "visited by one response" in found["Omega"].evidence
+    assert "visited by 1 response" in found["Omega"].evidence
     assert found.holds
 
 

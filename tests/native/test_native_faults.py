@@ -238,7 +238,7 @@ class TestBadInput:
 
     def test_states_of_a_wrong_length(self, linear):
         """Three numbers for one state."""
-        with pytest.raises(nlctl.ParameterError, match="needs 1 values"):
+        with pytest.raises(nlctl.ParameterError, match="needs 1 value for"):
             run(linear, [0, 1], 0, [1.0, 2.0, 3.0])
 
 

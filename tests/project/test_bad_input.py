@@ -29,7 +29,11 @@ def refused(error, *told):
     [
         ("GaussianBasis", {"widths": -2.0}, ["widths[0] > 0", "-2"]),
         ("GaussianBasis", {"widths": (2.0,) * 26 + (0.0,)}, ["widths[26] > 0", "got 0"]),
-        ("GaussianBasis", {"widths": (1.0, 2.0)}, ["1 or 27 widths", "27 centres", "got 2"]),
+        (
+            "GaussianBasis",
+            {"widths": (1.0, 2.0)},
+            ["one for each of its 27 centres", "got 2"],
+        ),
         ("GaussianBasis", {"centres": []}, ["centres", "(0,)"]),
         ("GaussianBasis", {"centres": np.zeros((0, 2))}, ["at least one value in centres"]),
         ("GaussianBasis", {"centres": [[1.0, 2.0], [3.0]]}, ["numbers for centres", "[3.0]"]),
@@ -69,7 +73,7 @@ def low_order(order):
 @each_row(
     ("make", "choices", "error", "told"),
     [
-        (example_1, low_order(1), ParameterError, ["1 derivatives", "order 2 needs 2"]),
+        (example_1, low_order(1), ParameterError, ["1 derivative,", "order 2 needs 2"]),
         (example_2, low_order(2), ParameterError, ["2 derivatives", "order 3 needs 3"]),
         (example_1, {"phase": "chirp"}, UnknownNameError, ["'chirp'", "'integral', 'product'"]),
         (example_1, {"phase": "produkt"}, UnknownNameError, ["'produkt'", "nearest: 'product'"]),

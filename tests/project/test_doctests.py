@@ -59,13 +59,6 @@ def test_the_long_examples_run(name):
     assert failures([examples()[name]]) == ""
 
 
-def functions(package):
-    """The public functions of a package, by name."""
-    home = importlib.import_module(package)
-    found = {name: getattr(home, name) for name in home.__all__}
-    return {name: made for name, made in found.items() if inspect.isfunction(made)}
-
-
 def documented():
     """Every name of the reference that is not a value, by the package that offers it."""
     for home, name in documented_names():
@@ -88,42 +81,3 @@ def test_public_names_have_an_example(name, made):
     if found:
         home = importlib.import_module(name.rpartition(".")[0])
         assert ">>> " in inspect.getdoc(getattr(home, found[1])), f"{name} refers to {found[1]}"
-
-
-def offered():
-    """The public functions of all packages, by the names under which they are offered."""
-    for package in (nlctl, analysis):
-        homes = [package.__name__]
-        walked = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
-        homes += [found.name for found in walked if found.ispkg]
-        for home in homes:
-            if hasattr(importlib.import_module(home), "__all__"):
-                for name, made in functions(home).items():
-                    if made.__module__.partition(".")[0] in ("nlctl", "analysis"):
-                        yield f"{home}.{name}", made
-
-
-SECTION = r"^{}\n-+\n((?:.+\n?|\n(?!\w+\n-+\n))*)"
-
-
-def section(made, title):
-    """The lines of a section of a docstring, None without it."""
-    text = f"{inspect.getdoc(made) or ''}\n"
-    found = re.search(SECTION.format(title), text, re.MULTILINE)
-    return found and found[1].splitlines()
-
-
-@each_row(("name", "made"), sorted(dict(offered()).items()))
-def test_public_functions_tell_of_every_argument(name, made):
-    """A section Parameters names each of the signature, and nothing else is in it."""
-    told = section(made, "Parameters") or []
-    heads = [line for line in told if line and not line.startswith(" ")]
-    named = {part.strip(" *") for head in heads for part in head.split(" :")[0].split(",")}
-    assert named == set(inspect.signature(made).parameters), name
-
-
-@each_row(("name", "made"), sorted(dict(offered()).items()))
-def test_public_functions_tell_what_they_return(name, made):
-    """A section Returns or Yields, of all that return something."""
-    returns = inspect.signature(made).return_annotation not in (None, "None")
-    assert returns == any(section(made, title) for title in ("Returns", "Yields")), name

@@ -9,7 +9,8 @@ from places import ROOT
 
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
     ["nlctl._version", "nlctl.host", "nlctl.upstream"],
-    ["nlctl.errors", "nlctl.names", "nlctl.arguments", "nlctl.params", "nlctl.equations"],
+    ["nlctl.errors", "nlctl.wording", "nlctl.names", "nlctl.arguments", "nlctl.params"]
+    + ["nlctl.equations"],
     ["nlctl.blocks", "nlctl.diagrams", "nlctl.functions", "nlctl.drawing", "nlctl.responses"]
     + ["nlctl.sampling", "nlctl.delays", "nlctl.sliding"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers", "nlctl.faults"],

@@ -78,7 +78,7 @@ LEDGER = [
     ("|r| <= sqrt(2 B), B of (32)", r"\(|r|\le \sqrt{2\,B}\), \(B\) of (32)"),
     ("x1 in [-0.99, 1.13]", r"\(x_{1}\) in [-0.99, 1.13]"),
     ("all signals stay finite over 20 s", "all signals stay finite over 20 s"),
-    ("one response in [0, 20] s", "one response in [0, 20] s"),
+    ("1 response in [0, 20] s", "1 response in [0, 20] s"),
     ("the lobe's 'own' 5-fold", "the lobe's 'own' 5-fold"),
     ("a monotone zeta or a constant gain", r"a monotone \(\zeta \) or a constant gain"),
     ("lines (b), (c); as of (23), (24)", "lines (b), (c); as of (23), (24)"),

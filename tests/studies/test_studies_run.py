@@ -209,7 +209,7 @@ def test_a_replay_tells_a_difference(result):
     finally:
         save_finding(result.folder, before, origin)
     assert made.differences == ("iae",)
-    assert "1 columns differ" in str(made)
+    assert "1 column differs" in str(made)
     assert "The loop is the same; so are all versions: another processor?" in str(made)
     with pytest.raises(ParameterError, match="row 999 of the main table is not there"):
         replay(result.folder, 999)
@@ -385,9 +385,9 @@ def test_a_metric_that_failed_rows_lack_has_no_sensitivity(failing, key):
     failed = int(solution(table, 2.0).isna().sum())
     assert 0 < failed < len(table)
     assert found[key].sentence == (
-        f"Not answered: {failed} of {len(table)} rows did not reach their end and have no finite "
-        "'iae': take a margin, such as of = \"spec\", which every row has, or a space without "
-        "such rows."
+        f"Not answered: {failed} of {len(table)} rows have no finite 'iae', as runs did not "
+        'reach their end: take a margin, such as of = "spec", which every row has, or a space '
+        "without such rows."
     )
     assert (found[key].holds, found[key].runs) == (False, len(table))
     assert found.complete

@@ -1,10 +1,17 @@
-"""The names that the reference of the site documents."""
+"""The names that packages and the reference of the site offer, and sections of docstrings."""
 
+import importlib
+import inspect
+import pkgutil
 import re
 
 from places import ROOT
 
+import analysis
+import nlctl
+
 PUBLIC = re.compile(r"^\.\. public:: (\S+)\n\n((?: +.*\n?)+)", re.MULTILINE)
+SECTION = r"^{}\n-+\n((?:.+\n?|\n(?!\w+\n-+\n))*)"
 
 
 def documented_names():
@@ -12,3 +19,50 @@ def documented_names():
     for page in sorted((ROOT / "docs" / "reference").glob("*.rst")):
         for home, names in PUBLIC.findall(page.read_text(encoding="utf-8")):
             yield from ((home, name) for name in names.split())
+
+
+def functions(package):
+    """The public functions of a package, by name."""
+    home = importlib.import_module(package)
+    found = {name: getattr(home, name) for name in home.__all__}
+    return {name: made for name, made in found.items() if inspect.isfunction(made)}
+
+
+def offered():
+    """The public functions of all packages, by the names under which they are offered."""
+    for package in (nlctl, analysis):
+        homes = [package.__name__]
+        walked = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+        homes += [found.name for found in walked if found.ispkg]
+        for home in homes:
+            if hasattr(importlib.import_module(home), "__all__"):
+                for name, made in functions(home).items():
+                    if made.__module__.partition(".")[0] in ("nlctl", "analysis"):
+                        yield f"{home}.{name}", made
+
+
+def section(made, title):
+    """The lines of a section of a docstring, None without it."""
+    text = f"{inspect.getdoc(made) or ''}\n"
+    found = re.search(SECTION.format(title), text, re.MULTILINE)
+    return found and found[1].splitlines()
+
+
+def entries(made, title):
+    """The entries of a section: the line that begins each, and its description."""
+    found = []
+    for line in section(made, title) or []:
+        if line and not line.startswith(" "):
+            found.append((line, []))
+        elif line.strip():
+            found[-1][1].append(line.strip())
+    return [(head, " ".join(told)) for head, told in found]
+
+
+def methods():
+    """The methods of classes of the reference that have a section of parameters."""
+    for home, name in documented_names():
+        made = getattr(importlib.import_module(home), name)
+        for key, method in vars(made).items() if inspect.isclass(made) else ():
+            if inspect.isfunction(method) and entries(method, "Parameters"):
+                yield f"{home}.{name}.{key}", method

@@ -12,6 +12,7 @@ from nlctl.arguments import number, of_type, vector
 from nlctl.errors import ParameterError
 from nlctl.functions import smooth_sign
 from nlctl.plants import coordinate_names
+from nlctl.wording import counted
 
 from ...intervals.arithmetic import as_ball
 from ...intervals.box import Box, visited_box
@@ -35,6 +36,7 @@ def kappa() -> Proof:
     Returns
     -------
     Proof
+        Whether 0.2785 holds on [0, 10].
 
     Examples
     --------
@@ -63,6 +65,11 @@ def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float 
     -------
     Range
         In the unit of d, rounded outwards.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a box, `times` is not a pair in order, or `tol` is not positive.
 
     Examples
     --------
@@ -118,6 +125,7 @@ def constants(
     Returns
     -------
     Constants
+        Every constant with the proof that it rests on.
 
     Raises
     ------
@@ -179,7 +187,7 @@ def _outcome(bound: float) -> Provenance:
 
 
 def _sector_entries(bounds: Sector, box: Box, n: int) -> list[Constant]:
-    how = f"F/v, {bounds.boxes} boxes"
+    how = f"F/v, {counted(bounds.boxes, 'box', 'boxes')}"
     notes = {"m1": "v >= 0", "m2": "v >= 0", "m3": "v < 0, upper", "m4": "v < 0, lower"}
     return [
         Constant(
@@ -224,7 +232,7 @@ def _error_entries(
             value=found.magnitude,
             unit=per_second(n),
             provenance=_outcome(found.magnitude),
-            how=f"{how}, {found.boxes} boxes",
+            how=f"{how}, {counted(found.boxes, 'box', 'boxes')}",
             over=over,
         )
         for symbol, found, how, over in rows

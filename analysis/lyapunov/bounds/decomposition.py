@@ -20,6 +20,7 @@ from nlctl.arguments import number, vector
 from nlctl.errors import ParameterError, UsageError
 from nlctl.functions import clip
 from nlctl.params import equation_arguments
+from nlctl.wording import counted
 
 from ...intervals.arithmetic import Ball, as_ball, common
 from ...intervals.branch_and_bound import Box, Range, Undecided, enclose
@@ -191,6 +192,7 @@ def decompose(
     Returns
     -------
     Decomposition
+        The split with bounds of k and eps_u, and how they are known.
 
     Raises
     ------
@@ -331,12 +333,13 @@ def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: floa
     if undecided:
         raise DecompositionError(
             f"eps_u of {type(actuator).__name__} could not be bounded for |u| <= {2 * u_max:g}: "
-            f"{undecided} boxes are undecided"
+            f"{counted(undecided, 'box is', 'boxes are')} undecided"
         )
     _refuse_growth(actuator, k, u_max, (_eps_range(k, edges, u_max, tol), wide))
     declared = hasattr(actuator, "band") and not _is_of_nlctl(actuator)
     if declared:
         _refute_band(actuator, edges, u_max)
+    boxes = counted(sum(end.boxes for end in wide), "box", "boxes")
     return Decomposition(
         k_1=k[0],
         k_2=k[1],
@@ -344,7 +347,7 @@ def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: floa
         eps_high=wide[1].high,
         part=clipped_split(*k),
         provenance="given" if declared else "proved",
-        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {sum(r.boxes for r in wide)} boxes"
+        how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {boxes}"
         + (", within the band that the record declares" if declared else ""),
         over=f"|u| <= {2 * u_max:g}, all t",
     )

@@ -81,6 +81,7 @@ def premises(
     Parameters
     ----------
     constants : Constants
+        Of the loop, see `constants`.
     gains : Gains, optional
         Of a member of an ensemble; by default those of the constants.
     split : Decomposition, optional
@@ -89,6 +90,7 @@ def premises(
     Returns
     -------
     Premises
+        The numbers that (29)-(36) are evaluated with.
 
     Examples
     --------
@@ -117,6 +119,7 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
     Parameters
     ----------
     given : Premises
+        The derived ones.
     constants : Constants
         Their plant and box give d*.
     plant : record, optional

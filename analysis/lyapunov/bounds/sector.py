@@ -115,6 +115,7 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     Returns
     -------
     Sector
+        The constants, each as a proved range.
 
     Raises
     ------

@@ -88,12 +88,14 @@ def minimax_weights(network: Network, largest: float | None = None) -> np.ndarra
     Parameters
     ----------
     network : Network
+        Basis and g on a grid, see `network_on_grid`.
     largest : float, optional
         Bound of every |W_i|; without it the weights have no useful size.
 
     Returns
     -------
     ndarray of shape (l,)
+        W*, in the unit of g.
 
     Raises
     ------
@@ -149,13 +151,16 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
     Parameters
     ----------
     network : Network
+        Basis and g on a grid, see `network_on_grid`.
     gains : Gains
+        Gains of the controller, for V(0), alpha_0 and alpha_1.
     delta_rest : float
         G_max eps_u* + d*.
 
     Returns
     -------
     ndarray of shape (l,)
+        W, in the unit of g.
 
     Raises
     ------
@@ -202,14 +207,18 @@ def approximation_error(
 
     Parameters
     ----------
-    plant, basis
-        As in `network_on_grid`; `basis` may be None without weights.
+    plant : record
+        Plant of the class (1).
+    basis : record or None
+        `nlctl.GaussianBasis`, of the first states; may be None without weights.
     W : array_like of shape (l,)
         Any weights of norm up to 1e5.
     box : Box
         Sides x1, ..., xn.
-    tol, max_boxes
-        As in `analysis.intervals.branch_and_bound.enclose`.
+    tol : float, optional
+        Each end is at most this far from a value that is attained, in the unit of g.
+    max_boxes : int, optional
+        Limit of the branch and bound; where it is reached the range is wider, still proved.
 
     Returns
     -------

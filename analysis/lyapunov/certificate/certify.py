@@ -24,6 +24,7 @@ from flint import arb
 
 from nlctl.errors import ParameterError
 from nlctl.params import integer
+from nlctl.wording import counted
 
 from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
@@ -94,7 +95,7 @@ class Certificate:
         alpha_0 = "0.2785 (tau delta* + b) + sigma_2 delta*^2/2"
         alpha_1 = "min{2 beta, sigma_1 Gamma, sigma_2 gamma}"
         unit, error, energy = per_second(n), per_second(n - 1), per_second(2 * n - 2)
-        k = (split.provenance, split.how, split.over)
+        boxes, k = counted(need.boxes, "box", "boxes"), (split.provenance, split.how, split.over)
         sure = "given" if split.provenance == "given" else "proved"
         rows: list[tuple[str, float, str, Any, str, str]] = [
             ("G_min", need.G_min, unit, "proved", "F/v", f"all v, {over}"),
@@ -103,7 +104,7 @@ class Certificate:
             ("k_2", split.k_2, "1", *k),
             ("eps_u*", split.eps_star, "1", *k),
             ("N_0 k_1 G_min", gain, "1", sure, "must be at least 1", over),
-            ("sup |g + d|", need.matched, unit, "proved", f"{need.boxes} boxes", f"all t, {over}"),
+            ("sup |g + d|", need.matched, unit, "proved", boxes, f"all t, {over}"),
             ("delta*", need.delta_star, unit, sure, "sup |g + d| + G_max eps_u*", over),
             ("alpha_0", self.alpha_0, per_second(2 * n - 1), sure, alpha_0, over),
             ("alpha_1", self.alpha_1, "1/s", "computed", alpha_1, "all t"),
@@ -173,10 +174,12 @@ def certify(
     tol : float, optional
         Relative tolerance of the proved suprema.
     max_iterations : int, optional
+        Rounds C -> box -> C after which the proof is given up.
 
     Returns
     -------
     Certificate
+        The proved bound with its constants and box, or why there is none.
 
     Raises
     ------
@@ -219,7 +222,9 @@ def certify(
             break
         C = upper(C_0)
     else:
-        reason = f"C_0 still grows after {max_iterations} iterations: {iterations[-1]:.6g}"
+        reason = (
+            f"C_0 still grows after {counted(max_iterations, 'iteration')}: {iterations[-1]:.6g}"
+        )
     u = _bound_of_u(read, need, C_0)
     reason = reason or _doubt(read, split, u, u_max, iterations[-1])
     proved = f"the box closes: |r| < {need.C:.6g} implies |r| <= {iterations[-1]:.6g}"

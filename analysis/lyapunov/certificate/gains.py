@@ -119,8 +119,10 @@ def design(
         As for `certify`.
     u_limit : float
         Limit of max |u| along the simulation from the loop's own initial state.
-    k, u_max
-        As for `certify`.
+    k : (k_1, k_2), optional
+        Bounds that the actuator's k shall have, see `decompose`.
+    u_max : float, optional
+        Half the range of u for which the actuator's split is proved.
     horizon : float, optional
         Length of the simulation (s).
     evaluations : int, optional
@@ -131,7 +133,8 @@ def design(
 
     Returns
     -------
-    Design
+    GainDesign
+        The gains, their proved bound, and what the run with them shows.
 
     Raises
     ------

@@ -68,6 +68,7 @@ def observed(
     Parameters
     ----------
     loop : control.InterconnectedSystem
+        The closed loop; it stays as it is.
     parts : Parts
         What `read_parts` found in it; the blocks are given the parameters of that run.
     split : Decomposition

@@ -35,6 +35,7 @@ def sharpest(split: Decomposition) -> Decomposition:
     Returns
     -------
     Decomposition
+        With the same k_1 and k_2, and a smaller or equal eps_u*.
 
     Examples
     --------

@@ -8,6 +8,7 @@ import numpy as np
 
 from nlctl.diagrams import state_names
 from nlctl.errors import DiagramError, ParameterError
+from nlctl.wording import counted
 
 from ..nussbaum.property import GainFunction
 from .roles import read_parts
@@ -48,8 +49,8 @@ def law_of_response(loop: Any, response: Any) -> GainFunction:
     states = np.atleast_2d(np.asarray(response.states))
     if states.shape[0] != loop.nstates:
         raise ParameterError(
-            f"the response has {states.shape[0]} states, '{loop.name}' has {loop.nstates}: give "
-            "the loop that it is of"
+            f"the response has {counted(states.shape[0], 'state')}, '{loop.name}' has "
+            f"{loop.nstates}: give the loop that it is of"
         )
     params = own_parameters(loop, response)
     parts = read_parts(loop, params=params)

@@ -16,6 +16,7 @@ from nlctl.diagrams import state_names as all_states
 from nlctl.errors import ParameterError
 from nlctl.response import input_output_response
 from nlctl.upstream.control_internals import set_parameters
+from nlctl.wording import counted
 
 from ..bounds.decomposition import Decomposition
 from ..bounds.final_bound import Gains, alpha_1
@@ -141,8 +142,8 @@ def _of_response(loop: ct.InterconnectedSystem, response: Any) -> Member:
     states = np.atleast_2d(np.asarray(response.states))
     if states.shape[0] != (loop.nstates or 0):
         raise ParameterError(
-            f"ledger needs responses with the {loop.nstates} states of '{loop.name}', got "
-            f"{states.shape[0]}"
+            f"ledger needs responses with the {counted(loop.nstates, 'state')} of '{loop.name}', "
+            f"got {states.shape[0]}"
         )
     start = dict(zip(all_states(loop), map(float, states[:, 0]), strict=True))
     own = own_parameters(loop, response)

@@ -94,6 +94,7 @@ def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
     Returns
     -------
     Drift
+        zeta, r and the energies E_+ and E_- over time.
 
     Raises
     ------
@@ -173,6 +174,7 @@ def drift_margin(
     Parameters
     ----------
     run : Drift
+        The energies of a run, see `drift`.
     V_0, alpha_0 : float
         V(0), and the constant of (31) per second.
     l_min, l_max : float

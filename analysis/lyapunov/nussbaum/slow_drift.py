@@ -235,6 +235,7 @@ def slow_drift(
     Returns
     -------
     SlowDrift
+        Rates per window, and what they predict.
 
     Raises
     ------

@@ -217,6 +217,7 @@ def evaluate(
     Parameters
     ----------
     prepared : Prepared
+        The experiment, compiled: what `prepare` returns.
     table : pandas.DataFrame
         One column for each name of the space, such as `design.rows` returns; others are ignored.
     threads : int, optional

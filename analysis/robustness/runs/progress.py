@@ -62,10 +62,19 @@ class Progress:
         return (self.total - self.done) / self.rate if self.rate > 0 else np.inf
 
     def interval(self, confidence: float = 0.99) -> tuple[float, float] | None:
-        """Bounds of the probability of a violation that may be looked at any time.
+        """Return bounds of the probability of a violation that may be looked at any time.
 
-        See `sequential.sequence_bounds`.  None without a run, and for designs whose rows are no
-        independent draws.
+        See `sequential.sequence_bounds`.
+
+        Parameters
+        ----------
+        confidence : float, optional
+            That they hold at every moment, between 0 and 1.
+
+        Returns
+        -------
+        tuple of float or None
+            Lower and upper; None without a run, and for rows that are not independent draws.
         """
         if not (self.is_iid and self.runs):
             return None
@@ -134,9 +143,11 @@ def until_decided(
     Parameters
     ----------
     design : Design
+        The independent draws that are swept.
     threshold : float
         Probability of a violation.
     confidence : float, optional
+        That the decision is right, between 0 and 1.
 
     Returns
     -------

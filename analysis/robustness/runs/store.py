@@ -28,6 +28,7 @@ from filelock import FileLock, Timeout
 
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
+from nlctl.wording import some_of
 
 from .experiment import Columns, typed
 from .identity import differences_of
@@ -199,8 +200,9 @@ def _write(store: ChunkStore, path: Path, content: bytes | memoryview) -> None:
         replace_file(path, write)
     except OSError as error:
         raise StoreError(
-            f"cannot write '{path}': {error.strerror or error}. {stored(store)} of {store.size} "
-            "rows are kept there; make room and continue with resume=True (--resume)"
+            f"cannot write '{path}': {error.strerror or error}. "
+            f"{some_of(stored(store), store.size, 'row', 'is', 'are')} kept there; make room and "
+            "continue with resume=True (--resume)"
         ) from error
 
 

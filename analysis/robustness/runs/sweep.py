@@ -75,7 +75,18 @@ class Sweep:
         return self.columns()
 
     def columns(self, *names: str) -> pd.DataFrame:
-        """Return some columns of `table`, all by default; the others are not read."""
+        """Return some columns of `table`; the others are not read.
+
+        Parameters
+        ----------
+        *names : str
+            Names of columns; all by default.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row for each row that is finished.
+        """
         if self.folder is None:
             assert self.held is not None
             return self.held.filter(list(names)) if names else self.held
@@ -95,6 +106,7 @@ def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
     Returns
     -------
     Sweep
+        With the rows that are finished.
 
     Raises
     ------
@@ -146,6 +158,7 @@ def sweep(
     Parameters
     ----------
     prepared : Prepared
+        The experiment, compiled: what `prepare` returns.
     design : Design
         Of the space of ``prepared.experiment``.
     folder : path, optional
@@ -180,6 +193,8 @@ def sweep(
         no folder to resume.
     StoreError
         As in `store.claimed`, or if a chunk cannot be written; those before it are kept.
+    UnknownNameError
+        If the design has a quantity that the experiment lacks.
 
     Examples
     --------

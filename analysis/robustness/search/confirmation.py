@@ -88,6 +88,7 @@ def confirm(
     Parameters
     ----------
     prepared : Prepared
+        The experiment, compiled: what `prepare` returns.
     row : mapping
         ``{name: value}``, such as `WorstCase.witness`.
     python_control : bool, optional

@@ -94,7 +94,9 @@ def degradation_curve(
     runs : int
         Number of rows at each factor.
     entropy : int, optional
+        Of the draws; drawn itself if left out.
     confidence : float, optional
+        Of the intervals, between 0 and 1.
     simultaneous : bool, optional
         By default each interval holds with this confidence by itself, and of many intervals some
         may miss.  True makes all of them hold together with at least this confidence, by widening

@@ -87,6 +87,7 @@ def failure_map(
     evaluate : callable
         See `evaluation.Evaluate`.
     space : Space
+        Quantities with their boxes, and choices.
     x, y : str
         Names of two quantities.
     at : mapping, optional
@@ -256,6 +257,11 @@ def boundary(made: FailureMap) -> pd.DataFrame:
     -------
     pandas.DataFrame
         Columns by the names of the two quantities.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a `FailureMap`.
 
     Examples
     --------

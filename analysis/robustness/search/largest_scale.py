@@ -41,6 +41,7 @@ def largest_scale(
     Parameters
     ----------
     prepared : Prepared
+        The experiment, compiled: what `prepare` returns.
     at_most : float, optional
         Larger factors are not tried.
     names : collection of str, optional

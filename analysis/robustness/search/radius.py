@@ -160,7 +160,9 @@ def robustness_radius(
         Independent draws for the statement; 459, without a violation, bound its probability by
         1 % with confidence 99 %, see `runs_needed`.  0 leaves it out.
     confidence : float, optional
+        Of the statement from `draws`, between 0 and 1.
     entropy : int, optional
+        Of searches and draws; drawn itself if left out.
 
     Returns
     -------

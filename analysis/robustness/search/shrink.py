@@ -12,6 +12,7 @@ import numpy as np
 
 from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
+from nlctl.wording import counted, some_of
 
 from ..uncertainty.space import Space, checked_row, nominal
 from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
@@ -59,8 +60,8 @@ class Shrunk:
         why = "no fewer do" if self.is_fewest else "each of them is needed"
         kept = row_text({name: self.row[name] for name in self.names})
         return (
-            f"{len(self.names)} of {self.of} deviations suffice for a violation, and {why}: "
-            f"{kept} (margin {self.margin:.4g}, {self.runs} runs)."
+            f"{some_of(len(self.names), self.of, 'deviation', 'suffices', 'suffice')} for a "
+            f"violation, and {why}: {kept} (margin {self.margin:.4g}, {counted(self.runs, 'run')})."
         )
 
 

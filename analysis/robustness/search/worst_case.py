@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from nlctl.arguments import integer, number, of_type
+from nlctl.wording import counted
 
 from ..uncertainty.design import Design, checked_entropy, listed
 from ..uncertainty.space import Space
@@ -92,7 +93,7 @@ class WorstCase:
             f"{row_text(self.witness)}"
         )
         verdict = "A violation" if self.is_violated else "No violation, which proves nothing"
-        return f"{verdict}: of {self.design.size} runs ({rows}) {found}."
+        return f"{verdict}: of {counted(self.design.size, 'run')} ({rows}) {found}."
 
 
 def worst_case(

@@ -13,6 +13,7 @@ from scipy import stats
 from nlctl.arguments import fraction, of_type, one_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
+from nlctl.wording import counted, some_of
 
 from ..stl.spec import violates
 from ..uncertainty.design import Design
@@ -66,7 +67,8 @@ class Comparison:
     def __str__(self) -> str:
         first = self.ranking.to_string(float_format=lambda x: f"{x:.4g}")
         return (
-            f"{len(self.ranking)} options of {self.choice} on the same {self.size} samples "
+            f"{len(self.ranking)} options of {self.choice} on the same "
+            f"{counted(self.size, 'sample')} "
             f"(intervals at {100 * self.confidence:g} %, each by itself)\n{first}"
         )
 
@@ -82,11 +84,17 @@ def crossed(design: Design, choice: Choice) -> pd.DataFrame:
     design : Design
         Its space may hold the choice already; the labels that were drawn are then replaced.
     choice : Choice
+        The options that are compared.
 
     Returns
     -------
     pandas.DataFrame
         For `experiment.evaluate`, or as `design.from_table` of a space with the choice.
+
+    Raises
+    ------
+    ParameterError
+        If `choice` is not a `Choice`.
 
     Examples
     --------
@@ -132,10 +140,12 @@ def compare(
     spec : str, optional
         Column of the margin that decides about violations.
     confidence : float, optional
+        Of each interval by itself, between 0 and 1.
 
     Returns
     -------
     Comparison
+        Ranking, violations, paired differences and wins, with their intervals.
 
     Raises
     ------
@@ -211,8 +221,9 @@ def _check_rows(wanted: pd.DataFrame, table: pd.DataFrame, choice: str) -> None:
     if len(missing):
         label = wanted.loc[missing[0], choice]
         raise ParameterError(
-            f"a comparison needs every sample with every {choice}: {len(missing)} of "
-            f"{len(wanted)} rows are missing, the first is row {missing[0]} ('{label}')"
+            f"a comparison needs every sample with every {choice}: "
+            f"{some_of(len(missing), len(wanted), 'row', 'is', 'are')} missing, the first is row "
+            f"{missing[0]} ('{label}')"
         )
     if len(beyond):
         raise ParameterError(

@@ -12,6 +12,7 @@ from scipy import stats
 
 from nlctl.arguments import fraction, integer, of_type, one_of
 from nlctl.errors import ParameterError, UsageError
+from nlctl.wording import counted, some_of
 
 from ..stl.spec import violates
 from ..uncertainty.design import Design
@@ -90,8 +91,8 @@ class Violation:
 
     def __str__(self) -> str:
         return (
-            f"{self.violations} of {self.runs} runs violate the spec. {self.bounds} "
-            f"({self.method}). Assumed: {'; '.join(self.assumptions)}."
+            f"{some_of(self.violations, self.runs, 'run', 'violates', 'violate')} the spec. "
+            f"{self.bounds} ({self.method}). Assumed: {'; '.join(self.assumptions)}."
         )
 
     @property
@@ -157,6 +158,7 @@ def clopper_pearson(
     violations, runs : int
         k and n, at most 10^9.
     confidence : float, optional
+        That the bounds hold, between 0 and 1.
     side : {"upper", "lower", "both"}, optional
         The bound that is left out is 0 or 1.
 
@@ -287,11 +289,14 @@ def violation_probability(
     Parameters
     ----------
     design : Design
+        Independent draws.
     margins : sequence of length ``design.size``
         Margin of every row in order; a run violates the spec unless its margin is > 0, so NaN is a
         violation.  A Series goes by its index.
-    confidence, side
-        As in `clopper_pearson`.
+    confidence : float, optional
+        That the bounds hold, between 0 and 1.
+    side : {"upper", "lower", "both"}, optional
+        The bound that is left out is 0 or 1.
 
     Returns
     -------
@@ -363,7 +368,8 @@ def violations_of(design: Design, margins: Margins) -> np.ndarray:
         )
     if not 0 < series.size <= design.size:
         raise NoGuaranteeError(
-            f"the design has {design.size} rows, got margins of {series.size} runs"
+            f"the design has {counted(design.size, 'row')}, got margins of "
+            f"{counted(series.size, 'run')}"
         )
     return violates(series)
 

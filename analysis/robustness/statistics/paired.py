@@ -13,6 +13,7 @@ from scipy import stats
 from nlctl.arguments import of_type, one_of
 from nlctl.errors import ParameterError
 from nlctl.params import as_numbers
+from nlctl.wording import counted
 
 from ..stl.spec import violates
 from ..uncertainty.design import Design
@@ -45,6 +46,7 @@ def differences(
     confidence : float, optional
         Of each interval by itself.
     better : {"smaller", "larger"}, optional
+        Which number is the better one.
 
     Returns
     -------
@@ -117,6 +119,11 @@ def wins(
     -------
     pandas.DataFrame
         Counts, controllers in rows and columns.
+
+    Raises
+    ------
+    ParameterError
+        If there are less than two controllers, or numbers are missing.
 
     Examples
     --------
@@ -256,8 +263,8 @@ def _column(design: Design, name: str, values: Margins) -> np.ndarray:
     series = series_of(values, f"'{name}'").sort_index()
     if not np.array_equal(series.index, np.arange(design.size)):
         raise ParameterError(
-            f"a comparison needs a number of '{name}' for each of {design.size} rows, got "
-            f"{series.size}"
+            f"a comparison needs a number of '{name}' for each of {counted(design.size, 'row')}, "
+            f"got {series.size}"
         )
     return series.to_numpy()
 

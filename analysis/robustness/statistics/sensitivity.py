@@ -11,6 +11,7 @@ from scipy import stats
 
 from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
+from nlctl.wording import counted
 
 from ..stl.spec import FAILED
 from ..uncertainty.design import Design, affordable, checked_entropy, listed, sobol_points
@@ -38,10 +39,12 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
 
     Returns
     -------
-    values : ndarray
+    values : ndarray of shape (rows,)
+        The margins, with `least` for the runs that failed.
     failed : int
         Number of rows that count as `least`.
     least : float
+        The least margin of the runs that reached their end, at most -1.
 
     Raises
     ------
@@ -61,7 +64,8 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
     ended = values > -FAILED  # not of NaN
     if not ended.any():
         raise ParameterError(
-            f"none of {values.size} rows reached its end, so that their margins tell nothing apart"
+            f"of {counted(values.size, 'row')} none reached its end, so that their margins tell "
+            "nothing apart"
         )
     least = min(float(values[ended].min()), -1.0)
     return np.where(ended, values, least), int(np.sum(~ended)), least
@@ -83,10 +87,12 @@ def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None
     levels : int, optional
         An even number.
     entropy : int, optional
+        Of the rows' seeds; drawn if left out.
 
     Returns
     -------
     Design
+        The rows of all trajectories, one trajectory after the other.
 
     Raises
     ------
@@ -194,10 +200,12 @@ def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
     size : int
         A power of 2.
     entropy : int, optional
+        Of the rows' seeds; drawn if left out.
 
     Returns
     -------
     Design
+        The rows of A and B, and of A with one column of B at a time.
 
     Raises
     ------
@@ -238,6 +246,7 @@ def sobol_indices(
     confidence : float, optional
         Of the bootstrap intervals (percentiles; rows of all sets resampled together).
     resamples : int, optional
+        Number of bootstrap samples.
 
     Returns
     -------
@@ -293,8 +302,8 @@ def _checked(design: Design, values: Sequence[float] | np.ndarray, kind: str, ma
     if y.size != design.size or bad.size:
         what = f"row {bad[0]} has {y[bad[0]]}" if bad.size else f"got {y.size}"
         raise ParameterError(
-            f"this analysis needs a finite value for each of {design.size} rows, {what}; margins "
-            "are finite for runs that diverged as well"
+            f"this analysis needs a finite value for each of {counted(design.size, 'row')}, "
+            f"{what}; margins are finite for runs that diverged as well"
         )
     return y
 
@@ -336,8 +345,9 @@ def regional(design: Design, margins: Margins) -> pd.DataFrame:
     passed = series_of(margins, "margins").sort_index().to_numpy() > 0
     if passed.size != design.size or passed.all() or not passed.any():
         raise ParameterError(
-            f"regional sensitivity needs a margin for each of {design.size} rows with passing and "
-            f"failing runs among them, got {passed.size} rows and {passed.sum()} that pass"
+            f"regional sensitivity needs a margin for each of {counted(design.size, 'row')} with "
+            f"passing and failing runs among them, got {counted(passed.size, 'row')} and "
+            f"{passed.sum()} that pass"
         )
     table = design.table
     rows = []

@@ -10,6 +10,7 @@ import numpy as np
 from scipy import optimize, special
 
 from nlctl.arguments import fraction
+from nlctl.wording import counted
 
 from ..uncertainty.design import Design
 from .guarantee import (
@@ -69,10 +70,12 @@ def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tup
     violations, runs : int
         Of the first runs in the order of the design.
     confidence : float, optional
+        That the bounds hold at every moment, between 0 and 1.
 
     Returns
     -------
     lower, upper : float
+        Between 0 and 1.
 
     Raises
     ------
@@ -134,7 +137,7 @@ class SequentialTest:
     statement: Violation
 
     def __str__(self) -> str:
-        runs = f"after {self.statement.runs} runs"
+        runs = f"after {counted(self.statement.runs, 'run')}"
         if self.decision == "undecided":
             return f"Undecided {runs} whether it is below {self.threshold:g}. {self.statement}"
         return f"Decided {runs}: {self.decision} {self.threshold:g}. {self.statement}"
@@ -150,6 +153,7 @@ def confidence_sequence(
     Parameters
     ----------
     design : Design
+        Independent draws.
     margins : sequence of at most ``design.size`` numbers
         Margin of the first rows in order, see `guarantee.violation_probability`.
     confidence : float, optional

@@ -10,6 +10,7 @@ from scipy import stats
 
 from nlctl.arguments import fraction
 from nlctl.errors import ParameterError
+from nlctl.wording import counted
 
 from .guarantee import MOST_RUNS, Violation, least_count, runs_needed
 from .sequential import SequentialTest, log_evidence
@@ -55,6 +56,7 @@ def bound_verdict(statement: Violation, limit: float) -> Verdict:
     statement : Violation
         From `guarantee.violation_probability`.
     limit : float
+        Between 0 and 1.
 
     Returns
     -------
@@ -126,7 +128,7 @@ def test_verdict(test: SequentialTest) -> Verdict:
 
 
 def _more(runs: int) -> str:
-    return f"at least {runs} more run{'s' * (runs != 1)} without a violation"
+    return f"at least {counted(runs, 'more run')} without a violation"
 
 
 def better_verdict(wins: int, losses: int, p: float, level: float, tests: float = 1.0) -> Verdict:
@@ -151,5 +153,6 @@ def better_verdict(wins: int, losses: int, p: float, level: float, tests: float 
         return 2 * one > all_ and bool(stats.binomtest(one, all_).pvalue * tests <= level)
 
     enough = least_count(decides, 0, 1)
-    needs = f"at least {enough} more sample{'s' * (enough != 1)}, won in every one"
+    assert enough is not None  # no count is too large
+    needs = f"at least {counted(enough, 'more sample')}, won in every one"
     return Verdict(answer="not shown yet", needs=needs)

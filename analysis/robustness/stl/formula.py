@@ -140,6 +140,7 @@ def in_band(
     Parameters
     ----------
     signal : str
+        Name of the signal.
     lower, upper : float, optional
         Bounds in the signal's unit; one may be left out.
     scale : float, optional
@@ -150,6 +151,7 @@ def in_band(
     Returns
     -------
     Band
+        The formula; its margin is the distance to the nearer bound, divided by `scale`.
 
     Raises
     ------
@@ -196,6 +198,7 @@ def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
     Returns
     -------
     Always
+        The formula; its margin is the least of `part` from start to end.
 
     Raises
     ------
@@ -233,6 +236,12 @@ def eventually(part: Formula, start: float = 0.0, end: float = np.inf) -> Eventu
     Returns
     -------
     Eventually
+        The formula; its margin is the largest of `part` from start to end.
+
+    Raises
+    ------
+    ParameterError
+        If not 0 <= start <= end, or start is infinite.
 
     Examples
     --------

@@ -43,6 +43,7 @@ def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
     Returns
     -------
     Space
+        With every name, unit and nominal value; the given one stays as it is.
 
     Raises
     ------
@@ -161,12 +162,14 @@ def diagrams(
     Parameters
     ----------
     space : Space
+        Quantities with their laws, and choices.
     build : callable
         Called with one keyword per choice, such as `nlctl.paper.example_1`.
 
     Returns
     -------
     list of (labels, diagram)
+        The options by the names of their choices, and the diagram built with them.
 
     Raises
     ------

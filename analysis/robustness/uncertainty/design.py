@@ -100,6 +100,12 @@ def row_seed(design: Design, row: int) -> np.random.SeedSequence:
     Returns
     -------
     numpy.random.SeedSequence
+        For `numpy.random.default_rng`.
+
+    Raises
+    ------
+    ParameterError
+        If the row is not an integer, or below 0.
 
     Examples
     --------
@@ -153,6 +159,7 @@ def rows(design: Design, numbers: range) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
+        Values in the quantities' units, and labels of choices.
 
     Raises
     ------
@@ -199,6 +206,7 @@ def independent(space: Space, size: int, entropy: int | None = None) -> Design:
     Parameters
     ----------
     space : Space
+        Quantities with their laws, and choices.
     size : int
         Number of rows, see `guarantee.runs_needed`.
     entropy : int, optional
@@ -208,6 +216,11 @@ def independent(space: Space, size: int, entropy: int | None = None) -> Design:
     -------
     Design
         Rows that follow from `entropy` and their numbers alone.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a space, or `size` or `entropy` is out of range.
 
     Examples
     --------
@@ -256,16 +269,19 @@ def from_table(
     Parameters
     ----------
     space : Space
+        Quantities and choices, whose names are the columns.
     table : pandas.DataFrame
         One column for each name of the space; others are refused.
     drawn_independently : bool, optional
         The user's word that rows are independent draws of the space's laws.  Statements about
         probabilities then quote it.
     entropy : int, optional
+        Of the rows' seeds; drawn if left out.
 
     Returns
     -------
     Design
+        The rows of the table, numbered from 0.
 
     Raises
     ------
@@ -348,6 +364,7 @@ def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
     Returns
     -------
     Design
+        Rows that fill the space; they are not independent draws.
 
     Raises
     ------
@@ -398,6 +415,12 @@ def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Desi
     Returns
     -------
     Design
+        Rows that fill the space; they are not independent draws.
+
+    Raises
+    ------
+    ParameterError
+        If `size` or `entropy` is out of range, or it would hold more than `MOST_HELD` numbers.
 
     Examples
     --------

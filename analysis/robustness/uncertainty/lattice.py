@@ -25,14 +25,17 @@ def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = No
     Parameters
     ----------
     space : Space
+        Quantities with their boxes, and choices.
     levels : int or mapping
         Number of values per quantity, at least 1; one value is the middle of the box.  A mapping
         names every quantity.
     entropy : int, optional
+        Of the rows' seeds; drawn if left out.
 
     Returns
     -------
     Design
+        All points of the grid, with every combination of options.
 
     Raises
     ------
@@ -74,6 +77,7 @@ def corners(space: Space, entropy: int | None = None) -> Design:
     Returns
     -------
     Design
+        All corners, with every combination of options.
 
     Raises
     ------
@@ -123,6 +127,7 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
     Returns
     -------
     Design
+        The nominal row, and one row for each variation.
 
     Raises
     ------

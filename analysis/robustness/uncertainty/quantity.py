@@ -12,6 +12,7 @@ from scipy import stats
 from nlctl.arguments import number, of_type, text, vector
 from nlctl.errors import UsageError
 from nlctl.params import as_numbers
+from nlctl.wording import counted
 
 __all__ = ["QUANTILES", "Choice", "SpaceError", "Uncertain"]
 
@@ -183,7 +184,7 @@ class Choice:
         weights = vector(f"choice '{self.name}'", "weights", given).tolist()
         if len(weights) != len(labels) or min(weights) < 0 or not np.isclose(sum(weights), 1):
             raise SpaceError(
-                f"choice '{self.name}' needs {len(labels)} weights >= 0 that add up to 1, "
-                f"got {self.weights}"
+                f"choice '{self.name}' needs {counted(len(labels), 'weight')} >= 0 that add up to "
+                f"1, got {self.weights}"
             )
         object.__setattr__(self, "weights", tuple(weights))

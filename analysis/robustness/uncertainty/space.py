@@ -111,6 +111,7 @@ def nominal(space: Space) -> dict[str, Any]:
     Returns
     -------
     dict
+        A number in the quantity's unit, or the label of a choice, by name.
 
     Raises
     ------
@@ -138,6 +139,12 @@ def scaled(space: Space, factor: float) -> Space:
     Returns
     -------
     Space
+        Wider for factors above 1; the given one stays as it is.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a space, or the factor is not a finite number.
 
     Examples
     --------

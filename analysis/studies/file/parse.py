@@ -74,6 +74,7 @@ def read_study(
     Parameters
     ----------
     path : Path
+        The study file, in TOML.
     settings : sequence of str, optional
         ``key=value`` that replace what stands there: ``runs.size=100``,
         ``space."actuator.b_r".uniform=[0.3, 0.6]``, ``analysis.0.confidence=0.9``.

@@ -23,6 +23,7 @@ def shipped(name: str) -> Path:
     Returns
     -------
     pathlib.Path
+        Of the file that is installed.
 
     Raises
     ------

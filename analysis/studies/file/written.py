@@ -20,6 +20,7 @@ def to_toml(study: Study) -> str:
     Parameters
     ----------
     study : Study
+        What is written.
 
     Returns
     -------
@@ -47,12 +48,14 @@ def from_toml(text: str, own: Mapping[str, Kind] | None = None) -> Study:
     Parameters
     ----------
     text : str
+        In TOML.
     own : mapping of str to Kind, optional
         Kinds of analysis of one's own, as the text calls them.
 
     Returns
     -------
     Study
+        Equal to the one that was written.
 
     Raises
     ------

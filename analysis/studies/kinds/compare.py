@@ -24,6 +24,7 @@ from analysis.robustness.statistics.comparison import Comparison, compare, cross
 from analysis.robustness.statistics.verdict import better_verdict
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
+from nlctl.wording import counted
 
 from ... import figures as figures
 from ...figures.labels import plain
@@ -226,12 +227,13 @@ def _middle(metric: str, row: Mapping[str, Any]) -> str:
 def _sentence(asked: Compare, found: Comparison) -> str:
     metric = next(iter(asked.metrics))
     told = "; ".join(
-        f"{label}: {row['violations']:.0f} violations, {_middle(metric, row)}"
+        f"{label}: {counted(int(row['violations']), 'violation')}, {_middle(metric, row)}"
         for label, row in found.ranking.to_dict("index").items()
     )
     spec = f" (requirements {', '.join(asked.requirements)})" if asked.requirements else ""
     return (
-        f"{asked.keyword.capitalize()} on the same {found.size} samples{spec}, best first: {told}."
+        f"{asked.keyword.capitalize()} on the same {counted(found.size, 'sample')}{spec}, best "
+        f"first: {told}."
     )
 
 

@@ -11,6 +11,7 @@ from analysis.robustness.runs.sweep import Sweep
 from analysis.robustness.statistics.sensitivity import censored
 from nlctl.errors import ParameterError
 from nlctl.native import Status
+from nlctl.wording import some_of
 
 from ..kind import Ground, column
 
@@ -80,9 +81,10 @@ def response(of: str, ground: Ground, done: Sweep) -> tuple[np.ndarray, str, dic
     lacking = int(np.count_nonzero(~np.isfinite(values)))
     if lacking:
         failed = int(np.count_nonzero(column(done, "status") != Status.OK.name))
-        why = "did not reach their end and have" if failed else "have"
+        lack = some_of(failed or lacking, done.done, "row", "has", "have")
+        why = ", as runs did not reach their end" if failed else ""
         raise ParameterError(
-            f"{failed or lacking} of {done.done} rows {why} no finite '{of}': take a margin, such "
-            'as of = "spec", which every row has, or a space without such rows'
+            f"{lack} no finite '{of}'{why}: take a margin, such as "
+            'of = "spec", which every row has, or a space without such rows'
         )
     return values, "", {}

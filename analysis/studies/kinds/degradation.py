@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from analysis.robustness import bound_verdict, independent
 from analysis.robustness.search.degradation import degradation_curve
 from analysis.robustness.statistics.guarantee import design_assumptions, rounded_down, rounded_up
+from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure, Table
@@ -100,9 +101,9 @@ def _largest(asked: AskedDegradation, quantities: int) -> int:
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     row = finding.tables["curve"].loc[asked.at]
     return {
-        "measured": f"{row['violations']:.0f} of {row['runs']:.0f} runs at size {asked.at:g}; "
-        f"{rounded_down(row['lower'])} to {rounded_up(row['upper'])} with confidence "
-        f"{100 * asked.confidence:g} %",
+        "measured": f"{row['violations']:.0f} of {counted(int(row['runs']), 'run')} at size "
+        f"{asked.at:g}; {rounded_down(row['lower'])} to {rounded_up(row['upper'])} with "
+        f"confidence {100 * asked.confidence:g} %",
         "limit": f"≤ {asked.limit:g}",
         "margin": f"{asked.limit - row['upper']:.3g}",
     }

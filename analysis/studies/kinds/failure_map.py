@@ -13,6 +13,7 @@ from pydantic import Field
 from analysis.robustness import Space
 from analysis.robustness.search.failure_map import boundary, failure_map
 from analysis.robustness.stl.spec import violates
+from nlctl.wording import counted, some_of
 
 from ... import figures as figures
 from ...report.document import Figure, Paragraph
@@ -69,14 +70,14 @@ def _run(asked: Map, ground: Ground) -> Finding:
     bad = int(np.count_nonzero(violates(found.table["spec"])))
     if bad in (0, len(found.table)):
         which = "every one" if bad else "none"
-        told = f"{which} of {len(found.table)} points violates the spec."
+        told = f"{which} of {counted(len(found.table), 'point')} violates the spec."
     else:
         sides = " and ".join(f"{side:.3g}" for side in found.cell)
         fine = "" if found.is_finished else "; refinement ended with the number of runs"
         told = (
-            f"{bad} of {len(found.table)} points violate the spec; cells at the boundary have "
-            f"sides {sides}{fine}. Points were chosen near the boundary, so their share is not "
-            "a probability."
+            f"{some_of(bad, len(found.table), 'point', 'violates', 'violate')} the spec; cells at "
+            f"the boundary have sides {sides}{fine}. Points were chosen near the boundary, so "
+            "their share is not a probability."
         )
     return made(
         asked,

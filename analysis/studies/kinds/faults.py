@@ -22,6 +22,7 @@ from nlctl.errors import ParameterError
 from nlctl.faults import NEVER, Fault, with_faults
 from nlctl.names import unknown
 from nlctl.native import Status
+from nlctl.wording import some_of
 
 from ... import figures as figures
 from ...report.document import Figure, Paragraph, Table
@@ -212,13 +213,14 @@ def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
     worst = single.sort_values("margin", kind="stable").to_dict("records")[0]
     words = (
         f"The loop without a fault {'meets' if alone > 0 else 'already violates'} the spec (margin "
-        f"{margin_text(alone)}). {len(bad)} of {len(single)} single faults violate it; the worst "
-        f"is {worst['first']} at {worst['onset']:g} s ({_in_words(worst['margin'])})."
+        f"{margin_text(alone)}). "
+        f"{some_of(len(bad), len(single), 'single fault', 'violates', 'violate')} it; the worst is "
+        f"{worst['first']} at {worst['onset']:g} s ({_in_words(worst['margin'])})."
     )
     if asked.pairs:
         words += (
-            f" So do {len(bad_pairs)} of {len(pairs)} pairs, {len(only)} of them although neither "
-            "fault does alone."
+            f" {some_of(len(bad_pairs), len(pairs), 'pair', 'does too', 'do too')}, {len(only)} of "
+            "them although neither fault does alone."
         )
     numbers = {
         "nominal_margin": alone,

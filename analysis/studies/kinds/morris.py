@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field
 
 from analysis.robustness import Design, Space, elementary_effects, morris
+from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure
@@ -60,8 +61,8 @@ def _run(asked: Morris, ground: Ground) -> Finding | None:
     order = ", ".join(table.nlargest(3, "mu_star").index)
     return made(
         asked,
-        f"Largest mean effects on '{asked.of}': {order} ({done.done} runs of a Morris design, "
-        f"which screens and proves nothing).{failed}",
+        f"Largest mean effects on '{asked.of}': {order} ({counted(done.done, 'run')} of a Morris "
+        f"design, which screens and proves nothing).{failed}",
         runs=done.done,
         numbers={"of": asked.of, "trajectories": asked.trajectories, **numbers},
         tables={"effects": table},

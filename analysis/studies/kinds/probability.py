@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from analysis.robustness import bound_verdict, violation_probability
 from analysis.robustness.statistics.guarantee import rounded_down, rounded_up
+from nlctl.wording import counted
 
 from ..file.field_types import Confidence
 from ..finding import Finding
@@ -69,7 +70,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
         bound = f"{bound}{', ' * bool(bound)}at least {rounded_down(low)}"
     each = " each" if low > 0 and n["side"] != "both" and high < 1 else ""
     return {
-        "measured": f"{n['violations']} of {n['runs']} runs; {bound or 'nothing'} with "
+        "measured": f"{n['violations']} of {counted(n['runs'], 'run')}; {bound or 'nothing'} with "
         f"confidence {100 * n['confidence']:g} %{each}",
         "limit": f"≤ {asked.limit:g}",
         "margin": f"{asked.limit - high:.3g}",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.robustness import regional
+from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure
@@ -43,15 +44,18 @@ def _run(asked: Regional, ground: Ground) -> Finding:
     passed = int(np.count_nonzero(margins > 0))
     if passed in (0, margins.size):
         which = "passes" if passed else "fails"
-        sentence = f"Every one of {margins.size} rows {which}: nothing sets failures apart."
+        sentence = (
+            f"Every one of {counted(margins.size, 'row')} {which}: nothing sets failures apart."
+        )
         return made(asked, sentence, runs=margins.size)
     table = regional(design, margins)
     largest = table.nlargest(3, "statistic")["statistic"].to_dict()
     largest_first = ", ".join(f"{name} ({value:.2g})" for name, value in largest.items())
     return made(
         asked,
-        f"What sets {margins.size - passed} failing rows most apart from {passed} passing ones "
-        f"(distance of the two distributions, 0 to 1): {largest_first}.",
+        f"What sets {counted(margins.size - passed, 'failing row')} most apart from "
+        f"{counted(passed, 'passing one')} (distance of the two distributions, 0 to 1): "
+        f"{largest_first}.",
         runs=margins.size,
         tables={"differences": table},
     )

@@ -10,6 +10,7 @@ from pydantic import Field
 from analysis.robustness import Design, decide, test_verdict
 from analysis.robustness.runs.progress import Progress, until_decided
 from analysis.robustness.statistics.guarantee import rounded_down, rounded_up
+from nlctl.wording import counted
 
 from ..file.field_types import Confidence
 from ..finding import Finding
@@ -57,8 +58,9 @@ def _stop(asked: Sequential, design: Design) -> Callable[[Progress], Any]:
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
     return {
-        "measured": f"{n['violations']} of {n['runs']} runs; {rounded_down(n['lower'])} to "
-        f"{rounded_up(n['upper'])} with confidence {100 * n['confidence']:g} %",
+        "measured": f"{n['violations']} of {counted(n['runs'], 'run')}; "
+        f"{rounded_down(n['lower'])} to {rounded_up(n['upper'])} with confidence "
+        f"{100 * n['confidence']:g} %",
         "limit": f"< {asked.limit:g}",
         "margin": f"{asked.limit - n['upper']:.3g}",
     }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field
 
 from analysis.robustness import Design, Space, saltelli, sobol_indices
+from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure
@@ -67,8 +68,8 @@ def _run(asked: Sobol, ground: Ground) -> Finding | None:
     return made(
         asked,
         f"Largest shares of the variance of '{asked.of}', interactions included: {shares} "
-        f"({done.done} runs; intervals by bootstrap with confidence {100 * asked.confidence:g} % "
-        f"each).{failed}",
+        f"({counted(done.done, 'run')}; intervals by bootstrap with confidence "
+        f"{100 * asked.confidence:g} % each).{failed}",
         runs=done.done,
         numbers={"of": asked.of, "confidence": asked.confidence, **numbers},
         tables={"indices": table},

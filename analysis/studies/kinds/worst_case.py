@@ -15,6 +15,7 @@ from analysis.robustness.search.confirmation import confirm
 from analysis.robustness.search.evaluation import margins_of
 from analysis.robustness.search.shrink import shrink
 from analysis.robustness.search.worst_case import worst_case
+from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure, Paragraph, Table
@@ -132,7 +133,8 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield Figure(
         key=f"{key}-search",
         caption=caption,
-        description=f"{caption} After {lowest.size} runs it is {margin_text(lowest[-1])}.",
+        description=f"{caption} After {counted(lowest.size, 'run')} it is "
+        f"{margin_text(lowest[-1])}.",
         figure=figures.search(lowest, list(finding.tables["rows"]["searcher"].astype(str))),
     )
     if "replays" in finding.tables:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from nlctl.wording import counted
+
 if TYPE_CHECKING:
     from analysis.studies.result import Result
 
@@ -28,7 +30,9 @@ def methods(result: Result, published: Published | None = None) -> tuple[list[st
         "parabolas."
     )
     if result.rows is not None and study.runs is not None:
-        first += f" The main table has {result.rows.done} rows (design: {study.runs.design})."
+        first += (
+            f" The main table has {counted(result.rows.done, 'row')} (design: {study.runs.design})."
+        )
     answered = [f.key for f in result.findings if f.is_answered]
     kinds = dict.fromkeys(result.asked[key].definition for key in answered)
     told = [kind.method for kind in kinds if kind.method]

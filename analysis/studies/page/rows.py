@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from nlctl.native import Status
+from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure, History, Item, Paragraph, Table
@@ -193,9 +194,9 @@ def fan_items(kept: Histories, key: str) -> Iterator[Item]:
     )
     worst = margin_text(kept.margin)
     caption = (
-        f"The first {count} rows simulated again: {_bands(kept)}, the nominal run, and the worst "
-        f"run that is known (margin {worst}).{_limits(kept)}{ended} What leaves the picture is cut "
-        "off."
+        f"The first {counted(count, 'row')} simulated again: {_bands(kept)}, the nominal run, and "
+        f"the worst run that is known (margin {worst}).{_limits(kept)}{ended} What leaves the "
+        "picture is cut off."
     )
     yield Figure(
         key=f"{key}-fans",

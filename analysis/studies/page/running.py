@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlctl.wording import counted
+
 from ... import figures as figures
 from ...report.document import Figure, Item
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
@@ -55,8 +57,8 @@ def running_items(
     yield Figure(
         key=f"{key}-running",
         caption=caption,
-        description=f"{caption} After {curve.index[-1]} runs: {last['rate']:.4g}, band from "
-        f"{last['low']:.4g} to {last['high']:.4g}{ends}.",
+        description=f"{caption} After {counted(curve.index[-1], 'run')}: {last['rate']:.4g}, band "
+        f"from {last['low']:.4g} to {last['high']:.4g}{ends}.",
         figure=figures.running_estimate(curve, asked.limit, fixed),
     )
 

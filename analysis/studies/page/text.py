@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from nlctl.wording import some_of
+
 from ...figures import CLIP
 from ...report.typography import in_print
 from ...robustness.stl.spec import FAILED
@@ -74,7 +76,7 @@ def assumptions_in(sentences: Iterable[str]) -> list[str]:
 
 def violate(count: int, total: int) -> str:
     """Return how many runs violate the spec."""
-    return f"{count} of {total} runs {'violates' if count == 1 else 'violate'} the spec"
+    return f"{some_of(count, total, 'run', 'violates', 'violate')} the spec"
 
 
 def clipped(margins: Iterable[float]) -> str:

@@ -42,10 +42,12 @@ def dynamic_surface_control(
     law : record or control.InputOutputSystem, optional
         `ModelReferenceLaw` by default; its gain is what is known of the input gain.
     name : str, optional
+        Name of the connected controller, in front of its parameters' names.
 
     Returns
     -------
     control.InterconnectedSystem
+        The controller, in the place of one block.
 
     Raises
     ------

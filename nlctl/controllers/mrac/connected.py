@@ -50,10 +50,12 @@ def mrac(
         `ModelReferenceLaw` by default, `DirectLaw` where the input gain is unknown,
         `ConstrainedLaw` where the actuator saturates too.
     name : str, optional
+        Name of the connected controller, in front of its parameters' names.
 
     Returns
     -------
     control.InterconnectedSystem
+        The controller, in the place of one block.
 
     Raises
     ------

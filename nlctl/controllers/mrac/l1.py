@@ -145,6 +145,7 @@ def l1_adaptive(
         `ModelError` with the gains K = a, `AffineRegressor`, `ProjectedWeights` with Gamma = 1000,
         and `FilteredLaw` by default.
     name : str, optional
+        Name of the connected controller, in front of its parameters' names.
 
     Returns
     -------

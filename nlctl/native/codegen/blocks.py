@@ -18,6 +18,7 @@ from ...expressions.operators import elementwise
 from ...expressions.stage import Stage
 from ...expressions.trace import trace
 from ...sampling.system import Happening, Sampled, oldest, rounded
+from ...wording import counted
 from ..diagram.feedthrough import feedthrough
 from ..diagram.schedule import (
     AlgebraicLoop,
@@ -438,7 +439,7 @@ class Reader:
             parts = [trace(self.graph, function, arguments) for function in functions]
             found = concatenated(self.graph, parts)
             if found.size != count:
-                raise Untraceable(f"it returns {found.size} values, not {count}")
+                raise Untraceable(f"it returns {counted(found.size, 'value')}, not {count}")
         except Untraceable as error:
             return self._called(i, kind, functions, inputs, count, str(error))
         except Ambiguous as error:

@@ -19,6 +19,7 @@ def compile_ahead(compiled: Compiled, *, ensemble: bool = False) -> None:
     Parameters
     ----------
     compiled : Compiled
+        What `nlctl.compile` returns.
     ensemble : bool, optional
         Make that of `nlctl.ensemble_response`, instead of that of single runs.
 

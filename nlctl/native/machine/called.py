@@ -21,6 +21,7 @@ from ...blocks import Block
 from ...errors import CompileError
 from ...upstream.control_internals import current_parameters
 from ...upstream.numba_internals import CPUDispatcher
+from ...wording import counted
 from ..codegen.calls import Call, Source
 from ..parameters import Slot, current_values
 from ..thirdparty import dicts, vectors
@@ -112,8 +113,8 @@ class _AsItStands:
         values = np.concatenate([np.empty(0), *found])
         if values.size != count:
             raise ValueError(
-                f"block '{self.path}' returns {values.size} values from its {self.kind} function, "
-                f"needs {count}"
+                f"block '{self.path}' returns {counted(values.size, 'value')} from its {self.kind} "
+                f"function, needs {count}"
             )
         return values
 

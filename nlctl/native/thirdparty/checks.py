@@ -12,6 +12,7 @@ from ...blocks import Block, is_delayed
 from ...errors import CompileError
 from ...params import as_numbers
 from ...upstream.control_internals import current_parameters, outputs_now, rates_now, set_parameters
+from ...wording import counted
 from ..parameters import current_values
 from .purity import Reading, check_pure
 from .values import FRESH, VECTOR, Impure, captured
@@ -106,7 +107,7 @@ def _check_counts(path: str, system: Any) -> None:
             continue
         if got != wanted:
             raise CompileError(
-                f"block '{path}' returns {got} values from its {what} function, needs "
+                f"block '{path}' returns {counted(got, 'value')} from its {what} function, needs "
                 f"{wanted}, one for each of its {kind}"
             )
 

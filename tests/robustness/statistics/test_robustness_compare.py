@@ -175,8 +175,8 @@ class TestRefused:
     @each_row(
         ("change", "message"),
         [
-            (lambda t: t.drop(index=4), r"1 of 12 rows are missing, the first is row 4 \('two'\)"),
-            (lambda t: t.rename(index={11: 12}), "rows are missing"),
+            (lambda t: t.drop(index=4), r"1 of 12 rows is missing, the first is row 4 \('two'\)"),
+            (lambda t: t.rename(index={11: 12}), "1 of 12 rows is missing"),
             (lambda t: pd.concat([t, t.iloc[:1].rename(index={0: 12})]), "0 to 11, got row 12"),
             (lambda t: pd.concat([t, t.iloc[:1]]), "row 0 comes twice"),
             (lambda t: t.assign(a=t["a"] + (t.index == 7)), "row 7 has a = .* another design"),

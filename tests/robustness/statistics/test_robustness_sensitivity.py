@@ -203,7 +203,7 @@ def test_a_failed_run_is_no_better_than_any_other_and_violates(margins):
     margins = np.array(margins)
     ended = margins > -1e6
     if not ended.any():
-        with pytest.raises(nlctl.ParameterError, match=f"none of {margins.size} rows reached"):
+        with pytest.raises(nlctl.ParameterError, match=f"of {margins.size} rows? none reached"):
             censored(margins)
         return
     values, failed, least = censored(margins)

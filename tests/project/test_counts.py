@@ -1,0 +1,79 @@
+"""A number agrees with its noun: text that counts does it with nlctl.wording."""
+
+import ast
+import itertools
+import re
+
+import pytest
+from test_layers import MODULES
+
+from nlctl.wording import counted, some_of
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (counted(0, "state"), "0 states"),
+        (counted(1, "state"), "1 state"),
+        (counted(2, "analysis", "analyses"), "2 analyses"),
+        (counted(1, "analysis", "analyses"), "1 analysis"),
+        (some_of(0, 3, "run", "violates", "violate"), "0 of 3 runs violate"),
+        (some_of(1, 3, "run", "violates", "violate"), "1 of 3 runs violates"),
+        (some_of(3, 3, "run", "violates", "violate"), "3 of 3 runs violate"),
+        (some_of(1, 1, "claim", "fails", "fail"), "1 of 1 claim fails"),
+        (some_of(0, 1, "claim", "fails", "fail"), "0 of 1 claim fails"),
+    ],
+)
+def test_a_number_agrees_with_noun_and_verb(text, expected):
+    assert text == expected
+
+
+def nouns():
+    """The nouns that the modules count, in the plural."""
+    calls = (node for tree in MODULES.values() for node in ast.walk(tree))
+    for call in (node for node in calls if isinstance(node, ast.Call)):
+        words = [one.value for one in call.args if isinstance(one, ast.Constant)]
+        match getattr(call.func, "id", ""), words:
+            case "counted", [_, many]:
+                yield many.split()[0]
+            case ("counted", [one]) | ("some_of", [one, _, _]):
+                yield f"{one.split()[-1]}s"
+
+
+def counts(tree):
+    """Yield line, value and what follows, where a text has a value before a word."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            for value, rest in itertools.pairwise(node.values):
+                if isinstance(value, ast.FormattedValue) and isinstance(rest, ast.Constant):
+                    yield node.lineno, ast.unparse(value.value), rest.value
+
+
+SEVERAL = {  # never one: of a fixed size, or another text is written for one
+    ("analysis.paper.page.claims", "total"),
+    ("analysis.paper.page.report", "_count(number, compared)"),
+    ("analysis.paper.page.rivals", "own['samples'].iloc[0]"),
+    ("analysis.report.outline", "total"),
+    ("analysis.robustness.uncertainty.design", "rows"),
+    ("analysis.robustness.uncertainty.design", "columns"),
+    ("analysis.robustness.uncertainty.design", "MOST_HELD // columns"),
+    ("analysis.studies.page.rows", "len(worst)"),
+    ("analysis.studies.replay", "count"),
+    ("analysis.studies.result", "count"),
+    ("nlctl.native.integrate.methods.tableau", "stages - 1"),
+    ("nlctl.native.integrate.methods.tableau", "stages"),
+}
+NO_COUNT = re.compile(r"^_?[A-Z_]+$|shape|\.ratio$")  # a constant, "3 x 2 values", "2.5 times"
+
+
+def test_what_is_counted_is_counted_in_one_way():
+    """No text writes a number before a plural that others count."""
+    plural = re.compile(rf" (?:{'|'.join(sorted(set(nouns())))})\b")
+    found = {
+        (name, value): line
+        for name, tree in MODULES.items()
+        for line, value, rest in counts(tree)
+        if plural.match(rest) and not NO_COUNT.search(value)
+    }
+    assert {place: line for place, line in found.items() if place not in SEVERAL} == {}
+    assert found.keys() == SEVERAL, "named here and not there any more"
