@@ -1,10 +1,13 @@
 """An analysis and an actuator from outside of the package: a study names them, all finds them."""
 
+import os
+import subprocess
 import sys
 
 import numpy as np
 import pytest
 from command_line import nlctl_here
+from places import ROOT
 from rows import each_row
 
 from analysis.cli.study_report import report_study
@@ -333,3 +336,37 @@ def test_a_kind_that_cannot_be_one_is_refused_where_it_is_made(fields, words):
     with pytest.raises(UsageError) as told:
         Kind(**whole)
     assert words in str(told.value)
+
+
+REACHED = '''
+import numpy as np
+import pandas as pd
+from analysis.robustness.runs.loop_record import short_key
+from analysis.studies import Asked, Kind
+
+
+class Mean(Asked):
+    """The mean of a column."""
+
+
+def run(asked, ground):
+    return np.mean(ground), pd.DataFrame(ground).mean()
+
+
+mean = Kind(name="mean", schema=Mean, run=run, title="Mean", answers="a mean")
+print(short_key(run), short_key(mean))
+'''
+
+
+@pytest.mark.slow
+def test_the_code_of_a_kind_has_one_key_in_every_process():
+    """Also where its run mentions a name that the kind has: a schema is built from sets."""
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", REACHED], capture_output=True, text=True, check=True,
+            env={**os.environ, "PYTHONHASHSEED": seed}, cwd=ROOT,
+        ).stdout.split()
+        for seed in ("1", "2")
+    ]  # fmt: skip
+    assert told[0] == told[1]
+    assert len(set(told[0])) == 2

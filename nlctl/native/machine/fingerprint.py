@@ -22,7 +22,10 @@ from typing import Any, Protocol
 import numba
 import numpy as np
 
-_LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"}  # their versions stand for them
+_LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"} | {  # their versions stand for them
+    *("pandas", "pyarrow", "matplotlib", "jinja2", "rich"),  # in no equation, and
+    *("pydantic", "pydantic_core", "annotated_types", "typing_extensions"),  # built from sets
+}
 MODULE = "\1of "  # begins a text that names a module and nothing of its content
 HEAP_TYPE = 1 << 9  # Py_TPFLAGS_HEAPTYPE: made by a class statement
 _CONSTANTS = (int, float, complex, str, bytes, tuple, list, dict, np.ndarray, np.generic)
@@ -228,7 +231,7 @@ def _defined(module: types.ModuleType) -> Iterator[str]:
 
 @functools.cache
 def _is_library(name: str | None) -> bool:
-    """Whether a module is Python's own or numba's: a version stands for its content."""
+    """Whether a module is Python's own or a library's: a version stands for its content."""
     top = (name or "").partition(".")[0]
     if top not in sys.stdlib_module_names:
         return top in _LIBRARIES
