@@ -32,6 +32,7 @@ from .machine.routine import lowered_code
 
 _POINTS = 5  # of a trajectory, its start and end among them
 _ROUNDING = 1e-10  # relative difference that rounding explains without a closer look
+_PART_OF_RUN = 0.01
 _DIFFERENCES = 1e-4  # part of a rate that differences may miss
 _APART = 1e-5  # way, relative to the state, over which a rate is taken
 SHAKEN = 1e-13  # relative change of states and inputs that shows what rounding does to a value
@@ -272,11 +273,13 @@ def _line(values: np.ndarray) -> DelayLine:
 
 
 def _rounded(t: float, trial: Trial) -> float:
-    """Return how much later rounding may make it; at t = 0 a step of the run stands for t.
+    """Return how much later rounding may make it; near t = 0 a part of the run counts.
 
-    Never earlier: what begins at t, as a step does, has begun.
+    It must be seen beside phases: machine code knows that sin(w t + pi) is -sin(w t), NumPy's is
+    1.2e-16 at t = 0.  Never earlier: what begins at t, as a step does, has begun.
     """
-    return SHAKEN * max(abs(t), float(np.max(np.diff(trial.time), initial=0.0)))
+    step = float(np.max(np.diff(trial.time), initial=0.0))
+    return SHAKEN * max(abs(t), step, _PART_OF_RUN * float(np.ptp(trial.time)))
 
 
 def _near(point: Any, trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
