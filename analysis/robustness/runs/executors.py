@@ -58,7 +58,7 @@ def chunk_table(
     Returns
     -------
     pandas.DataFrame
-        With the columns of `columns.columns_of`.
+        With the columns of `experiment.columns_of`.
 
     Raises
     ------

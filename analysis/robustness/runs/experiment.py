@@ -161,7 +161,7 @@ def prepare(experiment: Experiment) -> Prepared:
     Raises
     ------
     UsageError
-        As in `resolve.diagrams` and `nlctl.compile`.
+        As in `binding.diagrams` and `nlctl.compile`.
     ParameterError
         If the inputs do not fit a diagram, or are not finite.
     UnknownNameError

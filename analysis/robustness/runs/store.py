@@ -71,7 +71,7 @@ class ChunkStore:
     identity : mapping
         See `identity.identity_of`.
     columns : mapping
-        See `columns.columns_of`.
+        See `experiment.columns_of`.
     """
 
     folder: Path

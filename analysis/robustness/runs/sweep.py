@@ -177,7 +177,7 @@ def sweep(
         Called with a `Progress` whenever rows are finished.
     stop : callable, optional
         Called with a `Progress` after every chunk; what it returns, unless false, ends the sweep
-        and becomes ``decided``, see `watch.until_decided`.
+        and becomes ``decided``, see `progress.until_decided`.
     identity : mapping, optional
         What else identifies the study in `folder`, such as the text of its study file.
 

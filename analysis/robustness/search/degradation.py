@@ -88,7 +88,7 @@ def degradation_curve(
     evaluate : callable
         See `evaluation.Evaluate`.
     space : Space
-        With nominal values, see `resolve.resolved`.
+        With nominal values, see `binding.resolved`.
     factors : sequence of float
         At least 0; at 0 all quantities are nominal and choices still vary.
     runs : int

@@ -145,7 +145,7 @@ def robustness_radius(
     evaluate : callable
         See `evaluation.Evaluate`.
     space : Space
-        With nominal values, see `resolve.resolved`.  Choices are not scaled: every option is
+        With nominal values, see `binding.resolved`.  Choices are not scaled: every option is
         searched at every size.
     largest : float, optional
         Largest size; for a loop from `largest_scale.largest_scale`.

@@ -88,7 +88,7 @@ def shrink(
     evaluate : callable
         See `evaluation.Evaluate`.
     space : Space
-        With nominal values, see `resolve.resolved`.
+        With nominal values, see `binding.resolved`.
     row : mapping
         ``{name: value}``, such as `WorstCase.witness`.
     steps : int, optional

@@ -118,7 +118,7 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
     Parameters
     ----------
     space : Space
-        With nominal values, see `resolve.resolved`.
+        With nominal values, see `binding.resolved`.
     levels : int, optional
         Number of evenly spaced values per quantity, ends included.
     entropy : int, optional

@@ -48,7 +48,7 @@ class Uncertain:
         Ends of the `box`.
     nominal : float, optional
         What the box is scaled about, and what the other quantities hold while one varies.  By
-        default the diagram's own value, see `resolve.resolved`.
+        default the diagram's own value, see `binding.resolved`.
     unit : str
         By default the diagram's.
 

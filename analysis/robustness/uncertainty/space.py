@@ -232,7 +232,7 @@ def _table(space: Space, unit: np.ndarray, value: Any) -> pd.DataFrame:
 def arguments(space: Space, table: pd.DataFrame) -> dict[str, dict[str, np.ndarray]]:
     """Return the ``params`` and ``initial_state`` of `nlctl.ensemble_response` for these rows.
 
-    Choices are left out: rows with the same labels share a diagram, see `resolve.diagrams`.
+    Choices are left out: rows with the same labels share a diagram, see `binding.diagrams`.
 
     Parameters
     ----------
