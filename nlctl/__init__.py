@@ -1,7 +1,7 @@
 """nlctl: adaptive neural control of pure-feedback nonlinear systems with python-control.
 
 The names below are loaded when first used, so that ``import nlctl`` and ``nlctl --help`` are
-instant.  `__init__.pyi` lists them for readers, editors and type checkers alike.
+instant.  ``__init__.pyi`` lists them for readers, editors and type checkers alike.
 """
 
 import lazy_loader

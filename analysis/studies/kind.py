@@ -217,7 +217,7 @@ class Kind:
     """A kind of analysis.
 
     The first argument ``asked`` of its functions is an instance of `schema`.  What they refuse they
-    refuse with a `nlctl.UsageError`, which costs this analysis and no other one.
+    refuse with a `nlctl.errors.UsageError`, which costs this analysis and no other one.
 
     Attributes
     ----------

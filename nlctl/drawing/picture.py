@@ -1,6 +1,6 @@
 """Block diagrams of python-control interconnections, drawn as in a control textbook.
 
-`signal_graph` reads what is connected to what, `lay_out` places it (see `_layout`), `draw` paints
+`signal_graph` reads what is connected to what, `lay_out` places it (see `nlctl.drawing.routes`), `draw` paints
 it.
 """
 

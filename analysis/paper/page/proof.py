@@ -36,7 +36,7 @@ def lyapunov_sections(
     found : mapping
         Result of `evidence` by number of the example; without any there is no part.
     far : mapping, optional
-        Runs far beyond 20 s, by key of `analysis.paper.evidence.FAR`.
+        Runs far beyond 20 s, by key of `analysis.paper.evidence.FAR_HORIZONS`.
 
     Returns
     -------
