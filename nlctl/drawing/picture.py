@@ -1,7 +1,7 @@
 """Block diagrams of python-control interconnections, drawn as in a control textbook.
 
-`signal_graph` reads what is connected to what, `lay_out` places it (see `nlctl.drawing.routes`), `draw` paints
-it.
+`signal_graph` reads what is connected to what, `lay_out` places it (see `nlctl.drawing.routes`),
+`draw` paints it.
 """
 
 from __future__ import annotations
