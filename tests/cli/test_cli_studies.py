@@ -107,7 +107,7 @@ def test_an_error_in_the_users_own_function_is_exit_code_3(folder):
     assert json.loads(told.stdout) == {"error": "RuntimeError: no such luck"}
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_a_full_disk_is_exit_code_4_and_can_be_continued(folder):
     """Files may grow to 20 kB only: the first chunk cannot be written; later it can."""
     path = write(folder, HEAD, MANY, name="many.toml")

@@ -163,7 +163,7 @@ class TestFaults:
             (1, {"Omega"}),
             pytest.param(2, {"A2"}, marks=pytest.mark.slow),  # in the ensemble every day
             pytest.param(3, {"A3"}, marks=pytest.mark.slow),
-            (4, {"decay"}),
+            pytest.param(4, {"decay"}, marks=pytest.mark.slow),
         ],
     )
     def test_planted_faults_are_named(self, member, broken):
@@ -172,6 +172,7 @@ class TestFaults:
         assert broken <= violated
         assert all(line.follows for line in of_member(member).violated)
 
+    @pytest.mark.slow
     def test_the_healthy_member_is_healthy(self):
         """A check that always fails is as bad as one that cannot."""
         assert of_member(0).holds

@@ -248,6 +248,7 @@ class TestCache:
         value, compilations = result.stdout.split()
         return float(value), int(compilations)
 
+    @pytest.mark.slow
     def test_a_second_process_compiles_nothing(self, tmp_path):
         """Other parameters use the same machine code."""
         first, compilations = self.start(tmp_path, 1.0)

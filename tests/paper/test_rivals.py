@@ -151,7 +151,10 @@ def test_the_record_is_of_the_study(example):
     assert rivals_text(record, example) in PAGE.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("column", ["study", "parameters", "rates"])
+@pytest.mark.parametrize(
+    "column",
+    ["study", *(pytest.param(one, marks=pytest.mark.slow) for one in ("parameters", "rates"))],
+)
 def test_a_record_of_another_study_or_loop_is_refused(tmp_path, column):
     """With the command that makes it again; of the last line, what it says of the loop is false."""
     record = pd.read_csv(RIVALS_RECORD)

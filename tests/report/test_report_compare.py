@@ -176,7 +176,7 @@ def test_gallery_shows_hostile_titles_as_text(tmp_path, name):
     assert two.text.count(HOSTILE[name]) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_a_page_is_opened_in_the_browser_of_the_user(tmp_path, monkeypatch):
     """Here a program that writes down what it was given; without any, a sentence says so."""
     folder, seen = write_report(small(), tmp_path / "reports" / "one").parents[1], tmp_path / "seen"

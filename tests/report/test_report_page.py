@@ -186,7 +186,9 @@ APART = ("latex", "long")  # a formula that can be read, and what would hide the
 TOGETHER = [text for name, text in HOSTILE.items() if name not in APART]
 
 
-@pytest.mark.parametrize("texts", [TOGETHER, *([HOSTILE[name]] for name in APART)])
+@pytest.mark.parametrize(
+    "texts", [TOGETHER, *(pytest.param([HOSTILE[n]], marks=pytest.mark.slow) for n in APART)]
+)
 def test_whatever_a_user_names_is_shown_and_is_no_markup(texts):
     """In every field: same elements as with plain text, and the text in full."""
     text = " ".join(texts)
@@ -291,7 +293,7 @@ def test_letters_are_drawn_once_for_all_figures_of_a_page():
     assert first.replace("first", "second") == second
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_a_pool_that_helps_with_drawing_changes_no_byte():
     """Figures are the same files wherever they are drawn, and in the same order."""
 

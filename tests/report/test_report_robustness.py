@@ -331,6 +331,7 @@ def test_a_refused_guarantee_is_shown_with_its_reason(tmp_path, kind):
     assert "not an estimate of a probability" in section.items[0].text
 
 
+@pytest.mark.slow
 def test_an_analysis_without_an_answer_says_why(result):
     """Of whatever kind: its section and its claim have the reason, and the others are as ever.
 

@@ -126,7 +126,7 @@ class TestCertify:
             ),
             (example_1(), TIGHT, 0.48346),
             pytest.param(example_2(), None, 1.44794, marks=pytest.mark.slow),
-            (example_2(tau=0.05), None, 0.51938),
+            pytest.param(example_2(tau=0.05), None, 0.51938, marks=pytest.mark.slow),
         ],
     )
     def test_the_bound_holds_for_the_run_and_meets_the_known_one(self, loop, k, known):

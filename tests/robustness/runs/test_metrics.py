@@ -189,7 +189,7 @@ def test_no_metric_of_a_diverged_response_is_a_calm_number(metric, bad):
         assert not np.isfinite(metric(t, np.where(t > 0.5, bad, 0.0)))
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_numba_compiles_the_metrics_as_they_stand():
     """One compiled function gives the same numbers; the other metrics are made of these."""
     calls = [
