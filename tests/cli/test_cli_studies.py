@@ -171,12 +171,17 @@ def waiting(name="loop"):
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kept", "command"),
     [
-        ("study.toml", "begin with: nlctl run study.toml --out out --jobs 1"),
-        ("out/study.toml", "continue with: nlctl run study.toml --resume --out out --jobs 1"),
+        pytest.param(
+            *("study.toml", "begin with: nlctl run study.toml --out out --jobs 1"),
+            marks=pytest.mark.weekly,
+        ),
+        pytest.param(
+            *("out/study.toml", "continue with: nlctl run study.toml --resume --out out --jobs 1"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 @pytest.mark.usefixtures("ctrl_c")
@@ -208,7 +213,7 @@ def assert_same(one, other):
     np.testing.assert_array_equal(first.index, range(3000))
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_processes_give_the_same_rows(folder):
     """The user's loop from a file travels to other processes."""
     path = write(folder)

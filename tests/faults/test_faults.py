@@ -143,6 +143,7 @@ def test_a_fault_that_does_not_begin_changes_no_bit(example, signal):
         np.testing.assert_array_equal(diagram.output(t, with_memory, []), plain.output(t, x, []))
 
 
+@pytest.mark.slow
 @each_row(
     "example, kind, more",
     [

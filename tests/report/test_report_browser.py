@@ -85,8 +85,15 @@ def test_nothing_is_fetched_and_the_console_is_silent(visit, name):
     assert [url for url in page.seen if not url.startswith("data:")] == []
 
 
-@pytest.mark.parametrize("name", [name for name in PAGES if name != "long"])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+SCHEMES = [
+    pytest.param(name, scheme, marks=[pytest.mark.weekly] * (scheme == "dark" and name != "paper"))
+    for name in PAGES
+    for scheme in ("light", "dark")
+    if name != "long"
+]
+
+
+@pytest.mark.parametrize(("name", "scheme"), SCHEMES)
 def test_axe_finds_no_violation(visit, name, scheme):
     """Contrast, names, roles, headings, keyboard, in both colour schemes."""
     axe = needed("axe_playwright_python.sync_playwright", "browser")

@@ -22,7 +22,8 @@ FILES = {  # calls that are equal at least, and refused at most: together 190 an
     "response": (0, 0),
     "stochsys": (31, 1),
 }
-LONG = ("iosys", "statefbk", "stochsys", "timeresp", "response")  # most of the time: once a week
+# most of the time: once a week
+LONG = ("iosys", "nlsys", "statefbk", "stochsys", "timeresp", "trdata", "response")
 CASES = [pytest.param(name, marks=[pytest.mark.weekly] * (name in LONG)) for name in FILES]
 
 

@@ -230,7 +230,7 @@ class TestKnownProblems:
     """Against an implicit Runge-Kutta method of another kind."""
 
     @needs_jit
-    @pytest.mark.parametrize("method", ["rodas5p", "auto"])
+    @pytest.mark.parametrize("method", [pytest.param("rodas5p", marks=pytest.mark.slow), "auto"])
     def test_van_der_pol(self, method):
         """Over a period and more, with its jumps."""
         made = run(

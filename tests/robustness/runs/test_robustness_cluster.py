@@ -73,7 +73,8 @@ def test_the_command_line_runs_a_study_on_the_cluster(client, tmp_path):
 @pytest.mark.parametrize(
     ("address", "words"),
     [
-        ("tcp://127.0.0.1:9", "Timed out"),  # the port of discard, where nobody listens
+        # the port of discard, where nobody listens
+        pytest.param("tcp://127.0.0.1:9", "Timed out", marks=pytest.mark.weekly),
         ("mainframe", "missing port"),
     ],
 )

@@ -67,7 +67,7 @@ def test_threads_of_an_executor_compute_the_same_table(made, design, whole):
         same(sweep(made, design, executor=pool, chunk=7).table, whole)
 
 
-@pytest.mark.slow
+@pytest.mark.weekly
 def test_spawned_processes_compute_the_same_table(made, design, whole):
     """Also the rows of a listed design, whose points travel with their chunks.
 
