@@ -10,7 +10,7 @@ from hypothesis import settings
 settings.register_profile("nlctl", deadline=None, derandomize=True, database=None, max_examples=50)
 settings.load_profile("nlctl")
 
-NEEDY = ("browser", "cluster", "docs", "upstream")  # marks of what counts as slow
+NEEDY = ("weekly", "browser", "cluster", "docs", "upstream")  # marks of what counts as slow
 
 
 def pytest_configure(config):
@@ -24,15 +24,14 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
-    """Count as slow what needs a browser, a cluster, Sphinx or other people's tests; not if weekly.
+    """Count as slow what is weekly, needs a browser, a cluster, Sphinx or other people's tests.
 
     So is the machine code, ``native=True``, of what the same test compares as plain Python.
     """
     for item in items:
         values = item.callspec.params if hasattr(item, "callspec") else {}
         marked = any(item.get_closest_marker(name) for name in NEEDY)
-        weekly = item.get_closest_marker("weekly")
-        if not weekly and (marked or values.get("native") is True):
+        if marked or values.get("native") is True:
             item.add_marker("slow")
 
 
