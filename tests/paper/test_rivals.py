@@ -181,7 +181,8 @@ def test_lines_of_the_record_are_runs_of_today(example, tmp_path):
     record = checked()
     columns = ["example", "actuator", "controller"]
     kept = today[columns].merge(record, on=columns, how="left")
-    for column in today.columns.difference([*columns, "study"]):
+    assert today["parameters"].tolist() == kept["parameters"].tolist()
+    for column in today.columns.difference([*columns, "study", "parameters"]):
         np.testing.assert_allclose(today[column], kept[column], rtol=1e-3, atol=1e-9)
 
 
