@@ -11,6 +11,7 @@ from .parameters import (
 )
 from .places import (
     Place,
+    continuous_blocks,
     initial_state,
     known_system,
     leaves,
@@ -24,6 +25,7 @@ __all__ = [
     "all_parameter_rows",
     "as_system",
     "check_read",
+    "continuous_blocks",
     "initial_state",
     "interconnect",
     "known_system",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
 import control as ct
@@ -155,21 +156,16 @@ def _check_blocks(systems: Sequence[Any]) -> None:
 
 def _check_timebases(systems: Sequence[Any]) -> None:
     """One timebase for all: what samples among others says so."""
-    first = None
-    for system in systems:
-        if system.dt is None:  # any
-            continue
-        if first is not None:
-            try:
-                ct.common_timebase(first.dt, system.dt)
-            except ValueError:
-                slow = system if system.dt else first
-                raise DiagramError(
-                    f"'{first.name}' {_timebase(first.dt)} and '{system.name}' "
-                    f"{_timebase(system.dt)}: nlctl.sampled({slow.name}, dt) is connected with "
-                    "others, continuous or of another rate"
-                ) from None
-        first = first if first is not None and first.dt is not True else system
+    for one, other in combinations(systems, 2):
+        try:
+            ct.common_timebase(one.dt, other.dt)
+        except ValueError:
+            slow = other if other.dt else one
+            raise DiagramError(
+                f"'{one.name}' {_timebase(one.dt)} and '{other.name}' {_timebase(other.dt)}: "
+                f"nlctl.sampled({slow.name}, dt) is connected with others, continuous or of "
+                "another rate"
+            ) from None
 
 
 def _timebase(dt: Any) -> str:

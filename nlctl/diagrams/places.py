@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import control as ct
 import numpy as np
 
-from ..blocks import default_state
-from ..errors import ParameterError
+from ..blocks import Block, default_state, within
+from ..errors import DiagramError, ParameterError
 from ..names import Parameters, find_name
 from ..params import as_numbers
 
@@ -102,6 +102,53 @@ def leaves(system: ct.InputOutputSystem) -> Iterator[Place]:
 def _is_scoped(diagram: ct.InterconnectedSystem) -> bool:
     """Whether a diagram puts its name in front of its parameters' names."""
     return isinstance(diagram.params, Parameters) and diagram.params.scope is not None
+
+
+def continuous_blocks(
+    system: Any, chosen: Callable[[Any], bool], why: str, shared: str
+) -> list[Block]:
+    """Return chosen blocks of a diagram, in the order of its blocks; each stands there once.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram or a block.
+    chosen : callable
+        Whether a block is one of them.
+    why : str
+        Why it needs continuous time, for the error.
+    shared : str
+        What two places would share, for the error.
+
+    Returns
+    -------
+    list of Block
+        Those that `chosen` is true of.
+
+    Raises
+    ------
+    DiagramError
+        If one is in discrete time, is sampled, or stands in the diagram twice.
+    """
+    found: dict[int, Block] = {}
+    for leaf in leaves(system):
+        made = within(leaf.system)
+        if not chosen(made):
+            continue
+        kind = type(made.spec).__name__
+        if made is not leaf.system or not ct.isctime(system) or made.dt not in (0, None):
+            raise DiagramError(f"block '{leaf.path}' is {_a(kind)}, which {why}")
+        if id(made) in found:
+            raise DiagramError(
+                f"{kind} '{leaf.path}' stands in '{system.name}' twice, with one {shared} for "
+                "both: make a block of each"
+            )
+        found[id(made)] = made
+    return list(found.values())
+
+
+def _a(noun: str) -> str:
+    return f"an {noun}" if noun[0] in "AEIOU" else f"a {noun}"
 
 
 def known_system(who: str, system: Any) -> Any:

@@ -29,6 +29,7 @@ from .diagram.block_inputs import block_inputs
 from .diagram.schedule import Signal, signal_name
 from .machine.evaluations import Machine, prepared_parameters
 from .machine.routine import lowered_code
+from .sliding.reading import relay_places
 
 _POINTS = 5  # of a trajectory, its start and end among them
 _ROUNDING = 1e-10  # relative difference that rounding explains without a closer look
@@ -107,7 +108,7 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
             return
         done.append(code)
         evaluated, trial = _evaluated(compiled, code, c), replace(trial, meetings=code.meetings)
-        relays = any(slides(node.system) for node in compiled.schedule.nodes)
+        relays = relay_places(compiled.schedule.nodes)
         outputs = every_output(compiled, trial.p) if relays else None
         for point in _points(trial):
             known = _relay_outputs(compiled, outputs(point)) if outputs else {}
@@ -205,7 +206,7 @@ def _relay_outputs(compiled: Compiled, found: np.ndarray) -> dict[int, float]:
     """Return what ideal relays output, by the number of their blocks, of all blocks' outputs."""
     nodes = compiled.schedule.nodes
     starts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
-    return {i: float(found[starts[i]]) for i, node in enumerate(nodes) if slides(node.system)}
+    return {i: float(found[starts[i]]) for i in relay_places(nodes)}
 
 
 def _compare_sliding(compiled: Compiled, trial: Trial, point: Any) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import tempfile
+import tomllib
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,6 @@ from nlctl import paper
 
 from ...robustness.runs.loop_record import loop_facts, loop_values
 from ...studies import Result, read_study, run, shipped
-from ...studies.origin import plain_study
 from ..rivals import rival_loop
 from .markdown import markdown_table
 
@@ -50,8 +50,8 @@ def rivals_study(example: str) -> Path:
 
 
 def study_key(example: str) -> str:
-    """Return a key of all that the study file of an example asks."""
-    asked = plain_study(read_study(rivals_study(example)).study)
+    """Return a key of all that the study file of an example asks; comments do not count."""
+    asked = tomllib.loads(rivals_study(example).read_text(encoding="utf-8"))
     return sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:12]
 
 

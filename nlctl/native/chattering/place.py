@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks import slides
 from ...upstream.control_internals import rates_now, set_parameters
 from ..audit import block_outputs
 from ..codegen.program import count_switching_functions, memory
 from ..compiled import Compiled
 from ..diagram.block_inputs import block_inputs
+from ..sliding.reading import relay_places
 from .detection import Jump
 
 __all__ = ["chattering_words"]
@@ -41,7 +41,7 @@ def chattering_words(
     jump : Jump
         Where the run chatters.
     """
-    relays = any(slides(node.system) for node in compiled.schedule.nodes)
+    relays = relay_places(compiled.schedule.nodes)
     advice = (
         "the run comes back to it with each of the shortest steps: smooth the jump over a small "
         "width, give it hysteresis, or sample the controller (nlctl.sampled)"

@@ -14,7 +14,12 @@ from .rates import OUTPUTS, Motion, SlidingInput, sliding_rates
 
 if TYPE_CHECKING:
     from ..codegen.blocks import Reader
-    from ..diagram.schedule import Schedule
+    from ..diagram.schedule import Node, Schedule
+
+
+def relay_places(blocks: Sequence[Node]) -> list[int]:
+    """Return the numbers of the blocks that are ideal relays."""
+    return [i for i, node in enumerate(blocks) if slides(node.system)]
 
 
 def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
@@ -28,7 +33,7 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
         If the input of a relay has no rate of the form a + b v.
     """
     graph, blocks = reader.graph, reader.blocks
-    places = [i for i, node in enumerate(blocks) if slides(node.system)]
+    places = relay_places(blocks)
     if not places:
         return reader
     leaves = [graph.leaf(OUTPUTS, k, None) for k in range(len(places))]
