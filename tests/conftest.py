@@ -10,7 +10,7 @@ from hypothesis import settings
 settings.register_profile("nlctl", deadline=None, derandomize=True, database=None, max_examples=50)
 settings.load_profile("nlctl")
 
-NEEDY = ("weekly", "browser", "cluster", "docs", "upstream")  # marks of what counts as slow
+NEEDY = ("weekly", "browser", "cluster", "docs", "upstream")  # marks of what counts as ci
 
 
 def pytest_configure(config):
@@ -24,14 +24,17 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
-    """Count as slow what is weekly, needs a browser, a cluster, Sphinx or other people's tests.
+    """Count as ci what is weekly, needs a browser, a cluster, Sphinx or other people's tests.
 
     So is the machine code, ``native=True``, of what the same test compares as plain Python.
+    What is ci is slow.
     """
     for item in items:
         values = item.callspec.params if hasattr(item, "callspec") else {}
         marked = any(item.get_closest_marker(name) for name in NEEDY)
         if marked or values.get("native") is True:
+            item.add_marker("ci")
+        if item.get_closest_marker("ci"):
             item.add_marker("slow")
 
 

@@ -37,6 +37,7 @@ def test_every_actuator_is_in_one_class():
     assert sorted(RECORDS) == sorted(name for names in classes for name in names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(SPLIT))
 @given(data=st.data())
 @settings(max_examples=10)
@@ -71,6 +72,7 @@ def test_the_others_say_why_they_have_none(names, why):
             decompose(RECORDS[name](), k=(0.5, 1.5))
 
 
+@pytest.mark.slow
 @given(w=st.lists(st.floats(0.05, 1), min_size=4, max_size=4), w_0=st.floats(0.1, 1))
 @settings(max_examples=10)
 def test_the_sum_of_plays_attains_its_bounds(w, w_0):
@@ -131,7 +133,7 @@ def test_other_records_are_refused_too(spec, told):
         decompose(spec)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_proof_is_examined_with_several_memories_or_refused():
     """The ledger's runs with four plays; with relays one sentence, before anything runs."""
     found = examine(nlctl.paper.example_1(actuator=nlctl.PrandtlIshlinskii()), 1.0)

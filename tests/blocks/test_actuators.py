@@ -214,6 +214,7 @@ class TestBacklashInPythonControl:
         orders = np.log2(np.array(errors[:-1]) / errors[1:])
         np.testing.assert_allclose(orders, 2.0, atol=0.15)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "changed", [{}, {"m_r": 1.5, "m_l": 0.8}, {"m_r": 0.8, "m_l": 1.5, "v0": 0.4}]
     )
@@ -226,6 +227,7 @@ class TestBacklashInPythonControl:
         _, _, v, _ = respond(u, 8.0, rate=1e3, **changed)
         np.testing.assert_allclose(v, exact(changed, u, 8.0, v.size), atol=2e-4)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("amplitude", "r"), [(2.0, 0.5), (1.2, 0.3), (1.0, 0.8)])
     def test_the_loop_area_is_4_r_times_amplitude_minus_r(self, amplitude, r):
         """One cycle of u = A sin t encloses 4 r (A - r) for unit slopes and the half gap r."""
@@ -237,6 +239,7 @@ class TestBacklashInPythonControl:
         area = abs(np.trapezoid(work, t[late]))
         assert area == pytest.approx(4 * r * (amplitude - r), rel=1e-3)
 
+    @pytest.mark.slow
     def test_it_is_rate_independent(self):
         """The same path at a warped time ends at the same output."""
         path = lambda s: 2 * np.sin(3 * s) * np.exp(-0.3 * s)  # noqa: E731
@@ -252,6 +255,7 @@ class TestBacklashInPythonControl:
         np.testing.assert_allclose(looping[2][-8:], straight[2][-8:], atol=1e-6)
         assert np.abs(looping[1] - straight[1]).max() > 0.5
 
+    @pytest.mark.slow
     def test_a_run_may_be_split(self):
         """Going on from the last memory equals going on."""
         u = lambda t: 2 * np.sin(t)  # noqa: E731

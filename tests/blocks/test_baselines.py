@@ -220,13 +220,14 @@ class TestComparedControllers:
             )
             assert law.spec.kappa == pytest.approx(-nlctl.functions.nussbaum(zeta), rel=2e-3)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("example", EXAMPLES)
     def test_the_certified_one_is_certified(self, example):
         """|r| <= C_0 for all time, proved; C_0 is no larger than the initial error."""
         loop = EXAMPLES[example](controller=compared_controllers(example)["certified"])
         assert certify(loop).C_0 < 1.0
 
-    @pytest.mark.slow
+    @pytest.mark.ci
     @pytest.mark.parametrize("example", EXAMPLES)
     def test_the_baselines_are_tuned(self, example):
         """Twice or half of a gain costs more, or exceeds the paper's peak or the search's steps."""

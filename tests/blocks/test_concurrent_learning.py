@@ -76,6 +76,7 @@ def test_the_law_is_the_sum_over_recorded_errors(taken, W_hat, r, psi):
     np.testing.assert_allclose(found, 2.0 * by_hand, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 @each_row("command", [0.0, 1.0])
 def test_weights_converge_with_recorded_points_and_do_not_without(command):
     """A constant command excites nothing at last: MRAC tracks with other weights than W."""

@@ -46,6 +46,7 @@ def run_of(error):
 CONSTRAINED = nlctl.ConstrainedError(K=(1.0,), Q=(2.0,), gamma_d=1.0)  # P = 1, as theirs
 
 
+@pytest.mark.slow
 def test_the_loop_of_the_authors_written_in_their_symbols():
     """theta, k, beta_delta, e_delta as one `ct.nlsys`, in python-control's own simulation."""
 

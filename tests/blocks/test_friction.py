@@ -227,6 +227,7 @@ class TestLuGre:
         assert widths[0] > 0
         assert np.all(np.diff(widths) > 0)
 
+    @pytest.mark.slow
     def test_stick_and_slip(self):
         """Pulled at 0.1 m/s by a spring of 2 N/m; Radau's method agrees to 1e-6.
 

@@ -149,6 +149,7 @@ class TestBandLimited:
         assert np.sqrt(np.mean(y**2)) == pytest.approx(rms, rel=0.02)
         assert abs(np.mean(y)) < 0.01 * rms
 
+    @pytest.mark.slow
     @given(seed=st.integers(0, 1000), low=st.floats(0, 20), width=st.floats(1, 30))
     @settings(max_examples=10)
     def test_its_spectrum_lies_in_the_band(self, seed, low, width):

@@ -96,12 +96,14 @@ def operator(spec, path):
 
 @every_kind
 class TestEveryOperator:
+    @pytest.mark.slow
     @given(data=st.data())
     def test_machine_code_follows_the_operator(self, kind, data):
         """From turning point to turning point, thresholds met exactly among them."""
         spec, path = data.draw(EVERY[kind]), data.draw(paths)
         np.testing.assert_allclose(along(spec, path), operator(spec, path), atol=1e-13)
 
+    @pytest.mark.slow
     @given(data=st.data())
     @settings(max_examples=20)
     def test_machine_code_equals_python_control_at_break_points(self, kind, data):
@@ -119,6 +121,7 @@ class TestEveryOperator:
                 got = getattr(made, name)(0.0, x, [u], p)
                 np.testing.assert_allclose(got, expected, rtol=1e-14, atol=1e-15)
 
+    @pytest.mark.slow
     @given(data=st.data())
     @settings(max_examples=20)
     def test_it_is_rate_independent(self, kind, data):
@@ -130,6 +133,7 @@ class TestEveryOperator:
         warped = drive(spec, np.append(0.0, np.cumsum(steps)), path).outputs[0]
         np.testing.assert_array_equal(warped, along(spec, path))
 
+    @pytest.mark.slow
     @given(data=st.data())
     @settings(max_examples=20)
     def test_a_run_may_be_split(self, kind, data):
@@ -148,6 +152,7 @@ class TestEveryOperator:
         v = along(spec, [*path, path[-1], path[-1]])
         assert v[-1] == v[-2] == v[-3]
 
+    @pytest.mark.slow
     @given(data=st.data())
     @settings(max_examples=20)
     def test_closed_minor_loops_leave_no_trace(self, kind, data):
@@ -160,6 +165,7 @@ class TestEveryOperator:
             looped = along(spec, [*before, *path, c, path[-1], *after])
             np.testing.assert_allclose(looped[-len(after) :], straight[-len(after) :], atol=1e-12)
 
+    @pytest.mark.slow
     @given(data=st.data())
     @settings(max_examples=20)
     def test_minor_loops_between_equal_inputs_are_congruent(self, kind, data):
@@ -186,6 +192,7 @@ class TestEveryOperator:
             assert first == pytest.approx(operator(spec, [u])[0], abs=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["play", "stop", "Prandtl-Ishlinskii"])
 @given(data=st.data())
 def test_outputs_are_no_further_apart_than_the_inputs(kind, data):
@@ -239,6 +246,7 @@ def test_loop_area_of_a_relay(A, height):
     assert -integral(v, cycle) == pytest.approx(expected, abs=1e-7)
 
 
+@pytest.mark.slow
 @given(path=grid_paths, r=quarters)
 def test_the_stop_stores_v_squared_over_two_and_burns_the_rest(path, r):
     """Its work, the integral of v du, is the change of v^2 / 2 and r times the play's way."""
@@ -286,6 +294,7 @@ def test_a_sum_of_plays_is_the_sum_of_plays():
     np.testing.assert_allclose(stop + along(plays[0], path), path, atol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", EVERY)
 def test_in_python_control_the_memories_relax_onto_the_operator(kind):
     """Away from jumps they differ by some times |u'| / rate, at the start and at corners of u."""
@@ -344,6 +353,7 @@ def test_in_contact_the_switching_function_is_exactly_zero(kind, data):
     np.testing.assert_array_equal((distances == 0).any(axis=0)[moved != x], True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_a_sum_of_plays_in_a_closed_loop_takes_no_more_steps_than_a_play(rtol):
     """Several memories that reverse and touch together: the paper's Example 1 with one and four."""

@@ -66,6 +66,7 @@ def inverse_of(spec):
 class TestPrandtlIshlinskii:
     """Kuhnen's inverse in closed form."""
 
+    @pytest.mark.slow
     @given(spec=operators(), data=st.data())
     def test_operator_and_inverse_are_the_identity(self, spec, data):
         """In either order, from every admissible start: exact at every turning point."""

@@ -63,6 +63,7 @@ class TestItsPlace:
         loop = nlctl.paper.example_1(controller=controller)
         assert "zeta" not in loop.output_labels
 
+    @pytest.mark.slow
     def test_V_falls_as_the_certificate_says(self):  # noqa: N802
         """V' <= -alpha_1 V + alpha_0 + 0.2785 b, V' being gradient times right-hand side.
 

@@ -84,6 +84,7 @@ def rohrs_mrac(weights):
     return loop, nlctl.initial_state(loop, start)
 
 
+@pytest.mark.slow
 @each_row(
     ("weights", "holds"),
     [

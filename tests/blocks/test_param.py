@@ -68,6 +68,7 @@ class Mixed:
 
 
 class TestBounds:
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", BOUNDS)
     @given(value=st.one_of(st.just(2.0), st.floats(-1e6, 1e6)))
     def test_a_bound_holds_exactly_where_it_says(self, kind, value):

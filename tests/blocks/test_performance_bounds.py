@@ -113,6 +113,7 @@ def test_funnel_control_of_an_integrator_is_known_in_closed_form():
     assert np.ptp(invariant) < 1e-8
 
 
+@pytest.mark.slow
 @each_row(("label", "number"), [(label, i) for label in CONTROLLERS for i in (0, 1)])
 def test_the_bound_holds_for_every_member_of_an_ensemble(label, number):
     """Other plants, actuators and starts: no member leaves its bound, and none is tuned for it."""

@@ -27,6 +27,7 @@ def slope(plant, t, x, v, params=None):
 
 
 class TestPureFeedback:
+    @pytest.mark.slow
     @pytest.mark.parametrize("order", range(1, 6))
     def test_a_linear_plant_is_a_state_space_system(self, order):
         """With linear f the response is that of the companion form, to the solver's tolerance."""

@@ -95,6 +95,7 @@ def check_rhs(example, actuator, diagram, centres, t, state, parameters, **optio
             np.testing.assert_allclose(outputs[i], signals[name], rtol=1e-12, atol=1e-12 * size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("actuator", ["dead_zone", "backlash"])
 @pytest.mark.parametrize("example", [1, 2])
 def test_right_hand_side_agrees_with_the_independent_transcription(example, actuator):

@@ -51,6 +51,7 @@ def test_help_imports_nothing_heavy():
     assert result.stderr.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_simulate_writes_what_was_asked_for(tmp_path):
     """The table starts from the initial state that was set; the figure is an SVG."""
     result = nlctl_here(
@@ -123,6 +124,7 @@ def test_list_shows_blocks_with_units_and_bounds():
     assert "DeadZone" not in alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["svg", "png", "pdf"])
 def test_diagram_is_drawn_in_each_format(suffix, tmp_path):
     """The file begins as its format does."""
@@ -198,6 +200,7 @@ def test_loops_of_ones_own_run_with_inputs(own, engine):
     np.testing.assert_allclose(table["y"], 3 * (1 - np.exp(-table["time"])), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_loops_of_modules_and_files_are_drawn_and_checked(own):
     """A function of a module, and one of a file."""
     drawn = nlctl_here("diagram", "nlctl.paper:example_2", "-o", "out.svg", cwd=own)

@@ -24,6 +24,8 @@ from nlctl import paper
 from nlctl.diagrams import initial_state, state_names
 from nlctl.errors import ParameterError, UnknownNameError
 
+pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
+
 
 @pytest.fixture(scope="module")
 def found():
@@ -54,7 +56,7 @@ def test_the_published_loop_holds_and_the_paper_does_not():
     assert lines["(29)"]["status"] == "proved"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_runs_of_python_control_are_reproduced_and_give_the_same_ledger():
     """Two engines, one loop: the same statuses, and margins that agree to the runs' tolerance."""
     arguments = ("example-1", "--until", "0.5", "--json", "--set", "actuator.b_r=0.4")
@@ -96,7 +98,7 @@ def test_a_diverging_run_is_exit_code_1():
     assert lines["run"]["status"] == "violated"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_worst_run_of_an_ensemble_can_be_run_again():
     """The printed command starts where the member started: its largest |r| is the same state."""
     options = ("--horizon", "3", "--ensemble", "2", "--seed", "3", "--set", "law.beta=3.5")

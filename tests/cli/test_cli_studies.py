@@ -26,6 +26,7 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("cli")
 
 
+@pytest.mark.slow
 def test_a_study_is_validated_run_and_replayed(folder):
     """Exit code 0 throughout, one verdict, and a row again bit for bit with its figure."""
     path = write(folder)
@@ -43,6 +44,7 @@ def test_a_study_is_validated_run_and_replayed(folder):
     assert (folder / "row.svg").read_text(encoding="utf-8").lstrip().startswith("<?xml")
 
 
+@pytest.mark.slow
 def test_a_failing_claim_is_exit_code_1_and_json_is_json(folder):
     """Standard output is one JSON document, whatever the outcome."""
     path = write(folder)
@@ -139,7 +141,7 @@ def interrupted(arguments, is_time, cwd):
     return process.returncode, out, told
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_is_exit_code_130_and_prints_how_to_go_on(folder):
     """The chunk in hand is kept; the printed command ends with the uninterrupted table."""
@@ -180,7 +182,7 @@ def waiting(name="loop"):
         ),
         pytest.param(
             *("out/study.toml", "continue with: nlctl run study.toml --resume --out out --jobs 1"),
-            marks=pytest.mark.slow,
+            marks=pytest.mark.ci,
         ),
     ],
 )
@@ -231,6 +233,7 @@ def test_processes_give_the_same_rows(folder):
 REPORTS = ROOT / "reports"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(REPORTS.glob("*.toml")), ids=lambda p: p.stem)
 def test_the_committed_studies_are_valid(path):
     """Every name in them exists in the loops of today."""

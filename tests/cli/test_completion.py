@@ -32,6 +32,7 @@ def shell(tmp_path_factory):
     return os.environ | {"PATH": os.pathsep.join([str(folder), os.environ["PATH"]])}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("bash") is None, reason="this machine has no bash")
 @pytest.mark.parametrize(
     ("words", "offered"),

@@ -7,7 +7,7 @@ from studies_example import HEAD, ROWS, write
 from analysis.studies import RunFolderError, read_study, run
 from analysis.studies.folder import remove_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.ci
 
 SMALL = ROWS.replace("size = 200", "size = 20")
 MINE = "<!DOCTYPE html><title>My own page</title>"

@@ -108,6 +108,7 @@ def chain(first=0.3, second=0.45):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_step_through_two_delays_ends_a_step_twice(engine):
     times = np.linspace(0, 3, 13)
@@ -180,6 +181,7 @@ def test_a_long_run_forgets_what_no_delay_reaches():
     np.testing.assert_allclose(run.outputs[0], np.sin(times), rtol=0, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_delayed_program_is_a_program_with_a_delay():
     """A controller whose outputs are late by tau is `sampled(..., delay=tau)`."""
     plant = ct.ss([[0, 1], [-1, -0.2]], [[0], [1]], [[1, 0]], 0, inputs="v", outputs="y")
@@ -206,7 +208,7 @@ def test_a_delayed_program_is_a_program_with_a_delay():
         np.testing.assert_allclose(run.outputs[0], exact[0], rtol=0, atol=tolerance)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_engines_agree_on_a_nonlinear_loop_with_two_delays():
     @nlctl.equation
     def pendulum(x, v):

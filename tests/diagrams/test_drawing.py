@@ -304,6 +304,7 @@ def test_examples_are_laid_out_cleanly(name):
     assert_routes_join_their_blocks(diagram, layout)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(diagrams())
 def test_any_diagram_is_laid_out_cleanly(diagram):
@@ -466,6 +467,7 @@ def svg(figure):
     return buffer.getvalue()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["adaptive loop", "cross-coupled plant", "chain of 15"])
 def test_the_same_diagram_gives_the_same_file(name):
     """Byte-identical SVG for two diagrams made alike."""
@@ -473,6 +475,7 @@ def test_the_same_diagram_gives_the_same_file(name):
     assert first == second
 
 
+@pytest.mark.slow
 def test_drawing_in_threads_changes_nothing():
     diagram = cross_coupled()
     alone = lay_out(diagram)

@@ -272,6 +272,7 @@ class TestRandomNesting:
             y = k * y + 1
         return y
 
+    @pytest.mark.slow
     @given(trees)
     def test_every_block_keeps_its_own_default(self, tree):
         """However blocks are nested, copied and named: the diagram computes with their gains."""

@@ -76,6 +76,7 @@ def agree(ours, theirs, atol=1e-6):
 class TestAsInPythonControl:
     """What has a meaning gives the same response."""
 
+    @pytest.mark.slow
     @given(inputs=INPUTS, start=STATES)
     def test_inputs_and_initial_states(self, inputs, start):
         """Numbers, arrays, short vectors, lists of all of these, blocks of inputs."""
@@ -107,6 +108,7 @@ class TestAsInPythonControl:
         wanted = reference(ONE, T, inputs, [0.0, 1.0], solve_ivp_kwargs=PRECISE)
         agree(simulate(system_for("one", engine), T, inputs, [0.0, 1.0]), wanted)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("engine", ENGINES)
     @pytest.mark.parametrize("name", SYSTEMS)
     @pytest.mark.parametrize("squeeze", [None, True, False])
@@ -123,6 +125,7 @@ class TestAsInPythonControl:
             pair = reference(SYSTEMS[name], t, 1.0, 0.5, return_states=states, **how)
             assert [np.shape(part) for part in made] == [np.shape(part) for part in pair]
 
+    @pytest.mark.slow
     @given(
         wanted=st.lists(
             st.one_of(st.floats(0, 1), st.sampled_from(list(T))), min_size=1, max_size=8

@@ -36,7 +36,7 @@ def ran(page, *, without=()):
     return names
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @each_row("page", PAGES)
 def test_code_of_the_explanations_runs(page):
     """Each block asserts what the text says; but for the run of 10,000 s, which is weekly."""

@@ -31,6 +31,7 @@ def test_symbols():
     assert {name: symbol(name) for name in table} == table
 
 
+@pytest.mark.slow
 def test_no_symbol_has_two_subscripts():
     """LaTeX refuses them: an index of a parameter stands behind those that its name has."""
     for name, cls in block_records().items():
@@ -107,7 +108,7 @@ def judged(system, t, x, u):
     return len(found)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_users_functions_read_back():
     """The formulas of the corpus, with two states, have the values of its functions."""
     rng, count, formulas = np.random.default_rng(3), 0, 0

@@ -105,6 +105,7 @@ def test_each_kind_in_front_of_a_lag(kind):
     assert made.statistics.events <= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_in_python_control(kind):
     """Plain python-control runs the same diagram; a relaxed memory costs what it says."""
@@ -143,7 +144,7 @@ def test_a_fault_that_does_not_begin_changes_no_bit(example, signal):
         np.testing.assert_array_equal(diagram.output(t, with_memory, []), plain.output(t, x, []))
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @each_row(
     "example, kind, more",
     [
@@ -248,6 +249,7 @@ class TestOnsets:
 class TestConditions:
     """A condition latches: the fault stays when it is no longer met."""
 
+    @pytest.mark.slow
     @each_row(
         "when, begins",
         [

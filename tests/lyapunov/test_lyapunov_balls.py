@@ -181,6 +181,7 @@ def test_what_the_boxes_leave_open_is_undecided():
     assert left.undecided > 0
 
 
+@pytest.mark.slow
 @given(x=st.floats(-1, 1), y=st.floats(-1, 1))
 def test_a_proof_on_a_box_holds_at_its_points(x, y):
     """x^2 + y^2 - x y >= 0 with a margin, on numbers as on balls."""
@@ -202,6 +203,7 @@ def test_a_box_refuses_what_is_no_interval():
         Box.of(x1=(0, 1))["x_1"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [n for n, row in TABLE.items() if row.enclosure and n not in JUMPS]
 )

@@ -36,6 +36,7 @@ def given_weights():
     return constants(example(1), BOX_1, W=np.zeros(27))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "layout"), AUDIT)
 def test_the_constants_agree_with_the_audit(number, layout):
     """To the tolerance of eps*, 1e-3, which every later constant inherits."""
@@ -72,6 +73,7 @@ def test_the_formulas_join_the_constants():
     assert given_weights().C_0() == given_weights()["C_0"]
 
 
+@pytest.mark.slow
 def test_the_tightest_weights_beat_none():
     """The bound holds for every W, so the best of them is a choice."""
     assert of_example(1, "diagonal")["C_0"] < given_weights()["C_0"]
@@ -126,6 +128,7 @@ def test_a_network_may_be_left_out():
     assert c["alpha_0"] == pytest.approx(given_weights()["alpha_0"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_actuator_s_split_is_a_choice():
     """A lower k_1 lowers eps_u* and with it every bound."""
     c = constants(example(1), BOX_1, W=np.zeros(27), k=(0.6, 1.3))
@@ -147,7 +150,7 @@ def test_every_constant_tells_where_it_comes_from():
         c["delta"]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_what_could_not_be_bounded_is_not_called_proved():
     """A gain that grows with v has no sector over all v."""
     plant = nlctl.PureFeedback(order=2, f=hardening)

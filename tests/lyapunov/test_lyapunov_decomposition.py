@@ -74,6 +74,7 @@ WIDE = SmoothLimit(limit=1e4)  # over |u| <= 30 a gain close to 1
 split = functools.cache(decompose)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BOUNDS)
 @given(u=st.floats(-60, 60, allow_subnormal=False))
 def test_every_split_of_the_dead_zone_holds_at_every_input(name, u):
@@ -90,6 +91,7 @@ def test_the_textbook_split_has_the_closed_form_bounds():
     assert found.eps_u(at_crest, output(ZONE, at_crest)) == pytest.approx(-0.65)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k_1", [0.6, 0.3, 0.1])
 def test_a_smaller_gain_buys_a_smaller_error(k_1):
     """eps_u* of the clipped split is k_1 max(b_r, |b_l|) for k_1 up to the least slope."""

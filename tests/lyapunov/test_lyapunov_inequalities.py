@@ -86,6 +86,7 @@ def margins(signals, number=1):
     return {m.equation: m for m in inequalities(signals, premises(found(number)))}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 2])
 def test_the_steps_of_the_proof_agree_to_rounding(number):
     """(9), (14), (15) and (22) = (26) = (27) = (28) are identities in the state."""
@@ -95,6 +96,7 @@ def test_the_steps_of_the_proof_agree_to_rounding(number):
         assert margin.least >= -1e-12 * max(margin.scale, 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 2])
 def test_the_inequalities_hold_at_every_state_of_the_box(number):
     """(18)-(31) are statements about states, not about trajectories."""

@@ -22,6 +22,8 @@ from analysis.lyapunov import (
 from analysis.lyapunov.conclusions import slow_drift_of
 from nlctl import ParameterError, UnknownNameError
 
+pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
+
 BOXES = {
     1: Box.of(x1=(-0.85, 1.0), x2=(-0.55, 1.1), v=(-12, 6)),
     2: Box.of(x1=(-0.85, 1.1), x2=(-0.55, 0.75), x3=(-0.6, 0.6), v=(-2.5, 4.5)),
@@ -161,9 +163,9 @@ class TestFaults:
         ("member", "broken"),
         [
             (1, {"Omega"}),
-            pytest.param(2, {"A2"}, marks=pytest.mark.slow),  # in the ensemble every day
-            pytest.param(3, {"A3"}, marks=pytest.mark.slow),
-            pytest.param(4, {"decay"}, marks=pytest.mark.slow),
+            pytest.param(2, {"A2"}, marks=pytest.mark.ci),  # in the ensemble every day
+            pytest.param(3, {"A3"}, marks=pytest.mark.ci),
+            pytest.param(4, {"decay"}, marks=pytest.mark.ci),
         ],
     )
     def test_planted_faults_are_named(self, member, broken):
@@ -172,7 +174,7 @@ class TestFaults:
         assert broken <= violated
         assert all(line.follows for line in of_member(member).violated)
 
-    @pytest.mark.slow
+    @pytest.mark.ci
     def test_the_healthy_member_is_healthy(self):
         """A check that always fails is as bad as one that cannot."""
         assert of_member(0).holds

@@ -123,6 +123,7 @@ class TestSlowDrift:
         assert found.time < found.burst_range[0] <= found.burst <= found.burst_range[1]
         assert "drifts" in str(found)
 
+    @pytest.mark.slow
     def test_r_that_follows_the_reference_stops_the_drift(self):
         """eta = beta r + Y_d: A' = (d^2/|N| - |Y_d d|)/beta is zero where |N| = |d / Y_d|."""
         Y_d = -0.1

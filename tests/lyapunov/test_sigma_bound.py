@@ -27,6 +27,7 @@ def proof(equations, floor, most=3000):
     return prove_decrease(V, gradient, equations, BOX, level=8.0, floor=floor, max_boxes=most)
 
 
+@pytest.mark.slow
 def test_the_function_falls_above_the_floor_of_completed_squares():
     """Its rate is at most -min(k, Gamma sigma) V + P D^2 / k + sigma W^2."""
     assert proof(rates, 1.001 * FLOOR, most=100_000).holds
@@ -36,6 +37,7 @@ def test_the_function_falls_above_the_floor_of_completed_squares():
         assert falls <= -min(K, GAMMA * SIGMA) * V(z) + P * D**2 / K + SIGMA * W**2 + 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("equations", "floor"),
     [

@@ -60,7 +60,7 @@ def sampled():
         pytest.param(
             *(nlctl.paper.example_1, {"prepare", "rhs", "out"}),
             {"params": {"law.beta": [2.0, 3.0]}},
-            marks=pytest.mark.slow,
+            marks=pytest.mark.ci,
         ),
         (sampled, {"rhs", "out"}, {"initial_state": {"x[0]": [2.0, 3.0]}}),
     ],
@@ -78,7 +78,7 @@ def test_single_runs_and_ensembles(make, functions, varied, ensemble):
     assert during == []
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_rows_of_an_experiment_and_their_metrics():
     prepared = prepare(experiment())
     with compiling() as before:
@@ -90,7 +90,7 @@ def test_rows_of_an_experiment_and_their_metrics():
     assert np.all(np.isfinite(found["peak"]))
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_observed_loop_of_a_proof():
     loop = nlctl.paper.example_1()
     with compiling() as before:

@@ -103,6 +103,7 @@ def test_the_message_names_signal_block_and_both_values():
     assert isinstance(caught.value, nlctl.DivergedError)  # whoever handles one handles the other
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("actuator", "jump"),
     [(nlctl.Quantiser(q=0.5), 0.5), (nlctl.Quantiser(), 0.1), (nlctl.DeadZoneInverse(), 0.8)],
@@ -194,6 +195,7 @@ def test_a_relay_with_hysteresis_oscillates_with_the_period_of_its_width(actuato
     np.testing.assert_allclose(found, exact, rtol=0, atol=8e3 * rtol * width)
 
 
+@pytest.mark.slow
 def test_members_of_an_ensemble_chatter_whatever_is_beside_them():
     """Statuses, times and steps of nine members, together and three of them alone."""
     block = ct.nlsys(

@@ -81,6 +81,7 @@ def test_a_compiled_diagram_does_not_run_in_python_control():
     assert response.statistics.accepted > 0
 
 
+@pytest.mark.slow
 def test_a_block_that_raises_ends_the_run_with_its_own_error():
     """In machine code as in Python: the exception reaches the caller."""
 

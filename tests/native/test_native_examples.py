@@ -205,6 +205,7 @@ def test_the_examples_of_the_textbook_agree_at_random_points(name, native):
     compare(EXAMPLES[name](), native=native)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_responses_agree_with_python_control(name):
     """The same response, both at tight tolerances."""

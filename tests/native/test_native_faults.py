@@ -326,6 +326,7 @@ BEYOND = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", BEYOND)
 def test_what_an_opaque_function_raises_is_passed_on(kind):
     """Through machine code, which knows no exceptions; before that time all is well."""

@@ -44,7 +44,7 @@ CASES = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_spawned_process_computes_the_same_bits():
     """Paper examples and other people's closures, by pickle, in fresh interpreters."""
     compiled = {name: nlctl.compile(make()) for name, (make, _, _) in CASES.items()}

@@ -116,6 +116,7 @@ class TestAccuracy:
         assert len(compared) == 13
         assert all(check.passed for check in compared)
 
+    @pytest.mark.slow
     def test_parameters_and_initial_states_by_name(self):
         """The same overrides give the same response in python-control and in machine code."""
         loop, t = nlctl.paper.example_1(), np.linspace(0, 0.3, 31)
@@ -248,7 +249,7 @@ class TestCache:
         value, compilations = result.stdout.split()
         return float(value), int(compilations)
 
-    @pytest.mark.slow
+    @pytest.mark.ci
     def test_a_second_process_compiles_nothing(self, tmp_path):
         """Other parameters use the same machine code."""
         first, compilations = self.start(tmp_path, 1.0)
@@ -257,7 +258,7 @@ class TestCache:
         assert compilations == 0
         assert second - first == pytest.approx(1.5)  # one unit of slope at u - b_r = 1.5
 
-    @pytest.mark.slow
+    @pytest.mark.ci
     def test_an_unwritable_cache_costs_time_only(self, tmp_path):
         """A file in the place of the folder: the program still runs."""
         blocked = tmp_path / "file"

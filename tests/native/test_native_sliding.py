@@ -133,6 +133,7 @@ def test_it_converges_with_the_order_of_the_method_where_it_slides():
     assert np.all(errors < 0.01 * steps**5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_a_hysteresis_converges_to_it_with_its_width(seed):
     """Planar systems x' = A x + d - b v, u = c x with c b > 0, at random: apart by O(width)."""
@@ -155,7 +156,7 @@ def test_a_hysteresis_converges_to_it_with_its_width(seed):
     assert apart[1] < apart[0] / 4
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_what_holds_of_every_relay(order):
     """Random linear plants and disturbances, u held to and pushed off 0: what v and u may be."""

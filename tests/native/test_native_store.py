@@ -151,7 +151,7 @@ class TestEntries:
         store.write("key", BODY)
         assert store.read("key") == BODY
 
-    @pytest.mark.slow
+    @pytest.mark.ci
     def test_two_processes_may_write_at_the_same_time(self, folder):
         """Whoever reads finds a whole entry."""
         script = (
@@ -240,6 +240,7 @@ class TestMachineCode:
         assert not second._can_compile  # other arguments are refused, as by a given signature
         assert len(list(folder.iterdir())) == 1
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "damage", ["flip", "truncate", "empty", "random", "rename", "pickle", "library"]
     )
@@ -331,6 +332,7 @@ class TestPrograms:
         assert [self.run(), self.run(), self.run(-1.0), self.run(-1.0)] == [1, 0, 1, 0]
         assert len(list(folder.iterdir())) == 2
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("damage", ["flip", "truncate", "empty", "random", "rename"])
     def test_a_damaged_entry_is_made_anew_without_a_word(self, folder, damage):
         """The code of another program under this one's name is not run either."""
@@ -421,7 +423,7 @@ class TestKeys:
         one, other = namedtuple("Point", "a b")(1.0, 2.0), namedtuple("Point", "b a")(1.0, 2.0)
         assert function_key(one) != function_key(other)
 
-    @pytest.mark.slow
+    @pytest.mark.ci
     def test_a_key_is_the_same_in_every_process(self):
         """Whatever the order of sets and the addresses of objects there are."""
         script = (
@@ -499,10 +501,12 @@ def keys_of_copy(path, edits):
 class TestSources:
     """Machine code follows the sources of the package."""
 
+    @pytest.mark.slow
     def test_a_copy_has_the_same_keys(self, tmp_path):
         """Paths and processes do not count."""
         assert keys_of_copy(tmp_path, {}) == [integrator_key(), module_key(*TAUGHT)]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "name",
         [name if name in DAILY else pytest.param(name, marks=pytest.mark.weekly) for name in EDITS],
@@ -523,6 +527,7 @@ class TestSources:
             nlctl.compile(system).native  # noqa: B018
         assert (module_key(*TAUGHT), integrator_key()) == before
 
+    @pytest.mark.slow
     def test_an_edit_of_a_code_generator(self, tmp_path):
         """Machine code of programs: nothing in them names what generates it."""
         first = "from __future__ import annotations\n"

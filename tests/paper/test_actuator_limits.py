@@ -34,6 +34,7 @@ def test_it_has_every_actuator_behind_every_controller_in_both_examples():
     assert list(RECORD[["example", "controller", "actuator"]].itertuples(index=False)) == wanted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("label", "name"),
     [
@@ -68,6 +69,7 @@ def test_a_run_that_does_not_reach_its_end_has_no_numbers():
     assert np.array_equal(np.isfinite(RECORD["peak"]), ended)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", paper.EXAMPLES)
 def test_the_page_has_the_tables_of_the_record(example):
     """What is known of each split (2) is found today."""

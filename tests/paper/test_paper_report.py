@@ -34,6 +34,7 @@ def folder(tmp_path_factory):
     return here
 
 
+@pytest.mark.slow
 def test_runs_of_any_study_are_a_part(folder):
     """Its verdict, and what each analysis found, without a word of what is missing."""
     told = []
@@ -55,6 +56,7 @@ def test_what_a_part_lacks_is_told(folder, tmp_path):
     assert told[0].startswith("the report has no fans and no diagram: ")
 
 
+@pytest.mark.slow
 def test_only_runs_are_cleared(folder, tmp_path):
     """What holds something else stays, and is named."""
     write(tmp_path)

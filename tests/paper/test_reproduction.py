@@ -82,6 +82,7 @@ def test_diagrams_as_they_stand_reach_their_figures_in_python_control(key):
         assert check.error <= max(RELAXED, check.expectation.tolerance), check
 
 
+@pytest.mark.slow
 def test_every_case_reaches_its_figures():
     """Machine code of every case, to the tolerance in the table."""
     found = checks({case.key: run_case(case) for case in CASES})
@@ -111,6 +112,7 @@ def test_long_horizon_figures(example, max_e, rms_e, max_u, zeta, tolerance):
     assert result.signals["zeta"][-1] == pytest.approx(zeta, abs=tolerance)
 
 
+@pytest.mark.slow
 def test_nlctl_call_and_plain_call_agree():
     """nlctl.input_output_response is python-control's integration, nothing else."""
     diagram, timepts = CASE["1"].diagram, np.linspace(0, 1, 21)

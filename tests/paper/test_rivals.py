@@ -68,6 +68,7 @@ def test_the_gains_reach_the_loop(example):
             assert (own[int(index[:-1])] if index else own) == value
 
 
+@pytest.mark.slow
 def test_each_actuator_has_the_same_controllers_on_the_same_samples():
     """The study files differ in the pairs alone."""
     for number, example in zip("12", EXAMPLES, strict=True):
@@ -89,6 +90,7 @@ def test_an_unknown_pair_is_refused(pair, told):
         rival_loop("example_1", pair)
 
 
+@pytest.mark.slow
 def test_of_several_samples_the_mean_cost_and_the_worst_limit_count():
     """x' = u = -k x from x_0: IAE = |x_0| / k, max |u| = k |x_0|; so k = limit / max |x_0|."""
 
@@ -139,6 +141,7 @@ def checked():
     return checked_rivals()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_the_record_is_of_the_study(example):
     """All controllers behind all actuators on the samples that the file asks for; the page too."""
@@ -153,7 +156,7 @@ def test_the_record_is_of_the_study(example):
 
 @pytest.mark.parametrize(
     "column",
-    ["study", *(pytest.param(one, marks=pytest.mark.slow) for one in ("parameters", "rates"))],
+    ["study", *(pytest.param(one, marks=pytest.mark.ci) for one in ("parameters", "rates"))],
 )
 def test_a_record_of_another_study_or_loop_is_refused(tmp_path, column):
     """With the command that makes it again; of the last line, what it says of the loop is false."""
@@ -204,6 +207,7 @@ def test_who_beats_whom_is_a_matter_of_violations_and_an_interval():
     assert found == {"a": {"beaten by": ("better",), "beats": ("worse",)}}
 
 
+@pytest.mark.slow
 def test_the_papers_page_says_who_beats_it():
     """Every line of the record, and what each controller has to know."""
     record = checked_rivals()

@@ -57,6 +57,7 @@ def test_a_record_of_other_equations_is_refused(tmp_path):
         checked_record(tmp_path / "record.csv")
 
 
+@pytest.mark.slow
 def test_the_section_says_what_the_record_says():
     record = checked_record()
     section = sampling_section(record)

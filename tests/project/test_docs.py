@@ -83,6 +83,7 @@ def test_the_glossary_explains_every_status(word):
     assert re.search(rf"^\| {word} \| \S", glossary, flags=re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_the_guide_to_sampling_runs():
     """Its loop is as good as the continuous one."""
     code = re.findall(

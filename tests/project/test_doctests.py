@@ -46,6 +46,7 @@ def failures(tests):
     return "".join(said)
 
 
+@pytest.mark.slow
 def test_the_examples_run():
     """They print what they say, each docstring's by themselves."""
     found = examples()
@@ -53,7 +54,7 @@ def test_the_examples_run():
     assert failures(test for name, test in found.items() if name not in LONG) == ""
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("name", sorted(LONG))
 def test_the_long_examples_run(name):
     assert failures([examples()[name]]) == ""

@@ -38,6 +38,7 @@ def test_every_record_documents_its_fields(kind):
         assert [name for name in fields if name not in section] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["native", "python-control"])
 def test_a_closed_loop_without_inputs_plots(engine):
     """And says in a few lines what it is."""

@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 
+import pytest
 from places import ROOT
 
 import nlctl
@@ -20,6 +21,7 @@ def test_it_is_short_and_its_links_lead_somewhere():
         assert link.startswith("https://") or (ROOT / link).exists(), link
 
 
+@pytest.mark.slow
 def test_the_loop_of_ones_own_runs_in_at_most_30_lines(tmp_path):
     """The first block of Python prints the tracking error that its comment says."""
     code = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)[0]

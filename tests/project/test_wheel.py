@@ -13,7 +13,7 @@ import pytest
 from extras import needed
 from places import ROOT
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.ci
 
 
 def run(*command, cwd):

@@ -42,6 +42,7 @@ def complaint(call):
     return ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("group", GROUPS)
 def test_every_wrong_call_is_refused_in_a_sentence(group):
     """By an error of nlctl's that names the culprit, the rule and the value."""

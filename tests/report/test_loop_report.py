@@ -114,6 +114,7 @@ def test_a_report_without_author_has_no_title_page():
     assert "no command was given" in plain
 
 
+@pytest.mark.slow
 def test_the_same_report_is_the_same_to_the_byte():
     """No time and no place is in it."""
     once, again = (
@@ -123,6 +124,7 @@ def test_the_same_report_is_the_same_to_the_byte():
     assert once == again
 
 
+@pytest.mark.slow
 @each_row(
     ("given", "words"),
     [
@@ -164,6 +166,7 @@ def studied(folder):
     return run(read_study(studies_example.write(folder)), folder / "run")
 
 
+@pytest.mark.slow
 def test_a_study_of_the_loop_is_a_part_of_its_page(tmp_path):
     """Its claims have their evidence on the page."""
     result = studied(tmp_path)

@@ -92,6 +92,7 @@ def test_an_ensemble_shows_its_first_members():
     )
 
 
+@pytest.mark.slow
 def test_a_ledger_shows_each_line_with_its_status():
     """In its order."""
     found = ledger(nlctl.paper.example_1(), 1.0)

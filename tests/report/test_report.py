@@ -109,6 +109,7 @@ def simple_report(text="plain", **changes):
     return dataclasses.replace(report, **changes)
 
 
+@pytest.mark.slow
 def test_page_is_well_formed_with_unique_ids_and_links_that_lead_somewhere(page):
     """No id stands twice, every link but that of a DOI stays on the page."""
     parsed = outline(page)
@@ -185,6 +186,7 @@ def test_every_number_is_in_the_json_file(runs):
     assert len(table["rows"]) == sum(e.case.startswith("1") for e in expectations())
 
 
+@pytest.mark.slow
 def test_a_missed_figure_is_the_first_sentence(runs):
     """The verdict names the figure, its value and what was to be reached."""
     spoiled = dict(runs)
@@ -241,6 +243,7 @@ def test_limits_state_how_far_zeta_moves(runs, page):
     assert f"changes by {drift:+.3g} in Example\N{NO-BREAK SPACE}1" in page
 
 
+@pytest.mark.slow
 def test_curves_differ_in_more_than_their_colours(runs):
     """In every figure, each curve of the legend by its dashes, its markers or its width."""
     items = [item for section in paper_report(runs).sections for item in section.items]

@@ -32,7 +32,7 @@ from analysis.paper.reference_run import (
 from analysis.report import Figure, Paragraph, Report, Section, Table, render_html, render_json
 from analysis.report.outline import claim_status, light, summary
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.ci
 
 
 @functools.cache

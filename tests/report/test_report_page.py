@@ -187,7 +187,7 @@ TOGETHER = [text for name, text in HOSTILE.items() if name not in APART]
 
 
 @pytest.mark.parametrize(
-    "texts", [TOGETHER, *(pytest.param([HOSTILE[n]], marks=pytest.mark.slow) for n in APART)]
+    "texts", [TOGETHER, *(pytest.param([HOSTILE[n]], marks=pytest.mark.ci) for n in APART)]
 )
 def test_whatever_a_user_names_is_shown_and_is_no_markup(texts):
     """In every field: same elements as with plain text, and the text in full."""
@@ -210,7 +210,7 @@ def test_control_characters_and_broken_characters_cost_no_report(tmp_path):
     assert "a\ufffdb\ufffd\\ud800" in page
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @given(st.lists(st.text(max_size=8), min_size=1, max_size=6))
 def test_anchors_are_unique_and_harmless_whatever_the_keys(keys):
     """Letters, digits, dots, dashes; equal keys get a number."""
@@ -227,6 +227,7 @@ def test_anchors_are_unique_and_harmless_whatever_the_keys(keys):
     assert not {"provenance", "claims", "contents"} & set(anchors)
 
 
+@pytest.mark.slow
 def test_every_id_is_unique_and_every_link_inside_leads_to_one():
     """Also with two sections and two figures of the same key."""
     for text in ("plain", HOSTILE["markup"]):
@@ -327,6 +328,7 @@ def test_templates_refuse_what_is_missing_and_let_no_markup_through():
         assert not [*parsed.find_all(nodes.EvalContextModifier)]
 
 
+@pytest.mark.slow
 def test_what_is_drawn_ahead_is_drawn_once_and_in_the_same_bytes():
     """Until something else is to be done; a figure that is drawn is not drawn again."""
     kept = [Figure(key=str(i), caption="c", description="d", figure=drawn()) for i in range(4)]
@@ -480,6 +482,7 @@ def test_ragged_rows_are_shown_in_full():
     assert cells == ["1.5", "2.5", "3.5", "4.5"]
 
 
+@pytest.mark.slow
 def test_hashes_are_those_of_the_files(tmp_path):
     """The page names each file with its SHA-256; two of one name are refused."""
     (tmp_path / "data.csv").write_bytes(b"1,2\n")

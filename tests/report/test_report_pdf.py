@@ -43,6 +43,7 @@ def page(tmp_path, monkeypatch):
     return installed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", [WORKS, LEAVES_A_CHILD], ids=["works", "leaves a child"])
 def test_a_print_may_take_longer_than_the_patience(page, tmp_path, program):
     """As long as it computes; and it has ended when it ends, whatever it has started."""
@@ -52,6 +53,7 @@ def test_a_print_may_take_longer_than_the_patience(page, tmp_path, program):
     assert not left(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("program", "reason"), [(HANGS, "no sign of work for 1.0 s"), (FAILS, "no such font")]
 )

@@ -40,6 +40,8 @@ from analysis.studies.page.running import running
 from analysis.studies.page.text import margin_text, violate, without_assumptions
 from nlctl.errors import UsageError
 
+pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
+
 SPACE = """
 loop = "loop.py:scaled"
 [study]
@@ -331,7 +333,7 @@ def test_a_refused_guarantee_is_shown_with_its_reason(tmp_path, kind):
     assert "not an estimate of a probability" in section.items[0].text
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_an_analysis_without_an_answer_says_why(result):
     """Of whatever kind: its section and its claim have the reason, and the others are as ever.
 

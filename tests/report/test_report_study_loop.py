@@ -78,6 +78,7 @@ def test_a_loop_without_formulas_or_blocks_is_shown_as_far_as_it_goes(study):
     assert "study_source" not in made
 
 
+@pytest.mark.slow
 def test_the_page_begins_with_a_picture_of_the_runs_and_the_question(study):
     """The signal that the spec limits first; without runs to draw, their margins."""
     result, prepared = study

@@ -55,6 +55,7 @@ LOOPS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", LOOPS.values(), ids=LOOPS)
 def test_machine_code_is_python_control_from_sample_to_sample(make):
     """All signals, at samples and between them; quanta leave no room for rounding to move them."""
@@ -214,6 +215,7 @@ def test_the_papers_controller_on_a_computer_is_the_papers_as_it_gets_faster():
     assert np.all(np.abs(orders - 1) < 0.25), (errors, orders)
 
 
+@pytest.mark.slow
 def test_parameters_keep_their_names():
     loop = nlctl.paper.example_1(controller=on_a_computer(0.01, delay=0.004, input_quantum=1e-3))
     known = list(nlctl.parameters(nlctl.paper.example_1()).index)
@@ -413,6 +415,7 @@ def variable():
     return nlctl.compile(nlctl.paper.example_1(controller=controller))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changed", SAMPLINGS.values(), ids=SAMPLINGS)
 def test_a_diagram_with_overrides_is_one_that_was_made_so(variable, changed):
     times = np.linspace(0, 0.5, 26)

@@ -69,6 +69,7 @@ BOMBS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BOMBS)
 def test_bombs_end_in_a_sentence_at_once(tmp_path, name):
     """Neither a traceback nor a wait; the sentence is short, whatever it quotes."""
@@ -84,6 +85,7 @@ def test_bombs_end_in_a_sentence_at_once(tmp_path, name):
     assert spent < 30  # not minutes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "setting",
     [f"{DOTS}=1", "runs.size=" + "1" * 5000, "x=" + "[" * 5000, "study.seed=" + "9" * 4200],

@@ -148,7 +148,7 @@ def assert_same(one, other):
 
 def kill(number):
     """One of each sort in each `.ci/run`; the others once a week."""
-    mark = pytest.mark.slow if number in EACH_SORT else pytest.mark.weekly
+    mark = pytest.mark.ci if number in EACH_SORT else pytest.mark.weekly
     return pytest.param(number, marks=mark)
 
 

@@ -13,6 +13,8 @@ from analysis.robustness.runs import identity
 from analysis.studies import RunFolderError, load_result, read_study, run
 from analysis.studies.sealed import read_json, write_json
 
+pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
+
 SEARCHES = """
 [[analysis]]
 kind = "worst case"
@@ -121,7 +123,7 @@ def test_an_option_of_a_comparison_is_part_of_the_loop(copied, command):
 @pytest.mark.parametrize(
     ("name", "command"),
     [("searches", "resume")]
-    + [pytest.param("rows", command, marks=pytest.mark.slow) for command in COMMANDS],
+    + [pytest.param("rows", command, marks=pytest.mark.ci) for command in COMMANDS],
 )
 def test_the_same_loop_goes_on(copied, done, name, command):
     """Comments do not count; the end is that of one run."""

@@ -210,6 +210,7 @@ def test_the_list_shows_both(folder):
     assert "a block's record or a kind of analysis, 'spread.py:not_a_kind' is a int" in told.stderr
 
 
+@pytest.mark.slow
 def test_the_report_has_its_section_claim_method_and_source(folder, result):
     """Everything that the kind brings stands on the page, from a run that is read back."""
     made = study_report(load_result(folder / "run"))
@@ -290,6 +291,7 @@ def test_a_run_can_be_read_whose_kind_has_gone(tmp_path, forgotten):
     remove_run(tmp_path / "run")
 
 
+@pytest.mark.slow
 def test_a_kind_from_elsewhere_is_imported_for_who_trusts_it(tmp_path):
     """Without trust a run is read all the same, and the note says what its page lacks."""
     home = tmp_path / "study"
@@ -358,7 +360,7 @@ print(short_key(run), short_key(mean))
 '''
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_code_of_a_kind_has_one_key_in_every_process():
     """Also where its run mentions a name that the kind has: a schema is built from sets."""
     told = [

@@ -113,6 +113,7 @@ def decays(table):
     return (0.5 - table["lag.x(0)"] * np.exp(-table["lag.rate"])) / 0.5
 
 
+@pytest.mark.slow
 def test_the_rows_are_those_of_the_closed_form(result):
     """Margins and counts, 200 independent draws of the laws."""
     table = result.rows.table
@@ -217,7 +218,7 @@ def test_a_replay_tells_a_difference(result):
         replay(result.folder, 0, "regional")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_an_interrupted_study_goes_on_to_the_same_result(result, folder):
     """Whatever is missing is run again: the same numbers, bit for bit."""
     path = write(folder, HEAD, EVERY_KIND)
@@ -271,6 +272,7 @@ size = 8
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("part", "findings"), [("rows", 0), ("morris", 2), ("sobol", 3)])
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_in_a_last_chunk_is_not_forgotten(folder, part, findings):
@@ -377,6 +379,7 @@ def solution(table, t):
     return 1 / np.sqrt(inverse_square.where(inverse_square > 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["sobol", "morris"])
 def test_a_metric_that_failed_rows_lack_has_no_sensitivity(failing, key):
     """The finding says how many and what to take instead; the others are made, and stay made."""

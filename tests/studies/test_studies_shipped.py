@@ -9,6 +9,7 @@ from nlctl import UnknownNameError
 NAMES = sorted(path.stem for path in (ROOT / "reports").glob("*.toml"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_every_study_is_valid(name):
     """Names, laws, formulas and analyses fit the loop."""

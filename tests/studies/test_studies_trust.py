@@ -68,6 +68,7 @@ def nested(name):
 PLACES = [in_loop, in_options, in_choices, in_comparison, in_metrics, in_kind, nested]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", PLACES)
 @pytest.mark.parametrize("name", ["../outside/other.py:loop", "{outside}/other.py:loop",
                                   "linked.py:loop", "stray_module_of_a_test:loop"])  # fmt: skip
@@ -84,6 +85,7 @@ def test_code_from_elsewhere_needs_trust(place, monkeypatch, where, name):
     assert "stray_module_of_a_test" not in sys.modules
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["../outside/other.py:loop", "stray_module_of_a_test:loop"])
 def test_who_trusts_it_may_run_it(place, monkeypatch, name):
     """With --trust, at every command that reads the study."""
@@ -232,6 +234,7 @@ def with_functions(folder, name):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["numpy:save", "_pytest.config:main", "pandas:read_pickle", "analysis.cli.main:main",
              "analysis.cli.report:write_gallery_of", "matplotlib.pyplot:savefig"]

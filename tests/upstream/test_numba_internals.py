@@ -192,6 +192,7 @@ def test_what_numba_refuses_is_a_numba_error():
         numba.njit(lambda x: x.nothing)(1.0)
 
 
+@pytest.mark.slow
 def test_what_numba_warns_of_is_a_numba_warning():
     """`NumbaWarning`: here of a matrix that is not contiguous."""
     matrix = np.ones((4, 4))[::2, ::2]

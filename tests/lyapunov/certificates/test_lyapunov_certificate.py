@@ -65,6 +65,7 @@ class TestTracking:
         with pytest.raises(ParameterError, match=r"root at -0\.5\+1\.32"):
             filter_poles((1.0, 2.0))
 
+    @pytest.mark.slow
     @given(
         st.lists(st.floats(-1, 1), min_size=3, max_size=3),
         st.lists(st.sampled_from([-1.0, 1.0]), min_size=40, max_size=40),
@@ -118,15 +119,14 @@ class TestTracking:
 
 
 class TestCertify:
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("loop", "k", "known"),
         [
-            pytest.param(
-                example_1(gamma=1e5, sigma_2=1e-4), TIGHT, 0.46703, marks=pytest.mark.slow
-            ),
+            pytest.param(example_1(gamma=1e5, sigma_2=1e-4), TIGHT, 0.46703, marks=pytest.mark.ci),
             (example_1(), TIGHT, 0.48346),
-            pytest.param(example_2(), None, 1.44794, marks=pytest.mark.slow),
-            pytest.param(example_2(tau=0.05), None, 0.51938, marks=pytest.mark.slow),
+            pytest.param(example_2(), None, 1.44794, marks=pytest.mark.ci),
+            pytest.param(example_2(tau=0.05), None, 0.51938, marks=pytest.mark.ci),
         ],
     )
     def test_the_bound_holds_for_the_run_and_meets_the_known_one(self, loop, k, known):
@@ -144,6 +144,7 @@ class TestCertify:
             low, high = found.demand.box[name]
             assert low <= signals[name].min() <= signals[name].max() <= high
 
+    @pytest.mark.slow
     def test_the_bound_is_that_of_its_constants(self):
         """Every formula once more by hand, from the proved delta*."""
         found = plain()
@@ -154,6 +155,7 @@ class TestCertify:
         assert (found.V_0, found.alpha_0, found.alpha_1) == pytest.approx((V_0, alpha_0, 5.0))
         assert pytest.approx(np.sqrt(2 * max(V_0, alpha_0 / 5))) == found.C_0
 
+    @pytest.mark.slow
     def test_delta_star_covers_the_run(self):
         """|g + d + G eps_u| along a run, from the plant's acceleration: x_n' - kG u."""
         loop, found = example_1(), plain()
@@ -166,6 +168,7 @@ class TestCertify:
         assert np.abs(np.array(x2_dot) - k * G * u).max() <= found.demand.delta_star
         assert found.demand.G_min <= G.min() <= G.max() <= found.demand.G_max
 
+    @pytest.mark.slow
     def test_the_published_gains_do_not_close(self):
         """C -> C_0(C) runs away, and the reason shows how."""
         loop = example_1(gamma=1.5, sigma_2=0.5, Gamma=0.5)
@@ -177,17 +180,19 @@ class TestCertify:
         assert "C_0" not in [c.symbol for c in found.constants]
         assert str(found).startswith("no bound is proved")
 
+    @pytest.mark.slow
     def test_a_gain_below_the_sector_is_refused(self):
         """N_0 < 1 / (k_1 G_min)."""
         found = certified(example_1(N_0=1.5))
         assert not found.holds
         assert "N_0 = 1.5 is below 1/(k_1 G_min)" in found.reason
 
+    @pytest.mark.slow
     def test_sigma_zero_proves_nothing(self):
         """sigma_2 = 0 makes alpha_1 = 0: no bound for all time."""
         assert not certified(example_1(sigma_2=0.0)).holds
 
-    @pytest.mark.slow
+    @pytest.mark.ci
     def test_parameters_of_the_run_count(self):
         """The same override that a run takes changes the proof."""
         loop = example_1()
@@ -195,6 +200,7 @@ class TestCertify:
         assert by_override.C_0 == certified(example_1(tau=0.1)).C_0
         assert by_override.C_0 < plain().C_0
 
+    @pytest.mark.slow
     def test_a_larger_disturbance_needs_a_larger_bound(self):
         """q_mean enters delta* with its whole size."""
         forced = certified(example_1(plant=nlctl.ForcedDuffing(q_mean=6.0)))
@@ -268,6 +274,7 @@ class TestVanDerPol:
         assert found.holds
         assert found.undecided == 0
 
+    @pytest.mark.slow
     def test_the_true_level_is_sharp(self):
         """Proved 1 % below it; 1 % above a point in the set is named where V' >= 0."""
         level = self.true_level()

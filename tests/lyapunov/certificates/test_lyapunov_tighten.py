@@ -9,6 +9,8 @@ import nlctl
 from analysis.lyapunov import ledger, tighten
 from nlctl import ParameterError, UnknownNameError
 
+pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
+
 LIMIT = 14.0
 
 

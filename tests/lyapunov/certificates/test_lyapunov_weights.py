@@ -76,6 +76,7 @@ def test_minimax_is_never_worse_than_least_squares():
     assert np.abs(bounded).max() <= 10 + 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", [DUFFING, GENESIO])
 def test_diagonal_centres_cannot_do_better_than_the_pair_bound(plant):
     """On the diagonal W^T psi = exp(-|x|^2/4) F(x1 + ... + xn): equal sums share F.
@@ -129,6 +130,7 @@ def test_without_decay_the_tightest_weights_make_alpha_0_small():
     assert mine < none
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", [DUFFING, GENESIO])
 def test_the_proved_error_is_above_the_grid_s_and_close(plant):
     """The grid gives a lower bound, branch and bound an upper one; a finer grid lies between."""

@@ -286,6 +286,7 @@ PARAMETERS = {
 
 @pytest.mark.filterwarnings("ignore:Unused:UserWarning")
 class TestNoneIsCertified:
+    @pytest.mark.slow
     def test_the_loop_without_a_difference_is(self):
         """A check that always refuses is as bad as one that cannot: flat and nested, renamed."""
         for loop in (wired(), nested()):
@@ -300,6 +301,7 @@ class TestNoneIsCertified:
         with pytest.raises(DiagramError, match=said):
             certify(make())
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("what", TIME)
     def test_time(self, what):
         """k of the paper is k(u, t): the split is proved for all t or refused."""
@@ -314,6 +316,7 @@ class TestNoneIsCertified:
         with pytest.raises(DiagramError, match=said):
             certify(wired(**make()))
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("what", PARAMETERS)
     def test_parameters(self, what):
         """Wherever they are set."""
@@ -322,6 +325,7 @@ class TestNoneIsCertified:
         assert not found.holds
         assert np.inf == found.C_0
 
+    @pytest.mark.slow
     def test_a_declared_split_proves_nothing(self):
         """Whatever its record says of it; the number that would follow is told as such."""
         found = certify(wired(actuator=Declared()))
@@ -337,6 +341,7 @@ def largest_r(loop, times=TIMES, inputs=0):
 
 
 class TestOfTheLoopAtHand:
+    @pytest.mark.slow
     def test_a_gain_that_varies_within_its_bounds(self):
         """v = u (1 + 0.1 sin t) is proved with bounds that hold for all t, and keeps C_0."""
         loop = wired(actuator=actuator(lambda t, u: u * (1 + 0.1 * np.sin(t))))
@@ -344,6 +349,7 @@ class TestOfTheLoopAtHand:
         assert found.holds
         assert largest_r(loop) <= found.C_0
 
+    @pytest.mark.slow
     def test_what_the_update_adds_is_counted(self):
         """60 sin 3t beside f and d: the plant's own update is enclosed, and delta* knows it."""
         loop = wired(
@@ -355,6 +361,7 @@ class TestOfTheLoopAtHand:
         assert found.holds
         assert largest_r(loop) <= found.C_0
 
+    @pytest.mark.slow
     def test_an_external_input_with_a_bound(self):
         """|w| <= 0.5 with gain -2 adds 1 to eps_u*; a switching w keeps the larger bound."""
         loop = wired(inputs={"w": ["plant.v"]})

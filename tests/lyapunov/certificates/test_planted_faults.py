@@ -268,6 +268,7 @@ def assert_caught(what):
     assert found[key].follows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", QUICK)
 def test_faults_are_named(what):
     """A few of the table every day."""
@@ -275,7 +276,7 @@ def test_faults_are_named(what):
 
 
 OTHERS = [what for what in FAULTS if what not in QUICK]
-PARTS = [pytest.mark.slow, *[pytest.mark.weekly] * 5]  # a sixth in every `.ci/run`
+PARTS = [pytest.mark.ci, *[pytest.mark.weekly] * 5]  # a sixth in every `.ci/run`
 
 
 @pytest.mark.parametrize(
@@ -350,7 +351,7 @@ def healthy(what):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("what", HEALTHY)
 def test_no_false_alarm(what):
     """Loops that satisfy the premises: nothing of the corrected proof is violated."""

@@ -65,6 +65,7 @@ def loop(function):
                            name="loop")  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_runs_agree_with_python_control(function):
     """A run, audited at every point that an audit looks at."""
@@ -79,6 +80,7 @@ def test_runs_agree_with_python_control(function):
     np.testing.assert_allclose(found.states, wanted.states, rtol=2e-5, atol=2e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_right_hand_sides_are_python_controls_own(function):
     """Bit for bit where the function is called in Python."""
@@ -90,6 +92,7 @@ def test_right_hand_sides_are_python_controls_own(function):
         np.testing.assert_allclose(found, made.dynamics(t, x, u, {"k": 2.5}), rtol=1e-15)
 
 
+@pytest.mark.slow
 @needs_jit
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_members_do_not_depend_on_threads_or_on_each_other(function):

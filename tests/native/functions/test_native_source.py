@@ -52,6 +52,7 @@ def remember(text, file):
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.sets(st.integers(1, len(STATEMENTS) - 1)))
 def test_every_division_into_cells_has_the_source_of_the_file(ends):

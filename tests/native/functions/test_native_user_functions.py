@@ -10,7 +10,7 @@ ENTRIES = {entry.name: entry for entry in user_functions.ENTRIES}
 PURE = [entry for entry in ENTRIES.values() if entry.pure]
 IMPURE = [entry for entry in ENTRIES.values() if not entry.pure]
 # in the everyday tests the size at which arrays become loops
-SIZES = [n if n == 9 else pytest.param(n, marks=pytest.mark.slow) for n in user_functions.SIZES]
+SIZES = [n if n == 9 else pytest.param(n, marks=pytest.mark.ci) for n in user_functions.SIZES]
 GROUPS = 48  # of entries that are compiled one by one
 
 machine_code = pytest.mark.skipif(
@@ -29,6 +29,7 @@ def hold(entry, n, dt=0):
     assert verdict.good, f"{where}: {verdict.kind}: {verdict.text}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", SIZES)
 @pytest.mark.parametrize("entry", **named(PURE))
 def test_a_pure_function_agrees_or_is_refused(entry, n):
@@ -58,7 +59,7 @@ def test_the_corpus_is_large():
     assert len(IMPURE) >= 50
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_most_pure_functions_are_accepted():
     """Refusing all would be right and of no use."""
     kinds = [judged(entry, 9).kind for entry in PURE]
@@ -78,7 +79,7 @@ def report(job, n, names):
 
 def size(n):
     """The size at which arrays become loops in each `.ci/run`, the others once a week."""
-    return pytest.param(n, marks=pytest.mark.slow if n == 9 else pytest.mark.weekly)
+    return pytest.param(n, marks=pytest.mark.ci if n == 9 else pytest.mark.weekly)
 
 
 @machine_code
@@ -91,7 +92,7 @@ def test_traced_functions_in_one_diagram_in_machine_code(n):
 
 def part(group):
     """The first group in each `.ci/run`, the others once a week."""
-    return pytest.param(group, marks=pytest.mark.slow if group == 0 else pytest.mark.weekly)
+    return pytest.param(group, marks=pytest.mark.ci if group == 0 else pytest.mark.weekly)
 
 
 @machine_code

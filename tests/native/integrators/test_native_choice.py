@@ -36,6 +36,7 @@ def work(compiled, x0, end, method):
     return tried[False] + (run.task.cost * tried[True] if tried[True] else 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(getattr(config, "DISABLE_JIT", False), reason="10^5 steps")
 def test_it_takes_less_than_either_method_alone(drifting):
     """Ratio 0.59 over 10 s; 0.70 where the explicit steps are taken for longer than they are."""

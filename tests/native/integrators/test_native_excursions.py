@@ -63,6 +63,7 @@ amplitudes, frequencies = st.floats(0.1, 10), st.floats(0.05, 100)
 beyond = st.floats(-6, -0.03).map(lambda power: 10.0**power)  # the band, in amplitudes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("driven", ["by time", "by a clock"])
 @given(A=amplitudes, w=frequencies, d=beyond, periods=st.integers(1, 5))

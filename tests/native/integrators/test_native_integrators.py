@@ -84,6 +84,7 @@ def test_with_checked_indices_numba_makes_its_own(monkeypatch):
     assert shipped_bitcode() is None
 
 
+@pytest.mark.slow
 def test_the_first_run_compiles_nothing_by_numba(tmp_path, monkeypatch):
     """With an empty cache; numba's compiler alone would take ten times as long as all the rest."""
     if shipped_bitcode() is None:

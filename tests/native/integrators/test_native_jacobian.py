@@ -75,6 +75,7 @@ class TestExact:
             found[:, -1], (later - before) / (2 * h), rtol=1e-6, atol=1e-8 * scale
         )
 
+    @pytest.mark.slow
     def test_an_opaque_function_is_differentiated_by_differences_and_named(self):
         """The printed form says which; the numbers are the traced twin's."""
 
@@ -156,7 +157,7 @@ class TestBacklashInAStiffLoop:
                 made = from_2_5(example_2, [0.0, end], "rodas5p", rtol)
                 assert float(made.outputs[i, -1]) == pytest.approx(v, rel=10 * rtol)
 
-    @pytest.mark.slow
+    @pytest.mark.ci
     def test_the_drift_of_zeta_is_the_same_by_all_methods(self, example_2):
         """Over 100 s: zeta drifts by 1.1e-2, and all agree to a thousandth of that and better."""
         exact, rows = from_2_5(example_2, [0, 100.0], "tsit5", 1e-9), {}

@@ -27,6 +27,8 @@ from nlctl.native.integrate.methods.lu import (
 )
 from nlctl.native.integrate.state import DIRECTIONS
 
+pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
+
 
 class Work(NamedTuple):
     """What the linear equations read and write."""

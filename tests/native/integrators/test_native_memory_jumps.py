@@ -111,6 +111,7 @@ heights = st.tuples(*[st.floats(-0.8, 0.8).filter(lambda a: abs(a) > 1e-3)] * 3)
 ends = st.floats(0.05, 1.6).filter(lambda t: min(abs(t - s) for s in (*TIMES, 0.25)) > 1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ACTUATORS)
 @pytest.mark.parametrize("method", ["tsit5", "rodas5p"])
 @given(heights=heights, end=ends)
@@ -125,6 +126,7 @@ def test_behind_a_corner(name, method, heights, end):
     assert run.outputs[0, -1] == pytest.approx(wanted, abs=2e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ACTUATORS)
 @given(gain=st.floats(-3.0, 2.0).filter(lambda a: abs(a) > 0.01), end=st.floats(0.05, 1.6))
 @settings(max_examples=10)

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from nlctl.native.integrate.methods import quartic as q
 from nlctl.native.integrate.methods.tsit5 import TSIT5
 
+pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
+
 ROWS = TSIT5.arrays()["inside"]
 
 

@@ -229,8 +229,9 @@ def radau(update, end, x0):
 class TestKnownProblems:
     """Against an implicit Runge-Kutta method of another kind."""
 
+    @pytest.mark.slow
     @needs_jit
-    @pytest.mark.parametrize("method", [pytest.param("rodas5p", marks=pytest.mark.slow), "auto"])
+    @pytest.mark.parametrize("method", [pytest.param("rodas5p", marks=pytest.mark.ci), "auto"])
     def test_van_der_pol(self, method):
         """Over a period and more, with its jumps."""
         made = run(
@@ -242,6 +243,7 @@ class TestKnownProblems:
         assert made.statistics.stiff
         assert attempts(made) < 5000
 
+    @pytest.mark.slow
     def test_robertson(self):
         """Mass is conserved, and all three concentrations agree."""
         made = run(
@@ -251,6 +253,7 @@ class TestKnownProblems:
         np.testing.assert_allclose(made.states.sum(axis=0), 1, atol=1e-11)
         assert attempts(made) < 600
 
+    @pytest.mark.slow
     def test_hires(self):
         """The classic end time, 321.8122."""
         start = [1, 0, 0, 0, 0, 0, 0, 0.0057]

@@ -90,6 +90,7 @@ def test_a_loop_is_an_error_unless_asked_for():
         compile_diagram(diagram, algebraic_loops="newton")
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(st.integers(1, 4), st.integers(1, 3), st.integers(0, 10**6))
 def test_rings_of_direct_feedthrough_are_exact_to_rounding(count, size, seed):

@@ -66,6 +66,7 @@ def static(function, inputs=1, outputs=1, **params):
     return ct.nlsys(None, function, inputs=inputs, outputs=outputs, name="b", params=params)
 
 
+@pytest.mark.slow
 @settings(max_examples=many(150))
 @given(diagrams_of.diagrams(), st.integers(0, 1000), st.sampled_from([1, 2]))
 def test_random_diagrams_agree_with_python_control(diagram, seed, lanes):
@@ -197,6 +198,7 @@ def by_eigenvalues(t, x, u, params):
     return [np.linalg.det(np.array([[u[0], 1.0], [params["k"], 2.0]]))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", [while_loop, by_eigenvalues])
 @pytest.mark.parametrize("lanes", [1, 2])
 def test_what_cannot_be_traced_is_called_for_each_member(function, lanes):
@@ -208,6 +210,7 @@ def test_what_cannot_be_traced_is_called_for_each_member(function, lanes):
     assert list(lowered.opaque) == ["b_output_of_one"]
 
 
+@pytest.mark.slow
 def test_an_opaque_block_within_a_diagram():
     """States, inputs and parameters reach it, its results reach others, also long ones."""
 
@@ -312,6 +315,7 @@ def blocks():
                     yield thing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("record", list(blocks()), ids=lambda record: record.__name__)
 def test_nlctls_blocks_are_traced(record):
     """Each of them, unmodified, with nothing left to be called."""
@@ -496,6 +500,7 @@ def array_program(steps, n, opaque):
 STEPS = st.tuples(st.integers(0, 9), *[st.integers(0, 20)] * 3)
 
 
+@pytest.mark.slow
 @settings(max_examples=many(100))
 @given(st.lists(STEPS, max_size=7), st.sampled_from([9, 16, 20]), st.sampled_from([1, 2]),
        st.booleans())  # fmt: skip
@@ -507,6 +512,7 @@ def test_random_programs_of_vectors_agree_with_numpy(steps, n, lanes, opaque):
     check(block, lanes)
 
 
+@pytest.mark.slow
 def test_a_joined_parameter_reaches_an_opaque_function():
     """Inputs that are made of parameters alone, some of them constants, are joined in advance."""
 

@@ -192,6 +192,7 @@ def test_a_loop_is_audited():
     assert run.statistics.status.name == "OK"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [_MOST, _MOST + 1])
 def test_many_signals_in_a_loop(n):
     """Each is the cosine of its right neighbour and of itself: all are equal."""

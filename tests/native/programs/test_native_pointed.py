@@ -86,7 +86,7 @@ def copied(record, found):
         found.whole[4 + i] = record.cube.shape[i]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @given(RECORDS)
 def test_every_field_is_the_same_in_machine_code(record):
     """All bits of all numbers, and all shapes, empty arrays included."""

@@ -105,6 +105,7 @@ def diagrams(draw):
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=many(500))
 @given(diagrams(), st.integers(0, 1000))
 def test_random_diagrams_agree_with_python_control(diagram, seed):
@@ -126,7 +127,7 @@ def test_flat_parameters_of_third_party_blocks_resolve_as_in_python_control(diag
     compare(diagram, params={"gain": gain, "k": k}, points=1)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("make", [nlctl.paper.example_1, nlctl.paper.example_2])
 def test_examples_in_machine_code(make):
     """Compiled right-hand sides of the paper's loops equal the interpreted ones."""

@@ -121,6 +121,7 @@ def facts(text):
     return loop_facts(source_text.run(text)["loop"]())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EDITS)
 def test_every_edit_that_the_equations_reach_is_seen(name):
     """Each by itself; the values at the points see it too, where it changes any."""
@@ -217,7 +218,7 @@ def test_the_names_that_python_control_gives_do_not_count():
     assert loop_values(one, 1.0) == loop_values(other, 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_record_is_the_same_in_another_process():
     """Addresses, hash seeds and the order of sets are no part of it."""
     script = (

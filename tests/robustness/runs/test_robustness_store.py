@@ -20,6 +20,8 @@ from analysis.robustness import Requirement, Spec, always, in_band, independent,
 from analysis.robustness.runs.store import ChunkStore, StoreError, claimed, put, table_of
 from analysis.robustness.runs.sweep import load, sweep
 
+pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
+
 ROWS, CHUNK, ENTROPY = 96, 12, 3
 
 

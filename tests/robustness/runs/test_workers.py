@@ -34,6 +34,7 @@ TASKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("doing", TASKS)
 def test_workers_end_when_their_parent_is_killed(tmp_path, doing):
     """SIGKILL lets nobody say goodbye; whatever the workers are doing, they are gone in seconds."""

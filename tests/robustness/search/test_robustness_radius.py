@@ -50,6 +50,7 @@ def test_the_radius_of_the_linear_limit_state(d):
     assert made.margin <= 0
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=10)
 @given(st.lists(st.floats(-1, 1), min_size=1, max_size=3), st.floats(0.2, 3), st.integers(0, 2**32))
 def test_half_spaces(normal, offset, entropy):
@@ -228,6 +229,7 @@ def mass_and_spring(*quantities):
     )
 
 
+@pytest.mark.slow
 def test_the_radius_of_a_linear_loop_is_its_stability_margin():
     """d in 0.5 +- 0.2 and c in 0 +- 0.1 lose stability at (0.5 - 0.2 r) - 0.1 r = 0, r = 5 / 3."""
     made = mass_and_spring(

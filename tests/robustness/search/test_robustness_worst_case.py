@@ -46,6 +46,7 @@ class TestWorstCase:
         assert found.witness == dict.fromkeys(box(d).names, 2.0)
         assert found.margin == pytest.approx(1 - d * 2.1**2)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("d", [1, 2, 5])
     def test_a_worst_case_inside_is_found_by_cma_es(self, d):
         """Convex: the least of 0.1 + |x - 0.7|^2 is 0.1."""
@@ -103,6 +104,7 @@ class TestWorstCase:
         assert np.all(found.design.table["n"] % 1 == 0)
         assert found.margin == pytest.approx(0.16, abs=1e-3)
 
+    @pytest.mark.slow
     @settings(deadline=None, max_examples=25)
     @given(st.integers(1, 4), st.integers(1, 150), st.integers(0, 2**40), st.booleans())
     def test_it_reports_the_least_of_its_own_rows(self, d, runs, entropy, broken):

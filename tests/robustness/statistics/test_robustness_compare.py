@@ -113,6 +113,7 @@ class TestNumbers:
             assert len(table) == 3
             assert table["p_holm"].min() == pytest.approx(min(1, 3 * table["p"].min()))
 
+    @pytest.mark.slow
     def test_intervals_cover_the_true_difference_of_rates(self):
         """Of 40 comparisons the exact interval of a rate holds 80 % at least."""
         law, held = stats.norm(0.5), 0

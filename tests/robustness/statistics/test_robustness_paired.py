@@ -103,6 +103,7 @@ def test_the_interval_of_the_median_is_exact(n, confidence):
     assert coverage(rank) >= confidence > coverage(rank + 1)
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_true_difference():
     """Of 200 comparisons with skewed differences at 90 %, median 0 and mean 1 - ln 2."""
     rng = np.random.default_rng(3)

@@ -32,6 +32,7 @@ def cube(d, low=0.0, high=1.0):
     )
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10**6), st.sampled_from([2, 4, 8]))
 def test_effects_of_a_linear_function_are_its_slopes_times_the_box(entropy, levels):
     """In every trajectory alike: sigma is 0, the interval a point; scaling does not matter."""
@@ -137,6 +138,7 @@ def test_a_linear_function_shares_by_its_variances_whatever_the_laws():
     assert (got.ST["idle"], got.ST_high["idle"]) == (0, 0)
 
 
+@pytest.mark.slow
 def test_bootstrap_intervals_cover_and_repeat():
     """Of 40 designs most 90 % intervals hold the known share; one design has one interval."""
     covered = 0
@@ -231,6 +233,7 @@ def test_what_sets_failures_apart_is_found():
     assert by_arm.p_holm["x0"] > 0.01
 
 
+@pytest.mark.slow
 def test_p_values_of_idle_quantities_are_uniform():
     """Kolmogorov-Smirnov under the hypothesis: 5 % of p-values are below 0.05."""
     p = []

@@ -32,6 +32,7 @@ ARM = Choice(name="arm", options={"x": 1, "y": 2, "z": 3})
 SPACE = Space(quantities=(A, B), choices=(ARM,))
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**64), st.integers(1, 30), st.integers(0, 29))
 def test_any_row_can_be_drawn_again_without_the_others(entropy, size, row):
     """Alone, in a longer design, and in any chunk it is the same."""
