@@ -122,6 +122,8 @@ def _lock(rhs, task, lanes, w, chosen):
     A memory that counts wherever it stands, a relay's, is not carried but about to jump.  It
     keeps its value up to the corner where it jumps; at that corner already, it jumps.
     """
+    if not _any_moves(task, w, chosen):
+        return
     which, carried = np.ones(task.memory.size, np.bool_), np.ones(lanes.size, np.bool_)
     if _carried(rhs, task, lanes, w, chosen, which, carried):
         return
@@ -145,6 +147,16 @@ def _lock(rhs, task, lanes, w, chosen):
                 w.x[task.memory[i], j] = after if _at_corner(w.g, task.corners, j) else before[j]
                 w.e[row, j] = 0.0
         _refresh(rhs, task, lanes, w, chosen)
+
+
+@numba.njit(**INNER)
+def _any_moves(task, w, chosen):
+    """Whether a memory of a chosen lane is being carried along: behind a held input none is."""
+    for i in range(task.corners, w.e.shape[0]):
+        for j in range(chosen.size):
+            if chosen[j] and w.e[i, j] != 0.0:
+                return True
+    return False
 
 
 @numba.njit(**INNER)
