@@ -49,23 +49,26 @@ def test_no_symbol_has_two_subscripts():
             assert not re.search(r"_\{(?:[^{}]|\{[^{}]*\})*\}_", line), (name, line)
 
 
-@pytest.mark.parametrize("profiler", [cProfile.Profile().enable, lambda: sys.setprofile(print_not)])
-def test_a_profiler_changes_no_formula_and_goes_on(profiler):
+def test_a_profiler_changes_no_formula_and_goes_on():
     """Names of intermediate values are found by one, and Python cannot set cProfile's again."""
     loop = nlctl.paper.example_1()
-    alone = nlctl.typeset(loop)
-    profiler()
-    before = sys.getprofile()
+    alone, profiler = nlctl.typeset(loop), cProfile.Profile()
+    seen = []
+    with profiler:
+        assert nlctl.typeset(loop) == alone
+        called_afterwards()
+    assert called_afterwards.__code__ in [entry.code for entry in profiler.getstats()]
+    sys.setprofile(lambda frame, event, value: seen.append(frame.f_code))
     try:
         assert nlctl.typeset(loop) == alone
-        assert before is not None
-        assert sys.getprofile() is before
+        called_afterwards()
     finally:
         sys.setprofile(None)
+    assert called_afterwards.__code__ in seen
 
 
-def print_not(frame, event, value):
-    """A profiler that notes nothing."""
+def called_afterwards():
+    """What a profiler sees if it is still at work."""
 
 
 def test_numbers():
