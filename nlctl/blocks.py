@@ -42,15 +42,16 @@ class Spec(Protocol):
         Initial values of states, ``{"zeta": 1.0}``; the others start from 0.
     vector : bool, optional
         True where the equations want `x` and `u` as 1-D arrays and do not unpack them.
-    corners : callable, optional
-        ``corners(t, x, u, p)`` returns a tuple of switching functions: where one of them changes
-        its sign, an equation has a corner or a jump, and a step of the native engine ends there.
+    switching : callable, optional
+        ``switching(t, x, u, p)`` returns a tuple of switching functions: where one of them changes
+        its sign, an equation has a break point or a jump, and a step of the native engine ends
+        there.
     memory : sequence of str, optional
         States that are memory.  Within a step of the native engine they stand still.
     commit : callable, optional
         ``commit(t, x, u, p)`` returns what the states in `memory` become at the end of a step
         that was accepted.  A step in which a memory would reverse is divided where it does.
-        It must be continuous except where a corner changes its sign.
+        It must be continuous except where a switching function changes its sign.
     derived : callable, optional
         ``derived(self) -> dict`` of numbers that follow from the parameters; `p` has them too.
     check : callable, optional
@@ -412,10 +413,10 @@ def memory_states(spec: Any) -> tuple[str, ...]:
 
 def event_count(made: Block) -> int:
     """Return the number of switching functions that a block declares."""
-    if not hasattr(made.spec, "corners"):
+    if not hasattr(made.spec, "switching"):
         return 0
     u = np.full((made.ninputs or 0) + 2 * slides(made), 0.25)
-    return len(made.spec.corners(0.0, default_state(made), u, current_parameters(made)))
+    return len(made.spec.switching(0.0, default_state(made), u, current_parameters(made)))
 
 
 def _probe(made: Block) -> None:

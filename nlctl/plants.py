@@ -361,6 +361,6 @@ class WingRock:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The break points of |x1| and |x2|."""
         return x[0], x[1]

@@ -40,7 +40,7 @@ class HeldRelay:
 
     @staticmethod
     @nlctl.equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         return u[0] - 0.5, u[0] + 0.5
 
 

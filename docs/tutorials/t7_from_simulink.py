@@ -14,7 +14,7 @@ Gain, Sum, Transfer Fcn         ``ct.ss``, ``ct.tf``, ``ct.summing_junction`` of
 MATLAB Function                 a function of ``ct.nlsys``, or an equation of a record
 Saturation, Dead Zone, ...      ``nlctl.Saturation``, ``nlctl.DeadZone``, ``nlctl.Backlash``, ``nlctl.Relay``, ...
 initial condition               ``nlctl.initial_state(loop, {"plant.x1": 0.8})``
-zero-crossing detection         switching functions of a block (``corners``): steps end there
+zero-crossing detection         switching functions of a block (``switching``): steps end there
 Memory, Unit Delay              a state that is memory (``commit``); blocks in discrete time
 sample time, rate transition    ``nlctl.sampled(controller, dt)``
 accelerator mode                always: machine code; ``engine="python-control"`` interprets

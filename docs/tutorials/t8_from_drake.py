@@ -12,7 +12,7 @@ Drake                             nlctl
 ``Context``                       there is none: time, state, input and parameters are arguments of pure functions
 declared parameters               fields of the record, ``"actuator.b_r"`` in a diagram
 direct feedthrough                ``feedthrough``, declared and compared with the equations
-witness functions                 ``corners``
+witness functions                 ``switching``
 unrestricted update, events       a state that is memory, and ``commit``
 periodic discrete update          ``nlctl.sampled(block, dt)``
 ``Simulator``                     ``nlctl.input_output_response``; a run has a status

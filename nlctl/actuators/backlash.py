@@ -125,7 +125,7 @@ class Backlash:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Contact with either side of the gap."""
         (memory,) = x
         (u1,) = u

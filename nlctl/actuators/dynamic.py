@@ -77,7 +77,7 @@ class RateLimiter:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where the limits begin and end to count."""
         (v,) = x
         return p.K * (u[0] - v) - p.rise, p.K * (u[0] - v) - p.fall

@@ -69,7 +69,7 @@ class Coulomb:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where the velocity changes its sign."""
         return (u[0],)
 
@@ -117,7 +117,7 @@ class Stribeck:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where the velocity changes its sign."""
         return (u[0],)
 
@@ -213,7 +213,7 @@ class StickSlip:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where the mass comes to rest, and where it may break away."""
         velocity, applied = u
         forces = applied - p.F_s, applied + p.F_s
@@ -267,7 +267,7 @@ class Dahl:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where the velocity changes its sign."""
         return (u[0],)
 
@@ -334,7 +334,7 @@ class LuGre:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where the velocity changes its sign."""
         return (u[0],)
 
@@ -405,6 +405,6 @@ class BoucWen:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where the velocity or z changes its sign."""
         return u[0], x[0]

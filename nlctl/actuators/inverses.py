@@ -77,7 +77,7 @@ class DeadZoneInverse:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The jump."""
         return (u[0],)
 
@@ -177,7 +177,7 @@ class BacklashInverse:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where u reverses, and where the lines cross."""
         wanted, u1 = u
         one, other = needed_lines(wanted, p)
@@ -282,7 +282,7 @@ class PrandtlIshlinskiiInverse:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Contact of each play with either side of its gap."""
         return np.concatenate(unit_contact(u[0], x, p.R))
 

@@ -114,7 +114,7 @@ class Stop:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where it begins or ends to yield: contact with either side of the gap."""
         (memory,) = x
         return unit_contact(u[0], memory, p.r)
@@ -228,7 +228,7 @@ class PrandtlIshlinskii:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Contact of each play with either side of its gap."""
         return np.concatenate(unit_contact(u[0], x, p.r))
 
@@ -309,6 +309,6 @@ class OneSidedDeadZones:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The thresholds."""
         return u[0] - p.r

@@ -50,7 +50,7 @@ class Quantiser:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The jumps."""
         return (np.sin(np.pi * (u[0] / p.q + np.where(p.riser, 0.0, 0.5))),)
 

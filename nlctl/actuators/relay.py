@@ -131,7 +131,7 @@ class Relay:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The thresholds."""
         return u[0] - p.on, u[0] - p.off
 
@@ -260,6 +260,6 @@ class Preisach:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """All thresholds."""
         return np.concatenate((u[0] - p.alpha, u[0] - p.beta))

@@ -66,7 +66,7 @@ class DeadZone:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The break points."""
         (u1,) = u
         return u1 - p.b_l, u1 - p.b_r
@@ -136,7 +136,7 @@ class Saturation:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where it begins to saturate."""
         return u[0] + p.limit, u[0] - p.limit
 
@@ -177,6 +177,6 @@ class AsymmetricSaturation:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where the slope changes, and where it begins to saturate."""
         return u[0], p.slope_l * u[0] - p.limit_l, p.slope_r * u[0] - p.limit_r

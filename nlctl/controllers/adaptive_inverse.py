@@ -95,7 +95,7 @@ class AdaptiveDeadZoneInverse:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where the side changes, and where an estimate meets its bound."""
         m_r, mb_r, m_l, mb_l = x
         return u[0], m_r - p.m_min, mb_r, m_l - p.m_min, mb_l

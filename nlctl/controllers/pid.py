@@ -76,7 +76,7 @@ class PID:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Where u meets its limit."""
         w, _ = unlimited(x, u, p)
         return w + p.u_max, w - p.u_max

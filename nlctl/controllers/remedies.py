@@ -55,7 +55,7 @@ class DeadZoneNussbaumLaw(NussbaumLaw):
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The ends of the dead zone."""
         return u[0] + p.r_0, u[0] - p.r_0
 

@@ -57,7 +57,7 @@ class SuperTwistingLaw:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The edges of the layer."""
         (r,) = u
         return r + p.phi, r - p.phi

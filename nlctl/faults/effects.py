@@ -80,7 +80,7 @@ class _Effect:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """Beginning and end of the fault."""
         since = age(t, u, p)
         return since, since - p.duration
@@ -288,7 +288,7 @@ class Latch:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """By how much the condition is met."""
         return (excess(u, p),)
 

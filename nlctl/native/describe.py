@@ -89,7 +89,7 @@ def _facts(i: int, node: Node, program: Program, p: np.ndarray) -> Iterator[tupl
     parameters = [f"{name} = {_value(slot, p)}" for name, slot in program.layout[i].items()]
     parameters += [f"{k} = {value!r} (fixed)" for k, value in program.fixed.get(i, {}).items()]
     yield "parameters", _listed(parameters)
-    yield "corners", str(count_switching_functions(node) or "")
+    yield "switching functions", str(count_switching_functions(node) or "")
     yield "memory", _listed([labels[j - first] for j in memory(node)])
 
 

@@ -23,7 +23,7 @@ _REFUSED = {  # of the keywords of `solve_ivp` -> what there is instead
     "min_step": "step= is a fixed step, max_steps= bounds their number",
     "first_step": "it chooses its first step by the tolerances; step= is a fixed step",
     "dense_output": "evaluation_times= are the times that are wanted",
-    "events": "blocks declare their corners, and metrics find crossings in the response",
+    "events": "blocks declare switching functions, and metrics find crossings in the response",
     "vectorized": "it needs no other form of the functions",
     "args": "params= are the parameters",
     **dict.fromkeys(("jac", "jac_sparsity", "lband", "uband"), JACOBIAN),

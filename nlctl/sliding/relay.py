@@ -114,7 +114,7 @@ class IdealRelay:
 
     @staticmethod
     @equation
-    def corners(t: float, x: Any, u: Any, p: Any) -> Any:
+    def switching(t: float, x: Any, u: Any, p: Any) -> Any:
         """Where u is 0; while it slides, where it jumps away and where one rate leads away."""
         (mode,) = x
         above, below = rates_beside(u, p)

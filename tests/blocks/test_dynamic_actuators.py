@@ -105,7 +105,7 @@ class TestQuantiser:
         block, jump = nlctl.block(spec, "b"), q * (k + 0.5 * (not riser))
         for u in (jump, np.nextafter(jump, 99), np.nextafter(jump, -99)):
             assert along(spec, [u, u])[0] == block.output(0.0, [], [u])[0]
-            assert abs(spec.corners(0, (), (u,), equation_arguments(spec))[0]) < 1e-13
+            assert abs(spec.switching(0, (), (u,), equation_arguments(spec))[0]) < 1e-13
 
     @pytest.mark.parametrize("riser", [False, True])
     def test_the_area_below_the_staircase_is_exact(self, riser):
@@ -138,7 +138,7 @@ class TestAsymmetricSaturation:
         spec = nlctl.AsymmetricSaturation()
         p = equation_arguments(spec)
         for k, point in enumerate((0.0, p.limit_l / p.slope_l, p.limit_r / p.slope_r)):
-            assert spec.corners(0, (), (point,), p)[k] == 0.0
+            assert spec.switching(0, (), (point,), p)[k] == 0.0
 
 
 @each_row(

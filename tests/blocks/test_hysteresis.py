@@ -112,8 +112,8 @@ class TestEveryOperator:
         block, made, p = nlctl.block(spec, "b"), compiled(type(spec)), values(spec)
         x = np.array(data.draw(st.lists(inputs, min_size=len(spec.states), max_size=10)))
         x = x[: len(spec.states)]
-        corners = spec.corners(0.0, x, np.array([0.0]), equation_arguments(spec))
-        slope = spec.corners(0.0, x, np.array([1.0]), equation_arguments(spec))
+        corners = spec.switching(0.0, x, np.array([0.0]), equation_arguments(spec))
+        slope = spec.switching(0.0, x, np.array([1.0]), equation_arguments(spec))
         at = -np.asarray(corners) / (np.asarray(slope) - np.asarray(corners))
         for u in (data.draw(inputs), *at, *np.nextafter(at, 9), *np.nextafter(at, -9)):
             for name in ("dynamics", "output"):
@@ -349,7 +349,7 @@ def test_in_contact_the_switching_function_is_exactly_zero(kind, data):
     x = np.array(data.draw(st.lists(inputs, min_size=n, max_size=n)))
     u = np.array([data.draw(inputs)])
     moved = np.array(spec.commit(0.0, x, u, p), dtype=float)
-    distances = np.reshape(spec.corners(0.0, moved, u, p), (2, n))
+    distances = np.reshape(spec.switching(0.0, moved, u, p), (2, n))
     np.testing.assert_array_equal((distances == 0).any(axis=0)[moved != x], True)
 
 

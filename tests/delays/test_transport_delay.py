@@ -91,7 +91,7 @@ class Step:
 
     @staticmethod
     @nlctl.equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         return (t - 1.0,)
 
 

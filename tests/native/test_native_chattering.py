@@ -40,7 +40,7 @@ class Side:
 
     @staticmethod
     @nlctl.equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         return u[0] - p.width, u[0] + p.width
 
 

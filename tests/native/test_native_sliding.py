@@ -53,7 +53,7 @@ class StepAt:
 
     @staticmethod
     @nlctl.equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         return (t - p.time,)
 
 

@@ -59,7 +59,7 @@ def by_blocks(compiled, t, x, u):
         inputs = inputs_of(node)
         dx[states] = rates_now(node.system, t, x[states], inputs) if node.system.nstates else 0.0
         for count, name, target in (
-            (count_switching_functions(node), "corners", found),
+            (count_switching_functions(node), "switching", found),
             (len(memory(node)), "commit", committed),
         ):
             if count:

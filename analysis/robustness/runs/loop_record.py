@@ -28,7 +28,7 @@ from nlctl.sampling.system import Sampled, clocks_of, happening
 __all__ = ["array_text", "loop_facts", "loop_values", "short_key", "values_differ"]
 
 _T = TypeVar("_T")
-_EQUATIONS = ("update", "output", "corners", "commit")
+_EQUATIONS = ("update", "output", "switching", "commit")
 SHAPE = ("inputs", "outputs", "states", "feedthrough", "vector", "memory", "initial")
 _POINTS = 6
 GOLDEN = (math.sqrt(5) - 1) / 2

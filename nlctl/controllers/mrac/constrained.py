@@ -49,7 +49,7 @@ class ConstrainedLaw:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The limits."""
         return u[0] - p.u_max, u[0] + p.u_max
 

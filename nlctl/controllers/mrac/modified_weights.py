@@ -46,7 +46,7 @@ class EModifiedWeights(NetworkWeights):
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The break point of |r|."""
         return (u[0],)
 
@@ -98,6 +98,6 @@ class ProjectedWeights(NetworkWeights):
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The inner boundary of the layer, and where y = r psi turns outwards in it."""
         return boundary_function(x, p), np.sum(x * u[0] * u[1:])

@@ -126,6 +126,6 @@ class WingRockRegressor:
 
     @staticmethod
     @equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         """The break points of |x1| and |x2|."""
         return u[0], u[1]

@@ -158,7 +158,7 @@ class _Evaluated:
         dx, g = np.empty_like(xx), np.empty((self.run.work.g.shape[0], width))
         self.run.machine.rhs(tt[0].copy(), xx, uu, self.c, dx, g)
         dx[task.memory] = 0.0
-        return np.concatenate([dx[:, 0], g[task.corners :, 0]])
+        return np.concatenate([dx[:, 0], g[task.switching :, 0]])
 
     def points(self, attempt: Attempt) -> Iterator[tuple[float, np.ndarray]]:
         """Yield where a step has been: at its ends and, of the explicit method, at its stages."""

@@ -377,7 +377,7 @@ class Reader:
 
     def events(self, i: int) -> Tracer:
         node, spec = self.blocks[i], self.blocks[i].system.spec
-        used = [("corners", count_switching_functions(node)), ("commit", len(memory(node)))]
+        used = [("switching", count_switching_functions(node)), ("commit", len(memory(node)))]
         functions = [getattr(spec, name) for name, count in used if count]
         inputs = self.wired(node.inputs)
         if i in self.moving:

@@ -31,7 +31,7 @@ class Program:
         For every block the places of its parameters in the flat vector `p`.
     fixed : mapping
         For every block its parameters that are no numbers.
-    corners : int
+    switching : int
         Number of switching functions.
     memory : tuple of int
         Indices of the memory states.
@@ -43,7 +43,7 @@ class Program:
 
     layout: Mapping[int, Mapping[str, Slot]]
     fixed: Mapping[int, Mapping[str, Any]]
-    corners: int
+    switching: int
     memory: tuple[int, ...]
     sampled: tuple[int, ...] = ()
     clocks: Mapping[Any, Clock] = field(default_factory=dict)
@@ -69,10 +69,10 @@ class Program:
 
     @property
     def events(self) -> int:
-        """Size of the array `g`: the switching functions of all corners, then what the memory
+        """Size of the array `g`: the switching functions of all blocks, then what the memory
         states would be committed to.
         """
-        return self.corners + len(self.memory)
+        return self.switching + len(self.memory)
 
 
 def program(schedule: Schedule) -> Program:
@@ -93,7 +93,7 @@ def program(schedule: Schedule) -> Program:
     return Program(
         layout=layout,
         fixed={i: values for i, values in fixed.items() if values},
-        corners=sum(count_switching_functions(node) for node in schedule.nodes),
+        switching=sum(count_switching_functions(node) for node in schedule.nodes),
         memory=tuple(i for node in schedule.nodes for i in memory(node)),
         sampled=tuple(
             node.state_offset + i

@@ -51,7 +51,7 @@ def _judge(task, lanes, w, found):
         found[j] = CLEAR
         if w.e.shape[0]:
             found[j] = locate(
-                lane, task.corners, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j
+                lane, task.switching, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j
             )
         if found[j] == AGAIN:
             lane.rejected += 1
@@ -64,7 +64,7 @@ def _accept(task, lanes, w, found, done, passed):
     ``done`` becomes whether one was accepted, ``passed`` whether it ended with an event or set a
     memory in motion.  Return whether any lane has passed.
     """
-    any_passed, corners, memories = False, task.corners, task.memory.size
+    any_passed, switching, memories = False, task.switching, task.memory.size
     for j in range(lanes.size):
         lane, event = lanes[j], found[j] == EVENT
         done[j] = passed[j] = False
@@ -81,7 +81,7 @@ def _accept(task, lanes, w, found, done, passed):
         done[j] = True
         if memories:  # at a corner of the inputs memories may reverse as well
             at_corner = lane.ends and w.u.shape[0] > 0
-            passed[j] = at_corner or _began_to_move(corners, w.e_start, w.e, j)
+            passed[j] = at_corner or _began_to_move(switching, w.e_start, w.e, j)
         passed[j] |= event
         any_passed |= passed[j]
         if task.method == AUTO:
@@ -90,9 +90,9 @@ def _accept(task, lanes, w, found, done, passed):
 
 
 @numba.njit(**INNER)
-def _began_to_move(corners, e_start, e, j):
+def _began_to_move(switching, e_start, e, j):
     """Whether a memory that stood still at the start of the accepted step moves at its end."""
-    for i in range(corners, e.shape[0]):  # noqa: SIM110 (no generators in machine code)
+    for i in range(switching, e.shape[0]):  # noqa: SIM110 (no generators in machine code)
         if e_start[i, j] == 0.0 and e[i, j] != 0.0:
             return True
     return False
@@ -101,18 +101,18 @@ def _began_to_move(corners, e_start, e, j):
 @numba.njit(**INNER)
 def _take(task, w, done):
     """Make the ends of the accepted steps the states, and commit the memories."""
-    x, k, corners, last = w.x, w.k, task.corners, w.k.shape[0] - 1
+    x, k, switching, last = w.x, w.k, task.switching, w.k.shape[0] - 1
     for j in range(done.size):
         if not done[j]:
             continue
         for i in range(x.shape[0]):
             x[i, j] = w.x_new[i, j]
             k[0, i, j] = k[last, i, j]
-        for i in range(corners):
+        for i in range(switching):
             w.behind[i, j] = w.e_start[i, j] * w.e[i, j] < 0.0
         for i in range(task.memory.size):
-            m, become = task.memory[i], w.g[corners + i, j]
-            if w.e_start[corners + i, j] == 0.0 and x[m, j] != become:  # otherwise locked
+            m, become = task.memory[i], w.g[switching + i, j]
+            if w.e_start[switching + i, j] == 0.0 and x[m, j] != become:  # otherwise locked
                 x[m, j] = become
                 for c in range(w.behind.shape[0]):
                     w.behind[c, j] = 0.0  # with another memory the way back is an event
@@ -128,7 +128,7 @@ def _event_functions(rhs, task, lanes, w):
         for j in range(lanes.size):
             w.t_end[j] = lanes[j].t + lanes[j].step
         memory_rates(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1])
-    for i in range(task.corners):
+    for i in range(task.switching):
         for j in range(lanes.size):
             w.e[i, j] = w.g[i, j]
 

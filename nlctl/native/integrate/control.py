@@ -48,7 +48,7 @@ def memory_error(task, x, g, g_other, j):
     """
     largest, spoilt = 0.0, 0.0
     for m in range(task.memory.size):
-        i, before = task.corners + m, x[task.memory[m], j]
+        i, before = task.switching + m, x[task.memory[m], j]
         if g[i, j] == before or g_other[i, j] == before:
             continue
         part = abs(g[i, j] - g_other[i, j]) / (task.atol + task.rtol * abs(g[i, j]))

@@ -286,7 +286,7 @@ def prepared(
         times=times,
         inputs=inputs,
         p=c,
-        corners=program.corners,
+        switching=program.switching,
         memory=np.array(program.memory, dtype=np.int64),
         rtol=float(settings.rtol),
         atol=float(settings.atol),

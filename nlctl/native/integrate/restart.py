@@ -30,7 +30,7 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     for i in range(w.g.shape[0]):
         for j in range(lanes.size):
             w.slope[i, j] = (w.g_ahead[i, j] - w.g[i, j]) / max(w.h[j], 1e-300)
-    for i in range(task.corners, w.g.shape[0]):
+    for i in range(task.switching, w.g.shape[0]):
         for j in range(lanes.size):
             change = w.g_ahead[i, j] - w.g[i, j]  # exactly 0 where the memory stands still
             noise = 1e-15 * max(abs(w.g[i, j]), abs(w.g_ahead[i, j]))
@@ -47,8 +47,8 @@ def restart(rhs, task, lanes, w, chosen):
     """
     for i in range(task.memory.size):
         for j in range(lanes.size):
-            if chosen[j] and w.e_start[task.corners + i, j] != 0.0:
-                w.x[task.memory[i], j] = w.g[task.corners + i, j]
+            if chosen[j] and w.e_start[task.switching + i, j] != 0.0:
+                w.x[task.memory[i], j] = w.g[task.switching + i, j]
     _refresh(rhs, task, lanes, w, chosen)
     if task.memory.size:
         for _ in range(task.memory.size):  # one that commits may move the next
@@ -68,7 +68,7 @@ def restart(rhs, task, lanes, w, chosen):
     for i in range(w.e.shape[0]):
         for j in range(lanes.size):
             if chosen[j]:
-                w.e[i, j] = w.g[i, j] if i < task.corners else w.e[i, j]
+                w.e[i, j] = w.g[i, j] if i < task.switching else w.e[i, j]
                 w.e_start[i, j] = w.e[i, j]
                 w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
 
@@ -79,8 +79,8 @@ def _commit(task, w, chosen):
     changed = False
     for i in range(task.memory.size):
         for j in range(chosen.size):
-            if chosen[j] and w.x[task.memory[i], j] != w.g[task.corners + i, j]:
-                w.x[task.memory[i], j] = w.g[task.corners + i, j]
+            if chosen[j] and w.x[task.memory[i], j] != w.g[task.switching + i, j]:
+                w.x[task.memory[i], j] = w.g[task.switching + i, j]
                 changed = True
     return changed
 
@@ -129,12 +129,12 @@ def _lock(rhs, task, lanes, w, chosen):
         return
     for j in range(lanes.size):
         for i in range(task.memory.size):
-            if chosen[j] and w.e[task.corners + i, j] != 0.0:
+            if chosen[j] and w.e[task.switching + i, j] != 0.0:
                 w.x[task.memory[i], j] = w.x_ahead[task.memory[i], j]
     _refresh(rhs, task, lanes, w, chosen)
     before = np.zeros(lanes.size)
     for i in range(task.memory.size):
-        row = task.corners + i
+        row = task.switching + i
         for m in range(task.memory.size):
             which[m] = m == i
         for j in range(lanes.size):
@@ -144,7 +144,7 @@ def _lock(rhs, task, lanes, w, chosen):
         for j in range(lanes.size):
             if not carried[j]:
                 after = before[j] + w.e[row, j]
-                w.x[task.memory[i], j] = after if _at_corner(w.g, task.corners, j) else before[j]
+                w.x[task.memory[i], j] = after if _at_corner(w.g, task.switching, j) else before[j]
                 w.e[row, j] = 0.0
         _refresh(rhs, task, lanes, w, chosen)
 
@@ -152,7 +152,7 @@ def _lock(rhs, task, lanes, w, chosen):
 @numba.njit(**INNER)
 def _any_moves(task, w, chosen):
     """Whether a memory of a chosen lane is being carried along: behind a held input none is."""
-    for i in range(task.corners, w.e.shape[0]):
+    for i in range(task.switching, w.e.shape[0]):
         for j in range(chosen.size):
             if chosen[j] and w.e[i, j] != 0.0:
                 return True
@@ -160,9 +160,9 @@ def _any_moves(task, w, chosen):
 
 
 @numba.njit(**INNER)
-def _at_corner(g, corners, j):
+def _at_corner(g, switching, j):
     """Whether a lane's state lies on a corner."""
-    for i in range(corners):  # noqa: SIM110 (no generators in machine code)
+    for i in range(switching):  # noqa: SIM110 (no generators in machine code)
         if g[i, j] == 0.0:
             return True
     return False
@@ -179,7 +179,7 @@ def _carried(rhs, task, lanes, w, chosen, which, carried):
             w.x_ahead[i, j] = w.x[i, j]
     for j in range(lanes.size):
         for i in range(task.memory.size):
-            rate, m = w.e[task.corners + i, j], task.memory[i]
+            rate, m = w.e[task.switching + i, j], task.memory[i]
             if chosen[j] and which[i] and rate != 0.0:
                 far = FAR * (1.0 + abs(w.x[m, j]))
                 w.x[m, j] -= far if rate > 0.0 else -far
@@ -198,7 +198,7 @@ def _unchanged(task, w, j):
     for i in range(w.x.shape[0]):
         if w.dx_ahead[i, j] != w.k[0, i, j]:
             return False
-    for i in range(task.corners, w.g.shape[0]):  # noqa: SIM110
+    for i in range(task.switching, w.g.shape[0]):  # noqa: SIM110
         if w.g_ahead[i, j] != w.g[i, j]:
             return False
     return True

@@ -29,7 +29,7 @@ class Task(NamedTuple):
     times: np.ndarray  # of the samples; inputs are linear in between
     inputs: np.ndarray  # (inputs, times)
     p: np.ndarray  # (rows, lanes): what the right-hand side reads besides its arguments
-    corners: int  # number of switching functions, the first rows of g
+    switching: int  # number of switching functions, the first rows of g
     memory: np.ndarray  # indices of memory states; what they would become follows in g
     rtol: float
     atol: float
@@ -100,7 +100,7 @@ class Work(NamedTuple):
     floor: np.ndarray  # below 0: what is not told from it
     bracket: np.ndarray  # parts below, at and above the least value that is known
     height: np.ndarray  # and the values there
-    e: np.ndarray  # event functions: those of corners, and the rates of memories
+    e: np.ndarray  # event functions: switching functions, and the rates of memories
     e_start: np.ndarray
     e_low: np.ndarray  # at the ends of the bracket in which an event is located
     e_high: np.ndarray
@@ -238,7 +238,7 @@ _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
 _PLACES = np.zeros((1, 1), dtype=np.int64)
 TASK = type_of(  # only the types of these matter
     with_table(
-        Task, times=_LINE, inputs=_GRID, p=_GRID, corners=0, memory=_NONE, rtol=0.0, atol=0.0,
+        Task, times=_LINE, inputs=_GRID, p=_GRID, switching=0, memory=_NONE, rtol=0.0, atol=0.0,
         fixed=0.0, max_steps=0, method=0, pair_order=0.0, stable=0.0, A=_GRID, B=_GRID,
         C=_LINE, E=_LINE, inside=_GRID, kept=_NONE, alone=0,
         ticks=_GRID, which=_PLACES, samples=_NONE,
@@ -320,5 +320,5 @@ def outputs(rhs, out, task, w):
             call_rhs(rhs, w.t, states[m], w.u, task.p, w.dx_ahead, w.g)
             for i in range(task.memory.size):
                 for j in range(w.t.size):
-                    states[m, task.memory[i], j] = w.g[task.corners + i, j]
+                    states[m, task.memory[i], j] = w.g[task.switching + i, j]
         call_out(out, w.t, states[m], w.u, task.p, y[m])

@@ -84,7 +84,7 @@ def _functions(system: Any) -> Iterator[tuple[str, Any]]:
     if system.noutputs != 0 and system.outfcn is not None and not is_delayed(system):
         yield "output", system.outfcn
     if isinstance(system, Block):
-        for name in ("corners", "commit"):
+        for name in ("switching", "commit"):
             if hasattr(system.spec, name):
                 yield name, getattr(system.spec, name)
 

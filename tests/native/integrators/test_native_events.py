@@ -58,7 +58,7 @@ class Located(Kink):
 
     @staticmethod
     @nlctl.equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         return (u[0] - 1.0,)
 
 
@@ -135,7 +135,7 @@ class Relay:
 
     @staticmethod
     @nlctl.equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         return u[0] - p.on, u[0] - p.off
 
 
@@ -152,7 +152,7 @@ class Sign:
 
     @staticmethod
     @nlctl.equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         return (u[0],)
 
 

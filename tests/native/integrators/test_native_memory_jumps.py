@@ -50,7 +50,7 @@ class Jumps:
 
     @staticmethod
     @nlctl.equation
-    def corners(t, x, u, p):
+    def switching(t, x, u, p):
         return t - TIMES[0], t - TIMES[1], t - TIMES[2]
 
 

@@ -1,4 +1,4 @@
-"""What a step may have passed over: corners crossed and crossed back, memories that turned twice.
+"""What steps may pass over: break points crossed and crossed back, memories that turned twice.
 
 Error control sees the states only.  Where a switching function, or what drives a memory, is not a
 state (a dead zone behind a source), a step may grow until both of its ends lie on one side of a
@@ -82,7 +82,7 @@ def _suspected(task, lane, w, j):
         return True  # no such stages
     suspected = False
     for i in range(w.e.shape[0]):
-        if i < task.corners and _is_far(w, i, j):
+        if i < task.switching and _is_far(w, i, j):
             continue
         suspected |= _known(task, lane, w, i, j, row)[0] != _CLEAR
     return suspected
@@ -94,9 +94,9 @@ def _known(task, lane, w, i, j, row):
 
     Of `f`, which is above 0 at both ends of the step: sign times the event function plus offset.
     """
-    if i >= task.corners and w.e_start[i, j] == 0.0:
+    if i >= task.switching and w.e_start[i, j] == 0.0:
         return _standing(task, w, i, j, row)
-    carried = i >= task.corners
+    carried = i >= task.switching
     if carried and row != _DENSE:
         return _may_turn(lane, w, i, j), 0.0
     at, values, newton = task.inside[row], w.values, w.newton
@@ -129,7 +129,7 @@ def _follow(task, lane, w, i, j, at):
 
     Of a memory they are its rate and the polynomial that it is the derivative of.
     """
-    values, newton, carried = w.values, w.newton, i >= task.corners
+    values, newton, carried = w.values, w.newton, i >= task.switching
     sign, offset = _side(task, lane, w, i, j)
     start, end = (w.g_start[i, j], w.g[i, j]) if carried else (w.e_start[i, j], w.e[i, j])
     shift = 0.0 if carried else offset
@@ -152,7 +152,7 @@ def _follow(task, lane, w, i, j, at):
 def _still(task, w, j):
     """Return what a function changes by that stands still: rounding, of memories for instance."""
     largest = 0.0
-    for i in range(task.corners, w.g.shape[0]):
+    for i in range(task.switching, w.g.shape[0]):
         largest = max(largest, abs(w.g[i, j]))
     return 0.01 * task.atol + 1e-14 * largest
 
@@ -214,11 +214,11 @@ def _side(task, lane, w, i, j):
     """
     start, end = w.e_start[i, j], w.e[i, j]
     side = 1.0 if start > 0.0 or (start == 0.0 and w.g_inside[0, i, j] > 0.0) else -1.0
-    if i >= task.corners:
+    if i >= task.switching:
         end = lane.step * w.slope[i, j]
     if side * end >= 0.0:
         return side, 0.0
-    if i < task.corners and w.behind[i, j] != 0.0 and abs(start) <= STARTS_BEHIND * abs(end):
+    if i < task.switching and w.behind[i, j] != 0.0 and abs(start) <= STARTS_BEHIND * abs(end):
         return -side, 2.0 * abs(start)
     return side, -2.0 * side * end
 
@@ -226,7 +226,7 @@ def _side(task, lane, w, i, j):
 @numba.njit(**INNER)
 def _standing(task, w, i, j, row):
     """Whether a memory that stands still at both ends of a step has moved in between, and where."""
-    before = w.x[task.memory[i - task.corners], j]
+    before = w.x[task.memory[i - task.switching], j]
     if w.e[i, j] == 0.0 and w.g[i, j] == before:
         for n in range(3):
             if abs(w.g_inside[n, i, j] - before) > task.atol + task.rtol * abs(before):
@@ -240,15 +240,15 @@ def _go_on(task, lane, w, found, j, first):
     w.sought[j] = -1
     free = task.fixed == 0.0 and lane.tries == 0
     for i in range(first, w.e.shape[0]):
-        if (lane.quiet > 0) if i >= task.corners else _is_far(w, i, j):
+        if (lane.quiet > 0) if i >= task.switching else _is_far(w, i, j):
             continue
         known, x = _known(task, lane, w, i, j, _DENSE)
-        growing = i < task.corners or lane.step > _DOUBLE * lane.last  # a memory's rate has noise
+        growing = i < task.switching or lane.step > _DOUBLE * lane.last  # a memory's rate has noise
         if known == _UNRESOLVED and free and growing:
             shorten(lane, _SHORTER)
             found[j] = AGAIN
             return
-        if known == _SUSPECT and i >= task.corners and w.e_start[i, j] == 0.0:
+        if known == _SUSPECT and i >= task.switching and w.e_start[i, j] == 0.0:
             shorten(lane, x)
             found[j] = AGAIN
             return
@@ -327,7 +327,7 @@ def _evaluated(rhs, task, lanes, w):
     for j in range(lanes.size):
         if w.sought[j] < 0:
             w.part[j] = 0.0
-        carried |= w.sought[j] >= task.corners
+        carried |= w.sought[j] >= task.switching
     scratch = w.g_inside[3]
     events_at_parts(rhs, task, lanes, w, scratch)
     if carried:
@@ -342,6 +342,6 @@ def _evaluated(rhs, task, lanes, w):
             continue
         sign, offset = _side(task, lanes[j], w, i, j)
         event = scratch[i, j]
-        if i >= task.corners:
+        if i >= task.switching:
             event = (w.g_ahead[i, j] - event) / AHEAD
         w.looked[j] = sign * event + offset

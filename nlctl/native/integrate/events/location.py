@@ -1,4 +1,4 @@
-"""Events inside a step: corners, and memories that reverse.
+"""Events inside a step: break points, and memories that reverse.
 
 A switching function that changes its sign marks a corner; a memory reverses where the rate at
 which it would be carried along changes its sign or becomes zero.  In both cases the step is
@@ -35,26 +35,26 @@ def triggered(start, end, is_memory, behind):
 
 
 @numba.njit(**INNER)
-def first_root(lane, corners, e_start, e_low, e_high, behind, j):
+def first_root(lane, switching, e_start, e_low, e_high, behind, j):
     """Return where the first event between the lengths low and high lies, -1 if there is none.
 
     And whether it is a memory's.
     """
     first, is_memory = -1.0, False
     for i in range(e_start.shape[0]):
-        if triggered(e_start[i, j], e_high[i, j], i >= corners, behind[i, j] != 0.0):
+        if triggered(e_start[i, j], e_high[i, j], i >= switching, behind[i, j] != 0.0):
             low, high = e_low[i, j], e_high[i, j]
             if not low * high < 0.0:
                 high = -low  # a memory that would stand still says no more than that: halve
             part = 0.5 if low == high else low / (low - high)
             root = lane.low + part * (lane.high - lane.low)
             if first < 0.0 or root < first:
-                first, is_memory = root, i >= corners
+                first, is_memory = root, i >= switching
     return first, is_memory
 
 
 @numba.njit(**INNER)
-def locate(lane, corners, rtol, e_start, e_low, e_high, e, behind, j):
+def locate(lane, switching, rtol, e_start, e_low, e_high, e, behind, j):
     """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT.
 
     With AGAIN, ``lane.step`` is the next length to try.
@@ -63,7 +63,7 @@ def locate(lane, corners, rtol, e_start, e_low, e_high, e, behind, j):
         lane.low, lane.high = 0.0, lane.step
         for i in range(e.shape[0]):
             e_low[i, j], e_high[i, j] = e_start[i, j], e[i, j]
-    root, memory = _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j)
+    root, memory = _narrowed(lane, switching, e_start, e_low, e_high, e, behind, j)
     if root < 0.0:
         return CLEAR
     lane.tries += 1
@@ -86,12 +86,12 @@ def locate(lane, corners, rtol, e_start, e_low, e_high, e, behind, j):
 
 
 @numba.njit(**INNER)
-def _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j):
+def _narrowed(lane, switching, e_start, e_low, e_high, e, behind, j):
     """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
     before = lane.high
     if lane.tries > 0:
         lane.high = lane.step
-        inside = first_root(lane, corners, e_start, e_low, e, behind, j)[0] >= 0.0
+        inside = first_root(lane, switching, e_start, e_low, e, behind, j)[0] >= 0.0
         if not inside:
             lane.low, lane.high = lane.step, before
             lane.same_side = min(lane.same_side, 0) - 1
@@ -105,7 +105,7 @@ def _narrowed(lane, corners, e_start, e_low, e_high, e, behind, j):
                 e_low[i, j], e_high[i, j] = e[i, j], e_high[i, j] * weight
     else:
         lane.same_side = 0
-    return first_root(lane, corners, e_start, e_low, e_high, behind, j)
+    return first_root(lane, switching, e_start, e_low, e_high, behind, j)
 
 
 @numba.njit(**INNER)

@@ -43,7 +43,7 @@ def look_before(rhs, task, lanes, w, found):
     for j in range(lanes.size):
         far = w.sought[j] > 0
         ahead = 0.0 if far else 1.0 + _until_corner(task, w, nearer, j)
-        for i in range(task.corners, w.g.shape[0]):
+        for i in range(task.switching, w.g.shape[0]):
             if wanted[j] and w.e_start[i, j] != 0.0:
                 change = 0.0 if far else nearer[i, j] - w.g_ahead[i, j]
                 w.g[i, j] = w.g_ahead[i, j] + ahead * change
@@ -74,7 +74,7 @@ def _halve(rhs, task, lanes, w, back):
 def _until_corner(task, w, nearer, j):
     """Return how far it is to the first corner, in distances between the last two looks."""
     first = np.inf
-    for i in range(task.corners):
+    for i in range(task.switching):
         if w.e_start[i, j] * w.e[i, j] < 0.0:
             first = min(first, nearer[i, j] / (w.g_ahead[i, j] - nearer[i, j]))
     return min(max(first, 0.0), 1.0)
@@ -83,7 +83,7 @@ def _until_corner(task, w, nearer, j):
 @numba.njit(**INNER)
 def _crosses(task, w, e, j):
     """Whether a switching function has another sign than at the start of a step."""
-    for i in range(task.corners):  # noqa: SIM110 (no generators in machine code)
+    for i in range(task.switching):  # noqa: SIM110 (no generators in machine code)
         if w.e_start[i, j] * e[i, j] < 0.0:
             return True
     return False
