@@ -207,7 +207,27 @@ class Block(OwnParameters):
             set_parameters(self, None)
 
     def answer(self, t: float, x: Any, u: Any) -> Any:
-        """Return its outputs; of transport delays and ideal relays what `past` says, see there."""
+        """Return its outputs; of transport delays and ideal relays what `past` says, see there.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        x : array_like of shape (n,)
+            States.
+        u : array_like of shape (m,)
+            Inputs.
+
+        Returns
+        -------
+        ndarray of shape (k,)
+            The outputs.
+
+        Raises
+        ------
+        UsageError
+            If it is a transport delay or an ideal relay, which python-control would run wrongly.
+        """
         if not (is_delayed(self) or slides(self)):
             return super().answer(t, x, u)
         line = (_PAST.get() or {}).get(id(self))
@@ -228,7 +248,18 @@ class Block(OwnParameters):
         return own
 
     def taken(self, params: Mapping[str, Any]) -> Any:
-        """Return what equations get as `p`; python-control asks for it before a run."""
+        """Return what equations get as `p`; python-control asks for it before a run.
+
+        Parameters
+        ----------
+        params : mapping
+            Overrides of this run, by the names of the block's parameters.
+
+        Returns
+        -------
+        object
+            What the equations read as `p`: a number or an array under each name.
+        """
         before, self.current_spec = self.current_spec, self._resolved(params)
         if self.current_spec is before:
             return current_parameters(self)

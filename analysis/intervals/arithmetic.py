@@ -104,7 +104,20 @@ class Ball(NumPyFunctions):
         return f"Ball({self.value}, {self.gradient})"
 
     def chain(self, value: arb, slope: arb) -> Ball:
-        """Return `value` with the derivatives of self times `slope`."""
+        """Return `value` with the derivatives of self times `slope`.
+
+        Parameters
+        ----------
+        value : arb
+            Enclosure of phi of the ball.
+        slope : arb
+            Enclosure of the derivative of phi.
+
+        Returns
+        -------
+        Ball
+            With as many derivatives.
+        """
         return Ball(value, tuple(slope * g for g in self.gradient))
 
     def _joined(self, value: arb, by_self: Any, other: Ball, by_other: Any) -> Ball:
@@ -173,11 +186,33 @@ class Ball(NumPyFunctions):
         return self.maximum(-self)
 
     def minimum(self, other: Any) -> Ball:
-        """Smaller one; where balls overlap, the derivative is one or the other."""
+        """Smaller one; where balls overlap, the derivative is one or the other.
+
+        Parameters
+        ----------
+        other : Ball or float
+            What it is compared with.
+
+        Returns
+        -------
+        Ball
+            Encloses both where they overlap.
+        """
         return self._extreme(as_ball(other), arb.min)
 
     def maximum(self, other: Any) -> Ball:
-        """Larger one; where balls overlap, the derivative is one or the other."""
+        """Larger one; where balls overlap, the derivative is one or the other.
+
+        Parameters
+        ----------
+        other : Ball or float
+            What it is compared with.
+
+        Returns
+        -------
+        Ball
+            Encloses both where they overlap.
+        """
         return self._extreme(as_ball(other), arb.max)
 
     def _extreme(self, other: Ball, choose: Callable[[arb, arb], arb]) -> Ball:
@@ -193,7 +228,23 @@ class Ball(NumPyFunctions):
         return Ball(low.union(high), gradient)
 
     def apply(self, name: str) -> Ball:
-        """Return phi of the ball for the NumPy function of that name."""
+        """Return phi of the ball for the NumPy function of that name.
+
+        Parameters
+        ----------
+        name : str
+            A function of the table that has an enclosure, such as ``sin``.
+
+        Returns
+        -------
+        Ball
+            With the derivatives by the chain rule.
+
+        Raises
+        ------
+        Undecided
+            If the function may jump within the ball.
+        """
         row = FUNCTIONS[name]
         assert row.enclosure is not None
         value = row.enclosure(self.value)

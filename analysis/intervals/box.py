@@ -49,7 +49,18 @@ class Box:
 
     @classmethod
     def of(cls, **sides: tuple[float, float]) -> Box:
-        """Make a box of its sides, ``Box.of(x1=(-1, 1), v=(-12, 6))``."""
+        """Make a box of its sides, ``Box.of(x1=(-1, 1), v=(-12, 6))``.
+
+        Parameters
+        ----------
+        **sides : (float, float)
+            Lower and upper end of each side, by name.
+
+        Returns
+        -------
+        Box
+            In the order given.
+        """
         low, high = (tuple(float(ends[i]) for ends in sides.values()) for i in (0, 1))
         return cls(names=tuple(sides), low=low, high=high)
 
@@ -70,12 +81,36 @@ class Box:
         return self.low[i], self.high[i]
 
     def only(self, *names: str) -> Box:
-        """Return the box of some of the sides, in the order given."""
+        """Return the box of some of the sides, in the order given.
+
+        Parameters
+        ----------
+        *names : str
+            Sides to keep.
+
+        Returns
+        -------
+        Box
+            As many sides as names.
+        """
         low, high = (tuple(self[name][i] for name in names) for i in (0, 1))
         return dataclasses.replace(self, names=names, low=low, high=high)
 
     def times(self, name: str, low: float, high: float) -> Box:
-        """Return the product of the box with one more side."""
+        """Return the product of the box with one more side.
+
+        Parameters
+        ----------
+        name : str
+            Name of the new side.
+        low, high : float
+            Its ends.
+
+        Returns
+        -------
+        Box
+            The new side is the last.
+        """
         names = (*self.names, name)
         return dataclasses.replace(self, names=names, low=(*self.low, low), high=(*self.high, high))
 

@@ -126,7 +126,13 @@ class Conservatism:
         return self.C_0 / self.max_r
 
     def table(self) -> pd.DataFrame:
-        """Return the terms of C_0^2 / 2, indexed by term."""
+        """Return the terms of C_0^2 / 2, indexed by term.
+
+        Returns
+        -------
+        DataFrame
+            One row for each term.
+        """
         import pandas as pd
 
         return pd.DataFrame([dataclasses.asdict(s) for s in self.shares]).set_index("term")

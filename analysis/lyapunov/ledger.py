@@ -98,13 +98,25 @@ class Ledger:
         raise unknown("line", key, [line.key for line in self.lines], "of the ledger")
 
     def table(self) -> pd.DataFrame:
-        """Return the lines as a table, indexed by key."""
+        """Return the lines as a table, indexed by key.
+
+        Returns
+        -------
+        DataFrame
+            One row each, the fields of `Line` as columns.
+        """
         import pandas as pd
 
         return pd.DataFrame([dataclasses.asdict(line) for line in self.lines]).set_index("key")
 
     def to_json(self) -> str:
-        """Return the ledger as JSON; numbers that are not finite become null."""
+        """Return the ledger as JSON; numbers that are not finite become null.
+
+        Returns
+        -------
+        str
+            With the verdict, the constants and all lines.
+        """
         return json.dumps(
             as_json(
                 {

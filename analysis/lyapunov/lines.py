@@ -104,7 +104,18 @@ class Line:
     runs: int = 1
 
     def worse_of(self, other: Line | None) -> Line:
-        """Return the line with the worse status, or the smaller least margin."""
+        """Return the line with the worse status, or the smaller least margin.
+
+        Parameters
+        ----------
+        other : Line or None
+            The same line of another member, if there is one.
+
+        Returns
+        -------
+        Line
+            One of the two.
+        """
         if other is None or self._order < other._order:
             return self
         return other
@@ -114,7 +125,18 @@ class Line:
         return RANK.get(self.status, 5), self.least if not np.isnan(self.least) else np.inf
 
     def text(self, width: int) -> str:
-        """Return the line for a plain table."""
+        """Return the line for a plain table.
+
+        Parameters
+        ----------
+        width : int
+            Width of the column of keys.
+
+        Returns
+        -------
+        str
+            One line without its end.
+        """
         least = "" if np.isnan(self.least) else f"{self.least:.5g}"
         where = "" if np.isnan(self.time) else f"at {self.time:.5g} s"
         since = "" if np.isnan(self.first) else f" (first at {self.first:.5g} s)"

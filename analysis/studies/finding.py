@@ -67,6 +67,12 @@ class Finding:
         return f"{self.answer} (needs {self.needs})" if self.needs else self.answer
 
     def plain(self) -> dict[str, Any]:
-        """Return everything but the tables, as JSON can hold it."""
+        """Return everything but the tables, as JSON can hold it.
+
+        Returns
+        -------
+        dict
+            Tables by their names only.
+        """
         content = {key: value for key, value in vars(self).items() if key != "tables"}
         return as_json(content) | {"tables": sorted(self.tables)}

@@ -196,7 +196,18 @@ class Ground:
         return self.rows.design, column(self.rows, "spec")
 
     def space(self, names: Sequence[str] = ()) -> Space:
-        """Return the space, or the part of it with these quantities, named as in the file."""
+        """Return the space, or the part of it with these quantities, named as in the file.
+
+        Parameters
+        ----------
+        names : sequence of str, optional
+            Quantities; by default the whole space.
+
+        Returns
+        -------
+        Space
+            Without choices where names are given.
+        """
         whole = self.prepared.experiment.space
         if not names:
             return whole
@@ -366,7 +377,20 @@ class Kind:
                 )
 
     def planned(self, asked: Any, setup: Setup) -> int:
-        """Return how many simulations an analysis makes itself, at most."""
+        """Return how many simulations an analysis makes itself, at most.
+
+        Parameters
+        ----------
+        asked : object
+            The analysis as the study file asks for it.
+        setup : Setup
+            What it will run on.
+
+        Returns
+        -------
+        int
+            0 where it only reads what was run.
+        """
         if self.design is not None:
             return self.design(asked, setup.experiment.space, 0).size
         return self.runs(asked, setup)

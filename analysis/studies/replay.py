@@ -63,7 +63,13 @@ class Replay:
     versions: str = ""
 
     def plain(self) -> dict[str, Any]:
-        """Return the two rows and whether they are the same, as JSON can hold them."""
+        """Return the two rows and whether they are the same, as JSON can hold them.
+
+        Returns
+        -------
+        dict
+            Numbers that are not finite are text.
+        """
         content = {key: getattr(self, key) for key in ("row", "stored", "again", "differences")}
         return as_json({"same": not self.differences, **content})
 

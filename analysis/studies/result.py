@@ -135,7 +135,13 @@ class Result:
         return found[key]
 
     def plain(self) -> dict[str, Any]:
-        """Return everything but the tables, as JSON can hold it."""
+        """Return everything but the tables, as JSON can hold it.
+
+        Returns
+        -------
+        dict
+            Title, verdict, notes and findings.
+        """
         tables = {
             name: getattr(self, name).reset_index().to_dict("records")
             for name in ("quantities", "requirements", "metrics")

@@ -64,6 +64,16 @@ class TransportDelay:
     def earlier(self, t: float) -> np.ndarray:
         """Return the signals at a time before the run.
 
+        Parameters
+        ----------
+        t : float
+            Time before the run (s).
+
+        Returns
+        -------
+        ndarray of shape (k,)
+            One number for each signal.
+
         Raises
         ------
         ParameterError

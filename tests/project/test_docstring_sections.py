@@ -24,7 +24,8 @@ WITH_METHODS = [*OFFERED, *methods()]
 def test_arguments_have_a_type_and_a_description(name, made):
     """In order: ``name : type``, optional where there is a default, and below it what it is."""
     known, told = dict(inspect.signature(made).parameters), []
-    known.pop("self", None)
+    if "." in made.__qualname__:
+        known = {key: value for key, value in known.items() if key not in ("self", "cls")}
     for head, text in entries(made, "Parameters"):
         of, _, kind = head.partition(" : ")
         these = [one.strip(" *") for one in of.split(",")]

@@ -60,9 +60,20 @@ def entries(made, title):
 
 
 def methods():
-    """The methods of classes of the reference that have a section of parameters."""
+    """The public methods of classes of the reference.
+
+    What `nlctl.Spec` describes is left out, what a block's own equations call, without types, and
+    `Sampled`, which `nlctl.sampled` makes: only the engine calls its methods.
+    """
+    heads = [head.partition(" : ")[0] for head, _ in entries(nlctl.Spec, "Attributes")]
+    contract = {name for head in heads for name in head.split(", ")}
     for home, name in documented_names():
         made = getattr(importlib.import_module(home), name)
-        for key, method in vars(made).items() if inspect.isclass(made) else ():
-            if inspect.isfunction(method) and entries(method, "Parameters"):
+        if not inspect.isclass(made) or made is nlctl.Sampled:
+            continue
+        for key, method in vars(made).items():
+            method = getattr(method, "__func__", method)  # of a class method, say
+            if key.startswith("_") or key in contract or getattr(method, "__name__", "") != key:
+                continue
+            if inspect.isfunction(method) and method.__annotations__ and inspect.getdoc(method):
                 yield f"{home}.{name}.{key}", method

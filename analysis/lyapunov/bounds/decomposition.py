@@ -92,11 +92,33 @@ class Decomposition:
         return float(np.maximum(abs(self.eps_low), abs(self.eps_high)))
 
     def eps_u(self, u: Any, v: Any) -> Any:
-        """Return eps_u = v - k u for input u and output v."""
+        """Return eps_u = v - k u for input u and output v.
+
+        Parameters
+        ----------
+        u, v : array_like of shape (m,)
+            Input and output of the actuator.
+
+        Returns
+        -------
+        ndarray of shape (m,)
+            In the unit of v.
+        """
         return v - self.part(u, v)
 
     def gain(self, u: Any, v: Any) -> Any:
-        """Return k for input u and output v; k_1 at u = 0, where it has no effect."""
+        """Return k for input u and output v; k_1 at u = 0, where it has no effect.
+
+        Parameters
+        ----------
+        u, v : array_like of shape (m,)
+            Input and output of the actuator.
+
+        Returns
+        -------
+        ndarray of shape (m,)
+            Between `k_1` and `k_2`.
+        """
         u = np.asarray(u, dtype=float)
         k = self.part(u, v) / np.where(u == 0, 1.0, u)
         return np.where(u == 0, self.k_1, k)

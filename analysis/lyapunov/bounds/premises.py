@@ -69,7 +69,20 @@ class Premises:
         return alpha_1(self.gains)
 
     def C_0(self, V_0: float, Q: float) -> float:  # noqa: N802
-        """C_0 of (36)."""
+        """C_0 of (36).
+
+        Parameters
+        ----------
+        V_0 : float
+            V at the start.
+        Q : float
+            Supremum of I(t), (33).
+
+        Returns
+        -------
+        float
+            Bound of |r|; infinite where alpha_1 = 0.
+        """
         return bound(self.alpha_0, self.alpha_1, V_0, Q)
 
 

@@ -97,15 +97,43 @@ class Constants:
         raise unknown("constant", symbol, [entry.symbol for entry in self.entries])
 
     def C_0(self, Q: float = 0.0) -> float:  # noqa: N802
-        """Return C_0 of (36) for Q = sup I(t), (33); infinite where alpha_1 = 0."""
+        """Return C_0 of (36) for Q = sup I(t), (33); infinite where alpha_1 = 0.
+
+        Parameters
+        ----------
+        Q : float, optional
+            Supremum of I(t), from 0 on.
+
+        Returns
+        -------
+        float
+            In the unit of V.
+        """
         return bound(self["alpha_0"], self["alpha_1"], self["V(0)"], Q)
 
     def ultimate(self, limsup_I: float = 0.0) -> float:
-        """Return the bound of limsup |r| that (34) gives for limsup I(t)."""
+        """Return the bound of limsup |r| that (34) gives for limsup I(t).
+
+        Parameters
+        ----------
+        limsup_I : float, optional
+            Limit superior of I(t).
+
+        Returns
+        -------
+        float
+            In the unit of r.
+        """
         return bound(self["alpha_0"], self["alpha_1"], 0.0, limsup_I)
 
     def table(self) -> pd.DataFrame:
-        """Return the constants as a table with one row each, indexed by symbol."""
+        """Return the constants as a table with one row each, indexed by symbol.
+
+        Returns
+        -------
+        DataFrame
+            Values with where they come from.
+        """
         import pandas as pd
 
         return pd.DataFrame([vars(entry) for entry in self.entries]).set_index("symbol")

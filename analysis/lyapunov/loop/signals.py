@@ -41,7 +41,18 @@ class Signals:
         return self.values[name]
 
     def vector(self, name: str) -> np.ndarray:
-        """Return name[0], name[1], ... as the columns of an array of shape (m, l)."""
+        """Return name[0], name[1], ... as the columns of an array of shape (m, l).
+
+        Parameters
+        ----------
+        name : str
+            Name without the index, such as ``W_hat``.
+
+        Returns
+        -------
+        ndarray of shape (m, l)
+            A row for each sample; l is 0 where there is no such signal.
+        """
         count = 0
         while f"{name}[{count}]" in self.values:
             count += 1
@@ -49,7 +60,18 @@ class Signals:
         return np.column_stack(columns) if columns else np.zeros((self.t.size, 0))
 
     def at(self, time: float) -> dict[str, float]:
-        """Return x, r, u, v, zeta and delta_hat at the sample nearest to a time."""
+        """Return x, r, u, v, zeta and delta_hat at the sample nearest to a time.
+
+        Parameters
+        ----------
+        time : float
+            Time (s).
+
+        Returns
+        -------
+        dict
+            Values by name; what the loop lacks is left out.
+        """
         i = int(np.argmin(np.abs(self.t - time)))
         names = [n for n in self.values if n[:1] == "x" and n[1:].isdigit()]
         shown = [*names, "r", "u", "v", "zeta", "delta_hat"]

@@ -73,7 +73,20 @@ class BurstForecast:
     meaning = "time at which zeta is forecast to leave its lobe"
 
     def function(self, t: np.ndarray, zeta: np.ndarray, r: np.ndarray, u: np.ndarray) -> float:
-        """Return the forecast; NaN where zeta was in no lobe for five windows."""
+        """Return the forecast; NaN where zeta was in no lobe for five windows.
+
+        Parameters
+        ----------
+        t : ndarray of shape (m,)
+            Times (s).
+        zeta, r, u : ndarray of shape (m,)
+            Nussbaum argument, filtered error and control input.
+
+        Returns
+        -------
+        float
+            Time of the burst (s).
+        """
         lobe = lobe_around(float(zeta[0]), self.N)
         beyond = np.flatnonzero(zeta >= lobe.high)
         if beyond.size:

@@ -79,7 +79,20 @@ class Requirement:
         return signals_named(self.formula)
 
     def function(self, t: np.ndarray, *samples: np.ndarray) -> float:
-        """Return the margin, with the samples in the order of `signals`."""
+        """Return the margin, with the samples in the order of `signals`.
+
+        Parameters
+        ----------
+        t : ndarray of shape (m,)
+            Times (s).
+        *samples : ndarray of shape (m,)
+            Samples of each signal.
+
+        Returns
+        -------
+        float
+            Positive where the requirement holds.
+        """
         return margin(self, t, dict(zip(self.signals, samples, strict=True)))
 
 

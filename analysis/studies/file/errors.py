@@ -55,7 +55,13 @@ class Problem:
     settings: tuple[str, ...] = ()
 
     def plain(self) -> dict[str, Any]:
-        """Return it as JSON can hold it."""
+        """Return it as JSON can hold it.
+
+        Returns
+        -------
+        dict
+            Place, its text, line, message and settings.
+        """
         place = list(self.place)
         return {"place": place, "text": place_text(self.place), "line": self.line} | {
             "message": self.message,
