@@ -10,6 +10,7 @@ from .backlash import Backlash
 from .cascade import cascade
 from .dynamic import Lag, RateLimiter, SecondOrderLag
 from .friction import BoucWen, Coulomb, Dahl, LuGre, StickSlip, Stribeck
+from .generalised_plays import GeneralisedPrandtlIshlinskii
 from .inverses import BacklashInverse, DeadZoneInverse, PrandtlIshlinskiiInverse
 from .prandtl_ishlinskii import OneSidedDeadZones, PrandtlIshlinskii, Stop
 from .quantiser import Quantiser
@@ -26,6 +27,7 @@ __all__ = [
     "DeadZone",
     "DeadZoneInverse",
     "Gain",
+    "GeneralisedPrandtlIshlinskii",
     "Lag",
     "LuGre",
     "OneSidedDeadZones",

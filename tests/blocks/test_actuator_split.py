@@ -20,7 +20,10 @@ SPLIT = {
     "PrandtlIshlinskiiInverse", "Quantiser",
 }  # fmt: skip
 RATED = {"BacklashInverse"}
-BOUNDED = {"AsymmetricSaturation", "Preisach", "Relay", "Saturation", "Stop"}
+BOUNDED = {
+    "AsymmetricSaturation", "GeneralisedPrandtlIshlinskii", "Preisach", "Relay", "Saturation",
+    "Stop",
+}  # fmt: skip
 LATE = {"Lag", "RateLimiter", "SecondOrderLag"}
 FORCES = {"BoucWen", "Coulomb", "Dahl", "LuGre", "StickSlip", "Stribeck"}
 WHY = [

@@ -42,6 +42,18 @@ def sums_of_plays(draw):
 
 
 @st.composite
+def generalised_sums(draw):
+    """Envelopes that may cross, and plays without a gap of their own, are among them."""
+    envelope = st.tuples(positive, positive, inputs, inputs)
+    r = np.cumsum([draw(st.sampled_from((0.0, 0.3))), *draw(st.tuples(*[positive] * 3))])
+    w = draw(st.lists(positive, min_size=4, max_size=4))
+    v0 = draw(st.lists(inputs, min_size=4, max_size=4))
+    return nlctl.GeneralisedPrandtlIshlinskii(
+        rising=draw(envelope), falling=draw(envelope), w=w, r=r, v0=tuple(v0)
+    )
+
+
+@st.composite
 def relays(draw):
     off = draw(st.floats(-1, 1))
     return nlctl.Relay(off=off, on=off + draw(positive), height=draw(positive), v0=draw(signs))
@@ -58,6 +70,7 @@ EVERY = {
     "play": backlashes(),
     "stop": stops(),
     "Prandtl-Ishlinskii": sums_of_plays(),
+    "generalised": generalised_sums(),
     "relay": relays(),
     "Preisach": relay_sums(),
 }
@@ -66,6 +79,12 @@ every_kind = pytest.mark.parametrize("kind", EVERY)
 
 def by_clipping(u, memory, low, high):
     return np.clip(memory, u - high, u - low)
+
+
+def by_envelopes(u, memory, spec):
+    (a, b, c, d), (e, f, g, h) = spec.rising, spec.falling
+    ends = a * np.tanh(b * u + c) + d - spec.r, e * np.tanh(f * u + g) + h + spec.r
+    return np.clip(memory, np.minimum(*ends), np.maximum(*ends))
 
 
 def by_switching(u, sides, on, off):
@@ -85,6 +104,9 @@ def operator(spec, path):
         elif isinstance(spec, nlctl.PrandtlIshlinskii):
             memory = by_clipping(u, memory, -np.array(spec.r), np.array(spec.r))
             out.append(spec.w_0 * u + np.dot(spec.w, memory))
+        elif isinstance(spec, nlctl.GeneralisedPrandtlIshlinskii):
+            memory = by_envelopes(u, memory, spec)
+            out.append(np.dot(spec.w, memory))
         elif isinstance(spec, nlctl.Relay):
             memory = by_switching(u, memory, spec.on, spec.off)
             out.append(spec.height * memory[0])
@@ -183,7 +205,7 @@ class TestEveryOperator:
         """For every first input and every memory: in the band of that input."""
         spec, u = data.draw(EVERY[kind]), data.draw(inputs)
         first = along(spec, [u, u])[0]
-        if kind in ("play", "Prandtl-Ishlinskii"):
+        if kind in ("play", "Prandtl-Ishlinskii", "generalised"):
             low, high = spec.band(0.0, u, equation_arguments(spec))
             assert low - 1e-12 <= first <= high + 1e-12
         elif kind == "stop":
@@ -294,6 +316,49 @@ def test_a_sum_of_plays_is_the_sum_of_plays():
     np.testing.assert_allclose(stop + along(plays[0], path), path, atol=1e-13)
 
 
+def three_plays(path):
+    """Return the outputs of three plays and the input itself, at turning points."""
+    spec = nlctl.PrandtlIshlinskii(w_0=0.5, w=(0.2, 0.2, 0.1), r=(0.2, 0.4, 0.6))
+    made = compiled(nlctl.PrandtlIshlinskii, (("w", spec.w), ("r", spec.r)))
+    path = np.asarray(path, dtype=float)
+    times = np.arange(float(path.size))
+    return nlctl.input_output_response(made, times, path, params=values(spec)).outputs
+
+
+class TestGeneralisedPlays:
+    """With the default weights and thresholds: those of `three_plays`, and a play without gap."""
+
+    @given(path=paths)
+    @settings(max_examples=20)
+    def test_with_equal_envelopes_it_is_a_sum_of_plays_behind_a_characteristic(self, path):
+        """A play of half gap 0 is that characteristic itself."""
+        envelope = (2.0, 0.5, 0.3, -0.1)
+        made = nlctl.GeneralisedPrandtlIshlinskii(rising=envelope, falling=envelope)
+        gamma = 2.0 * np.tanh(0.5 * np.array(path) + 0.3) - 0.1
+        np.testing.assert_allclose(along(made, path), three_plays(gamma), atol=1e-13)
+
+    def test_nearly_straight_envelopes_make_the_plain_operator(self):
+        """tanh(s u) / s tends to u with the square of s."""
+        path = np.random.default_rng(6).uniform(-2, 2, 40)
+        wanted, apart = three_plays(path), []
+        for s in (0.04, 0.02, 0.01):
+            straight = (1 / s, s, 0.0, 0.0)
+            made = nlctl.GeneralisedPrandtlIshlinskii(rising=straight, falling=straight)
+            apart.append(np.abs(along(made, path) - wanted).max())
+        np.testing.assert_allclose(np.log2(apart[:-1]) - np.log2(apart[1:]), 2.0, atol=0.05)
+
+    @given(c=st.floats(0.1, 1.5), height=positive)
+    @settings(max_examples=20)
+    def test_the_area_between_saturations_that_are_apart_by_2_c(self, c, height):
+        """The integral of h (tanh(u + c) - tanh(u - c)) over all u is 4 c h."""
+        one = compiled(nlctl.GeneralisedPrandtlIshlinskii, (("w", (1.0,)), ("r", (0.0,))))
+        ends = {"rising": (height, 1.0, -c, 0.0), "falling": (height, 1.0, c, 0.0)}
+        params = {f"actuator.{name}": envelope for name, envelope in ends.items()}
+        u = dense([20.0, -20.0, 20.0], 4000)
+        run = nlctl.input_output_response(one, np.arange(float(u.size)), u, params=params)
+        assert -integral(run.outputs, u) == pytest.approx(4 * c * height, rel=1e-4)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", EVERY)
 def test_in_python_control_the_memories_relax_onto_the_operator(kind):
@@ -302,6 +367,7 @@ def test_in_python_control_the_memories_relax_onto_the_operator(kind):
         "play": nlctl.Backlash(rate=1e4),
         "stop": nlctl.Stop(rate=1e4),
         "Prandtl-Ishlinskii": nlctl.PrandtlIshlinskii(rate=1e4),
+        "generalised": nlctl.GeneralisedPrandtlIshlinskii(rate=1e4),
         "relay": nlctl.Relay(rate=1e4),
         "Preisach": nlctl.Preisach(rate=1e4),
     }[kind]
@@ -323,6 +389,15 @@ def test_in_python_control_the_memories_relax_onto_the_operator(kind):
         (lambda: nlctl.PrandtlIshlinskii(r=(0.2, 0.3)), "got 4 weights w and 2 thresholds r"),
         (lambda: nlctl.PrandtlIshlinskii(w=(-0.3, -0.4, 0, 0)), r"w_0 \+ w\[0\] .* > 0"),
         (lambda: nlctl.PrandtlIshlinskii(v0=(0.0, 1.0)), "needs v0 to be one number or 4, got 2"),
+        (
+            lambda: nlctl.GeneralisedPrandtlIshlinskii(rising=(1.0, -1.0, 0.0, 0.0)),
+            "needs rising = .* a_1 > 0, so that the envelope increases, got",
+        ),
+        (
+            lambda: nlctl.GeneralisedPrandtlIshlinskii(falling=(1.0, 1.0, 0.0)),
+            r"needs falling = \(a_0, a_1, a_2, a_3\)",
+        ),
+        (lambda: nlctl.GeneralisedPrandtlIshlinskii(r=(0.0,)), "got 4 weights w and 1 threshold r"),
         (lambda: nlctl.Relay(on=-1.0), "Relay needs off < on, got -1 and -1"),
         (lambda: nlctl.Relay(v0=0.0), "Relay needs v0 of 1 and -1 only, got 0"),
         (lambda: nlctl.Relay(v0=(1.0, 1.0)), "Relay needs a number for v0"),
@@ -337,7 +412,7 @@ def test_what_makes_no_operator_is_refused(make, told):
         make()
 
 
-@pytest.mark.parametrize("kind", ["play", "stop", "Prandtl-Ishlinskii"])
+@pytest.mark.parametrize("kind", ["play", "stop", "Prandtl-Ishlinskii", "generalised"])
 @given(data=st.data())
 def test_in_contact_the_switching_function_is_exactly_zero(kind, data):
     """Where the memory was carried to.
@@ -370,7 +445,8 @@ def test_members_of_an_ensemble_are_single_runs(kind):
     """Memories that start elsewhere, side by side in lanes; sums add up in another order."""
     record = {
         "play": nlctl.Backlash, "stop": nlctl.Stop, "Prandtl-Ishlinskii": nlctl.PrandtlIshlinskii,
-        "relay": nlctl.Relay, "Preisach": nlctl.Preisach,
+        "generalised": nlctl.GeneralisedPrandtlIshlinskii, "relay": nlctl.Relay,
+        "Preisach": nlctl.Preisach,
     }[kind]  # fmt: skip
     rng = np.random.default_rng(8)
     path, memories = rng.normal(size=20), np.sign(rng.normal(size=(11, len(record().states))))
