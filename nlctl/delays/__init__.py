@@ -1,7 +1,8 @@
 """Transport delays: signals that arrive later than they were sent.
 
-`transport` is the block, and `lines` finds those of a diagram.  What runs keep of the signals is in
-`nlctl.native.histories` and `nlctl.responses.delayed`.
+`transport` is the block, `variation` how its delay varies in time, as polynomials by `pieces`, and
+`lines` finds those of a diagram.  What runs keep of the signals is in `nlctl.native.histories` and
+`nlctl.responses.delayed`.
 """
 
 from .transport import TransportDelay

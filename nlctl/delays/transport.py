@@ -17,7 +17,10 @@ from ..wording import counted
 class TransportDelay:
     """Transport delay (dead time) of signals.
 
-        y_i(t) = u_i(t - delay)
+        y_i(t) = u_i(t - delay - varying(t))
+
+    A delay that varies is continuous and grows by less than 1 s per second, so that signals arrive
+    in the order in which they were sent: what a run sees of it is checked before the run.
 
     A run knows its signals from its first time t_0 on; earlier they are `before`, or what
     `history` says.  The delay breaks algebraic loops.  It has no finite state: to linearize, put
@@ -27,6 +30,9 @@ class TransportDelay:
     ----------
     inputs, outputs : tuple of str
         Names of the signals before and after, pairwise.
+    varying : callable, optional
+        ``varying(t)`` in s, 0 by default: what the delay is longer at time t.  It is called in
+        Python, before the run.
     history : callable, optional
         ``history(t)`` for t <= t_0 instead of `before`: a number, or one for each signal.  It is
         called in Python, before the run.
@@ -46,6 +52,7 @@ class TransportDelay:
     outputs: tuple[str, ...] = ("y",)
     delay: float = param(0.1, unit="s", meaning="time from input to output", above=0, symbol="tau")
     before: float = param(0.0, unit="1", meaning="signals before the run")
+    varying: Callable[[float], float] | None = None
     history: Callable[[float], Any] | None = None
 
     states = ()
@@ -53,13 +60,52 @@ class TransportDelay:
     delayed = True
 
     def check(self) -> None:
-        """Signals come in pairs; a history is a function."""
+        """Signals come in pairs; a history and a variation are functions."""
         pairs("TransportDelay", self.inputs, self.outputs)
+        if self.varying is not None and not callable(self.varying):
+            raise ParameterError(
+                f"TransportDelay needs a function of time for varying, got {self.varying!r}: a "
+                "constant belongs to delay"
+            )
         if self.history is not None and not callable(self.history):
             raise ParameterError(
                 "TransportDelay needs a function of time for history, got "
                 f"{self.history!r}: a constant is called before"
             )
+
+    def varied(self, t: float) -> float:
+        """Return what the delay is longer at a time.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+
+        Returns
+        -------
+        float
+            In s.
+
+        Raises
+        ------
+        ParameterError
+            If `varying` does not return a finite number.
+        """
+        if self.varying is None:
+            return 0.0
+        try:
+            found = float(self.varying(float(t)))
+        except Exception as error:
+            raise ParameterError(
+                f"TransportDelay needs a varying that is known at t = {t:g} s, but it raises "
+                f"{type(error).__name__}: {error}"
+            ) from error
+        if not np.isfinite(found):
+            raise ParameterError(
+                f"TransportDelay needs a varying that returns a finite number, got {found:g} at "
+                f"t = {t:g} s"
+            )
+        return found
 
     def earlier(self, t: float) -> np.ndarray:
         """Return the signals at a time before the run.

@@ -2,35 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..delays.pieces import smooth_pieces
+from ..delays.variation import checked_variation, variation_table
 from ..errors import ParameterError
-from .integrate.delays import POINTS, POWERS, SMOOTH
+from .integrate.delays import SMOOTH
 from .integrate.memory import with_table
-from .integrate.workspace import DEGREE, WORK, Work
+from .integrate.workspace import WORK, Work
 
 if TYPE_CHECKING:
     from .compiled import Compiled
     from .diagram.schedule import Schedule
 
 _ROOM = 256  # steps that are kept at first
-_NODES = 2 * POINTS - 1
-_BETWEEN = 0.5 * (_NODES[1:] + _NODES[:-1])
-_MISSED = 1e-13  # of a history's largest value
-_HALVINGS = 40
 _KEPT = ("past", "past_t", "past_h", "level")
 
 
-def lines_of(compiled: Compiled, p: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the delays of all lines (lines, lanes), and what acts directly on what."""
+def lines_of(compiled: Compiled, p: np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the delays of all lines (lines, lanes), how they vary, and what acts on what."""
     read = compiled.schedule
-    delays = np.zeros((len(read.lines), p.shape[1]))
+    delays, varied = np.zeros((len(read.lines), p.shape[1])), []
     for row, line in enumerate(read.lines):
+        node = read.nodes[line.block or 0]
         delays[row] = p[compiled.program.layout[line.block or 0]["delay"].offset]
-    return {"delays": delays, "direct": _direct(read).astype(np.int64)}
+        spec, run = node.system.current_spec, (float(times[0]), float(times[-1]))
+        varied.append(checked_variation(spec, *run, delays[row], node.path))
+    return {
+        "delays": delays, "direct": _direct(read).astype(np.int64), **variation_table(varied)
+    }  # fmt: skip
 
 
 def with_past(compiled: Compiled, task: Any, work: Any, p: np.ndarray) -> Any:
@@ -39,24 +42,29 @@ def with_past(compiled: Compiled, task: Any, work: Any, p: np.ndarray) -> Any:
     if not lines:
         return work
     begin = float(task.times[0])
-    pieces = list(_pieces(_before(compiled), begin, task.delays.max(axis=1)))
-    work = _with_capacity(work, max(_ROOM, 2 * len(pieces)))
-    for k, (start, length, values, jumps) in enumerate(pieces):
+    nodes, read = compiled.schedule.nodes, compiled.schedule.lines
+    specs = [nodes[line.block or 0].system.current_spec for line in read]
+    reach = task.delays + np.array([[spec.varied(begin)] for spec in specs])
+    before = _before(compiled)
+    earliest = begin - reach.max(axis=1)
+    found = list(smooth_pieces(lambda t: before(t, earliest), float(earliest.min()), begin, lines))
+    work = _with_capacity(work, max(_ROOM, 2 * len(found)))
+    for k, (start, length, powers, jumps) in enumerate(found):
         work.past_t[k], work.past_h[k] = start, length
-        work.past[k] = (values @ POWERS.T)[:, :, None]
+        work.past[k] = powers[:, :, None]
         work.level[k] = 0 if jumps else SMOOTH
-    for row, line in enumerate(read := compiled.schedule.lines):
-        if compiled.schedule.nodes[line.block or 0].system.spec.history is None:
+    for row, line in enumerate(read):
+        if nodes[line.block or 0].system.spec.history is None:
             slot = compiled.program.layout[line.block or 0]["before"]
-            work.past[: len(pieces), row] = 0.0
-            work.past[: len(pieces), row, 0] = p[slot.offset]
-            work.level[: len(pieces), row] = SMOOTH
-    work.kept[:], work.shown_to[:] = len(pieces), -1
+            work.past[: len(found), row] = 0.0
+            work.past[: len(found), row, 0] = p[slot.offset]
+            work.level[: len(found), row] = SMOOTH
+    work.kept[:], work.shown_to[:] = len(found), -1
     for row in range(len(read)):
         for j in range(lanes):
-            starts = work.past_t[: len(pieces), j]
-            first = int(np.searchsorted(starts, begin - task.delays[row, j], "right")) - 1
-            breaks = np.flatnonzero(work.level[: len(pieces), row, j] < SMOOTH)
+            starts = work.past_t[: len(found), j]
+            first = int(np.searchsorted(starts, begin - reach[row, j], "right")) - 1
+            breaks = np.flatnonzero(work.level[: len(found), row, j] < SMOOTH)
             later = breaks[breaks > max(first, 0)]
             work.first[row, j] = max(first, 0)
             work.next[row, j] = later[0] if later.size else -1
@@ -71,9 +79,10 @@ def with_room(task: Any, work: Any) -> Any:
     room = work.past_t.shape[0]
     if not task.delays.size or work.kept.max() < room:
         return work
+    longest = np.abs(task.vary).sum(axis=2).max(axis=1)  # and more: powers of z in [-1, 1]
     for j in range(task.delays.shape[1]):
         kept = work.kept[j]
-        oldest = work.lanes["t"][j] - task.delays[:, j].max()
+        oldest = work.lanes["t"][j] - (task.delays[:, j] + longest).max()
         gone = int(np.searchsorted(work.past_t[:kept, j], oldest, "right")) - 1
         gone = min(max(gone, 0), int(work.first[:, j].max()))
         gone = max(0, min(gone, *(i - 1 for i in work.next[:, j] if i >= 0), kept - 1))
@@ -141,34 +150,3 @@ def _before(compiled: Compiled) -> Callable[[float, np.ndarray], np.ndarray]:
         return np.concatenate(found)
 
     return values
-
-
-def _pieces(
-    before: Callable[[float, np.ndarray], np.ndarray], begin: float, longest: np.ndarray
-) -> Iterator[tuple[float, float, np.ndarray, bool]]:
-    """Yield when pieces of the past begin, their lengths, values (lines, nodes), and jumps there.
-
-    A piece is halved until a polynomial of its values is its signal; where none is, that jumps.
-    """
-    earliest = begin - longest
-    scale = np.zeros(longest.size)
-    left = [(float(earliest.min()), begin, 0)]
-    jumps = False
-    while left:
-        a, b, halvings = left.pop()
-
-        def at(z: np.ndarray, a: float = a, b: float = b) -> np.ndarray:
-            times = 0.5 * ((b - a) * z + (a + b))
-            return np.array([before(float(t), earliest) for t in times]).T
-
-        values, between = at(_NODES), at(_BETWEEN)
-        powers = values @ POWERS.T
-        guessed = powers @ np.vander(_BETWEEN, DEGREE + 1, increasing=True).T
-        scale = np.maximum(scale, np.abs(values).max(axis=1))
-        fits = np.all(np.abs(guessed - between) <= _MISSED * scale[:, None])
-        if not fits and halvings < _HALVINGS:
-            middle = 0.5 * (a + b)
-            left += [(middle, b, halvings + 1), (a, middle, halvings + 1)]
-            continue
-        yield a, b - a, values, jumps or not fits
-        jumps = not fits

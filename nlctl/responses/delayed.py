@@ -7,6 +7,7 @@ through its solution; a step whose polynomials do not settle is halved.
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -14,9 +15,11 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from scipy.optimize import brentq
 
 from ..blocks import Block, DelayLine, past
 from ..delays.lines import delayed_blocks
+from ..delays.variation import checked_variation
 from ..sampling.system import happening
 from ..upstream.control_internals import set_parameters
 from .arguments import interpolated
@@ -38,8 +41,8 @@ class Past:
     ----------
     blocks : list of Block
         The transport delays.
-    begin : float
-        First time of the run (s).
+    begin, end : float
+        First and last time of the run (s).
     lines : dict
         What leaves each, and what arrives there.
     starts, ends : list of float
@@ -54,6 +57,7 @@ class Past:
 
     blocks: list[Block]
     begin: float
+    end: float
     lines: dict[Any, DelayLine] = field(default_factory=dict)
     starts: list[float] = field(default_factory=list)
     ends: list[float] = field(default_factory=list)
@@ -74,37 +78,47 @@ class Past:
         spec: Any = self.blocks[number].current_spec
         a, b = self.step
         aside = _ASIDE * (b - a)
-        s, inside = t - spec.delay, min(max(t, a + aside), b - aside) - spec.delay
+        s, inside = _sent(spec, t), _sent(spec, min(max(t, a + aside), b - aside))
         if inside < self.begin:
             return spec.earlier(min(s, self.begin))
         k = max(bisect_right(self.starts, inside) - 1, 0)
         a, b = self.starts[k], self.ends[k]
-        return chebyshev.chebval((2.0 * s - a - b) / (b - a), self.pieces[k][number])
+        return np.asarray(chebyshev.chebval((2.0 * s - a - b) / (b - a), self.pieces[k][number]))
 
     def stops(self, begin: float, end: float) -> Iterator[tuple[float, float]]:
         """Yield steps from break to break, none longer than the shortest delay."""
-        taus = sorted({_delay(made) for made in self.blocks})
+        specs: list[Any] = [made.current_spec for made in self.blocks]
         a = begin
         while a < end:
-            later = [s + tau for s in self.breaks for tau in taus]
+            later = [self.arrival(spec, s) for s in self.breaks for spec in specs]
             ahead = (s for s in (*later, *self.breaks) if s > a + _ROUNDING * abs(a))
-            b = min([a + taus[0], end, *ahead])
+            b = min([*(self.arrival(spec, a) for spec in specs), end, *ahead])
             b = end if end - b <= _ROUNDING * abs(end) else b
             yield a, b
             if any(abs(s - b) <= _ROUNDING * abs(b) for s in later):
                 self.broken(b)
             a = b
 
+    def arrival(self, spec: Any, s: float) -> float:
+        """Return when leaves a delay what it is given at time s; inf behind the run."""
+        if spec.varying is None:
+            return s + spec.delay
+        if _sent(spec, self.end) <= s:
+            return math.inf
+        found: Any = brentq(lambda t: _sent(spec, t) - s, self.begin, self.end, xtol=1e-14)
+        return float(found)
+
     def broken(self, t: float) -> None:
         """Note a break; those that all delays have left behind are forgotten."""
-        longest = max(map(_delay, self.blocks))
-        self.breaks = [s for s in self.breaks if s + longest > t - 1e-9 * abs(t)]
+        oldest = min(_sent(made.current_spec, t) for made in self.blocks)
+        self.breaks = [s for s in self.breaks if s > oldest - 1e-9 * abs(t)]
         if not self.breaks or self.breaks[-1] != t:
             self.breaks.append(t)
 
 
-def _delay(made: Any) -> float:
-    return float(made.current_spec.delay)
+def _sent(spec: Any, t: float) -> float:
+    """Return when a delay was given what leaves it at time t."""
+    return t - (spec.delay + spec.varied(t))
 
 
 def by_steps(
@@ -139,6 +153,9 @@ def by_steps(
     wanted = times if evaluation_times is None else evaluation_times
     form = {name: settings.pop(name, None) for name in ("squeeze", "transpose", "return_states")}
     set_parameters(system, params)
+    for made in known.blocks:
+        spec: Any = made.current_spec
+        checked_variation(spec, known.begin, known.end, np.array([spec.delay]), str(made.name))
     run = _Run(
         simulate=simulate, known=known, system=system, times=times, inputs=inputs, params=params,
         settings=settings, wanted=wanted, x=np.array(x0, dtype=float),
@@ -218,7 +235,8 @@ class _Run:
 
 def with_delays(simulate: Callable[..., Any], system: Any, *given: Any, **settings: Any) -> Any:
     """Simulate a diagram with transport delays by `simulate`, which takes a `Past` first."""
-    known = Past(blocks=delayed_blocks(system), begin=float(given[0][0]))
+    blocks, times = delayed_blocks(system), given[0]
+    known = Past(blocks=blocks, begin=float(times[0]), end=float(times[-1]))
     known.step = (known.begin, known.begin)
     with past(known.lines), happening():
         return simulate(known, system, *given, **settings)

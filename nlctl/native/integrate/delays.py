@@ -22,7 +22,7 @@ from ..machine.address import call_out
 from .control import rejected
 from .methods import explicit
 from .state import INNER, RUNNING
-from .workspace import DEGREE, inputs_at, past_value
+from .workspace import DEGREE, arrival, inputs_at, past_value
 
 SMOOTH = 6  # level that a method of order 5 takes for smooth
 POINTS = 0.5 - 0.5 * np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
@@ -38,10 +38,13 @@ def next_break(task, w, lane, j, stop):
     """Return where a step must end for the delays of a lane, at `stop` at the latest."""
     first = stop
     for i in range(task.delays.shape[0]):
-        tau = task.delays[i, j]
-        first = min(first, lane.t + tau)
+        first = min(first, arrival(task, i, j, lane.t))
         if w.next[i, j] >= 0:
-            first = min(first, w.past_t[w.next[i, j], j] + tau)
+            first = min(first, arrival(task, i, j, w.past_t[w.next[i, j], j]))
+        for k in range(task.kinks.shape[1] if task.varied[i] else 0):
+            if task.kinks[i, k] > lane.t:
+                first = min(first, task.kinks[i, k])
+                break
     return stop if stop - first <= ROUNDING * abs(stop) else first
 
 
@@ -141,6 +144,7 @@ def keep(task, lanes, w, done, passed):
             broke = 0
         for i in range(task.delays.shape[0]):
             w.fresh[i, j] = broke
+        _bend(task, lanes[j], w, j)
         jumps = _arrive(task, lanes[j], w, j)
         jumped |= jumps
         passed[j] = jumps or (passed[j] and task.memory.size > 0)
@@ -178,13 +182,24 @@ def _has_kink(task, m):
 
 
 @numba.njit(**INNER)
+def _bend(task, lane, w, j):
+    """Note what leaves a line with a kink because its delay has one now."""
+    for i in range(task.delays.shape[0]):
+        for k in range(task.kinks.shape[1] if task.varied[i] else 0):
+            if task.kinks[i, k] == lane.t:
+                for other in range(task.delays.shape[0]):
+                    behind = 1 if task.direct[other, i] else 2
+                    w.fresh[other, j] = min(w.fresh[other, j], behind)
+
+
+@numba.njit(**INNER)
 def _arrive(task, lane, w, j):
     """Go behind the breaks that arrive now; return whether a signal jumps."""
     jumps = False
     for i in range(task.delays.shape[0]):
         while w.next[i, j] >= 0:
             k = w.next[i, j]
-            if w.past_t[k, j] + task.delays[i, j] > lane.t + ROUNDING * abs(lane.t):
+            if arrival(task, i, j, w.past_t[k, j]) > lane.t + ROUNDING * abs(lane.t):
                 break
             level = w.level[k, i, j]
             jumps |= level == 0

@@ -300,7 +300,7 @@ def prepared(
         **_instants(compiled, code, due),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
-        **lines_of(compiled, p),
+        **lines_of(compiled, p, times),
         signals=code.signal_entry,
         outputs=compiled.system.noutputs or 0,
         **_linear_equations(len(x0), WHOLE),

@@ -52,7 +52,12 @@ class Task(NamedTuple):
     sampled: np.ndarray  # indices of these states
     derivatives: int  # UNKNOWN until the stiff method asks for them
     c_along: np.ndarray  # what exact ones read besides their arguments
-    delays: np.ndarray  # (lines, lanes) in s
+    delays: np.ndarray  # (lines, lanes) in s, without what varies in time
+    varied: np.ndarray  # (lines,): number of pieces of what does
+    vary_t: np.ndarray  # (lines, pieces): when they begin
+    vary_h: np.ndarray  # and how long they are
+    vary: np.ndarray  # (lines, pieces, DEGREE + 1): polynomials in s
+    kinks: np.ndarray  # (lines, kinks): when a derivative of it jumps, then inf
     direct: np.ndarray  # (lines, lines): whether what arrives at one is what leaves the other
     signals: np.ndarray  # the function that fills the outputs, and then what arrives at the lines
     outputs: int  # number of the outputs
@@ -243,7 +248,9 @@ TASK = type_of(  # only the types of these matter
         C=_LINE, E=_LINE, inside=_GRID, kept=_NONE, alone=0,
         ticks=_GRID, which=_PLACES, samples=_NONE,
         due=_PLACES, sampled=_NONE, derivatives=0, c_along=_GRID,
-        delays=_GRID, direct=_PLACES, signals=_NONE, outputs=0,
+        delays=_GRID, varied=_NONE, vary_t=_GRID, vary_h=_GRID,
+        vary=np.zeros((1, 1, 1)), kinks=_GRID,
+        direct=_PLACES, signals=_NONE, outputs=0,
         cost=0.0, **vars(WHOLE),
     )
 )  # fmt: skip
@@ -269,12 +276,68 @@ def inputs_at(task, lanes, w):
 
 
 @numba.njit(**INNER)
+def _variation(task, i, t):
+    """Return by how much the delay of line `i` is longer at time t, and the slope of that."""
+    low, high = 0, task.varied[i] - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if task.vary_t[i, middle] <= t:
+            low = middle
+        else:
+            high = middle - 1
+    z = 2.0 * (t - task.vary_t[i, low]) / task.vary_h[i, low] - 1.0
+    z = min(max(z, -1.0 - 1e-6), 1.0 + 1e-6)  # it is known during the run only
+    value, slope = task.vary[i, low, DEGREE], 0.0
+    for n in range(DEGREE - 1, -1, -1):
+        slope = slope * z + value
+        value = value * z + task.vary[i, low, n]
+    return value, 2.0 * slope / task.vary_h[i, low]
+
+
+@numba.njit(**INNER)
+def sent(task, i, j, t):
+    """Return when line `i` of a lane was given what leaves it at time t."""
+    if task.varied[i] == 0:
+        return t - task.delays[i, j]
+    return t - (task.delays[i, j] + _variation(task, i, t)[0])
+
+
+@numba.njit(**INNER)
+def arrival(task, i, j, s):
+    """Return when leaves line `i` of a lane what it is given at time s; inf behind the run.
+
+    The delay grows by less than 1 s per second: Newton's method, with the bracket that this gives.
+    """
+    if task.varied[i] == 0:
+        return s + task.delays[i, j]
+    last = task.varied[i] - 1
+    low, high = task.vary_t[i, 0], task.vary_t[i, last] + task.vary_h[i, last]
+    if sent(task, i, j, high) < s:
+        return np.inf
+    t = min(max(s + task.delays[i, j], low), high)
+    for _ in range(100):
+        value, slope = _variation(task, i, t)
+        missed = t - (task.delays[i, j] + value) - s
+        if missed > 0.0:
+            high = t
+        else:
+            low = t
+        new = t - missed / (1.0 - slope)
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        if abs(new - t) <= 1e-15 * abs(t) or new == t:
+            return new
+        t = new
+    return t
+
+
+@numba.njit(**INNER)
 def past_value(task, w, i, j, t):
     """Return what leaves line `i` of a lane at time t.
 
     Of the polynomials between two breaks only, so that rounding never reads the other side.
     """
-    s = t - task.delays[i, j]
+    s = sent(task, i, j, t)
     low, high = w.first[i, j], w.kept[j] - 1
     if w.next[i, j] >= 0:
         high = w.next[i, j] - 1
