@@ -32,7 +32,7 @@ extensions = [
 ]
 root_doc = "index"
 exclude_patterns = ["auto/**/*.py", "auto/**/*.ipynb", "gallery", "tutorials", "how-to/*.py"]
-exclude_patterns += ["how-to/GALLERY_HEADER.rst"]
+exclude_patterns += ["how-to/GALLERY_HEADER.rst", "data"]
 
 autodoc_typehints = "none"  # types stand in the docstrings
 autosummary_generate = False
