@@ -79,7 +79,7 @@ def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -
     """Return the times of a run with inputs at `times` that is `wanted` at other times.
 
     A sampled system starts with the first of these; in between inputs are linear, and have their
-    corners where they were given.
+    break points where they were given.
     """
     if system.isdtime(strict=True):
         return wanted

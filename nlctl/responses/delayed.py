@@ -163,8 +163,8 @@ def by_steps(
     y = np.full((system.noutputs or 0, wanted.size), np.nan)
     states = np.full((system.nstates or 0, wanted.size), np.nan)
     known.broken(float(times[0]))
-    for corner in _corners(times, inputs):
-        known.breaks.append(corner)  # what happens there arrives later
+    for t in break_points(times, inputs):
+        known.breaks.append(t)  # what happens there arrives later
     for begin, end in known.stops(float(times[0]), float(times[-1])):
         for taken, outputs, path in run.stepped(begin, end, 0):
             y[:, taken], states[:, taken] = outputs, path
@@ -242,8 +242,8 @@ def with_delays(simulate: Callable[..., Any], system: Any, *given: Any, **settin
         return simulate(known, system, *given, **settings)
 
 
-def _corners(times: np.ndarray, inputs: np.ndarray) -> list[float]:
-    """Return the times at which an input has a corner."""
+def break_points(times: np.ndarray, inputs: np.ndarray) -> list[float]:
+    """Return the times at which an input has a break point."""
     if not np.size(inputs):
         return []
     rises, lengths = np.diff(np.atleast_2d(inputs)), np.diff(times)

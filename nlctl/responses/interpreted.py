@@ -19,7 +19,7 @@ from ..names import unknown
 from ..sampling.system import Sampled
 from ..sliding.blocks import sliding_blocks
 from .arguments import RunArguments, evaluation_array, input_array, state_array
-from .delayed import Past, by_steps, with_delays
+from .delayed import Past, break_points, by_steps, with_delays
 from .sampled import from_sample_to_sample
 from .time_response import as_response
 
@@ -66,6 +66,8 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     if not scipys and method not in SOLVE_IVP_METHODS:
         raise unknown("method", str(method), SOLVE_IVP_METHODS, "of python-control's solve_ivp")
     settings = {"rtol": solver["rtol"], "atol": solver["atol"], "events": watch}
+    if system.ninputs is not None:
+        settings["max_step"] = _longest_step(times, inputs)
     with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
         try:
             response = simulate(
@@ -88,6 +90,16 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     if not np.all(np.isfinite(response.y)):
         raise _diverged(system, watch.reached)
     return as_response(response)
+
+
+def _longest_step(times: np.ndarray, inputs: Any) -> float:
+    """Return the shortest time between break points of the inputs, inf where there are none.
+
+    A longer step from rest sees nothing of a pulse that it goes over.
+    """
+    known = np.asarray(break_points(times, inputs))
+    ends = np.concatenate((times[:1], known, times[-1:]))
+    return float(np.diff(ends).min()) if known.size else np.inf
 
 
 def _refuse_sliding(system: Any) -> None:

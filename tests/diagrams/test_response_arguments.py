@@ -83,7 +83,7 @@ class TestAsInPythonControl:
         with warnings.catch_warnings(record=True) as theirs:
             warnings.simplefilter("always")
             read = reference(THREE, T, inputs, start)
-        # exact, as corners of the inputs can deceive the error control of python-control's run
+        # exact, as break points of the inputs can deceive the error control of python-control's run
         exact = ct.forced_response(THREE, T, read.inputs, read.states[:, 0])
         for engine in ENGINES:
             with warnings.catch_warnings(record=True) as ours:
@@ -92,6 +92,16 @@ class TestAsInPythonControl:
             agree(made, exact)
             assert [w.category for w in ours] == [w.category for w in theirs]
             assert all("too short; padding with zeros" in str(w.message) for w in ours)
+
+    @pytest.mark.parametrize("engine", ENGINES)
+    @pytest.mark.parametrize("peak", range(1, M - 1))
+    def test_a_pulse_is_not_stepped_over(self, engine, peak):
+        """From rest: a solver that tries a long step sees the same input at both of its ends."""
+        times = 100 * T
+        pulse = np.zeros((3, M))
+        pulse[1, peak] = 1.0
+        made = simulate(system_for("three", engine), times, pulse, 0)
+        agree(made, ct.forced_response(THREE, times, pulse, 0))
 
     @pytest.mark.parametrize("engine", ENGINES)
     @pytest.mark.parametrize("given", [[1.0], np.array([1.0]), np.array(1.0), (np.ones((1, 1)),)])

@@ -79,9 +79,9 @@ def _accept(task, lanes, w, found, done, passed):
         if task.fixed == 0.0 and w.e.shape[0]:
             lane.h = min(lane.h, w.resolved[j])
         done[j] = True
-        if memories:  # at a corner of the inputs memories may reverse as well
-            at_corner = lane.ends and w.u.shape[0] > 0
-            passed[j] = at_corner or _began_to_move(switching, w.e_start, w.e, j)
+        if memories:  # at a break point of the inputs memories may reverse as well
+            at_break_point = lane.ends and w.u.shape[0] > 0
+            passed[j] = at_break_point or _began_to_move(switching, w.e_start, w.e, j)
         passed[j] |= event
         any_passed |= passed[j]
         if task.method == AUTO:

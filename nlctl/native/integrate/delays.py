@@ -1,10 +1,10 @@
 """Transport delays in a run: what delayed signals were, step by step, and when breaks arrive.
 
-A diagram with delays is integrated by the method of steps: no step is longer than the shortest
-delay, so that what leaves a delay is the past of what arrived there.  That is kept as one
-polynomial of degree 5 for each step, through the signal at Chebyshev points of the dense output;
-how large its last coefficient is belongs to the error of the step.  These points are inside of the
-step: at its end a signal may have jumped already.
+A diagram with delays is integrated by the method of steps: a step ends when what a delay is given
+at its beginning leaves it, so that what leaves a delay is known before the step.  That is kept as
+one polynomial of degree 5 for each step, through the signal at Chebyshev points of the dense
+output; how large its last coefficient is belongs to the error of the step.  These points are
+inside of the step: at its end a signal may have jumped already.
 
 Where the derivative of order `level` of a signal jumps, a step ends when that arrives: behind the
 delay the same derivative jumps, and one behind an integrator the next one.  What is smoother than
@@ -167,7 +167,7 @@ def _append(task, lane, w, j):
 
 @numba.njit(**INNER)
 def _has_kink(task, m):
-    """Whether an input has a corner at the time m of the grid."""
+    """Whether an input has a break point at the time m of the grid."""
     if m == 0 or m >= task.times.size - 1:
         return False
     before, after = task.times[m] - task.times[m - 1], task.times[m + 1] - task.times[m]

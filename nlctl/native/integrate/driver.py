@@ -103,7 +103,7 @@ class Statistics:
     accepted, rejected : int
         Steps of the integrator; steps tried to locate events count as rejected.
     events : int
-        Corners and turning memories at which a step was ended.
+        Break points and turning memories at which a step was ended.
     stiff : bool
         Whether the run ended with the stiff method.
     jump : Jump or None

@@ -120,7 +120,7 @@ def _lock(rhs, task, lanes, w, chosen):
     reverses does its value count again, and there it is committed.
 
     A memory that counts wherever it stands, a relay's, is not carried but about to jump.  It
-    keeps its value up to the corner where it jumps; at that corner already, it jumps.
+    keeps its value up to the break point where it jumps; at that break point already, it jumps.
     """
     if not _any_moves(task, w, chosen):
         return
@@ -144,7 +144,9 @@ def _lock(rhs, task, lanes, w, chosen):
         for j in range(lanes.size):
             if not carried[j]:
                 after = before[j] + w.e[row, j]
-                w.x[task.memory[i], j] = after if _at_corner(w.g, task.switching, j) else before[j]
+                w.x[task.memory[i], j] = (
+                    after if _at_break_point(w.g, task.switching, j) else before[j]
+                )
                 w.e[row, j] = 0.0
         _refresh(rhs, task, lanes, w, chosen)
 
@@ -160,8 +162,8 @@ def _any_moves(task, w, chosen):
 
 
 @numba.njit(**INNER)
-def _at_corner(g, switching, j):
-    """Whether a lane's state lies on a corner."""
+def _at_break_point(g, switching, j):
+    """Whether a lane's state lies on a break point."""
     for i in range(switching):  # noqa: SIM110 (no generators in machine code)
         if g[i, j] == 0.0:
             return True

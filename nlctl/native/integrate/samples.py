@@ -15,7 +15,7 @@ from .workspace import inputs_at
 def next_stop(task, lane, w, j):
     """Return where a step must end.
 
-    That is when something happens to sampled blocks, with inputs at their next corner, where a
+    That is when something happens to sampled blocks, with inputs at their next break point, where a
     break leaves a transport delay, and at the last time.
     """
     times = task.times

@@ -56,7 +56,7 @@ _FIELDS = [
     ("slow", "i8"),  # steps in a row whose size stability limits
     ("patience", "i8"),  # such steps that are borne before the stiff method is tried
     ("stiff", "i8"),  # 0 explicit, otherwise 1 + steps of the stiff method
-    ("ends", "i8"),  # the step being tried ends at a corner of the inputs or at the end
+    ("ends", "i8"),  # the step being tried ends at a break point of the inputs or at the end
 ]
 LANE = np.dtype((np.record, _FIELDS))
 

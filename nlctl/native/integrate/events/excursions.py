@@ -2,7 +2,7 @@
 
 Error control sees the states only.  Where a switching function, or what drives a memory, is not a
 state (a dead zone behind a source), a step may grow until both of its ends lie on one side of a
-corner although it has been on the other in between.
+break point although it has been on the other in between.
 
 Each event function is followed through a step by the polynomial through five of its values, three
 of them at stages, which cost nothing.  Where that may be below 0 in between, by what it may be
@@ -31,7 +31,7 @@ _FOLLOWED = 0.2  # of the range: what the polynomial may be wrong by at most
 _FLAT = 8.0  # in doubts: a slope at an end that may as well have the other sign
 _DENSE = 2  # the row of task.inside that is no method's stages
 _NARROW = 1e-6  # part of a step: a minimum is not below what is so near by more than its square
-_TOUCHING = 0.01  # the same at a start on the corner, where a memory has turned
+_TOUCHING = 0.01  # the same at a start on the break point, where a memory has turned
 _TRIES = 24  # looks at one function in one step
 _DOUBLE = 2.0  # growth of a step up to which the noise of stages does not count
 

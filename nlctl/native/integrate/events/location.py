@@ -1,6 +1,6 @@
 """Events inside a step: break points, and memories that reverse.
 
-A switching function that changes its sign marks a corner; a memory reverses where the rate at
+A switching function that changes its sign marks a break point; a memory reverses where the rate at
 which it would be carried along changes its sign or becomes zero.  In both cases the step is
 repeated, shorter each time, until it ends right behind the event: all stages but a negligible
 rest then lie on one side, and what the rest costs is below one local error.  Regula falsi with the
@@ -67,7 +67,7 @@ def locate(lane, switching, rtol, e_start, e_low, e_high, e, behind, j):
     if root < 0.0:
         return CLEAR
     lane.tries += 1
-    # behind a corner stages are wrong by the rest; what a memory misses is quadratic in it
+    # behind a break point stages are wrong by the rest; what a memory misses is quadratic in it
     tolerance = lane.high * (0.3 * np.sqrt(rtol) if memory else min(10.0 * rtol, 1e-4))
     is_behind = lane.high == lane.step
     if is_behind and (lane.high - root <= tolerance or lane.tries > TRIES):

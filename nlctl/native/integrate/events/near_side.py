@@ -1,7 +1,7 @@
-"""The near side of a corner: what memories are before their input jumps.
+"""The near side of a break point: what memories are before their input jumps.
 
-Behind a corner, what carries a memory along may have jumped back.  The memory keeps what it was
-just before, which is extrapolated from two looks at the solution inside the step.
+Behind a break point, what carries a memory along may have jumped back.  The memory keeps what it
+was just before, which is extrapolated from two looks at the solution inside the step.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from ..methods.dense import events_at_parts
 from ..state import INNER
 from .location import EVENT
 
-_HALVINGS = 24  # of the way to a corner that is farther back
+_HALVINGS = 24  # of the way to a break point that is farther back
 
 
 @numba.njit(**INNER)
 def look_before(rhs, task, lanes, w, found):
-    """Make memories in w.g what they are just before the corner at which a step ends.
+    """Make memories in w.g what they are just before the break point at which a step ends.
 
     Behind it, what carries a memory along may have jumped back: it keeps what it was before.
     """
     wanted, any_wanted, nearer = w.wanted, False, w.g_inside[3]
-    back = 2.5 * min(10.0 * task.rtol, 1e-4)  # see `locate`: the corner is not so far back
+    back = 2.5 * min(10.0 * task.rtol, 1e-4)  # see `locate`: the break point is not so far back
     for j in range(lanes.size):
         wanted[j] = found[j] == EVENT and _crosses(task, w, w.e, j)
         any_wanted |= wanted[j]
@@ -42,7 +42,7 @@ def look_before(rhs, task, lanes, w, found):
     events_at_parts(rhs, task, lanes, w, w.g_ahead)
     for j in range(lanes.size):
         far = w.sought[j] > 0
-        ahead = 0.0 if far else 1.0 + _until_corner(task, w, nearer, j)
+        ahead = 0.0 if far else 1.0 + _until_break_point(task, w, nearer, j)
         for i in range(task.switching, w.g.shape[0]):
             if wanted[j] and w.e_start[i, j] != 0.0:
                 change = 0.0 if far else nearer[i, j] - w.g_ahead[i, j]
@@ -51,9 +51,9 @@ def look_before(rhs, task, lanes, w, found):
 
 @numba.njit(**INNER)
 def _halve(rhs, task, lanes, w, back):
-    """Set w.part right before the first corner of the lanes that are sought.
+    """Set w.part right before the first break point of the lanes that are sought.
 
-    Where a memory turns at the corner at which its input jumps, a step ends farther behind.
+    Where a memory turns at the break point at which its input jumps, a step ends farther behind.
     """
     for j in range(lanes.size):
         if w.sought[j] > 0:
@@ -71,8 +71,8 @@ def _halve(rhs, task, lanes, w, back):
 
 
 @numba.njit(**INNER)
-def _until_corner(task, w, nearer, j):
-    """Return how far it is to the first corner, in distances between the last two looks."""
+def _until_break_point(task, w, nearer, j):
+    """Return how far it is to the first break point, in distances between the last two looks."""
     first = np.inf
     for i in range(task.switching):
         if w.e_start[i, j] * w.e[i, j] < 0.0:
