@@ -58,16 +58,14 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
         wanted = evaluation_array(wanted, times)
         if wanted.size == 1 and system.isdtime(strict=True):
             raise ParameterError("evaluation_times of a sampled system needs two times, got one")
-    simulate: Any = ct.input_output_response  # its types are those of the defaults
-    simulate = _between(simulate, system)
+    simulate = _between(ct.input_output_response, system)
     watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
     method = solver["method"] or solver["solve_ivp_method"] or "LSODA"
     scipys = isinstance(method, type) and issubclass(method, OdeSolver)
     if not scipys and method not in SOLVE_IVP_METHODS:
         raise unknown("method", str(method), SOLVE_IVP_METHODS, "of python-control's solve_ivp")
     settings = {"rtol": solver["rtol"], "atol": solver["atol"], "events": watch}
-    if system.ninputs is not None:
-        settings["max_step"] = _longest_step(times, inputs)
+    settings["max_step"] = np.inf if system.ninputs is None else _longest_step(times, inputs)
     with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
         try:
             response = simulate(
