@@ -16,6 +16,8 @@ import sys
 import matplotlib.pyplot as plt
 import numpy as np
 
+from analysis.robustness import clopper_pearson
+
 sys.path.append("../data")
 from ainncs import CASES
 
@@ -37,7 +39,6 @@ for ax, (name, case) in zip(axes.flat, CASES.items(), strict=True):
     ax.axvspan(case.begin if case.begin < case.end else 0.99 * case.end, case.end, alpha=0.1)
     ax.set(title=name, xlabel="t (s)", ylabel=case.says)
     least = margin[:, asked].min()
-    print(
-        f"{name}: least margin {least:.3g}, share that violates at most {1 - 0.05 ** (1 / RUNS):.1%}"
-    )
+    share = clopper_pearson(0, RUNS, 0.95)[1]
+    print(f"{name}: least margin {least:.3g}, share that violates at most {share:.1%}")
     assert least > 0

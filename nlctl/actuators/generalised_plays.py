@@ -9,7 +9,7 @@ from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
 from .memories import checked_start, memory_names, started
-from .prandtl_ishlinskii import check_thresholds, check_weights
+from .prandtl_ishlinskii import check_pairs, check_thresholds
 from .static import BOUNDED_OUTPUT
 
 __all__ = ["GeneralisedPrandtlIshlinskii"]
@@ -95,7 +95,6 @@ class GeneralisedPrandtlIshlinskii:
     feedthrough = True
     vector = True
     no_split = BOUNDED_OUTPUT
-    w_0 = 0.0  # no play of its own for u itself
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -118,7 +117,7 @@ class GeneralisedPrandtlIshlinskii:
                     f"GeneralisedPrandtlIshlinskii needs {name} = (a_0, a_1, a_2, a_3) with "
                     f"a_0 > 0 and a_1 > 0, so that the envelope increases, got {a}"
                 )
-        check_weights(self, "so that the loading curve increases")
+        check_pairs(self)
         check_thresholds(self)
         checked_start(self, len(self.r))
 

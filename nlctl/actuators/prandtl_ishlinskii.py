@@ -120,14 +120,19 @@ class Stop:
         return unit_contact(u[0], memory, p.r)
 
 
-def check_weights(spec: Any, meaning: str) -> None:
-    """Refuse thresholds and weights of different number, and a slope that is not positive."""
-    who = type(spec).__name__
+def check_pairs(spec: Any) -> None:
+    """Refuse thresholds and weights of different number."""
     if len(spec.r) != len(spec.w):
         raise ParameterError(
-            f"{who} needs one weight for each threshold, got {counted(len(spec.w), 'weight')} w "
-            f"and {counted(len(spec.r), 'threshold')} r"
+            f"{type(spec).__name__} needs one weight for each threshold, got "
+            f"{counted(len(spec.w), 'weight')} w and {counted(len(spec.r), 'threshold')} r"
         )
+
+
+def check_weights(spec: Any, meaning: str) -> None:
+    """Refuse thresholds and weights of different number, and a slope that is not positive."""
+    check_pairs(spec)
+    who = type(spec).__name__
     slopes = spec.w_0 + np.cumsum(spec.w)
     if not np.all(slopes > 0):
         i = int(np.argmax(~(slopes > 0)))
@@ -287,8 +292,7 @@ class OneSidedDeadZones:
 
     def check(self) -> None:
         """A weight for each threshold, none at 0, and a positive slope everywhere."""
-        if len(self.r) != len(self.w):
-            check_weights(self, "")
+        check_pairs(self)
         if 0.0 in self.r:
             raise ParameterError(
                 "OneSidedDeadZones needs thresholds r other than 0: the slope at 0 is w_0"
