@@ -3,24 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 PIECE_DEGREE = 5  # of the polynomials
+LOOKS = 1000  # places at which a function is looked at, at least: a pulse between two is not seen
 _NODES = chebyshev.chebpts1(PIECE_DEGREE + 1)
 _POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))  # values at the nodes -> coefficients
 _BETWEEN = 0.5 * (_NODES[1:] + _NODES[:-1])
 _MISSED = 1e-13  # of a function's largest value
+_JUMPED = 1e-10  # of it: polynomials that go through one function meet more closely
+_BENT = 1e-8  # and so do their slopes, times the length of the shorter piece
 _HALVINGS = 40
+
+
+@dataclass(frozen=True, kw_only=True)
+class Piece:
+    """Polynomials that functions are for a while.
+
+    Attributes
+    ----------
+    start, length : float
+        Time (s).
+    powers : ndarray of shape (count, 6)
+        Coefficients of powers of z, from -1 to 1 in the piece.
+    fits : bool
+        Whether they go through the functions: a piece too short to be halved has a jump in it.
+    breaks : bool
+        Whether a function, or its slope, jumps in it or where it begins.
+    """
+
+    start: float
+    length: float
+    powers: np.ndarray
+    fits: bool = True
+    breaks: bool = False
 
 
 def smooth_pieces(
     values: Callable[[float], np.ndarray], begin: float, end: float, count: int
-) -> Iterator[tuple[float, float, np.ndarray, bool]]:
+) -> Iterator[Piece]:
     """Divide functions of time into pieces that polynomials of degree 5 go through.
 
-    A piece is halved until it is a polynomial to rounding; where it never is, something jumps.
+    A piece is halved until it is a polynomial to rounding, also at those of 1000 places that lie
+    in it.
 
     Parameters
     ----------
@@ -29,17 +57,20 @@ def smooth_pieces(
     begin, end : float
         Times (s).
     count : int
-        Number of functions.
+        Number of functions; of none there is one piece.
 
     Yields
     ------
-    tuple
-        When a piece begins, its length, coefficients (count, 6) of powers of z, from -1 to 1 in the
-        piece, and whether a function or one of its derivatives jumps there.
+    Piece
+        In order.
     """
-    scale = np.zeros(count)
-    left = [(begin, end, 0)]
-    jumps = False
+    if not count:
+        yield Piece(start=begin, length=end - begin, powers=np.zeros((0, PIECE_DEGREE + 1)))
+        return
+    places = begin + (end - begin) * (np.arange(LOOKS) + 0.5) / LOOKS
+    looks = np.array([values(float(t)) for t in places]).T
+    scale = np.abs(looks).max(axis=1)
+    left, before = [(begin, end, 0)], None
     while left:
         a, b, halvings = left.pop()
 
@@ -47,13 +78,28 @@ def smooth_pieces(
             return np.array([values(float(t)) for t in 0.5 * ((b - a) * z + (a + b))]).T
 
         found, between = at(_NODES), at(_BETWEEN)
-        powers = found @ _POWERS.T
-        guessed = powers @ np.vander(_BETWEEN, PIECE_DEGREE + 1, increasing=True).T
-        scale = np.maximum(scale, np.abs(found).max(axis=1))
-        fits = np.all(np.abs(guessed - between) <= _MISSED * scale[:, None])
+        powers, scale = found @ _POWERS.T, np.maximum(scale, np.abs(found).max(axis=1))
+        inside = slice(*np.searchsorted(places, (a, b)))
+        z = np.concatenate((_BETWEEN, 2.0 * (places[inside] - a) / (b - a) - 1.0))
+        guessed = powers @ np.vander(z, PIECE_DEGREE + 1, increasing=True).T
+        missed = np.abs(guessed - np.concatenate((between, looks[:, inside]), axis=1))
+        fits = bool(np.all(missed <= _MISSED * scale[:, None]))
         if not fits and halvings < _HALVINGS:
             middle = 0.5 * (a + b)
             left += [(middle, b, halvings + 1), (a, middle, halvings + 1)]
             continue
-        yield a, b - a, powers, jumps or not fits
-        jumps = not fits
+        made = Piece(start=a, length=b - a, powers=powers, fits=fits)
+        before = replace(
+            made, breaks=not fits or (before is not None and _apart(before, made, scale))
+        )
+        yield before
+
+
+def _apart(one: Piece, other: Piece, scale: np.ndarray) -> bool:
+    """Whether a function, or its slope, jumps from one piece to the next."""
+    n = np.arange(PIECE_DEGREE + 1)
+    jump = one.powers.sum(axis=1) - other.powers @ (-1.0) ** n
+    slopes = one.powers @ n / one.length, other.powers @ (n * (-1.0) ** (n + 1)) / other.length
+    bend = 2.0 * (slopes[0] - slopes[1]) * min(one.length, other.length)
+    apart = (np.abs(jump) > _JUMPED * scale) | (np.abs(bend) > _BENT * scale)
+    return not one.fits or bool(np.any(apart))

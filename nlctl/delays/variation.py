@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from ..errors import ParameterError
-from .pieces import PIECE_DEGREE, smooth_pieces
+from .pieces import PIECE_DEGREE, Piece, smooth_pieces
 
 _APART = 1e-9  # of the largest value: what jumps by more over 40 halvings is not continuous
 
@@ -34,28 +33,38 @@ class Variation:
     powers: np.ndarray
     kinks: np.ndarray
 
-    def extremes(self, order: int) -> Iterator[tuple[float, float]]:
-        """Yield times and values between which V, or its slope, lies in each piece.
+    def extreme(self, order: int, sign: int) -> tuple[float, float]:
+        """Return where V, or its slope, is greatest or least, and how large it is there.
 
         Parameters
         ----------
         order : {0, 1}
             V itself, or its slope.
+        sign : {1, -1}
+            The greatest value, or the least.
 
-        Yields
-        ------
+        Returns
+        -------
         tuple of float
-            Time (s) and value: of both ends, and of what is stationary between them.
+            Time (s) and value.
         """
-        for start, length, powers in zip(self.starts, self.lengths, self.powers, strict=True):
-            own = polynomial.polyder(powers, order) * (2.0 / length) ** order
-            roots = polynomial.polyroots(polynomial.polytrim(polynomial.polyder(own)))
-            inner = roots.real[(np.abs(roots.imag) < 1e-9) & (np.abs(roots.real) < 1)]
-            for z in (-1.0, 1.0, *inner):
-                yield float(start + 0.5 * (z + 1) * length), float(polynomial.polyval(z, own))
+        own = self.powers
+        if order:
+            own = own[:, 1:] * np.arange(1, own.shape[1]) * (2.0 / self.lengths)[:, None]
+        own = sign * own
+        ends = np.stack([own @ np.power(z, np.arange(own.shape[1])) for z in (-1.0, 1.0)])
+        side, k = np.unravel_index(int(ends.argmax()), ends.shape)
+        best = (self.starts[k] + side * self.lengths[k], ends[side, k])
+        most = own[:, 0] + np.abs(own[:, 1:]).sum(axis=1)
+        for k in np.flatnonzero(most > best[1]):  # where it may be larger between the ends
+            roots = polynomial.polyroots(polynomial.polytrim(polynomial.polyder(own[k])))
+            for z in roots.real[(np.abs(roots.imag) < 1e-9) & (np.abs(roots.real) < 1)]:
+                here = self.starts[k] + 0.5 * (z + 1) * self.lengths[k]
+                best = max(best, (here, polynomial.polyval(z, own[k])), key=lambda point: point[1])
+        return float(best[0]), float(sign * best[1])
 
 
-def variation(spec: Any, begin: float, end: float) -> Variation | None:
+def variation(spec: Any, begin: float, end: float, path: str) -> Variation | None:
     """Return how the delay of a `TransportDelay` varies during a run, None where it does not.
 
     Parameters
@@ -63,51 +72,66 @@ def variation(spec: Any, begin: float, end: float) -> Variation | None:
     spec : TransportDelay
     begin, end : float
         First and last time of the run (s).
+    path : str
+        Name of the block.
 
     Raises
     ------
     ParameterError
-        If the variation jumps, or falls behind time itself: signals would overtake each other.
+        If the variation jumps, or grows as fast as time: signals would overtake each other.
     """
     if spec.varying is None:
         return None
-    found = list(smooth_pieces(lambda t: np.array([spec.varied(t)]), begin, end, 1))
-    powers = np.array([own[0] for _, _, own, _ in found])
-    starts, lengths = np.array([(a, h) for a, h, _, _ in found]).T
-    rough = np.flatnonzero([jumps for *_, jumps in found])
-    for k in rough:  # so short that it is a kink, or a jump
-        ends = [spec.varied(starts[k]), spec.varied(starts[k] + lengths[k])]
-        if abs(ends[1] - ends[0]) > _APART * (1.0 + np.abs(powers[:, 0]).max()):
-            raise ParameterError(
-                f"TransportDelay needs a continuous variation, got a jump from {ends[0]:g} s to "
-                f"{ends[1]:g} s at t = {starts[k]:g} s"
-            )
-    short = [k for k in rough if not k or lengths[k] < 1e-9 * (end - begin)]
-    for k in short:
-        low, high = spec.varied(starts[k]), spec.varied(starts[k] + lengths[k])
-        powers[k] = 0.0
-        powers[k, :2] = 0.5 * (low + high), 0.5 * (high - low)
-    made = Variation(starts=starts, lengths=lengths, powers=powers, kinks=starts[rough])
-    steepest = max(made.extremes(1), key=lambda point: point[1])
-    if not steepest[1] < 1:
+    try:
+        found = list(smooth_pieces(lambda t: np.array([spec.varied(t)]), begin, end, 1))
+    except ParameterError as error:
+        raise ParameterError(f"{error} (block '{path}')") from None
+    made = Variation(
+        starts=np.array([piece.start for piece in found]),
+        lengths=np.array([piece.length for piece in found]),
+        powers=np.array([_powers(spec, piece) for piece in found]),
+        kinks=np.array([piece.start for piece in found if piece.breaks]),
+    )
+    _check_continuous(made, np.array([piece.fits for piece in found]), path)
+    t, steepest = made.extreme(1, 1)
+    if not steepest < 1:
         raise ParameterError(
             "TransportDelay needs a delay that grows by less than 1 s per second, so that signals "
-            f"arrive in the order in which they were sent, got {steepest[1]:g} at t = "
-            f"{steepest[0]:g} s"
+            f"arrive in the order in which they were sent, got {steepest:g} at t = {t:g} s "
+            f"(block '{path}')"
         )
     return made
 
 
-def checked_variation(
-    spec: Any, begin: float, end: float, delays: np.ndarray, path: str
-) -> Variation | None:
-    """Return how a delay varies during a run, as `variation` does, if it is always positive.
+def _powers(spec: Any, piece: Piece) -> np.ndarray:
+    """Return the polynomial of a piece: from end to end where none goes through the function."""
+    if piece.fits:
+        return piece.powers[0]
+    low, high = spec.varied(piece.start), spec.varied(piece.start + piece.length)
+    return np.array([0.5 * (low + high), 0.5 * (high - low), *np.zeros(PIECE_DEGREE - 1)])
+
+
+def _check_continuous(made: Variation, fits: np.ndarray, path: str) -> None:
+    """Refuse a jump from piece to piece, or in one that is too short to be halved."""
+    low, high = made.powers @ (-1.0) ** np.arange(PIECE_DEGREE + 1), made.powers.sum(axis=1)
+    inside = np.where(fits, low, high)
+    before = np.concatenate((low[:1], high[:-1]))
+    for after in (low, inside):
+        apart = np.abs(after - before) > _APART * (1.0 + np.abs(made.powers[:, 0]).max())
+        if apart.any():
+            k = int(apart.argmax())
+            raise ParameterError(
+                f"TransportDelay needs a continuous variation, got a jump from {before[k]:g} s to "
+                f"{after[k]:g} s at t = {made.starts[k]:g} s (block '{path}')"
+            )
+
+
+def check_positive(made: Variation | None, delays: np.ndarray, path: str) -> None:
+    """Refuse delays that a variation makes 0 or negative.
 
     Parameters
     ----------
-    spec : TransportDelay
-    begin, end : float
-        First and last time of the run (s).
+    made : Variation or None
     delays : ndarray of shape (lanes,)
         Constant parts (s).
     path : str
@@ -118,18 +142,12 @@ def checked_variation(
     ParameterError
         With the block, the time and the value.
     """
-    try:
-        made = variation(spec, begin, end)
-    except ParameterError as error:
-        raise ParameterError(f"{error} (block '{path}')") from None
-    if made is not None:
-        t, least = min(made.extremes(0), key=lambda point: point[1])
-        if not delays.min() + least > 0:
-            raise ParameterError(
-                f"TransportDelay needs delay + varying(t) > 0, got {delays.min() + least:g} s at "
-                f"t = {t:g} s (block '{path}')"
-            )
-    return made
+    t, least = (0.0, 0.0) if made is None else made.extreme(0, -1)
+    if not delays.min() + least > 0:
+        raise ParameterError(
+            f"TransportDelay needs delay + varying(t) > 0, got {delays.min() + least:g} s at "
+            f"t = {t:g} s (block '{path}')"
+        )
 
 
 def variation_table(made: list[Variation | None]) -> dict[str, np.ndarray]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import control as ct
 import numpy as np
 
+from ..delays.variation import Variation
 from ..errors import ParameterError
 from ..host.notebook import table_html
 from ..names import unknown
@@ -23,6 +24,7 @@ from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
+from .histories import variations
 from .integrate.driver import (
     Run,
     Settings,
@@ -209,6 +211,7 @@ def ensemble_response(
             raise unknown("signal", signal, labels)
     u = input_array(compiled.system, inputs, times)
     settings = Settings(rtol=rtol, atol=atol, max_steps=max_steps, method=method or "auto")
+    varied = variations(compiled, times)  # once for all members
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
     _, p = every.batch(range(1), ENSEMBLE_WIDTH)  # checks all members before anything runs
     compile_for(compiled, p, ENSEMBLE_WIDTH)  # once, before the threads start
@@ -218,7 +221,7 @@ def ensemble_response(
     def one(numbers: range, stop: _Stop) -> dict[int, dict[str, Any]]:
         rows = {}
         for number, run in zip(
-            numbers, _group(every, numbers, times, u, settings, stop), strict=False
+            numbers, _group(every, numbers, times, u, settings, varied, stop), strict=False
         ):
             for signal, samples in kept.items():
                 samples[number, : run.time.size] = run.outputs[labels.index(signal)]
@@ -253,6 +256,7 @@ def _group(
     times: np.ndarray,
     inputs: np.ndarray,
     settings: Settings,
+    varied: list[Variation | None],
     stop: _Stop,
 ) -> Iterator[Trajectory]:
     """Run up to WIDTH members in a batch; yield them in their order."""
@@ -262,7 +266,7 @@ def _group(
         for j in range(len(numbers)):
             if not stop.wanted:
                 return
-            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings)
+            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings, varied=varied)
         return
     found: dict[int, tuple[Run, np.ndarray]] = {}
     while stop.wanted and (left := [j for j in range(len(numbers)) if j not in found]):
@@ -270,12 +274,12 @@ def _group(
         fits = np.roll(fitting(compiled, np.roll(p, -first, axis=1), ENSEMBLE_WIDTH), first)
         # others' places are taken by copies: what runs beside a member changes nothing
         columns = np.where(fits, np.arange(ENSEMBLE_WIDTH), first)
-        ran = _ran(compiled, times, inputs, (x0[:, columns], p[:, columns]), settings, stop)
+        ran = _ran(compiled, times, inputs, (x0[:, columns], p[:, columns]), settings, varied, stop)
         found |= {int(j): ran for j in np.flatnonzero(fits)}
     for j in range(len(numbers) if stop.wanted else 0):
         run, outputs = found[j]
         if run.lanes["status"][j] == STIFF:  # the stiff method is for single runs
-            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings)
+            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings, varied=varied)
         else:
             yield made(run, outputs, j)
 
@@ -286,11 +290,12 @@ def _ran(
     inputs: np.ndarray,
     members: tuple[np.ndarray, np.ndarray],
     settings: Settings,
+    varied: list[Variation | None],
     stop: _Stop,
 ) -> tuple[Run, np.ndarray]:
     """Run as many members as there are lanes; return the run and its outputs."""
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
-        run = prepared(compiled, times, inputs, *members, settings)
+        run = prepared(compiled, times, inputs, *members, settings, varied)
         begin(run)
         paces = new_paces(run.lanes)
         while stop.wanted and np.any(run.lanes["status"] == RUNNING):

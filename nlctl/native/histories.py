@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..delays.pieces import smooth_pieces
-from ..delays.variation import checked_variation, variation_table
+from ..delays.variation import Variation, check_positive, variation, variation_table
 from ..errors import ParameterError
 from .integrate.delays import SMOOTH
 from .integrate.memory import with_table
@@ -22,15 +22,24 @@ _ROOM = 256  # steps that are kept at first
 _KEPT = ("past", "past_t", "past_h", "level")
 
 
-def lines_of(compiled: Compiled, p: np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
+def variations(compiled: Compiled, times: np.ndarray) -> list[Variation | None]:
+    """Return how the delay of each line varies during runs over these times."""
+    read, (begin, end) = compiled.schedule, (float(times[0]), float(times[-1]))
+    blocks = [line.block or 0 for line in read.lines]
+    nodes = {i: read.nodes[i] for i in blocks}
+    made = {i: variation(n.system.current_spec, begin, end, n.path) for i, n in nodes.items()}
+    return [made[i] for i in blocks]
+
+
+def lines_of(
+    compiled: Compiled, p: np.ndarray, varied: list[Variation | None]
+) -> dict[str, np.ndarray]:
     """Return the delays of all lines (lines, lanes), how they vary, and what acts on what."""
     read = compiled.schedule
-    delays, varied = np.zeros((len(read.lines), p.shape[1])), []
+    delays = np.zeros((len(read.lines), p.shape[1]))
     for row, line in enumerate(read.lines):
-        node = read.nodes[line.block or 0]
         delays[row] = p[compiled.program.layout[line.block or 0]["delay"].offset]
-        spec, run = node.system.current_spec, (float(times[0]), float(times[-1]))
-        varied.append(checked_variation(spec, *run, delays[row], node.path))
+        check_positive(varied[row], delays[row], read.nodes[line.block or 0].path)
     return {
         "delays": delays, "direct": _direct(read).astype(np.int64), **variation_table(varied)
     }  # fmt: skip
@@ -47,18 +56,21 @@ def with_past(compiled: Compiled, task: Any, work: Any, p: np.ndarray) -> Any:
     reach = task.delays + np.array([[spec.varied(begin)] for spec in specs])
     before = _before(compiled)
     earliest = begin - reach.max(axis=1)
-    found = list(smooth_pieces(lambda t: before(t, earliest), float(earliest.min()), begin, lines))
+    told = [row for row, spec in enumerate(specs) if spec.history is not None]
+
+    def histories(t: float) -> np.ndarray:
+        return before(t, earliest)[told]
+
+    found = list(smooth_pieces(histories, float(earliest.min()), begin, len(told)))
     work = _with_capacity(work, max(_ROOM, 2 * len(found)))
-    for k, (start, length, powers, jumps) in enumerate(found):
-        work.past_t[k], work.past_h[k] = start, length
-        work.past[k] = powers[:, :, None]
-        work.level[k] = 0 if jumps else SMOOTH
+    work.level[: len(found)] = SMOOTH
     for row, line in enumerate(read):
-        if nodes[line.block or 0].system.spec.history is None:
-            slot = compiled.program.layout[line.block or 0]["before"]
-            work.past[: len(found), row] = 0.0
-            work.past[: len(found), row, 0] = p[slot.offset]
-            work.level[: len(found), row] = SMOOTH
+        slot = compiled.program.layout[line.block or 0]["before"]
+        work.past[: len(found), row, 0] = p[slot.offset]
+    for k, piece in enumerate(found):
+        work.past_t[k], work.past_h[k] = piece.start, piece.length
+        work.past[k, told] = piece.powers[:, :, None]
+        work.level[k, told] = 0 if piece.breaks else SMOOTH
     work.kept[:], work.shown_to[:] = len(found), -1
     for row in range(len(read)):
         for j in range(lanes):

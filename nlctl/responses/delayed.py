@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from ..blocks import Block, DelayLine, past
 from ..delays.lines import delayed_blocks
-from ..delays.variation import checked_variation
+from ..delays.variation import check_positive, variation
 from ..sampling.system import happening
 from ..upstream.control_internals import set_parameters
 from .arguments import interpolated
@@ -155,7 +155,8 @@ def by_steps(
     set_parameters(system, params)
     for made in known.blocks:
         spec: Any = made.current_spec
-        checked_variation(spec, known.begin, known.end, np.array([spec.delay]), str(made.name))
+        varied = variation(spec, known.begin, known.end, str(made.name))
+        check_positive(varied, np.array([spec.delay]), str(made.name))
     run = _Run(
         simulate=simulate, known=known, system=system, times=times, inputs=inputs, params=params,
         settings=settings, wanted=wanted, x=np.array(x0, dtype=float),

@@ -11,6 +11,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ...delays.variation import Variation
 from ...errors import ParameterError
 from ...names import unknown
 from ...sampling.clock import Instants
@@ -18,7 +19,7 @@ from ..chattering.detection import PROBE, Jump, asked, jump_of, new_paces, snaps
 from ..codegen.along import Along, derivatives
 from ..codegen.program import instants_of
 from ..compiled import Compiled
-from ..histories import lines_of, with_past, with_room
+from ..histories import lines_of, variations, with_past, with_room
 from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
 from .discrete import simulate_discrete
@@ -138,11 +139,13 @@ def trajectory(
     p: np.ndarray,
     settings: Settings,
     progress: Callable[[float], object] | None = None,
+    varied: list[Variation | None] | None = None,
 ) -> Trajectory:
     """Run one member.  Ctrl-C ends an integration with the status STOPPED."""
     if not ct.isctime(compiled.system):
         return _sampled(compiled, times, inputs, x0, p)
-    run = prepared(compiled, times, inputs, x0[:, None], p[:, None], settings)
+    varied = variations(compiled, times) if varied is None else varied
+    run = prepared(compiled, times, inputs, x0[:, None], p[:, None], settings, varied)
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         try:
             begin(run)
@@ -272,6 +275,7 @@ def prepared(
     x0: np.ndarray,
     p: np.ndarray,
     settings: Settings,
+    varied: list[Variation | None],
 ) -> Run:
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, count, read = compiled.program, x0.shape[1], compiled.schedule
@@ -300,7 +304,7 @@ def prepared(
         **_instants(compiled, code, due),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
-        **lines_of(compiled, p, times),
+        **lines_of(compiled, p, varied),
         signals=code.signal_entry,
         outputs=compiled.system.noutputs or 0,
         **_linear_equations(len(x0), WHOLE),
