@@ -162,20 +162,20 @@ def variation_table(made: list[Variation | None]) -> dict[str, np.ndarray]:
     -------
     dict
         ``varied`` (lines,): numbers of pieces, 0 where a delay is constant; ``vary_t`` and
-        ``vary_h`` (lines, pieces), ``vary`` (lines, pieces, 6), ``kinks`` (lines, kinks), then inf.
+        ``vary_h`` (pieces, lines), ``vary`` (pieces, lines, 6), ``kinks`` (lines, kinks), then inf.
     """
     most = max([1, *(one.starts.size for one in made if one)])
     kinks = max([1, *(one.kinks.size + 1 for one in made if one)])
     table = {
         "varied": np.zeros(len(made), dtype=np.int64),
-        "vary_t": np.zeros((len(made), most)),
-        "vary_h": np.ones((len(made), most)),
-        "vary": np.zeros((len(made), most, PIECE_DEGREE + 1)),
+        "vary_t": np.zeros((most, len(made))),
+        "vary_h": np.ones((most, len(made))),
+        "vary": np.zeros((most, len(made), PIECE_DEGREE + 1)),
         "kinks": np.full((len(made), kinks), np.inf),
     }
     for i, one in enumerate(made):
         if one is not None:
             n = table["varied"][i] = one.starts.size
-            table["vary_t"][i, :n], table["vary_h"][i, :n] = one.starts, one.lengths
-            table["vary"][i, :n], table["kinks"][i, : one.kinks.size] = one.powers, one.kinks
+            table["vary_t"][:n, i], table["vary_h"][:n, i] = one.starts, one.lengths
+            table["vary"][:n, i], table["kinks"][i, : one.kinks.size] = one.powers, one.kinks
     return table

@@ -91,7 +91,7 @@ def with_room(task: Any, work: Any) -> Any:
     room = work.past_t.shape[0]
     if not task.delays.size or work.kept.max() < room:
         return work
-    longest = np.abs(task.vary).sum(axis=2).max(axis=1)  # and more: powers of z in [-1, 1]
+    longest = np.abs(task.vary).sum(axis=2).max(axis=0)  # and more: powers of z in [-1, 1]
     for j in range(task.delays.shape[1]):
         kept = work.kept[j]
         oldest = work.lanes["t"][j] - (task.delays[:, j] + longest).max()

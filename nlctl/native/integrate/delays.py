@@ -22,7 +22,7 @@ from ..machine.address import call_out
 from .control import rejected
 from .methods import explicit
 from .state import INNER, RUNNING
-from .workspace import DEGREE, arrival, inputs_at, past_value
+from .workspace import DEGREE, arrival, inputs_at, past_value, piece_at, sent
 
 SMOOTH = 6  # level that a method of order 5 takes for smooth
 POINTS = 0.5 - 0.5 * np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
@@ -31,6 +31,7 @@ POWERS = np.ascontiguousarray(np.linalg.inv(np.vander(2 * POINTS - 1, increasing
 IN_CHEBYSHEV = 2.0 ** (1 - DEGREE)  # of a power of z in the Chebyshev polynomial of the same degree
 JUMP = 1e-10  # of the time: a step so short that its signals still bend in has a jump inside
 ROUNDING = 1e-15  # of the time: two breaks so close are one
+READ = 4  # pieces of the past that a step reads at most
 
 
 @numba.njit(**INNER)
@@ -38,7 +39,7 @@ def next_break(task, w, lane, j, stop):
     """Return where a step must end for the delays of a lane, at `stop` at the latest."""
     first = stop
     for i in range(task.delays.shape[0]):
-        first = min(first, arrival(task, i, j, lane.t))
+        first = min(first, arrival(task, i, j, lane.t), _read(task, w, lane, i, j))
         if w.next[i, j] >= 0:
             first = min(first, arrival(task, i, j, w.past_t[w.next[i, j], j]))
         for k in range(task.kinks.shape[1] if task.varied[i] else 0):
@@ -46,6 +47,19 @@ def next_break(task, w, lane, j, stop):
                 first = min(first, task.kinks[i, k])
                 break
     return stop if stop - first <= ROUNDING * abs(stop) else first
+
+
+@numba.njit(**INNER)
+def _read(task, w, lane, i, j):
+    """Return when a step that begins now has read enough of the past of a line.
+
+    Pieces are short where a signal moves: a longer step would go over a pulse that was kept.  A
+    step that was given is taken as it is.
+    """
+    ahead = piece_at(w.past_t, j, w.first[i, j], w.kept[j] - 1, sent(task, i, j, lane.t)) + READ
+    if task.fixed > 0.0 or ahead >= w.kept[j]:
+        return np.inf
+    return arrival(task, i, j, w.past_t[ahead, j])
 
 
 @numba.njit(**INNER)

@@ -54,9 +54,9 @@ class Task(NamedTuple):
     c_along: np.ndarray  # what exact ones read besides their arguments
     delays: np.ndarray  # (lines, lanes) in s, without what varies in time
     varied: np.ndarray  # (lines,): number of pieces of what does
-    vary_t: np.ndarray  # (lines, pieces): when they begin
+    vary_t: np.ndarray  # (pieces, lines): when they begin
     vary_h: np.ndarray  # and how long they are
-    vary: np.ndarray  # (lines, pieces, DEGREE + 1): polynomials in s
+    vary: np.ndarray  # (pieces, lines, DEGREE + 1): polynomials in s
     kinks: np.ndarray  # (lines, kinks): when a derivative of it jumps, then inf
     direct: np.ndarray  # (lines, lines): whether what arrives at one is what leaves the other
     signals: np.ndarray  # the function that fills the outputs, and then what arrives at the lines
@@ -276,22 +276,37 @@ def inputs_at(task, lanes, w):
 
 
 @numba.njit(**INNER)
-def _variation(task, i, t):
-    """Return by how much the delay of line `i` is longer at time t, and the slope of that."""
-    low, high = 0, task.varied[i] - 1
+def piece_at(starts, column, low, high, t):
+    """Return which piece from `low` to `high` a time lies in: the last that has begun."""
     while low < high:
         middle = (low + high + 1) // 2
-        if task.vary_t[i, middle] <= t:
+        if starts[middle, column] <= t:
             low = middle
         else:
             high = middle - 1
-    z = 2.0 * (t - task.vary_t[i, low]) / task.vary_h[i, low] - 1.0
-    z = min(max(z, -1.0 - 1e-6), 1.0 + 1e-6)  # it is known during the run only
-    value, slope = task.vary[i, low, DEGREE], 0.0
+    return low
+
+
+@numba.njit(**INNER)
+def _within(start, length, t):
+    """Return where a time lies in a piece, from -1 to 1.
+
+    What looks ahead of a step, or of the run, sees the polynomial standing still.
+    """
+    z = 2.0 * (t - start) / length - 1.0
+    return min(max(z, -1.0 - 1e-6), 1.0 + 1e-6)
+
+
+@numba.njit(**INNER)
+def _variation(task, i, t):
+    """Return by how much the delay of line `i` is longer at time t, and the slope of that."""
+    k = piece_at(task.vary_t, i, 0, task.varied[i] - 1, t)
+    z = _within(task.vary_t[k, i], task.vary_h[k, i], t)
+    value, slope = task.vary[k, i, DEGREE], 0.0
     for n in range(DEGREE - 1, -1, -1):
         slope = slope * z + value
-        value = value * z + task.vary[i, low, n]
-    return value, 2.0 * slope / task.vary_h[i, low]
+        value = value * z + task.vary[k, i, n]
+    return value, 2.0 * slope / task.vary_h[k, i]
 
 
 @numba.njit(**INNER)
@@ -311,7 +326,7 @@ def arrival(task, i, j, s):
     if task.varied[i] == 0:
         return s + task.delays[i, j]
     last = task.varied[i] - 1
-    low, high = task.vary_t[i, 0], task.vary_t[i, last] + task.vary_h[i, last]
+    low, high = task.vary_t[0, i], task.vary_t[last, i] + task.vary_h[last, i]
     if sent(task, i, j, high) < s:
         return np.inf
     t = min(max(s + task.delays[i, j], low), high)
@@ -338,20 +353,12 @@ def past_value(task, w, i, j, t):
     Of the polynomials between two breaks only, so that rounding never reads the other side.
     """
     s = sent(task, i, j, t)
-    low, high = w.first[i, j], w.kept[j] - 1
-    if w.next[i, j] >= 0:
-        high = w.next[i, j] - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if w.past_t[middle, j] <= s:
-            low = middle
-        else:
-            high = middle - 1
-    z = 2.0 * (s - w.past_t[low, j]) / w.past_h[low, j] - 1.0
-    z = min(max(z, -1.0 - 1e-6), 1.0 + 1e-6)  # what looks ahead of a step sees it standing still
-    value = w.past[low, i, DEGREE, j]
+    last = w.next[i, j] - 1 if w.next[i, j] >= 0 else w.kept[j] - 1
+    k = piece_at(w.past_t, j, w.first[i, j], last, s)
+    z = _within(w.past_t[k, j], w.past_h[k, j], s)
+    value = w.past[k, i, DEGREE, j]
     for n in range(DEGREE - 1, -1, -1):
-        value = value * z + w.past[low, i, n, j]
+        value = value * z + w.past[k, i, n, j]
     return value
 
 
