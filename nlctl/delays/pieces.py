@@ -9,10 +9,10 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 PIECE_DEGREE = 5  # of the polynomials
-LOOKS = 1000  # places at which a function is looked at, at least: a pulse between two is not seen
+PLACES = 1000  # places at which a function is looked at, at least: a pulse between two is not seen
 _NODES = chebyshev.chebpts1(PIECE_DEGREE + 1)
 _POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))  # values at the nodes -> coefficients
-_BETWEEN = 0.5 * (_NODES[1:] + _NODES[:-1])
+_BETWEEN = np.array([-1.0, *0.5 * (_NODES[1:] + _NODES[:-1]), 1.0])
 _MISSED = 1e-13  # of a function's largest value
 _JUMPED = 1e-10  # of it: polynomials that go through one function meet more closely
 _BENT = 1e-8  # and so do their slopes, times the length of the shorter piece
@@ -20,7 +20,7 @@ _HALVINGS = 40
 
 
 @dataclass(frozen=True, kw_only=True)
-class Piece:
+class SmoothPiece:
     """Polynomials that functions are for a while.
 
     Attributes
@@ -44,7 +44,7 @@ class Piece:
 
 def smooth_pieces(
     values: Callable[[float], np.ndarray], begin: float, end: float, count: int
-) -> Iterator[Piece]:
+) -> Iterator[SmoothPiece]:
     """Divide functions of time into pieces that polynomials of degree 5 go through.
 
     A piece is halved until it is a polynomial to rounding, also at those of 1000 places that lie
@@ -61,13 +61,13 @@ def smooth_pieces(
 
     Yields
     ------
-    Piece
+    SmoothPiece
         In order.
     """
     if not count:
-        yield Piece(start=begin, length=end - begin, powers=np.zeros((0, PIECE_DEGREE + 1)))
+        yield SmoothPiece(start=begin, length=end - begin, powers=np.zeros((0, PIECE_DEGREE + 1)))
         return
-    places = begin + (end - begin) * (np.arange(LOOKS) + 0.5) / LOOKS
+    places = begin + (end - begin) * (np.arange(PLACES) + 0.5) / PLACES
     looks = np.array([values(float(t)) for t in places]).T
     scale = np.abs(looks).max(axis=1)
     left, before = [(begin, end, 0)], None
@@ -88,14 +88,14 @@ def smooth_pieces(
             middle = 0.5 * (a + b)
             left += [(middle, b, halvings + 1), (a, middle, halvings + 1)]
             continue
-        made = Piece(start=a, length=b - a, powers=powers, fits=fits)
+        made = SmoothPiece(start=a, length=b - a, powers=powers, fits=fits)
         before = replace(
             made, breaks=not fits or (before is not None and _apart(before, made, scale))
         )
         yield before
 
 
-def _apart(one: Piece, other: Piece, scale: np.ndarray) -> bool:
+def _apart(one: SmoothPiece, other: SmoothPiece, scale: np.ndarray) -> bool:
     """Whether a function, or its slope, jumps from one piece to the next."""
     n = np.arange(PIECE_DEGREE + 1)
     jump = one.powers.sum(axis=1) - other.powers @ (-1.0) ** n

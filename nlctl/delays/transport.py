@@ -32,10 +32,10 @@ class TransportDelay:
         Names of the signals before and after, pairwise.
     varying : callable, optional
         ``varying(t)`` in s, 0 by default: what the delay is longer at time t.  It is called in
-        Python, before the run.
+        Python, before the run, at 1000 places at least: a pulse between two of them is not seen.
     history : callable, optional
         ``history(t)`` for t <= t_0 instead of `before`: a number, or one for each signal.  It is
-        called in Python, before the run.
+        called in Python, before the run, at 1000 places of the longest delay at least.
 
     Examples
     --------

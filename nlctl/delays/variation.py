@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from ..errors import ParameterError
-from .pieces import PIECE_DEGREE, Piece, smooth_pieces
+from .pieces import PIECE_DEGREE, SmoothPiece, smooth_pieces
 
 _APART = 1e-9  # of the largest value: what jumps by more over 40 halvings is not continuous
 
@@ -103,7 +103,7 @@ def variation(spec: Any, begin: float, end: float, path: str) -> Variation | Non
     return made
 
 
-def _powers(spec: Any, piece: Piece) -> np.ndarray:
+def _powers(spec: Any, piece: SmoothPiece) -> np.ndarray:
     """Return the polynomial of a piece: from end to end where none goes through the function."""
     if piece.fits:
         return piece.powers[0]

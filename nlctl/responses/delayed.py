@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 
 from ..blocks import Block, DelayLine, past
 from ..delays.lines import delayed_blocks
+from ..delays.pieces import PLACES
 from ..delays.variation import check_positive, variation
 from ..sampling.system import happening
 from ..upstream.control_internals import set_parameters
@@ -108,6 +109,25 @@ class Past:
         found: Any = brentq(lambda t: _sent(spec, t) - s, self.begin, self.end, xtol=1e-14)
         return float(found)
 
+    def longest_step(self, a: float, b: float) -> float:
+        """Return how long steps from a to b may be to go over no pulse that leaves a delay.
+
+        A function that nobody knows between two places is looked at at 1000; pieces of the past
+        are shorter the faster their signals move, three of them together: one alone may be what
+        is left between two breaks.
+        """
+        found = [math.inf]
+        for made in self.blocks:
+            spec: Any = made.current_spec
+            first, last = _sent(spec, a), _sent(spec, b)
+            if spec.varying is not None:
+                found.append((self.end - self.begin) / PLACES)
+            if spec.history is not None and first < self.begin:
+                found.append((self.begin - _sent(spec, self.begin)) / PLACES)
+            read = range(bisect_right(self.ends, first), bisect_right(self.starts, last) - 2)
+            found += [(self.ends[k + 2] - self.starts[k]) / 3 for k in read]
+        return min(found)
+
     def broken(self, t: float) -> None:
         """Note a break; those that all delays have left behind are forgotten."""
         oldest = min(_sent(made.current_spec, t) for made in self.blocks)
@@ -195,9 +215,12 @@ class _Run:
         nodes[0], nodes[-1] = a, b
         inner = np.union1d(np.union1d(self.times, self.wanted), nodes)
         grid = inner[(inner >= a) & (inner <= b)]
+        solver = self.settings["solve_ivp_kwargs"]
+        longest = min(solver.get("max_step", math.inf), known.longest_step(a, b))
         part = self.simulate(
             system, grid, interpolated(self.inputs, self.times, grid), self.x, params=self.params,
-            squeeze=False, transpose=False, return_states=False, **self.settings,
+            squeeze=False, transpose=False, return_states=False,
+            **self.settings | {"solve_ivp_kwargs": solver | {"max_step": longest}},
         )  # fmt: skip
         states = () if part.x is None else part.x  # None of a diagram without states
         path = np.reshape(states, (system.nstates or 0, grid.size))

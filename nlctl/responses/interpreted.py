@@ -132,10 +132,10 @@ class _Watch:
     repeated: int = 0
 
     def __call__(self, t: float, x: np.ndarray) -> float:
-        self.repeated = self.repeated + 1 if t <= self.reached else 0
+        self.repeated = self.repeated + 1 if t == self.reached else 0  # before it: tried again
         if self.repeated > _STANDSTILL or not np.all(np.isfinite(x)):
             raise _diverged(self.system, self.reached)
-        self.reached = max(float(t), self.reached)
+        self.reached = float(t)
         if self.progress is not None:
             self.progress(float(t))
         return 1.0

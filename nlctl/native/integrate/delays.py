@@ -31,7 +31,7 @@ POWERS = np.ascontiguousarray(np.linalg.inv(np.vander(2 * POINTS - 1, increasing
 IN_CHEBYSHEV = 2.0 ** (1 - DEGREE)  # of a power of z in the Chebyshev polynomial of the same degree
 JUMP = 1e-10  # of the time: a step so short that its signals still bend in has a jump inside
 ROUNDING = 1e-15  # of the time: two breaks so close are one
-READ = 4  # pieces of the past that a step reads at most
+PAST_PIECES = 4  # pieces of the past that a step reads at most
 
 
 @numba.njit(**INNER)
@@ -56,7 +56,8 @@ def _read(task, w, lane, i, j):
     Pieces are short where a signal moves: a longer step would go over a pulse that was kept.  A
     step that was given is taken as it is.
     """
-    ahead = piece_at(w.past_t, j, w.first[i, j], w.kept[j] - 1, sent(task, i, j, lane.t)) + READ
+    now = piece_at(w.past_t, j, w.first[i, j], w.kept[j] - 1, sent(task, i, j, lane.t))
+    ahead = now + PAST_PIECES
     if task.fixed > 0.0 or ahead >= w.kept[j]:
         return np.inf
     return arrival(task, i, j, w.past_t[ahead, j])

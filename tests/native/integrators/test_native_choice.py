@@ -24,7 +24,7 @@ def work(compiled, x0, end, method):
     """Return the steps tried up to a time, those of the stiff method for `cost` explicit ones."""
     p, inputs = compiled.parameter_vector(None), np.zeros((compiled.system.ninputs or 0, 2))
     times = np.array([0.0, end])
-    run = prepared(compiled, times, inputs, x0[:, None], p[:, None], Settings(method=method))
+    run = prepared(compiled, times, inputs, x0[:, None], p[:, None], Settings(method=method), [])
     begin(run)
     tried = {False: 0, True: 0}
     while run.lanes["status"][0] == RUNNING:
