@@ -14,6 +14,7 @@ import numpy as np
 
 from . import known_calls
 from .known_calls import MEMORY
+from .source import source_file
 from .values import (
     FRESH,
     OUTSIDE,
@@ -61,8 +62,8 @@ class Expressions(ast.NodeVisitor):
             return super().visit(node)
         except Impure as error:
             if not error.place and hasattr(node, "lineno"):
-                code = self.frame.function.__code__
-                error.place = f"{code.co_filename}, line {node.lineno}"  # type: ignore[attr-defined]
+                file = source_file(self.frame.function)
+                error.place = f"{file}, line {node.lineno}"  # type: ignore[attr-defined]
             raise
 
     def generic_visit(self, node: ast.AST) -> Any:

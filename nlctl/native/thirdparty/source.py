@@ -54,12 +54,11 @@ def definition(function: FunctionType) -> Definition:
         If its source is not to be found, or is not what the function was made of.
     """
     code = function.__code__
-    linecache.checkcache(code.co_filename)
-    text = "".join(linecache.getlines(code.co_filename, function.__globals__))
+    file, text = _file_and_text(function)
     if not text:
         raise Unreadable("its source cannot be found", "define it in a file or a notebook")
     try:
-        module = text, code.co_filename, code.co_flags & _FUTURES
+        module = text, file, code.co_flags & _FUTURES
         places, codes = _compiled(*module)
     except (SyntaxError, ValueError) as error:
         raise Unreadable(f"its source cannot be parsed ({error})", "mend its file") from error
@@ -71,6 +70,24 @@ def definition(function: FunctionType) -> Definition:
         advice = "give each function a line of its own"
         raise Unreadable("its source cannot be told from others on the same line", advice)
     return found[0]
+
+
+def source_file(function: FunctionType) -> str:
+    """Return the name of the file, or the cell of a notebook, that a function stands in."""
+    return _file_and_text(function)[0]
+
+
+def _file_and_text(function: FunctionType) -> tuple[str, str]:
+    """Return where a function stands, and what stands there: "" where nothing is found.
+
+    Functions that cloudpickle has made again do not know their file; their globals do.
+    """
+    named = function.__code__.co_filename
+    for file in (named, str(function.__globals__.get("__file__", named))):
+        linecache.checkcache(file)
+        if text := "".join(linecache.getlines(file, function.__globals__)):
+            return file, text
+    return named, ""
 
 
 @functools.lru_cache(maxsize=128)

@@ -3,7 +3,10 @@
 import ast
 import linecache
 import math
+import runpy
 
+import cloudpickle
+import control as ct
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -96,3 +99,27 @@ def test_a_block_of_a_later_cell_is_compiled():
     system = names["ct"].nlsys(names["f"], None, states=1, inputs=0, name="decay")
     response = nlctl.input_output_response(nlctl.compile(system), [0, 1], 0, [2.0], rtol=1e-9)
     assert math.isclose(math.sinh(response.states[0, -1]), math.sinh(2) / math.e, rel_tol=1e-6)
+
+
+def test_functions_made_again_from_a_pickle_have_the_source_of_their_file(tmp_path):
+    """cloudpickle leaves the file out of their code; it is believed only where it fits the code."""
+    file = tmp_path / "blocks.py"
+    file.write_text(TEXT)
+    known = functions(runpy.run_path(str(file)))
+    again = cloudpickle.loads(cloudpickle.dumps(known))
+    for one, other in zip(known, again, strict=True):
+        assert ast.dump(definition(one)) == ast.dump(definition(other))
+    file.write_text(TEXT.replace("K *", "3 * K *"))
+    with pytest.raises(Unreadable, match="is not what it was made of"):
+        definition(again[0])
+
+
+def test_where_a_function_from_a_pickle_cannot_be_compiled_is_said(tmp_path):
+    """With its file and line, as for the function itself."""
+    file = tmp_path / "counter.py"
+    file.write_text("def made():\n    n = 0\n    def f(t, x, u, p):\n        nonlocal n\n"
+                    "        n += 1\n        return -n * x\n    return f\n")  # fmt: skip
+    f = cloudpickle.loads(cloudpickle.dumps(runpy.run_path(str(file))["made"]()))
+    system = ct.nlsys(f, None, states=1, inputs=0, name="counter")
+    with pytest.raises(nlctl.native.CompileError, match=r"counter\.py, line 5"):
+        nlctl.compile(system)
