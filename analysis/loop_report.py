@@ -6,15 +6,14 @@
     page = write_report(made, "reports/pendulum")             # of analysis.report
     write_pdf(page, "reports/pendulum.pdf")
 
-What is seen to be of another loop is refused: a response whose samples are not the loop's outputs
-of its states, a study whose record is of other equations, parameters or wires, a ledger of another
-name.  That a response's states follow from the loop's equations, and that a ledger is of this very
-loop and not of a namesake, is not checked.
+What is of another loop is refused: a response whose samples are not the loop's outputs or whose
+states do not follow from its equations (`analysis.response_of_loop` says how closely), a study or a
+ledger whose record is of other equations, parameters or wires.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import control as ct
@@ -26,6 +25,7 @@ from nlctl.names import unknown
 from nlctl.wording import counted
 
 from .figures.axes import BLUE, stacked_axes
+from .loop_record import fact_differences, listed, loop_facts
 from .lyapunov.ledger import Ledger
 from .paper.page.proof import ledger_tables
 from .paper.page.proof_text import ledger_text
@@ -40,6 +40,7 @@ from .report.document import (
     Table,
     versions,
 )
+from .response_of_loop import check_response, own_parameters
 from .studies.origin import diagram_differences
 from .studies.page.claims import claims as study_claims
 from .studies.page.loop import diagram_figures, equation_items, parameter_tables
@@ -53,8 +54,6 @@ from .studies.result import Result
 __all__ = ["loop_report"]
 
 _SHOWN = 6  # signals that are drawn by default
-_POINTS = 8  # samples at which a response is compared with the loop's outputs
-_EQUAL = 1e-6  # relative to the largest sample of a signal
 ONE_RUN = "Runs are samples of the model: nothing follows for other values, or for later times."
 
 
@@ -77,9 +76,10 @@ def loop_report(
     references: Sequence[str] = (),
     command: str = "",
 ) -> Report:
-    """Compose a report about a loop, from what was computed of it; nothing is simulated.
+    """Compose a report about a loop, from what was computed of it.
 
-    But for a study: some of its rows are simulated again to be drawn.
+    Only spans of the response are simulated, to see that it is the loop's, and rows of a study
+    that are drawn.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def loop_report(
     signals : sequence of str, optional
         Outputs that are drawn; by default the first six.
     params : mapping, optional
-        The parameters that the run was made with.
+        The parameters that the run was made with; by default what the response says.
     ledger : Ledger, optional
         Of `analysis.lyapunov.ledger`.
     study : Result, optional
@@ -116,7 +116,7 @@ def loop_report(
     Raises
     ------
     DiagramError
-        If the response, the ledger or the study is seen to be of another loop.
+        If the response, the ledger or the study is of another loop.
     UnknownNameError
         If the loop has no output that `signals` names.
 
@@ -137,8 +137,9 @@ def loop_report(
     found = [f"The loop '{loop.name}' has {blocks} and {states}."]
     parts = _model(loop)
     if response is not None:
-        _check_response(loop, response, params)
-        parts.append(_run(loop, response, signals))
+        given = own_parameters(loop, response) if params is None else dict(params)
+        check_response(loop, response, given)
+        parts.append(_run(loop, response, signals, given))
     parts += sections
     if ledger is not None:
         _check_ledger(loop, ledger)
@@ -183,8 +184,10 @@ def _model(loop: ct.InputOutputSystem) -> list[Section]:
     ]
 
 
-def _run(loop: ct.InputOutputSystem, response: Any, signals: Sequence[str]) -> Section:
-    """Return one run: its signals over time, and their ranges."""
+def _run(
+    loop: ct.InputOutputSystem, response: Any, signals: Sequence[str], params: Mapping[str, Any]
+) -> Section:
+    """Return one run: its own parameters, its signals over time, and their ranges."""
     curves = _signals(response)
     for name in signals:
         if name not in curves:
@@ -205,7 +208,10 @@ def _run(loop: ct.InputOutputSystem, response: Any, signals: Sequence[str]) -> S
         key="run-history", caption=caption, description=told, time=t, signals=curves,
         shown=tuple(shown),
     )  # fmt: skip
+    values = ", ".join(f"{name} = {value}" for name, value in params.items())
+    own = [Paragraph(text=f"This run has values of its own: {values}.")] if params else []
     items: list[Item] = [
+        *own,
         Figure(key="run-signals", caption=caption, description=told, figure=figure),
         history,
         Table(
@@ -257,45 +263,12 @@ def _numbers(response: Any, study: Result | None) -> dict[str, Any]:
     return told
 
 
-def _check_response(
-    loop: ct.InputOutputSystem, response: Any, params: Mapping[str, Any] | None
-) -> None:
-    """Refuse a response whose samples are not the loop's own outputs of its states."""
-    curves = _signals(response)
-    if list(curves) != list(loop.output_labels) or np.shape(response.x)[0] != loop.nstates:
-        raise DiagramError(
-            f"the response is not of '{loop.name}', whose outputs are "
-            f"{', '.join(loop.output_labels)} and which has "
-            f"{counted(loop.nstates or 0, 'state')}: it has {', '.join(curves)} and "
-            f"{np.shape(response.x)[0]}"
-        )
-    for place, values in _own_outputs(loop, response, params):
-        for (name, y), own in zip(curves.items(), values, strict=True):
-            scale = float(np.nanmax(np.abs(y), initial=1.0))
-            if np.isfinite(y[place]) and not abs(y[place] - own) <= _EQUAL * scale:
-                raise DiagramError(
-                    f"the response is not of '{loop.name}': {name} is {y[place]:.6g} at "
-                    f"t = {response.time[place]:g} s, and the loop says {own:.6g}; give the "
-                    "parameters that it was run with as params={...}"
-                )
-
-
-def _own_outputs(
-    loop: Any, response: Any, params: Mapping[str, Any] | None
-) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield the loop's outputs at some samples, as python-control evaluates them."""
-    u = np.zeros((loop.ninputs or 0, len(response.time)))
-    u = u if response.u is None else np.asarray(response.u, dtype=float).reshape(u.shape)
-    x = np.asarray(response.x, dtype=float)
-    for place in np.unique(np.linspace(0, len(response.time) - 1, _POINTS).astype(int)):
-        with np.errstate(all="ignore"):
-            own = loop.output(response.time[place], x[:, place], u[:, place], dict(params or {}))
-        yield int(place), np.atleast_1d(np.asarray(own, dtype=float))
-
-
 def _check_ledger(loop: ct.InputOutputSystem, found: Ledger) -> None:
-    if found.loop != loop.name:
-        raise DiagramError(f"the ledger is of '{found.loop}', the report of '{loop.name}'")
+    if told := listed([*fact_differences(found.loop_facts, loop_facts(loop))]):
+        raise DiagramError(
+            f"the ledger is of another loop '{found.loop}' than '{loop.name}' ({told}): give the "
+            "loop that it was made of"
+        )
 
 
 def _check_study(loop: ct.InputOutputSystem, result: Result) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import control as ct
@@ -16,6 +17,7 @@ from nlctl.names import unknown
 from nlctl.wording import counted
 
 from ..json_values import as_json
+from ..loop_record import loop_facts
 from ..metrics import peak
 from .bounds.provenance import Constants
 from .conclusions import conclusions, slow_drift_of
@@ -40,6 +42,8 @@ class Ledger:
     ----------
     loop : str
         Name of the diagram.
+    loop_facts : mapping
+        What the diagram consists of, see `analysis.loop_record`.
     lines : tuple of Line
     constants : Constants
     horizon : float
@@ -57,6 +61,7 @@ class Ledger:
     """
 
     loop: str
+    loop_facts: Mapping[str, Mapping[str, str]] = field(repr=False)
     lines: tuple[Line, ...]
     constants: Constants
     horizon: float
@@ -223,6 +228,7 @@ def _assembled(study: Examination) -> Ledger:
     lines = tuple(dataclasses.replace(line, runs=count) for line in merged.values())
     return Ledger(
         loop=str(loop.name),
+        loop_facts=loop_facts(loop),
         lines=lines,
         constants=found,
         horizon=horizon,

@@ -7,13 +7,20 @@ another one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from analysis.json_values import as_json, from_json
+from analysis.loop_record import (
+    fact_differences,
+    listed,
+    loop_facts,
+    loop_values,
+    short_key,
+    values_differ,
+)
 from analysis.robustness import Prepared, diagrams
 from analysis.robustness.runs.identity import differences_of, experiment_facts, labels_text
-from analysis.robustness.runs.loop_record import loop_facts, loop_values, short_key, values_differ
 
 from .file.parse import StudyFile
 from .file.schema import Study, keyed
@@ -27,8 +34,6 @@ __all__ = [
     "plain_study",
     "version_differences",
 ]
-
-_MOST = 4  # differences that a sentence names
 
 
 def origin_of(file: StudyFile, prepared: Prepared) -> dict[str, Any]:
@@ -78,7 +83,7 @@ def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared
         "diagrams": {name: loop_facts(system) for name, system in names.items()},
         "values": {name: loop_values(system, end) for name, system in names.items()},
     }
-    return _listed(list(dict.fromkeys(_diagrams(before, from_json(as_json(now))))))
+    return listed(list(dict.fromkeys(_diagrams(before, from_json(as_json(now))))))
 
 
 def diagram_differences(origin: Mapping[str, Any], diagram: Any) -> str:
@@ -92,8 +97,8 @@ def diagram_differences(origin: Mapping[str, Any], diagram: Any) -> str:
         With the values that it has by itself.
     """
     now = from_json(as_json(loop_facts(diagram)))
-    found = [list(_parts(before, now)) for before in origin["diagrams"].values()]
-    return _listed(min(found, key=len, default=["the study kept no record of its loop"]))
+    found = [list(fact_differences(before, now)) for before in origin["diagrams"].values()]
+    return listed(min(found, key=len, default=["the study kept no record of its loop"]))
 
 
 def plain_study(study: Study) -> dict[str, Any]:
@@ -104,7 +109,7 @@ def plain_study(study: Study) -> dict[str, Any]:
 def version_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """Return which versions differ, in words; nothing if none does."""
     old, new = before["versions"], now["versions"]
-    return _listed(
+    return listed(
         [
             f"{name} {old.get(name, 'absent')} then, {new.get(name, 'absent')} now"
             for name in dict.fromkeys([*old, *new])
@@ -116,12 +121,7 @@ def version_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> st
 def loop_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """Return what else differs, in words; nothing if nothing does."""
     found = list(dict.fromkeys([*_settings(before, now), *_diagrams(before, now)]))
-    return _listed(found)
-
-
-def _listed(texts: Sequence[str]) -> str:
-    more = f"; and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
-    return "; ".join(texts[:_MOST]) + more
+    return listed(found)
 
 
 def _settings(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
@@ -142,27 +142,10 @@ def _diagrams(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str
         if name not in old or name not in new:
             yield f"the diagram '{name}' is {'new' if name in new else 'gone'}"
             continue
-        found = list(_parts(old[name], new[name]))
+        found = list(fact_differences(old[name], new[name]))
         moved = values_differ(before["values"][name], now["values"][name])
         if moved and not found:
             found = [f"the value of {moved[0]} at the same point"]
         if not found and old[name] != new[name]:
             found = ["the compiled program"]
         yield from found
-
-
-def _parts(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what differs between two records of one diagram."""
-    for part, words in (("blocks", "the equations of '{}'"), ("wiring", "the wiring of '{}'")):
-        for name in _changed(old[part], new[part]):
-            here, there = name in old[part], name in new[part]
-            told = words.format(name) if here and there else f"'{name}'"
-            yield told + ("" if here and there else " is gone" if here else " is new")
-    for part, words, default in (("parameters", "{}", "absent"), ("initial_state", "{}(0)", "0.0")):
-        for name in _changed(old[part], new[part]):
-            was, now = (content.get(name, default) for content in (old[part], new[part]))
-            yield f"{words.format(name)} was {was}, now {now}"
-
-
-def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    return [name for name in dict.fromkeys([*old, *new]) if old.get(name) != new.get(name)]

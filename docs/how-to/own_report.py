@@ -85,8 +85,8 @@ print(f"decays with {rate:.3f} 1/s")
 assert abs(rate - 2) < 0.05
 
 # %%
-# What is seen to be of another loop is refused. A response is compared with the loop's own outputs, a study with the
-# record of what it was run with:
+# What is of another loop is refused. A response's outputs are compared with the loop's own, and spans of it are simulated
+# again; a ledger and a study have a record of the loop that they are of:
 try:
     loop_report(nlctl.paper.example_1(), title="Another loop", response=response)
 except nlctl.DiagramError as error:

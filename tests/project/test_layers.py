@@ -18,7 +18,8 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.expressions"],
     ["nlctl.native"],
     ["nlctl.response", "nlctl.__main__"],
-    ["analysis.json_values", "analysis.catalogue", "analysis.metrics", "analysis.intervals"],
+    ["analysis.json_values", "analysis.catalogue", "analysis.metrics", "analysis.intervals"]
+    + ["analysis.loop_record", "analysis.response_of_loop"],
     ["analysis.lyapunov", "analysis.robustness"],
     ["analysis.figures", "analysis.report"],
     ["analysis.studies"],

@@ -134,7 +134,7 @@ def test_the_same_report_is_the_same_to_the_byte():
         ),
         ({"response": RESPONSE, "signals": ["z"]}, "unknown output 'z'"),
         ({"study": "study"}, "another loop than 'decay'"),
-        ({"ledger": "ledger"}, "the ledger is of 'example_1'"),
+        ({"ledger": "ledger"}, "the ledger is of another loop 'example_1' than 'decay'"),
     ],
 )
 def test_what_is_of_another_loop_is_refused(given, words, tmp_path_factory):
@@ -152,14 +152,29 @@ def test_what_is_of_another_loop_is_refused(given, words, tmp_path_factory):
     assert re.search(words, str(e.value))
 
 
-def test_a_response_with_other_parameters_needs_them():
-    """An output that reads a parameter shows it: the run's own outputs are not the loop's."""
+def test_values_of_a_run_that_are_not_the_loops_are_told():
+    """A run says its own parameters; where it is said to have had others it is refused."""
     loop = nlctl.paper.example_1()
     response = nlctl.input_output_response(loop, TIMES, params={"law.beta": 3.0})
-    with pytest.raises(nlctl.DiagramError, match=r"params=\{...\}"):
-        loop_report(loop, title="Decay", response=response)
-    made = loop_report(loop, title="Decay", response=response, params={"law.beta": 3.0})
+    made = loop_report(loop, title="Decay", response=response)
     assert set(made.numbers["run"]) == set(loop.output_labels)
+    told = render_html(made).replace("\N{NO-BREAK SPACE}", " ")
+    assert "This run has values of its own: law.beta = 3.0." in told
+    with pytest.raises(nlctl.DiagramError, match=r"params=\{...\}"):
+        loop_report(loop, title="Decay", response=response, params={"law.beta": 4.0})
+
+
+@pytest.mark.slow
+def test_the_ledger_of_a_namesake_is_refused():
+    """Of the same name, blocks and wires, with one other value: the sentence names it."""
+    from analysis.lyapunov import ledger
+
+    one = nlctl.paper.example_1()
+    other = nlctl.paper.example_1(actuator=nlctl.DeadZone(b_r=0.6))
+    found = ledger(other, 0.2)
+    assert loop_report(other, title="Its own", ledger=found).verdict
+    with pytest.raises(nlctl.DiagramError, match=r"actuator.b_r was 0.6, now 0.5"):
+        loop_report(one, title="A namesake", ledger=found)
 
 
 def studied(folder):

@@ -343,7 +343,7 @@ def test_a_kind_that_cannot_be_one_is_refused_where_it_is_made(fields, words):
 REACHED = '''
 import numpy as np
 import pandas as pd
-from analysis.robustness.runs.loop_record import short_key
+from analysis.loop_record import short_key
 from analysis.studies import Asked, Kind
 
 

@@ -18,11 +18,11 @@ from nlctl.response import input_output_response
 from nlctl.upstream.control_internals import set_parameters
 from nlctl.wording import counted
 
+from ...response_of_loop import own_parameters
 from ..bounds.decomposition import Decomposition
 from ..bounds.final_bound import Gains, alpha_1
 from .instrumented import observed
 from .reference_rates import reference_margin
-from .response_of_loop import own_parameters
 from .roles import Parts, read_parts
 from .same_loop import check_same, points_around
 from .signals import Margin, Signals, signals_of

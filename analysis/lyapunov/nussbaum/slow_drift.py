@@ -29,7 +29,7 @@ from nlctl import functions
 from nlctl.arguments import integer, number, of_type
 from nlctl.errors import ParameterError
 
-from ..loop.response_of_loop import law_of_response
+from ..loop.nussbaum_law import law_of_response
 from .energy import Drift, drift
 from .property import GainFunction, Lobe, antiderivative, lobe_around, root
 
@@ -223,7 +223,7 @@ def slow_drift(
         The Nussbaum function of the law.
     loop : control.InterconnectedSystem or Compiled, optional
         The loop that the response is of: N is then that of its law, and it is checked that the
-        loop is one that this is about, see `analysis.lyapunov.loop.response_of_loop`.
+        loop is one that this is about, see `analysis.lyapunov.loop.nussbaum_law`.
     window : float, optional
         Length of the windows (s) over which rates are averaged; whole periods of the reference,
         of which the default holds four for the paper's.

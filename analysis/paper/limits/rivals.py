@@ -18,7 +18,7 @@ import pandas as pd
 
 from nlctl import paper
 
-from ...robustness.runs.loop_record import loop_facts, loop_values
+from ...loop_record import loop_facts, loop_values
 from ...studies import Result, read_study, run, shipped
 from ..rivals import rival_loop
 from .markdown import markdown_table

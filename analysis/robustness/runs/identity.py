@@ -16,12 +16,12 @@ import pandas as pd
 
 from nlctl import errors
 
+from ...loop_record import array_text, loop_facts, short_key
 from ...metrics import Metric
 from ..uncertainty.design import Design
 from ..uncertainty.quantity import Uncertain
 from ..uncertainty.space import Space
 from .experiment import Prepared
-from .loop_record import array_text, loop_facts, short_key
 
 __all__ = [
     "differences_of",
@@ -34,7 +34,12 @@ __all__ = [
 VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
 COMPUTING = {
     Path(errors.__file__).parent: ("**/*.py",),
-    Path(__file__).parents[2]: ("robustness/**/*.py", "studies/**/*.py", "metrics/*.py"),
+    Path(__file__).parents[2]: (
+        "robustness/**/*.py",
+        "studies/**/*.py",
+        "metrics/*.py",
+        "loop_record.py",
+    ),
 }
 TOLD = ("drawing", "page")  # they compute nothing
 PROBES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])

@@ -12,7 +12,7 @@ import hashlib
 import math
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 import control as ct
@@ -25,7 +25,15 @@ from nlctl.params import declared_params
 from nlctl.sampling.clock import moments
 from nlctl.sampling.system import Sampled, clocks_of, happening
 
-__all__ = ["array_text", "loop_facts", "loop_values", "short_key", "values_differ"]
+__all__ = [
+    "array_text",
+    "fact_differences",
+    "listed",
+    "loop_facts",
+    "loop_values",
+    "short_key",
+    "values_differ",
+]
 
 _T = TypeVar("_T")
 _EQUATIONS = ("update", "output", "switching", "commit")
@@ -33,6 +41,7 @@ SHAPE = ("inputs", "outputs", "states", "feedthrough", "vector", "memory", "init
 _POINTS = 6
 GOLDEN = (math.sqrt(5) - 1) / 2
 GIVEN = re.compile(r"sys\[\d+\]")  # by python-control
+_MOST = 4  # differences that a sentence names
 RTOL, ATOL = 1e-6, 1e-9  # what processors and versions of libraries may differ by
 
 
@@ -184,3 +193,26 @@ def _close(one: Any, other: Any) -> bool:
         both_nan = math.isnan(one) and math.isnan(other)
         return both_nan or math.isclose(one, other, rel_tol=RTOL, abs_tol=ATOL)
     return one == other
+
+
+def fact_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """Yield in words what differs between two records of `loop_facts`."""
+    for part, words in (("blocks", "the equations of '{}'"), ("wiring", "the wiring of '{}'")):
+        for name in _changed(old[part], new[part]):
+            here, there = name in old[part], name in new[part]
+            told = words.format(name) if here and there else f"'{name}'"
+            yield told + ("" if here and there else " is gone" if here else " is new")
+    for part, words, default in (("parameters", "{}", "absent"), ("initial_state", "{}(0)", "0.0")):
+        for name in _changed(old[part], new[part]):
+            was, now = (content.get(name, default) for content in (old[part], new[part]))
+            yield f"{words.format(name)} was {was}, now {now}"
+
+
+def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    return [name for name in dict.fromkeys([*old, *new]) if old.get(name) != new.get(name)]
+
+
+def listed(texts: Sequence[str]) -> str:
+    """Return differences as one text; of many the first."""
+    more = f"; and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
+    return "; ".join(texts[:_MOST]) + more

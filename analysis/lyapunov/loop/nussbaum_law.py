@@ -1,0 +1,58 @@
+"""Whether the loop that a response is of obeys N(zeta) zeta' = r u."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from nlctl.diagrams import state_names
+from nlctl.errors import DiagramError
+
+from ...response_of_loop import check_response, check_shape, own_outputs, own_parameters
+from ..nussbaum.property import GainFunction
+from .roles import read_parts
+
+__all__ = ["law_of_response"]
+
+_SIGNALS = ("zeta", "r", "u")
+_EQUAL = 1e-6  # relative, and absolute below 1
+
+
+def law_of_response(loop: Any, response: Any) -> GainFunction:
+    """Return the Nussbaum function of the loop that a response is of.
+
+    The response is compared with the loop, see `analysis.response_of_loop`, and at its samples
+    N(zeta) zeta' with r u, zeta' from the diagram's own right-hand side.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem or Compiled
+    response : control.TimeResponseData
+        With its states, and the outputs zeta, r and u.
+
+    Raises
+    ------
+    DiagramError
+        If the loop is not the one that the proof is about, has no Nussbaum law, or its law is not
+        (23), (24); if the response is not one of the loop.
+    """
+    loop = getattr(loop, "system", loop)
+    check_shape(loop, response, _SIGNALS)
+    params = own_parameters(loop, response)
+    parts = read_parts(loop, params=params)
+    check_response(loop, response, params, _SIGNALS)
+    if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
+        raise DiagramError(
+            f"slow_drift is about laws with a Nussbaum argument, got {type(parts.law).__name__}"
+        )
+    place = state_names(loop).index(f"{parts.paths['law']}.zeta")
+    for i, own in own_outputs(loop, response, params):
+        t, x = float(response.time[i]), np.asarray(response.states)[:, i]
+        rate = float(np.asarray(loop.dynamics(t, x, np.zeros(0), params=params))[place])
+        a, b = parts.law.N(own["zeta"]) * rate, own["r"] * own["u"]
+        if not abs(a - b) <= _EQUAL * max(1.0, abs(a), abs(b)):
+            raise DiagramError(
+                f"N(zeta) zeta' and r u of '{loop.name}' differ at t = {t:g} s: {a:.9g} and {b:.9g}"
+            )
+    return parts.law.N

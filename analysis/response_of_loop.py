@@ -1,0 +1,232 @@
+"""Whether a response is one of a loop: outputs are the loop's, and states follow from it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import count
+from typing import Any
+
+import numpy as np
+
+from nlctl.delays.lines import delayed_blocks
+from nlctl.diagrams import leaves
+from nlctl.errors import DiagramError, DivergedError
+from nlctl.response import EngineWarning, input_output_response
+from nlctl.sampling.system import clocks_of
+from nlctl.sliding.blocks import sliding_blocks
+from nlctl.wording import counted
+
+__all__ = ["check_response", "check_shape", "own_outputs", "own_parameters"]
+
+_PLACES = 12  # samples, and spans between samples, that are compared
+_EQUAL = 1e-6  # of an output, relative to its largest sample, and absolute below 1
+_SHORTEST = 1 / 200  # of the response: over shorter spans its states hardly move
+_FOLLOWS = 1e-2  # of how far a state moves in a span
+_STEPS = 1000  # between two samples: another loop may diverge, in ever shorter steps
+_LOCAL = 1e-3  # of a state's largest sample so far: python-control's default tolerance
+
+
+def own_parameters(loop: Any, response: Any) -> dict[str, Any]:
+    """Return the parameters of a response that differ from those of its loop.
+
+    Parameters
+    ----------
+    loop : control.InputOutputSystem
+    response : control.TimeResponseData
+
+    Returns
+    -------
+    dict
+        By name, as they are given to `nlctl.input_output_response`.
+    """
+    usual, given = dict(loop.params or {}), dict(response.params or {})
+    return {k: v for k, v in given.items() if not np.array_equal(usual.get(k, np.nan), v)}
+
+
+def check_response(
+    loop: Any, response: Any, params: Mapping[str, Any] | None = None, names: Sequence[str] = ()
+) -> None:
+    """Refuse a response that is not one of a loop.
+
+    At twelve samples the outputs must be those that the loop has at the response's states.  Over
+    twelve spans between samples the loop is simulated from the states at the beginning and must
+    come to those at the end, to a hundredth of how far each state moves and a thousandth of its
+    largest sample so far.  What samples, delays or slides cannot begin anywhere: it is
+    simulated as a whole, and states and outputs at twelve samples are compared.  A loop that
+    differs by less is not told from this one; a response that was simulated so coarsely that it
+    is wrong by more is refused too.
+
+    Parameters
+    ----------
+    loop : control.InputOutputSystem
+    response : control.TimeResponseData
+        One trace, with states.
+    params : mapping, optional
+        The parameters that it was run with; by default what it says itself.
+    names : sequence of str, optional
+        Outputs that are compared; by default all, which must be the loop's then.
+
+    Raises
+    ------
+    DiagramError
+        If it is of another loop, with the first value that differs.
+    """
+    params = own_parameters(loop, response) if params is None else dict(params)
+    check_shape(loop, response, names)
+    t, finite = np.asarray(response.time, dtype=float), np.isfinite(response.x).all(axis=0)
+    last = (len(t) if finite.all() else int(np.argmin(finite))) - 1
+    places = np.unique(np.linspace(0, last, _PLACES).astype(int))
+    if delayed_blocks(loop) or sliding_blocks(loop) or clocks_of(b.system for b in leaves(loop)):
+        _check_span(loop, response, params, places, [*(names or loop.output_labels)])
+        return
+    for place, own in own_outputs(loop, response, params):
+        _check_outputs(loop, response, place, own, names)
+    ends = np.searchsorted(t, t + _SHORTEST * (t[last] - t[0]) * (1 - 1e-9))
+    for a in places[:-1]:
+        _check_span(loop, response, params, np.array([a, min(max(ends[a], a + 1), last)]), [])
+
+
+def own_outputs(
+    loop: Any, response: Any, params: Mapping[str, Any]
+) -> Iterator[tuple[int, dict[str, float]]]:
+    """Yield a loop's outputs at samples of a response, as python-control evaluates them.
+
+    Parameters
+    ----------
+    loop : control.InputOutputSystem
+    response : control.TimeResponseData
+        With states.
+    params : mapping
+
+    Yields
+    ------
+    place : int
+        Of the sample.
+    outputs : dict
+        By name.
+    """
+    x, u = _states(response), _inputs(loop, response)
+    for place in np.unique(np.linspace(0, len(response.time) - 1, _PLACES).astype(int)):
+        with np.errstate(all="ignore"):
+            own = loop.output(response.time[place], x[:, place], u[:, place], dict(params) or None)
+        values = np.atleast_1d(np.asarray(own, dtype=float)).tolist()
+        yield int(place), dict(zip(loop.output_labels, values, strict=True))
+
+
+def check_shape(loop: Any, response: Any, names: Sequence[str]) -> None:
+    """Refuse a response with another number of states, other outputs, or several traces.
+
+    Parameters
+    ----------
+    loop : control.InputOutputSystem
+    response : control.TimeResponseData
+    names : sequence of str
+        Outputs that it must have; without any, those of the loop.
+
+    Raises
+    ------
+    DiagramError
+        Which says what both have.
+    """
+    if response.x is None or np.ndim(response.y) != 2:
+        raise DiagramError(
+            f"a response of '{loop.name}' needs its states and one trace, got outputs of shape "
+            f"{np.shape(response.y)} and {'no' if response.x is None else 'its'} states"
+        )
+    known, count = list(response.output_labels), np.shape(response.x)[0]
+    same = set(names) <= set(known) if names else known == list(loop.output_labels)
+    if not same or count != loop.nstates:
+        raise DiagramError(
+            f"the response is not of '{loop.name}', whose outputs are "
+            f"{', '.join(names or loop.output_labels)} and which has "
+            f"{counted(loop.nstates or 0, 'state')}: it has {', '.join(known)} and {count}"
+        )
+
+
+def _check_outputs(
+    loop: Any, response: Any, place: int, own: Mapping[str, float], names: Sequence[str]
+) -> None:
+    """Refuse outputs at one sample that are not the loop's at the same states."""
+    for name in names or loop.output_labels:
+        y = np.asarray(response.y[list(response.output_labels).index(name)], dtype=float)
+        scale = float(np.nanmax(np.abs(y), initial=1.0))
+        if np.isfinite(y[place]) and not abs(y[place] - own[name]) <= _EQUAL * scale:
+            raise _another(loop, name, y[place], response.time[place], own[name])
+
+
+def _check_span(
+    loop: Any, response: Any, params: Mapping[str, Any], places: np.ndarray, names: list[str]
+) -> None:
+    """Simulate a loop from the first sample to the last; refuse other states, and named outputs."""
+    span = slice(int(places[0]), int(places[-1]) + 1)
+    whole, labels = _signals(response, names), [*loop.state_labels, *names]
+    told = whole[:, span]
+    moved = np.abs(np.diff(told, axis=1)).sum(axis=1)
+    largest = np.abs(whole[:, : span.stop]).max(axis=1)
+    allowed = (_FOLLOWS * moved + _LOCAL * largest + np.finfo(float).tiny)[:, None]
+    places = places[1:] - places[0]
+    for engine in ("auto",) if sliding_blocks(loop) else ("auto", "python-control"):
+        own = _again(loop, response, span, params, engine, names)  # python-control relaxes memories
+        wrong = ~(np.abs(own - told)[:, places] <= allowed)
+        if not wrong.any():
+            return
+    first = int(np.argmax(wrong.any(axis=0)))
+    row, k = int(np.argmax(wrong[:, first])), int(places[first])
+    t = response.time[span]
+    raise _another(loop, labels[row], told[row, k], t[k], own[row, k], t[0])
+
+
+def _again(
+    loop: Any, response: Any, span: slice, params: Mapping[str, Any], engine: str, names: list[str]
+) -> np.ndarray:
+    """Return states, and named outputs, of a loop over some samples; NaN where it does not come."""
+    u, steps = _inputs(loop, response)[:, span], count()
+
+    def bounded(t: float) -> None:
+        if next(steps) > _STEPS * (span.stop - span.start):
+            raise DivergedError("too many steps", t)
+
+    found = np.full((len(response.x) + len(names), span.stop - span.start), np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", EngineWarning)
+        try:
+            run: Any = input_output_response(
+                loop, response.time[span], u if u.size else 0, response.x[:, span.start],
+                params=dict(params), engine=engine, squeeze=False, progress=bounded,
+            )  # fmt: skip
+        except DivergedError:
+            return found
+    found[:] = _signals(run, names)
+    return found
+
+
+def _signals(response: Any, names: Sequence[str]) -> np.ndarray:
+    """Return the states of a response, and below them the outputs that are named."""
+    rows = [list(response.output_labels).index(name) for name in names]
+    y = np.reshape(np.asarray(response.y, dtype=float), (-1, len(response.time)))
+    return np.concatenate([_states(response), y[rows]])
+
+
+def _states(response: Any) -> np.ndarray:
+    return np.atleast_2d(np.asarray(response.x, dtype=float))
+
+
+def _inputs(loop: Any, response: Any) -> np.ndarray:
+    shape = (loop.ninputs or 0, len(response.time))
+    return (
+        np.zeros(shape)
+        if response.u is None
+        else np.asarray(response.u, dtype=float).reshape(shape)
+    )
+
+
+def _another(
+    loop: Any, name: str, told: float, t: float, own: float, since: float | None = None
+) -> DiagramError:
+    begun = "" if since is None else f" from the states at t = {since:g} s"
+    return DiagramError(
+        f"the response is not of '{loop.name}': {name} is {told:.6g} at t = {t:g} s, and the loop "
+        f"says {own:.6g}{begun}; give the parameters that it was run with as params={{...}}"
+        + ("" if since is None else ", or simulate it with smaller tolerances")
+    )
