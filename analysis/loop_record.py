@@ -27,8 +27,8 @@ from nlctl.sampling.system import Sampled, clocks_of, happening
 
 __all__ = [
     "array_text",
+    "difference_text",
     "fact_differences",
-    "listed",
     "loop_facts",
     "loop_values",
     "short_key",
@@ -212,7 +212,7 @@ def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     return [name for name in dict.fromkeys([*old, *new]) if old.get(name) != new.get(name)]
 
 
-def listed(texts: Sequence[str]) -> str:
+def difference_text(texts: Sequence[str]) -> str:
     """Return differences as one text; of many the first."""
     more = f"; and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
     return "; ".join(texts[:_MOST]) + more

@@ -25,7 +25,7 @@ from nlctl.names import unknown
 from nlctl.wording import counted
 
 from .figures.axes import BLUE, stacked_axes
-from .loop_record import fact_differences, listed, loop_facts
+from .loop_record import difference_text, fact_differences, loop_facts
 from .lyapunov.ledger import Ledger
 from .paper.page.proof import ledger_tables
 from .paper.page.proof_text import ledger_text
@@ -264,7 +264,7 @@ def _numbers(response: Any, study: Result | None) -> dict[str, Any]:
 
 
 def _check_ledger(loop: ct.InputOutputSystem, found: Ledger) -> None:
-    if told := listed([*fact_differences(found.loop_facts, loop_facts(loop))]):
+    if told := difference_text([*fact_differences(found.loop_facts, loop_facts(loop))]):
         raise DiagramError(
             f"the ledger is of another loop '{found.loop}' than '{loop.name}' ({told}): give the "
             "loop that it was made of"

@@ -131,8 +131,8 @@ def check_shape(loop: Any, response: Any, names: Sequence[str]) -> None:
     """
     if response.x is None or np.ndim(response.y) != 2:
         raise DiagramError(
-            f"a response of '{loop.name}' needs its states and one trace, got outputs of shape "
-            f"{np.shape(response.y)} and {'no' if response.x is None else 'its'} states"
+            f"a response of '{loop.name}' needs states and one trace, got states of shape "
+            f"{np.shape(response.x)} and outputs of shape {np.shape(response.y)}"
         )
     known, count = list(response.output_labels), np.shape(response.x)[0]
     same = set(names) <= set(known) if names else known == list(loop.output_labels)

@@ -12,8 +12,8 @@ from typing import Any
 
 from analysis.json_values import as_json, from_json
 from analysis.loop_record import (
+    difference_text,
     fact_differences,
-    listed,
     loop_facts,
     loop_values,
     short_key,
@@ -83,7 +83,7 @@ def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared
         "diagrams": {name: loop_facts(system) for name, system in names.items()},
         "values": {name: loop_values(system, end) for name, system in names.items()},
     }
-    return listed(list(dict.fromkeys(_diagrams(before, from_json(as_json(now))))))
+    return difference_text(list(dict.fromkeys(_diagrams(before, from_json(as_json(now))))))
 
 
 def diagram_differences(origin: Mapping[str, Any], diagram: Any) -> str:
@@ -98,7 +98,7 @@ def diagram_differences(origin: Mapping[str, Any], diagram: Any) -> str:
     """
     now = from_json(as_json(loop_facts(diagram)))
     found = [list(fact_differences(before, now)) for before in origin["diagrams"].values()]
-    return listed(min(found, key=len, default=["the study kept no record of its loop"]))
+    return difference_text(min(found, key=len, default=["the study kept no record of its loop"]))
 
 
 def plain_study(study: Study) -> dict[str, Any]:
@@ -109,7 +109,7 @@ def plain_study(study: Study) -> dict[str, Any]:
 def version_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """Return which versions differ, in words; nothing if none does."""
     old, new = before["versions"], now["versions"]
-    return listed(
+    return difference_text(
         [
             f"{name} {old.get(name, 'absent')} then, {new.get(name, 'absent')} now"
             for name in dict.fromkeys([*old, *new])
@@ -121,7 +121,7 @@ def version_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> st
 def loop_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """Return what else differs, in words; nothing if nothing does."""
     found = list(dict.fromkeys([*_settings(before, now), *_diagrams(before, now)]))
-    return listed(found)
+    return difference_text(found)
 
 
 def _settings(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:

@@ -4,6 +4,7 @@ from .ablations import FixedGainLaw, ablations, replaced
 from .adaptive import Zero, adaptive_neural
 from .adaptive_inverse import AdaptiveDeadZoneInverse
 from .backstepping import DynamicSurface, dynamic_surface_control
+from .extremum_seeking import ExtremumSeeking
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
 from .mrac import (
@@ -37,8 +38,7 @@ from .rbf import (
 )
 from .remedies import DeadZoneNussbaumLaw, LeakyNussbaumLaw, MonotoneNussbaumLaw
 from .robust import RobustTerm
-from .sliding_mode import SlidingModeLaw, sliding_mode
-from .super_twisting import SuperTwistingLaw
+from .sliding_modes import SlidingModeLaw, SuperTwistingLaw, sliding_mode
 
 __all__ = [
     "PID",
@@ -52,6 +52,7 @@ __all__ = [
     "DirectLaw",
     "DynamicSurface",
     "EModifiedWeights",
+    "ExtremumSeeking",
     "FilteredError",
     "FilteredLaw",
     "FixedGainLaw",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..equations import equation
-from ..params import param, record
+from ...equations import equation
+from ...params import param, record
 
 __all__ = ["SuperTwistingLaw"]
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import control as ct
 
-from ..diagrams import as_system, interconnect
-from ..equations import equation
-from ..functions import clip
-from ..params import param, record
-from .filtered_error import FilteredError
+from ...diagrams import as_system, interconnect
+from ...equations import equation
+from ...functions import clip
+from ...params import param, record
+from ..filtered_error import FilteredError
 
 __all__ = ["SlidingModeLaw", "sliding_mode"]
 
