@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import warnings
 from collections.abc import Callable, Mapping
@@ -183,10 +184,7 @@ def input_output_response(
         raise ParameterError(f"squeeze needs True, False or None, got {squeeze!r}")
     named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
     named |= {"evaluation_times": evaluation_times, "return_states": return_states}
-    defaults = {
-        k: p.default for k, p in inspect.signature(input_output_response).parameters.items()
-    }
-    named = with_aliases(named, aliases, defaults)
+    named = with_aliases(named, aliases, _defaults())
     form = {"squeeze": squeeze, "transpose": transpose, "return_states": named["return_states"]}
     run = RunArguments(
         system=system,
@@ -205,6 +203,13 @@ def input_output_response(
         },
     )
     return _computed(unified(run), engine or "auto")
+
+
+@functools.cache
+def _defaults() -> dict[str, Any]:
+    """Return the arguments of `input_output_response` with their defaults."""
+    parameters = inspect.signature(input_output_response).parameters
+    return {name: parameter.default for name, parameter in parameters.items()}
 
 
 def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:

@@ -77,9 +77,17 @@ def _same(now: Any, then: Any) -> bool:
         return False
     if type(now) is np.ndarray:
         alike = now.dtype == then.dtype and now.shape == then.shape
-        return alike and now.tobytes() == then.tobytes()
+        return alike and np.array_equal(_bits(now), _bits(then))
     if type(now) in (list, tuple):
         return len(now) == len(then) and all(map(_same, now, then))
     if type(now) is dict:
         return now.keys() == then.keys() and all(_same(now[k], then[k]) for k in now)
     return isinstance(now, PLAIN) and bool(now == then or (now != now and then != then))
+
+
+def _bits(array: np.ndarray) -> np.ndarray:
+    """Return an array as integers: NaN is itself, and 0 is not -0."""
+    flat = np.ascontiguousarray(array).reshape(-1)
+    if flat.dtype == object:
+        return np.array([id(value) for value in flat], dtype=np.int64)
+    return flat.view(np.int64 if flat.itemsize == 8 else np.uint8)
