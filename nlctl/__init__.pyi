@@ -97,6 +97,7 @@ from .native import (
     Ensemble,
     compile,  # noqa: A004
     ensemble_response,
+    linearize,
     typeset,
 )
 from .params import param, record
@@ -215,6 +216,7 @@ __all__ = [
     "interconnect",
     "l1_adaptive",
     "latin_hypercube_centres",
+    "linearize",
     "mrac",
     "native",
     "paper",

@@ -183,7 +183,7 @@ def _inputs(system: Any, u0: Any) -> np.ndarray:
     return u
 
 
-def linearize(
+def linear_system(
     compiled: Compiled,
     x0: Any,
     u0: Any,
