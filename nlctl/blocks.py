@@ -51,7 +51,8 @@ class Spec(Protocol):
     commit : callable, optional
         ``commit(t, x, u, p)`` returns what the states in `memory` become at the end of a step
         that was accepted.  A step in which a memory would reverse is divided where it does.
-        It must be continuous except where a switching function changes its sign.
+        It must be continuous except where a switching function changes its sign; one that may
+        jump is refused where none is declared.
     derived : callable, optional
         ``derived(self) -> dict`` of numbers that follow from the parameters; `p` has them too.
     check : callable, optional
