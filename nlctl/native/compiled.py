@@ -308,6 +308,7 @@ class Compiled(StandIn):
                     f"{what} needs {counted(wanted or 0, 'value')}, got {given.size}"
                 )
         result = np.empty(size or 0)
+        u = np.append(u, np.zeros(self.schedule.ninputs - u.size))  # inputs stand still
         function(float(t), x, u, self.parameter_vector(params), result, *more)
         return result
 
