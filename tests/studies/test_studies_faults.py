@@ -152,6 +152,37 @@ def test_the_claim_is_shown_and_refuted(finding, tmp_path):
     assert len(other.tables["effects"]) == 7
 
 
+def test_what_tells_of_a_fault_is_told_beside_the_spec(tmp_path):
+    """An alarm at y = 1.3: 1 + c (1 - exp(-(t - 5))) is there after ln(c / (c - 0.3))."""
+    text = STUDY + 'pairs = false\ndetects = { alarm = "always y <= 1.3" }\n'
+    file = read_study(written(tmp_path, text))
+    result = run(file, tmp_path / "run")
+    (finding,) = result.findings
+    for name, c in (("one.s bias", 0.4), ("lag.s bias", 1.0)):
+        told = effect(finding, name)["alarm violated at"]
+        assert told == pytest.approx(5 + np.log(c / (c - 0.3)), abs=1e-4)
+    assert effect(finding, "lag.s gain")["alarm violated at"] == np.inf
+    assert effect(finding, "")["alarm violated at"] == np.inf
+    assert "2 of 6 single faults are detected" in finding.sentence
+    assert "of those that violate the spec 1 of 2 before they do" in finding.sentence
+    told = str([vars(i) for section in study_report(result).sections for i in section.items])
+    assert "detected by alarm after (s)" in told
+
+
+@each_row(
+    "detects, message",
+    [
+        ('{ alarm = "always z <= 1.3" }', "unknown signal 'z' of 'alarm'"),
+        ('{ near = "always y <= 1.3" }', "another name for 'near' of detects: the spec has it"),
+        ('{ alarm = "y is large" }', "y"),
+    ],
+)
+def test_a_mistaken_detector_is_refused(tmp_path, detects, message):
+    """By its name, before anything runs."""
+    with pytest.raises(StudyError, match=message):
+        read_study(written(tmp_path, STUDY + f"detects = {detects}\n"))
+
+
 def test_each_row_is_replayed_to_the_bit(folder, finding):
     """By the number that the table prints."""
     number = int(effect(finding, "one.s bias", "lag.s gain").name)
