@@ -272,20 +272,18 @@ def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
 
 def _detection(asked: Faults, effects: pd.DataFrame) -> str:
     """Return how many single faults are detected, and whether before they violate the spec."""
-    found = effects[[f"{name} violated at" for name in asked.detects]].min(axis=1)
     others = [k for k in effects if k.endswith(" violated at") and k[:-12] not in asked.detects]
-    violated = effects[others].min(axis=1)
-    single = _single(effects)
-    bad = _violating(single).index
-    is_found = np.isfinite(found)
-    early = int((is_found & (found < violated)).loc[bad].sum())
-    count = int(is_found.loc[single.index].sum())
+    found = effects[[f"{name} violated at" for name in asked.detects]].to_numpy().min(axis=1)
+    violated = effects[others].to_numpy().min(axis=1)
+    alone = ((effects["first"] != "") & (effects["second"] == "")).to_numpy()
+    bad = alone & violates(effects["margin"])
+    count, early = int(np.isfinite(found[alone]).sum()), int((found < violated)[bad].sum())
     words = (
-        f"{some_of(count, len(single), 'single fault', 'is', 'are')} detected; of those that "
-        f"violate the spec {early} of {len(bad)} before they do."
+        f"{some_of(count, int(alone.sum()), 'single fault', 'is', 'are')} detected; of those that "
+        f"violate the spec {early} of {int(bad.sum())} before they do."
     )
-    if is_found.iloc[0]:
-        words += f" Without a fault there is a false alarm at {found.iloc[0]:g} s."
+    if np.isfinite(found[0]):
+        words += f" Without a fault there is a false alarm at {found[0]:g} s."
     return words
 
 
