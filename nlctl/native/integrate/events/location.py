@@ -150,7 +150,7 @@ def locate_jump(lane, rtol, is_behind):
     lane.tries += 1
     rest = max(min(10.0 * rtol, 1e-4) * lane.high, 4e-16 * abs(lane.t))
     found = lane.high - lane.low <= rest
-    if found and is_behind:
+    if found and (is_behind or lane.low == lane.high):
         return EVENT
     lane.step = lane.high if found else 0.5 * (lane.low + lane.high)
     lane.ends = 0
