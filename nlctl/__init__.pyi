@@ -98,6 +98,7 @@ from .native import (
     Ensemble,
     compile,  # noqa: A004
     ensemble_response,
+    linearize,
     typeset,
 )
 from .params import param, record
@@ -217,6 +218,7 @@ __all__ = [
     "interconnect",
     "l1_adaptive",
     "latin_hypercube_centres",
+    "linearize",
     "mrac",
     "native",
     "paper",

@@ -51,7 +51,8 @@ class Spec(Protocol):
     commit : callable, optional
         ``commit(t, x, u, p)`` returns what the states in `memory` become at the end of a step
         that was accepted.  A step in which a memory would reverse is divided where it does.
-        It must be continuous except where a switching function changes its sign.
+        It must be continuous except where a switching function changes its sign; one that may
+        jump is refused where none is declared.
     derived : callable, optional
         ``derived(self) -> dict`` of numbers that follow from the parameters; `p` has them too.
     check : callable, optional
@@ -336,8 +337,8 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     name : str
         Name of the block, and the first part of its parameters' names.
     dt : float, bool or None, optional
-        Timebase as in python-control, where None leaves the choice to its rules.  Records without
-        states may have any; one with states is in continuous time unless it says
+        Timebase as in python-control.  Records without states may have any, and with None have
+        that of the diagram; one with states is in continuous time, dt = 0, unless it says
         ``discrete = True``.
 
     Returns
@@ -372,6 +373,8 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
         raise ParameterError(f"a block needs a name, got {name!r} for {type(spec).__name__}")
     ensure_checked(spec)
     _check_timebase(spec, name, dt)
+    if dt is None and spec.states:  # whatever python-control's default is
+        dt = 0
     made = Block(spec, name, **({} if dt is None else {"dt": dt}))
     _probe(made)
     return made

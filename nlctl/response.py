@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 
 from .arguments import number
+from .blocks import sampling_of
+from .diagrams import leaves
 from .errors import ParameterError
 from .names import unknown
 from .params import checked_times
@@ -231,10 +233,16 @@ def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
     try:
         return _native(run)
     except (CompileError, AlgebraicLoopError, AuditError) as error:
-        if engine != "auto" or not interpretable or sliding_blocks(run.system):
+        is_ring = isinstance(error, AlgebraicLoopError) and _is_sampled(run.system)
+        if engine != "auto" or not interpretable or sliding_blocks(run.system) or is_ring:
             raise
         warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=3)
     return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}))
+
+
+def _is_sampled(system: Any) -> bool:
+    """Whether blocks are sampled: of a circle at one instant python-control names no signal."""
+    return any(sampling_of(leaf.system) is not None for leaf in leaves(system))
 
 
 def _takes_machine_code(run: RunArguments, engine: str, interpretable: bool) -> bool:

@@ -12,7 +12,7 @@ one run what python-control returns, `ensemble` runs many.
 
 from ..errors import CompileError
 from .audit import AuditError
-from .compiled import Compiled, compile  # noqa: A004 (what it does)
+from .compiled import Compiled, compile, linearize  # noqa: A004 (what it does)
 from .diagram.schedule import AlgebraicLoopError
 from .ensemble import Ensemble, ensemble_response
 from .integrate.driver import Settings, Statistics
@@ -39,6 +39,7 @@ __all__ = [
     "compile",
     "compile_ahead",
     "ensemble_response",
+    "linearize",
     "typeset",
     "uninterrupted",
 ]

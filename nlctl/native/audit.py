@@ -241,7 +241,10 @@ def _rates_of_input(compiled: Compiled, trial: Trial, i: int, point: Any) -> np.
     rates = _by_python_control(compiled, point, trial)[0]
     rates[list(compiled.program.memory)] = 0.0  # they stand still within a step
     part = _APART * (1.0 + np.abs(x).max()) / (1.0 + np.abs(rates).max())
-    ends = [(t + k * part, x + k * part * rates, u) for k in (-1, 0, 1)]
+    given = np.zeros(u.size)
+    count = compiled.schedule.rates
+    given[:count] = u[u.size - count :]
+    ends = [(t + k * part, x + k * part * rates, u + k * part * given) for k in (-1, 0, 1)]
     before, here, after = (_arriving(compiled, trial, i, end) for end in ends)
     return np.array([here - before, 0.5 * (after - before), after - here]) / part
 

@@ -24,7 +24,7 @@ from .codegen.lower import Lowered, lower
 from .codegen.program import Program, program
 from .describe import called, described
 from .diagram.schedule import Schedule, schedule
-from .jacobians import Tangent, linearize, parameter_jacobian, tangent
+from .jacobians import Tangent, linear_system, parameter_jacobian, tangent
 from .machine.evaluations import evaluations
 from .parameters import packed
 from .thirdparty.captured import changed
@@ -49,8 +49,8 @@ class Compiled(StandIn):
     Notes
     -----
     `nlctl.input_output_response` and `nlctl.ensemble_response` run it; ``compiled.linearize(x0)``
-    linearizes it with exact derivatives, and so does ``ct.linearize(compiled, x0)``.  Every other
-    function of python-control takes ``compiled.system``.
+    linearizes it with exact derivatives, and so do `nlctl.linearize` and ``ct.linearize``.  Every
+    other function of python-control takes ``compiled.system``.
 
     The stiff method's Jacobian is exact too.  Where a function is opaque it is taken by
     differences; the printed form says so, and why.
@@ -255,7 +255,7 @@ class Compiled(StandIn):
         -----
         Forward mode on the expressions, so nothing is lost to a step width.
         """
-        return linearize(self, x0, u0, t, params, copy_names=copy_names, names=names)
+        return linear_system(self, x0, u0, t, params, copy_names=copy_names, names=names)
 
     def parameter_jacobian(
         self,
@@ -308,6 +308,7 @@ class Compiled(StandIn):
                     f"{what} needs {counted(wanted or 0, 'value')}, got {given.size}"
                 )
         result = np.empty(size or 0)
+        u = np.append(u, np.zeros(self.schedule.ninputs - u.size))  # inputs stand still
         function(float(t), x, u, self.parameter_vector(params), result, *more)
         return result
 
@@ -393,6 +394,70 @@ def compile(  # noqa: A001 (what it does)
     made = Compiled(schedule=read, program=arrays)
     _ = made.equations  # what expressions would understand otherwise is refused now
     return made
+
+
+def linearize(
+    system: Any,
+    x0: Any,
+    u0: Any = None,
+    t: float = 0.0,
+    params: Mapping[str, Any] | None = None,
+    *,
+    copy_names: bool = True,
+    **names: Any,
+) -> ct.StateSpace:
+    """Linearize a diagram at a point, with exact derivatives of its equations.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem or Compiled
+        A diagram, or what `compile` made of it.
+    x0 : mapping, array_like or control.OperatingPoint
+        State, as `initial_state` of `input_output_response`.
+    u0 : array_like, optional
+        Inputs, of shape (ninputs,); a number for all of them; 0 if left out.
+    t : float, optional
+        Time in s.
+    params : mapping, optional
+        Parameters that are overridden.
+    copy_names : bool, optional
+        Whether it gets the diagram's names of states, inputs and outputs, or python-control's
+        generic ones.
+    **names : object
+        Other names: `name`, `inputs`, `outputs` and `states` of ``ct.ss``.
+
+    Returns
+    -------
+    control.StateSpace
+        In continuous time; of a diagram with sampled blocks in discrete time, the map over the
+        common period of their clocks, whose delays are states of it.  At a kink it has the slopes
+        of the side that the point belongs to.
+
+    Raises
+    ------
+    AlgebraicLoopError
+        If signals depend on each other without a state in between.
+    CompileError
+        If the diagram cannot be compiled, or a function is called as it stands.
+    ParameterError
+        If an argument is refused, or the clocks have no common period.
+    UnknownKeywordError, UsageError
+        If there is no such keyword; if signals are delayed, whose past is not a state.
+
+    Examples
+    --------
+    A lag behind a zero-order hold is what ``ct.sample_system`` makes of it:
+
+    >>> import control as ct
+    >>> lag = ct.ss(-1, 1, 1, 0, inputs="v", outputs="y", name="lag")
+    >>> hold = nlctl.sampled(ct.ss([], [], [], 1.0, 0.1, inputs="u", outputs="v", name="hold"))
+    >>> held = nlctl.interconnect([lag, hold], inputs=["u"], outputs=["y"])
+    >>> linear = nlctl.linearize(held, 0)
+    >>> print(linear.dt, linear.A[0, 0].round(6), linear.B[0, 0].round(6))  # exp(-0.1), 1 - it
+    0.1 0.904837 0.095163
+    """
+    made = system if isinstance(system, Compiled) else compile(system, params=params)
+    return made.linearize(x0, u0, t, params, copy_names=copy_names, **names)
 
 
 def _short(value: Any) -> str:

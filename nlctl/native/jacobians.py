@@ -77,7 +77,8 @@ def tangent(compiled: Compiled) -> Tangent:
         delays = ", ".join(f"'{b.name}'" for b in delayed_blocks(compiled.system))
         raise CompileError(
             f"'{compiled.system.name}' has the transport delays {delays}, and so no finite state: "
-            "put ct.ss(ct.tf(*ct.pade(delay, n))) in the place of each"
+            "put ct.ss(ct.tf(*ct.pade(delay, n))) in the place of each, beside sampled blocks "
+            "nlctl.sampled(gain, dt, delay=...), which is exact"
         )
     names = ("dx", "y", *(name for name in found.results if name.startswith("sample")))
     why = inexact(compiled, names)
@@ -87,6 +88,13 @@ def tangent(compiled: Compiled) -> Tangent:
             "ct.linearize(diagram), which takes differences"
         )
     n, m = compiled.system.nstates or 0, compiled.schedule.ninputs
+    parts = needed([expr for name in names for expr, _ in found.pieces(name)])
+    rates = range(m - compiled.schedule.rates, m)
+    if any(e.op == "leaf" and e.data[0] == "u" and e.data[1] in rates for e in parts):
+        raise CompileError(
+            f"'{compiled.system.name}' has no linearization by its inputs: an ideal relay slides "
+            "as their rates say, too; put a lag before those that it sees"
+        )
     starts = {"x": 0, "u": n, "p": n + m}
     rows = {name: along(found, name, starts) for name in names}
     return Tangent(rows=rows, assumed=dict(found.graph.assumptions))
@@ -140,7 +148,7 @@ def jacobian(
 
     Parameters
     ----------
-    directions : ndarray of shape (nstates + ninputs + parameters, k)
+    directions : ndarray of shape (nstates + inputs of the program + parameters, k)
 
     Returns
     -------
@@ -156,7 +164,8 @@ def jacobian(
                 f"the equations of '{system.name}' were differentiated for an integer parameter "
                 f"of {value}, which is {p[place]:g} now: compile again with params={{...}}"
             )
-    columns = {"t": [t], "x": state_array(system, x0), "u": _inputs(system, u0), "p": p}
+    u = np.append(_inputs(system, u0), np.zeros(compiled.schedule.rates))  # they stand still
+    columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
     arrays = {name: np.asarray(v, dtype=float)[:, None] for name, v in columns.items()}
     arrays[DIRECTION] = directions
     searches = {name: searched(one) for name, one in compiled.equations.solvers.items()}
@@ -183,7 +192,7 @@ def _inputs(system: Any, u0: Any) -> np.ndarray:
     return u
 
 
-def linearize(
+def linear_system(
     compiled: Compiled,
     x0: Any,
     u0: Any,
@@ -201,13 +210,13 @@ def linearize(
     if isinstance(x0, ct.OperatingPoint):
         x0, u0 = x0.states, x0.inputs if u0 is None else u0
     system = compiled.system
-    n, m = system.nstates or 0, system.ninputs or 0
+    n, m, given = system.nstates or 0, system.ninputs or 0, compiled.schedule.ninputs
     if n == 1 and m == 0:
         raise UsageError(
             f"a control.StateSpace cannot have one state and no input, as '{system.name}' has: "
             "give the diagram an input"
         )
-    directions = np.eye(n + m + length(compiled.program.layout), n + m)
+    directions = np.eye(n + given + length(compiled.program.layout), n + m)
     found = jacobian(compiled, x0, u0, t, params, directions)
     rates, outputs, dt = found["dx"], found["y"], system.dt
     if compiled.program.sampled:
@@ -288,7 +297,7 @@ def parameter_jacobian(
                 name = f"{slot.name}[{k}]" if slot.shape else slot.name
                 places[name], owners[name] = slot.offset + k, compiled.schedule.holders[i]
     compiled.parameter_vector(params)  # blocks have the run's parameters then
-    start = (system.nstates or 0) + (system.ninputs or 0)
+    start = (system.nstates or 0) + compiled.schedule.ninputs
     directions = np.zeros((start + length(compiled.program.layout), len(parameters)))
     for k, name in enumerate(parameters):
         if name not in places:

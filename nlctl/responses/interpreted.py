@@ -16,7 +16,7 @@ from ..delays.lines import delayed_blocks
 from ..diagrams import check_read, leaves
 from ..errors import DivergedError, ParameterError, UsageError
 from ..names import unknown
-from ..sampling.system import Sampled
+from ..sampling.system import Sampled, happening
 from ..sliding.blocks import sliding_blocks
 from .arguments import RunArguments, evaluation_array, input_array, state_array
 from .delayed import Past, break_points, by_steps, with_delays
@@ -32,6 +32,7 @@ SOLVE_IVP_METHODS = (
     "BDF",
 )  # of scipy.integrate.solve_ivp
 _STANDSTILL = 200  # steps in a row that do not advance the time
+_ROUNDING = 1e-14  # of a time
 
 
 def python_control_response(run: RunArguments) -> ct.TimeResponseData:
@@ -58,7 +59,7 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
         wanted = evaluation_array(wanted, times)
         if wanted.size == 1 and system.isdtime(strict=True):
             raise ParameterError("evaluation_times of a sampled system needs two times, got one")
-    simulate = _between(ct.input_output_response, system)
+    simulate = _between(_integrated, system)
     watch = _Watch(system=system, reached=float(times[0]), progress=run.progress)
     method = solver["method"] or solver["solve_ivp_method"] or "LSODA"
     scipys = isinstance(method, type) and issubclass(method, OdeSolver)
@@ -88,6 +89,16 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     if not np.all(np.isfinite(response.y)):
         raise _diverged(system, watch.reached)
     return as_response(response)
+
+
+def _integrated(system: Any, times: np.ndarray, *given: Any, **settings: Any) -> Any:
+    """Run `control.input_output_response`, also between instants that only rounding sets apart.
+
+    LSODA refuses so short an interval; any step of an explicit method is exact there.
+    """
+    if times[-1] - times[0] <= _ROUNDING * max(abs(times[0]), abs(times[-1])):
+        settings["solve_ivp_method"] = "RK23"
+    return ct.input_output_response(system, times, *given, **settings)
 
 
 def _longest_step(times: np.ndarray, inputs: Any) -> float:
@@ -144,7 +155,7 @@ class _Watch:
 def _overflows(system: ct.NonlinearIOSystem, t: float, x0: Any, params: Any) -> bool:
     """Whether the right-hand side leaves the finite numbers at the start already."""
     try:
-        with np.errstate(over="raise", invalid="raise"):
+        with np.errstate(over="raise", invalid="raise"), happening():
             system.dynamics(t, x0, np.zeros(system.ninputs or 0), params)
     except FloatingPointError:
         return True

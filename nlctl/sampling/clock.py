@@ -21,8 +21,8 @@ _MOST = 50_000_000  # instants of one run
 class Clock:
     """Sample k is taken at offset + k dt, and its outputs follow `delay` later.
 
-    Numbers count as the decimals that they are printed as: clocks of 0.1 s and 0.3 s meet at every
-    third instant of the first.
+    Numbers count as decimals of 15 digits, so that what was computed means what was written: clocks
+    of 0.1 s and 3 * 0.1 s meet at every third instant of the first.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def common_period(clocks: Sequence[Clock]) -> tuple[float, float, float]:
     period = Fraction(lcm(*(int(p * scale) for p in periods)), scale)
     if period / min(periods) > 10_000:
         raise ParameterError(
-            f"clocks of {', '.join(f'{float(p):g}' for p in periods)} s have a common period of "
+            f"clocks of {', '.join(f'{float(p):.15g}' for p in periods)} s have a common period of "
             f"{float(period):g} s, which is too long: choose sampling times with a short one"
         )
     settled = max(_exact(clock.offset) + _exact(clock.delay) for clock in clocks)
@@ -247,7 +247,7 @@ def _times(series: _Series, begin: float, end: float) -> np.ndarray:
 
 
 def _exact(value: float) -> Fraction:
-    return Fraction(repr(float(value)))
+    return Fraction(f"{float(value):.15g}")
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:

@@ -7,8 +7,8 @@ from typing import Any
 import control as ct
 
 from ..arguments import number, one_of
-from ..blocks import memory_states
-from ..diagrams import not_a_system
+from ..blocks import memory_states, sampling_of
+from ..diagrams import leaves, not_a_system
 from ..errors import ParameterError
 from ..upstream.control_internals import is_system
 from .rebuilt import rebuilt
@@ -37,8 +37,8 @@ def discretise(system: Any, dt: float, method: str = "euler") -> Any:
     Raises
     ------
     ParameterError
-        If `dt` is not positive, the method is for linear blocks only, or a block has a memory
-        that is not a state in discrete time.
+        If `dt` is not positive, the method is for linear blocks only, a block has a memory that
+        is not a state in discrete time, or no equations, or is sampled already.
 
     Examples
     --------
@@ -51,9 +51,49 @@ def discretise(system: Any, dt: float, method: str = "euler") -> Any:
     one_of("discretise", "method", method, _METHODS)
     if not is_system(system):
         raise ParameterError(not_a_system("discretise", system))
+    system = with_equations("discretise", system)
     if isinstance(system, ct.InterconnectedSystem):
         return rebuilt(system, lambda part: _discretised(part, dt, method), dt)
     return _discretised(system, dt, method)
+
+
+def with_equations(who: str, system: Any) -> Any:
+    """Return a system whose blocks have equations: of a transfer function its state space.
+
+    Parameters
+    ----------
+    who : str
+        Who asks, for the error.
+    system : control.InputOutputSystem
+
+    Raises
+    ------
+    ParameterError
+        If a block has no equations, does not say how many signals or states it has, or is sampled
+        already.
+    """
+    if isinstance(system, ct.TransferFunction):
+        return ct.ss(
+            system, name=system.name, inputs=system.input_labels, outputs=system.output_labels
+        )
+    for leaf in leaves(system):
+        _check_equations(who, leaf.system)
+    return system
+
+
+def _check_equations(who: str, made: Any) -> None:
+    """Refuse a block whose equations are not those of states that it has."""
+    if sampling_of(made) is not None:
+        raise ParameterError(
+            f"'{made.name}' is sampled already: give {who} the block that it samples, .inner"
+        )
+    if not isinstance(made, ct.StateSpace | ct.NonlinearIOSystem):
+        raise ParameterError(f"'{made.name}' is a {type(made).__name__}, which has no equations")
+    for kind in ("inputs", "outputs", "states"):
+        if getattr(made, f"n{kind}") is None:
+            raise ParameterError(
+                f"'{made.name}' does not say how many {kind} it has: give {kind}=... to ct.nlsys"
+            )
 
 
 def _discretised(system: Any, dt: float, method: str) -> Any:

@@ -76,7 +76,7 @@ class Sampling:
         elif pending > self.waiting:
             rule = (
                 f"delay <= {self.waiting * self.dt:g}, at most "
-                f"{counted(self.waiting, 'sampling time')},"
+                f"{counted(self.waiting, 'sampling time')}"
             )
             advice = f"waiting={pending}"
         else:

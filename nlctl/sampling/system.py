@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 
 from ..arguments import number
-from ..blocks import block, default_state
+from ..blocks import Block, block, default_state
 from ..errors import ParameterError, UsageError
 from ..names import Parameters
 from ..params import integer
@@ -24,7 +24,7 @@ from ..upstream.control_internals import (
     set_parameters,
 )
 from .clock import Clock, Moment
-from .discretised import discretise
+from .discretised import discretise, with_equations
 from .parameters import Sampling
 from .rebuilt import rebuilt, staged
 
@@ -170,7 +170,8 @@ class Sampled(Around):
                 f"block '{self.name}' is sampled every {self.sampling.current_spec.dt:g} s, and "
                 "python-control would integrate over its samples: use "
                 "nlctl.input_output_response, which stops at each of them "
-                "(engine='python-control' is the reference)"
+                "(engine='python-control' is the reference), and nlctl.linearize for the exact map "
+                "from sample to sample"
             )
         x = np.array(x, dtype=float)
         own, _, _ = self.parts(x)
@@ -285,7 +286,7 @@ def sampled(
     *,
     offset: float = 0.0,
     delay: float = 0.0,
-    jitter: float = 0.0,
+    jitter: float | None = None,
     seed: int = 0,
     input_quantum: float | None = None,
     output_quantum: float | None = None,
@@ -301,8 +302,9 @@ def sampled(
     Parameters
     ----------
     system : control.InputOutputSystem or record
-        In discrete time: ``ct.nlsys(..., dt=0.1)``, ``ct.ss(..., 0.1)``, a record whose ``update``
-        returns x[k+1], diagrams of these; a block without states may have any timebase.
+        In discrete time: ``ct.nlsys(..., dt=0.1)``, ``ct.ss(..., 0.1)``, ``ct.tf(..., 0.1)``, a
+        record whose ``update`` returns x[k+1], diagrams of these; a block without states may have
+        any timebase.
         `discretise` makes one of a block in continuous time.
     dt : float, optional
         Sampling time (s); by default that of `system`.
@@ -312,7 +314,8 @@ def sampled(
         Time that it takes to compute (s), also longer than `dt`: so much later than the sample
         its outputs change.
     jitter : float, optional
-        Each sample is late by a random time, uniform in [0, jitter] (s), the same in every run.
+        Each sample is late by a random time, uniform in [0, jitter] (s), the same in every run;
+        with None and 0.0 none is.
     seed : int, optional
         Of the random times.
     input_quantum, output_quantum : float, optional
@@ -334,8 +337,8 @@ def sampled(
     Raises
     ------
     ParameterError
-        If a number is out of its bounds, `system` is in continuous time, or has another sampling
-        time than `dt`.
+        If a number is out of its bounds, `system` is in continuous time, does not say in which, is
+        sampled already, or has another sampling time than `dt`.
 
     Notes
     -----
@@ -360,6 +363,7 @@ def sampled(
     if not is_system(system):
         is_discrete = getattr(system, "discrete", False)
         system = block(system, "sampled", dt=dt if is_discrete else None)
+    system = with_equations("nlctl.sampled", system)
     euler = method == "euler" and system.dt in (0, None)
     if method is not None and system.dt in (0, None):
         made = discretise(system, number("sampled", "dt", dt, above=0), method)
@@ -367,7 +371,7 @@ def sampled(
     own = _own_time(system, dt, euler)
     period = number("sampled", "dt", own or dt, above=0)
     spec = Sampling(
-        dt=period, offset=offset, delay=delay, jitter=jitter, seed=seed,
+        dt=period, offset=offset, delay=delay, jitter=0.0 if jitter is None else jitter, seed=seed,
         input_quantum=0.0 if input_quantum is None else input_quantum,
         output_quantum=0.0 if output_quantum is None else output_quantum,
         waiting=_waiting(dt=period, delay=delay, waiting=waiting), own_time=own,
@@ -383,13 +387,11 @@ def _sampled(system: Any, spec: Sampling, euler: bool) -> Any:
     delays = spec.waiting > 0
     if not isinstance(system, ct.InterconnectedSystem):
         sampling = _alone(spec, system)
-        return Sampled(
-            _discrete(system), sampling, euler=euler, delays=delays, converters=(before, behind)
-        )
+        return Sampled(system, sampling, euler=euler, delays=delays, converters=(before, behind))
     sampling = block(spec, "sampling")
 
     def each(part: Any) -> Sampled:
-        return Sampled(_discrete(part), sampling, euler=euler and bool(part.nstates))
+        return Sampled(part, sampling, euler=euler and bool(part.nstates))
 
     made = rebuilt(system, each, dt=0)
     first = _through(made.input_labels, "input_stage", sampling, before)
@@ -415,11 +417,14 @@ def _through(
 def _own_time(system: Any, dt: float | None, euler: bool) -> float:
     """Return the sampling time that a system has of its own, 0 if it has none."""
     own = system.dt if isinstance(system.dt, int | float) and system.dt is not True else None
-    if own == 0 and (system.nstates or 0) > 0 and not euler:
+    untold = system.dt is None and not isinstance(system, Block)  # of a record nlctl knows
+    if not own and system.dt is not True and (system.nstates or 0) > 0 and not euler:
+        why = "says nothing of its time, dt=None" if untold else "is in continuous time"
         raise ParameterError(
-            f"'{system.name}' is in continuous time, and a sampled block is in discrete time: "
+            f"'{system.name}' {why}, and a sampled block is in discrete time: "
             f"say how, nlctl.sampled(system, {0.01 if dt is None else dt}, method='euler'), or "
             "give ct.sample_system(system, dt) of a linear one"
+            + (", or its dt if it returns x[k+1]" if untold else "")
         )
     if dt is None and not own:
         raise ParameterError(f"'{system.name}' has no sampling time of its own: give dt in s")
@@ -428,21 +433,3 @@ def _own_time(system: Any, dt: float | None, euler: bool) -> float:
             f"'{system.name}' has a sampling time of {own:g} s and cannot be sampled every {dt} s"
         )
     return float(own or 0.0)
-
-
-def _discrete(system: Any) -> Any:
-    """Return a block that can be sampled: transfer functions as state-space systems."""
-    if isinstance(system, ct.TransferFunction):
-        return ct.ss(
-            system, name=system.name, inputs=system.input_labels, outputs=system.output_labels
-        )
-    if not isinstance(system, ct.StateSpace | ct.NonlinearIOSystem):
-        raise ParameterError(
-            f"'{system.name}' is a {type(system).__name__}, which has no equations"
-        )
-    for kind in ("inputs", "outputs", "states"):
-        if getattr(system, f"n{kind}") is None:
-            raise ParameterError(
-                f"'{system.name}' does not say how many {kind} it has: give {kind}=... to ct.nlsys"
-            )
-    return system

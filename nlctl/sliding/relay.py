@@ -53,9 +53,10 @@ class IdealRelay:
     slides.  Beyond `rest` it slides no longer: something else has made u jump.
 
     It runs in machine code.  `nlctl.compile` refuses it where u jumps with v, where v enters u'
-    otherwise than as a + b v, where u depends on an input of the diagram or a delayed signal, whose
-    rates nobody knows, and where several such relays act on each other's u'.  With b = 0
-    (relative degree above one) it never slides; switches that accumulate end as chattering.
+    otherwise than as a + b v, where u depends on a delayed signal, whose rate nobody knows, and
+    where several such relays act on each other's u'.  Inputs of the diagram have the rates of a
+    run, in which they are linear between its times.  With b = 0 (relative degree above one) it
+    never slides; switches that accumulate end as chattering.
 
     Examples
     --------

@@ -76,6 +76,13 @@ def of_relay(h, height):
     return 4 * height / np.pi * (np.sqrt(1 - h**2) - 1j * h) if h < 1 else 0.0
 
 
+def of_relay_pair(on, off):
+    """Of a relay of height 1 for unit amplitude, by its Fourier integrals: +1 from on to off."""
+    if max(on, -off) >= 1:
+        return 0.0
+    return 2 / np.pi * (np.sqrt(1 - on**2) + np.sqrt(1 - off**2) - 1j * (on - off))
+
+
 amplitudes = st.floats(0.3, 5).map(lambda v: round(v, 3))
 shares = st.floats(0.05, 1.4).map(lambda v: round(v, 3)).filter(lambda h: abs(h - 1) > 0.02)
 
@@ -119,6 +126,32 @@ class TestDescribingFunctions:
         plays = [w * of_play(r / A) for w, r in zip(spec.w, spec.r, strict=True)]
         found, _ = first_harmonic(nlctl.PrandtlIshlinskii, A)
         assert found == pytest.approx(spec.w_0 + sum(plays), abs=1e-8)
+
+    @given(A=amplitudes)
+    @settings(max_examples=4)
+    def test_of_the_inverse_of_a_sum_of_plays(self, A):
+        """A sum of plays with the inverse loading curve."""
+        spec = nlctl.PrandtlIshlinskiiInverse()
+        r, slopes = np.array(spec.r), spec.w_0 + np.cumsum([0.0, *spec.w])
+        thresholds = spec.w_0 * r + np.maximum(r[:, None] - r, 0) @ np.array(spec.w)
+        plays = [of_play(each / A) for each in thresholds]
+        found, by_fft = first_harmonic(nlctl.PrandtlIshlinskiiInverse, A)
+        wanted = 1 / spec.w_0 + np.diff(1 / slopes) @ plays
+        assert found == pytest.approx(wanted, abs=1e-8)
+        assert by_fft == pytest.approx(wanted, abs=1e-6)
+
+    @given(A=amplitudes.filter(lambda A: min(abs(A - k / 4) for k in range(20)) > 0.02))
+    @settings(max_examples=6)
+    def test_of_a_preisach_operator(self, A):
+        """The sum of its relays, whose thresholds are not symmetric."""
+        spec = nlctl.Preisach()
+        relays = [
+            w * of_relay_pair(on / A, off / A) / A
+            for on, off, w in zip(spec.alpha, spec.beta, spec.w, strict=True)
+        ]
+        found, by_fft = first_harmonic(nlctl.Preisach, A)
+        assert found == pytest.approx(sum(relays), abs=1e-6)
+        assert by_fft == pytest.approx(sum(relays), abs=1e-2)
 
     @given(A=amplitudes, h=shares, height=amplitudes)
     @settings(max_examples=8)

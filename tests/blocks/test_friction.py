@@ -119,6 +119,50 @@ class TestBoucWen:
         assert travel(spec, [y])[-1] == pytest.approx(exact, rel=1e-8)
 
 
+OF_THE_PATH = {
+    "Dahl": nlctl.Dahl(sigma_0=2.0),
+    "Bouc-Wen": nlctl.BoucWen(alpha=2.0, beta=1.0, gamma=0.8, delta=0.3, nu=1.7),
+}
+
+
+@pytest.mark.parametrize("spec", OF_THE_PATH.values(), ids=OF_THE_PATH)
+class TestForcesOfThePath:
+    """What is true of both: their force follows from the path alone."""
+
+    @given(moves=steps, data=st.data())
+    @settings(max_examples=10)
+    def test_they_are_rate_independent(self, spec, moves, data):
+        """The same moves at other speeds."""
+        times = data.draw(st.lists(st.floats(0.1, 10), min_size=len(moves), max_size=len(moves)))
+        np.testing.assert_allclose(travel(spec, moves, times), travel(spec, moves), atol=1e-8)
+
+    @given(one=steps, two=steps)
+    @settings(max_examples=10)
+    def test_a_run_may_be_split(self, spec, one, two):
+        """Going on from a saved state (semigroup)."""
+        whole, first = travel(spec, one + two), travel(spec, one)
+        rest = travel(spec, two, start=first[-1:])
+        np.testing.assert_allclose(np.append(first, rest[1:]), whole, atol=1e-8)
+
+    @given(moves=steps)
+    @settings(max_examples=10)
+    def test_at_rest_they_keep_their_force(self, spec, moves):
+        """To the bit: no velocity, no change (idempotence)."""
+        force = travel(spec, moves)[-1]
+        run = drive(spec, np.array([0.0, 50.0]), np.zeros(2), [force])
+        assert run.states[0, -1] == force
+
+    @given(far=positive, moves=steps)
+    @settings(max_examples=10)
+    def test_cycles_burn(self, spec, far, moves):
+        """Whatever came before, over a cycle of the position that has been gone through before."""
+        start = travel(spec, [*moves, *[far, -far] * 20])[-1:]
+        times = np.linspace(0, 2, 401)
+        speed = np.where(times < 1, far, -far)
+        run = drive(spec, times, speed, start, rtol=1e-10, atol=1e-12)
+        assert np.trapezoid(run.states[0] * speed, times) > 0
+
+
 MASS = 1.0  # kg
 
 

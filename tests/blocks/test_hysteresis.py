@@ -42,6 +42,13 @@ def sums_of_plays(draw):
 
 
 @st.composite
+def inverses(draw):
+    r = np.cumsum(draw(st.lists(positive, min_size=4, max_size=4)))
+    w = draw(st.lists(positive, min_size=4, max_size=4))
+    return nlctl.PrandtlIshlinskiiInverse(w_0=1 + draw(positive), w=w, r=r, v0=draw(inputs))
+
+
+@st.composite
 def generalised_sums(draw):
     """Envelopes that may cross, and plays without a gap of their own, are among them."""
     envelope = st.tuples(positive, positive, inputs, inputs)
@@ -70,10 +77,12 @@ EVERY = {
     "play": backlashes(),
     "stop": stops(),
     "Prandtl-Ishlinskii": sums_of_plays(),
+    "its inverse": inverses(),
     "generalised": generalised_sums(),
     "relay": relays(),
     "Preisach": relay_sums(),
 }
+OF_PLAYS = ("Prandtl-Ishlinskii", "its inverse", "generalised")
 every_kind = pytest.mark.parametrize("kind", EVERY)
 
 
@@ -85,6 +94,13 @@ def by_envelopes(u, memory, spec):
     (a, b, c, d), (e, f, g, h) = spec.rising, spec.falling
     ends = a * np.tanh(b * u + c) + d - spec.r, e * np.tanh(f * u + g) + h + spec.r
     return np.clip(memory, np.minimum(*ends), np.maximum(*ends))
+
+
+def of_the_inverse(spec):
+    """Weights and thresholds of the operator whose loading curve is the inverse one."""
+    r, slopes = np.array(spec.r), spec.w_0 + np.cumsum([0.0, *spec.w])
+    curve = spec.w_0 * r + np.maximum(r[:, None] - r, 0) @ np.array(spec.w)
+    return 1 / spec.w_0, np.diff(1 / slopes), curve
 
 
 def by_switching(u, sides, on, off):
@@ -104,6 +120,10 @@ def operator(spec, path):
         elif isinstance(spec, nlctl.PrandtlIshlinskii):
             memory = by_clipping(u, memory, -np.array(spec.r), np.array(spec.r))
             out.append(spec.w_0 * u + np.dot(spec.w, memory))
+        elif isinstance(spec, nlctl.PrandtlIshlinskiiInverse):
+            first, w, r = of_the_inverse(spec)
+            memory = by_clipping(u, memory, -r, r)
+            out.append(first * u + np.dot(w, memory))
         elif isinstance(spec, nlctl.GeneralisedPrandtlIshlinskii):
             memory = by_envelopes(u, memory, spec)
             out.append(np.dot(spec.w, memory))
@@ -141,7 +161,7 @@ class TestEveryOperator:
             for name in ("dynamics", "output"):
                 expected = getattr(block, name)(0.0, x, [u])
                 got = getattr(made, name)(0.0, x, [u], p)
-                np.testing.assert_allclose(got, expected, rtol=1e-14, atol=1e-15)
+                np.testing.assert_allclose(got, expected, rtol=1e-14, atol=1e-12)  # rates of 1000
 
     @pytest.mark.slow
     @given(data=st.data())
@@ -165,6 +185,29 @@ class TestEveryOperator:
         first = drive(spec, np.arange(float(len(one))), one)
         rest = along(spec, one[-1:] + two, first.states[:, -1])
         np.testing.assert_array_equal(np.append(first.outputs[0], rest[1:]), whole)
+
+    @pytest.mark.slow
+    @given(data=st.data())
+    @settings(max_examples=10)
+    def test_it_does_not_depend_on_the_solver(self, kind, data):
+        """Explicit or stiff, at another tolerance, with fixed steps that meet no turning point."""
+        spec, path = data.draw(EVERY[kind]), data.draw(paths)
+        times, known = np.arange(float(len(path))), along(spec, path)
+        for options in ({"method": "rodas5p"}, {"rtol": 1e-4, "atol": 1e-6}, {"step": 0.37}):
+            found = drive(spec, times, path, **options).outputs[0]
+            np.testing.assert_allclose(found, known, rtol=0, atol=1e-12)
+
+    @pytest.mark.slow
+    @given(data=st.data())
+    @settings(max_examples=10)
+    def test_cycles_turn_one_way(self, kind, data):
+        """Once it has been through, a cycle of u encloses v counterclockwise, or clockwise."""
+        spec, (a, b) = data.draw(EVERY[kind]), data.draw(st.tuples(inputs, inputs))
+        u = dense([a, b, a, b, a], 400)
+        v = along(spec, u)
+        sense = 1 if kind in ("stop", "its inverse") else -1
+        rest = 2 * abs(b - a) / 400 * np.abs(v).max()  # of jumps between two points
+        assert sense * integral(v[801:], u[801:]) >= -rest
 
     @given(data=st.data())
     @settings(max_examples=20)
@@ -205,7 +248,7 @@ class TestEveryOperator:
         """For every first input and every memory: in the band of that input."""
         spec, u = data.draw(EVERY[kind]), data.draw(inputs)
         first = along(spec, [u, u])[0]
-        if kind in ("play", "Prandtl-Ishlinskii", "generalised"):
+        if kind in ("play", *OF_PLAYS):
             low, high = spec.band(0.0, u, equation_arguments(spec))
             assert low - 1e-12 <= first <= high + 1e-12
         elif kind == "stop":
@@ -214,15 +257,38 @@ class TestEveryOperator:
             assert first == pytest.approx(operator(spec, [u])[0], abs=1e-13)
 
 
+def sum_of_slopes(spec):
+    """The largest slope of both envelopes, by the sum of the weights."""
+    return sum(spec.w) * max(spec.rising[0] * spec.rising[1], spec.falling[0] * spec.falling[1])
+
+
+def sum_of_weights(spec):
+    """The weights of the inverse, most of them negative."""
+    first, w, _ = of_the_inverse(spec)
+    return first + np.abs(w).sum()
+
+
+LIPSCHITZ = {
+    "play": lambda spec: spec.gains[1],
+    "stop": lambda spec: 2.0,
+    "Prandtl-Ishlinskii": lambda spec: spec.gains[1],
+    "its inverse": sum_of_weights,
+    "generalised": sum_of_slopes,
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["play", "stop", "Prandtl-Ishlinskii"])
+@pytest.mark.parametrize("kind", LIPSCHITZ)
 @given(data=st.data())
 def test_outputs_are_no_further_apart_than_the_inputs(kind, data):
-    """In the supremum norm: Lipschitz constant m of the play, 2 of the stop, the sum of a sum."""
+    """In the supremum norm: Lipschitz constant m of the play, 2 of the stop, the sum of a sum.
+
+    Those of memories of equal inputs: relays have none.
+    """
     spec = data.draw(EVERY[kind])
     pairs = data.draw(st.lists(st.tuples(inputs, inputs), min_size=2, max_size=8))
     one, two = np.array(pairs).T
-    constant = 2.0 if kind == "stop" else spec.gains[1]
+    constant = LIPSCHITZ[kind](spec)
     apart = np.abs(along(spec, one) - along(spec, two)).max()
     assert apart <= constant * np.abs(one - two).max() * (1 + 1e-12)
 
@@ -254,6 +320,30 @@ def test_loop_areas_of_play_and_stop(A, r):
     for spec, sense in ((nlctl.Backlash(m_r=1, m_l=1, c_r=r, c_l=-r), -1), (nlctl.Stop(r=r), 1)):
         v = along(spec, [A, *cycle])[1:]
         assert integral(v, cycle) == pytest.approx(sense * 4 * r * max(A - r, 0.0), abs=1e-12)
+
+
+@given(A=quarters, w=st.lists(positive, min_size=4, max_size=4))
+def test_the_loop_area_of_a_sum_of_plays_is_the_sum_of_theirs(A, w):
+    """Of each 4 r (A - r), by its weight."""
+    spec, r = nlctl.PrandtlIshlinskii(w=w, r=(0.25, 0.5, 1.0, 1.5)), np.array((0.25, 0.5, 1.0, 1.5))
+    cycle = every_quarter([-A, A, -A])
+    v = along(spec, [A, *cycle])[1:]
+    wanted = -4 * np.dot(w, r * np.maximum(A - r, 0))
+    assert integral(v, cycle) == pytest.approx(wanted, abs=1e-11)
+
+
+@given(A=st.floats(0.1, 3), w=st.lists(positive, min_size=10, max_size=10))
+def test_the_loop_area_of_a_preisach_operator_is_that_of_the_relays_it_switches(A, w):
+    """Of each relay that both ends pass 2 w (alpha - beta): exactly, between its thresholds."""
+    spec = nlctl.Preisach(w=w)
+    alpha, beta = np.array(spec.alpha), np.array(spec.beta)
+    near = np.add.outer([-1e-9, 0.0, 1e-9], [*alpha, *beta]).ravel()
+    up = np.unique([-A, *near[np.abs(near) < A], A])
+    cycle = np.concatenate((up, up[-2::-1]))
+    v = along(spec, [A, *cycle])[1:]
+    passed = (alpha <= A) & (beta >= -A)
+    wanted = -2 * np.dot(w, np.where(passed, alpha - beta, 0))
+    assert integral(v, cycle) == pytest.approx(wanted, abs=1e-6)
 
 
 @given(A=quarters, height=positive)
@@ -367,6 +457,7 @@ def test_in_python_control_the_memories_relax_onto_the_operator(kind):
         "play": nlctl.Backlash(rate=1e4),
         "stop": nlctl.Stop(rate=1e4),
         "Prandtl-Ishlinskii": nlctl.PrandtlIshlinskii(rate=1e4),
+        "its inverse": nlctl.PrandtlIshlinskiiInverse(rate=1e4),
         "generalised": nlctl.GeneralisedPrandtlIshlinskii(rate=1e4),
         "relay": nlctl.Relay(rate=1e4),
         "Preisach": nlctl.Preisach(rate=1e4),
@@ -412,7 +503,7 @@ def test_what_makes_no_operator_is_refused(make, told):
         make()
 
 
-@pytest.mark.parametrize("kind", ["play", "stop", "Prandtl-Ishlinskii", "generalised"])
+@pytest.mark.parametrize("kind", ["play", "stop", *OF_PLAYS])
 @given(data=st.data())
 def test_in_contact_the_switching_function_is_exactly_zero(kind, data):
     """Where the memory was carried to.
@@ -445,6 +536,7 @@ def test_members_of_an_ensemble_are_single_runs(kind):
     """Memories that start elsewhere, side by side in lanes; sums add up in another order."""
     record = {
         "play": nlctl.Backlash, "stop": nlctl.Stop, "Prandtl-Ishlinskii": nlctl.PrandtlIshlinskii,
+        "its inverse": nlctl.PrandtlIshlinskiiInverse,
         "generalised": nlctl.GeneralisedPrandtlIshlinskii, "relay": nlctl.Relay,
         "Preisach": nlctl.Preisach,
     }[kind]  # fmt: skip

@@ -1,5 +1,7 @@
 """Filippov's sliding motion of ideal relays: closed forms, and smaller and smaller hysteresis."""
 
+import pickle
+
 import control as ct
 import numpy as np
 import pytest
@@ -30,9 +32,9 @@ def first(t, x, u, p):
     return x[0]
 
 
-def run(system, start, times=TIMES, **given):
+def run(system, start, times=TIMES, inputs=0, **given):
     x0 = {f"plant.x[{i}]": value for i, value in enumerate(start)}
-    return nlctl.input_output_response(system, times, 0, x0, **given)
+    return nlctl.input_output_response(system, times, inputs, x0, **given)
 
 
 def of_plant(made):
@@ -318,21 +320,127 @@ def test_what_has_no_rate_is_refused(update, output, told):
     assert "hysteresis" in str(caught.value)
 
 
-def test_an_input_of_unknown_rate_is_refused():
-    """A signal from outside, and a delayed one; behind a lag both are taken."""
+def follower(*more, inputs=("r",), relay=None):
+    """x' = 1/2 - v, and the relay sees u = x - r, where r comes from outside."""
     follows = plant(lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0] - u[1], 1, ("v", "r"))
-    relay = nlctl.IdealRelay()
-    with pytest.raises(CompileError, match="an input of the diagram or a delayed signal"):
-        nlctl.compile(nlctl.interconnect({"relay": relay, "plant": follows}, inputs=["r"]))
-    delay = nlctl.TransportDelay(inputs=("w",), outputs=("r",), delay=0.1)
-    with pytest.raises(CompileError, match="an input of the diagram or a delayed signal"):
-        nlctl.compile(
-            nlctl.interconnect({"relay": relay, "plant": follows, "delay": delay}, inputs=["w"])
+    blocks = [nlctl.block(relay or nlctl.IdealRelay(height=3.0), "relay"), follows, *more]
+    return nlctl.interconnect(blocks, inputs=list(inputs), outputs=["u", "v"])
+
+
+CORNERS = np.array([0.0, 2.0, 3.0, 4.0, 5.5, 7.0, 10.0])
+POLYGON = np.array([0.0, 0.4, 0.4, -0.3, 2.0, 2.0, 1.0])
+
+
+class TestInputsOfTheDiagram:
+    """They are linear between the times of a run, and have known rates there."""
+
+    @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "auto"])
+    def test_what_slides_follows_a_polygon(self, method):
+        """From 1, at -5/2, until x = 0.2 t at t = 1 / 2.7: then x = r and v = 1/2 - r'."""
+        r = np.interp(TIMES, CORNERS, POLYGON)
+        made = nlctl.input_output_response(
+            follower(), TIMES, r, {"plant.x[0]": 1.0}, method=method, audit="every run"
         )
-    lag = ct.ss(-1, 1, 1, 0, inputs=["w"], outputs=["r"], name="lag")
-    system = nlctl.interconnect({"relay": relay, "plant": follows, "lag": lag}, inputs=["w"])
-    made = nlctl.input_output_response(system, TIMES, 1.0, 0)
-    np.testing.assert_allclose(of_plant(made)[0], 1 - np.exp(-TIMES), rtol=0, atol=1e-6)
+        late = TIMES > 0.5
+        np.testing.assert_allclose(of_plant(made)[0, late], r[late], rtol=0, atol=1e-6)
+        slope = (np.diff(POLYGON) / np.diff(CORNERS))[
+            np.clip(np.searchsorted(CORNERS, TIMES, side="right") - 1, 0, CORNERS.size - 2)
+        ]
+        np.testing.assert_allclose(made.outputs[1, late], 0.5 - slope[late], rtol=0, atol=1e-6)
+        assert made.statistics.events == 1
+
+    def test_what_is_too_fast_is_left_and_caught_up_with(self):
+        """A height of 1 rises at 3/2 at most, and r at 23/15 from t = 4 to 5.5."""
+        r = np.interp(TIMES, [0, 4, 5.5, 10], [0, 0, 2.3, 2.3])
+        made = nlctl.input_output_response(
+            follower(relay=nlctl.IdealRelay()), TIMES, r, {"plant.x[0]": 0.0}
+        )
+        exact = np.clip(1.5 * (TIMES - 4), 0, 2.3)
+        np.testing.assert_allclose(of_plant(made)[0], exact, rtol=0, atol=1e-6)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("seed", range(6))
+    def test_a_hysteresis_converges_to_it(self, seed):
+        """With random corners, at random times, beside a delayed signal that the plant sees."""
+        rng = np.random.default_rng(seed)
+        times = np.cumsum(np.append(0.0, rng.uniform(0.1, 0.5, 12)))
+        r = np.cumsum(rng.normal(size=times.size)) * 0.4
+        line = nlctl.block(
+            nlctl.TransportDelay(inputs=("u",), outputs=("late",), delay=0.3), "line"
+        )
+        body = plant(
+            lambda t, x, u, p: 0.5 - u[0] + 0.4 * u[2], lambda t, x, u, p: x[0] - np.sin(u[1]), 1,
+            ("v", "r", "late"),
+        )  # fmt: skip
+        paths = []
+        for relay in (nlctl.IdealRelay(height=2.0), nlctl.Relay(on=1e-4, off=-1e-4, height=2.0)):
+            loop = nlctl.interconnect(
+                [nlctl.block(relay, "relay"), body, line], inputs=["r"], outputs=["u"]
+            )
+            made = nlctl.input_output_response(
+                loop, times[:6], r[:6], {"plant.x[0]": 0.5}, rtol=1e-7, atol=1e-9
+            )
+            paths.append(of_plant(made))
+        np.testing.assert_allclose(paths[0], paths[1], rtol=0, atol=1e-3)
+
+    def test_members_are_single_runs_in_any_company(self):
+        """Of any number of threads, from a pickle, resumed at a corner of the input."""
+        loop = nlctl.compile(follower())
+        again = pickle.loads(pickle.dumps(loop))
+        r, starts = np.interp(TIMES, CORNERS, POLYGON), {"plant.x[0]": np.linspace(-1, 1, 11)}
+        made = [
+            nlctl.ensemble_response(one, TIMES, r, starts, keep=["u", "v"], threads=threads)
+            for one, threads in ((loop, 1), (loop, 2), (again, 1))
+        ]
+        for other in made[1:]:
+            for signal in ("u", "v"):
+                np.testing.assert_array_equal(other.signals[signal], made[0].signals[signal])
+        whole = run(loop.system, [1.0], inputs=r)
+        first = run(loop.system, [1.0], TIMES[:61], inputs=r[:61])
+        rest = nlctl.input_output_response(loop, TIMES[60:], r[60:], first.states[:, -1])
+        np.testing.assert_allclose(rest.states, whole.states[:, 60:], rtol=0, atol=1e-9)
+
+    def test_it_has_no_linearization_by_them_alone(self):
+        """v has a share of r' in it, which is no input of a state-space system."""
+        with pytest.raises(CompileError, match="by its inputs: an ideal relay slides as their rat"):
+            nlctl.linearize(follower(), 0, 0)
+        inside = ct.ss(-1, 1, 1, 0, inputs=["w"], outputs=["r"], name="lag")
+        assert nlctl.linearize(follower(inside, inputs=("w",)), 0, 0).B.shape == (3, 1)
+
+
+def test_a_delayed_input_is_refused():
+    """Its rate is not known; behind a lag it is taken."""
+    delay = nlctl.block(nlctl.TransportDelay(inputs=("w",), outputs=("r",), delay=0.1), "delay")
+    with pytest.raises(CompileError, match="depends on a delayed signal at the same instant"):
+        nlctl.compile(follower(delay, inputs=("w",)))
+    delay = nlctl.block(nlctl.TransportDelay(inputs=("w",), outputs=("l",), delay=0.1), "delay")
+    lag = ct.ss(-1, 1, 1, 0, inputs=["l"], outputs=["r"], name="lag")
+    made = nlctl.input_output_response(follower(delay, lag, inputs=("w",)), TIMES, 1.0, 0)
+    late = np.maximum(TIMES - 0.1, 0)
+    np.testing.assert_allclose(of_plant(made)[0], 1 - np.exp(-late), rtol=0, atol=1e-6)
+
+
+FAULTS = {
+    "a bias of what it sees": nlctl.Fault("relay.u", "bias", 0.3, at=1.7),
+    "a drift of what it sees": nlctl.Fault("relay.u", "drift", 0.2, at=1.7),
+    "noise": nlctl.Fault("relay.u", "noise", 0.1, at=1.7),
+    "less effect, enough": nlctl.Fault("relay.v", "gain", 0.5, at=1.7),
+    "less effect, too little": nlctl.Fault("relay.v", "gain", 0.2, at=1.7),
+    "a stuck output": nlctl.Fault("relay.v", "stuck", 0.4, at=1.7),
+    "a dropout": nlctl.Fault("relay.v", "dropout", at=1.7, until=2.3),
+    "a condition": nlctl.Fault("relay.v", "bias", 0.3, when="u < 0.2"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
+def test_faults_of_its_signals_are_those_of_a_narrow_hysteresis(fault):
+    """To its width, alone."""
+    times, paths = np.linspace(0, 3, 31), []
+    for relay in (nlctl.IdealRelay(height=2.0), nlctl.Relay(on=1e-3, off=-1e-3, height=2.0)):
+        system = loop(sliding_mode, lambda t, x, u, p: x[0] + x[1], 2, relay=relay)
+        paths.append(of_plant(run(nlctl.with_faults(system, fault), [1.0, 0.0], times)))
+    np.testing.assert_allclose(paths[0], paths[1], rtol=0, atol=3e-3)
 
 
 def test_python_control_does_not_run_it_wrongly():

@@ -152,6 +152,37 @@ def test_the_claim_is_shown_and_refuted(finding, tmp_path):
     assert len(other.tables["effects"]) == 7
 
 
+def test_what_tells_of_a_fault_is_told_beside_the_spec(tmp_path):
+    """An alarm at y = 1.3: 1 + c (1 - exp(-(t - 5))) is there after ln(c / (c - 0.3))."""
+    text = STUDY + 'pairs = false\ndetects = { alarm = "always y <= 1.3" }\n'
+    file = read_study(written(tmp_path, text))
+    result = run(file, tmp_path / "run")
+    (finding,) = result.findings
+    for name, c in (("one.s bias", 0.4), ("lag.s bias", 1.0)):
+        told = effect(finding, name)["alarm violated at"]
+        assert told == pytest.approx(5 + np.log(c / (c - 0.3)), abs=1e-4)
+    assert effect(finding, "lag.s gain")["alarm violated at"] == np.inf
+    assert effect(finding, "")["alarm violated at"] == np.inf
+    assert "2 of 6 single faults are detected" in finding.sentence
+    assert "of those that violate the spec 1 of 2 before they do" in finding.sentence
+    told = str([vars(i) for section in study_report(result).sections for i in section.items])
+    assert "detected by alarm after (s)" in told
+
+
+@each_row(
+    "detects, message",
+    [
+        ('{ alarm = "always z <= 1.3" }', "unknown signal 'z' of 'alarm'"),
+        ('{ near = "always y <= 1.3" }', "another name for 'near' of detects: the spec has it"),
+        ('{ alarm = "y is large" }', "y"),
+    ],
+)
+def test_a_mistaken_detector_is_refused(tmp_path, detects, message):
+    """By its name, before anything runs."""
+    with pytest.raises(StudyError, match=message):
+        read_study(written(tmp_path, STUDY + f"detects = {detects}\n"))
+
+
 def test_each_row_is_replayed_to_the_bit(folder, finding):
     """By the number that the table prints."""
     number = int(effect(finding, "one.s bias", "lag.s gain").name)
@@ -232,3 +263,64 @@ def test_a_run_that_ended_is_violated_at_its_last_good_time():
     for formula, wanted in (("always |y| <= 2", 4.0), ("always |y| <= 0.5", np.pi / 6)):
         asked = Requirement(key="k", formula=parse_formula(formula), until=10.0)
         assert violation_time(asked, TIMES, {"y": y}) == pytest.approx(wanted, abs=1e-4)
+
+
+@pytest.mark.slow
+def test_a_sliding_relay_and_a_delay_in_a_study(tmp_path):
+    """x' = 1/2 - v with an ideal relay is at rest; with less than half of it, x = c (t - 5).
+
+    The relay and the delay of what is shown are blocks that the study file names.
+    """
+    (tmp_path / "loop.py").write_text(SLIDING, encoding="utf-8")
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY_OF_SLIDING, encoding="utf-8")
+    (finding,) = run(read_study(path), tmp_path / "run").findings
+    assert effect(finding, "")["held violated at"] == np.inf
+    assert effect(finding, "relay.v bias")["held violated at"] == np.inf
+    # x = 0.1 when it is delayed by 1/4: (1/2 - 0.3) (t - 5 - 1/4) = 0.1
+    late = effect(finding, "relay.v gain")["held violated at"]
+    assert late == pytest.approx(5 + 0.25 + 0.1 / (0.5 - 0.3), abs=1e-3)
+    both = effect(finding, "relay.v bias", "relay.v gain")["held violated at"]  # 0.3 (v + 0.1)
+    assert both == pytest.approx(5 + 0.25 + 0.1 / (0.5 - 0.33), abs=1e-3)
+
+
+SLIDING = """
+import control as ct
+import nlctl
+
+
+def loop(relay, line):
+    plant = ct.nlsys(
+        lambda t, x, u, p: 0.5 - u[0], lambda t, x, u, p: x[0], states=1, inputs=["v"],
+        outputs=["u"], name="plant",
+    )
+    return nlctl.interconnect({"relay": relay, "plant": plant, "line": line}, outputs=["y"])
+"""
+STUDY_OF_SLIDING = """
+loop = "loop.py:loop"
+
+[study]
+title = "A relay that fails"
+seed = 4
+
+[options]
+relay = { block = "IdealRelay", height = 1.0 }
+line = { block = "TransportDelay", delay = 0.25 }
+
+[space]
+"relay.height" = { uniform = [0.8, 1.2] }
+
+[faults]
+"relay.v" = { gain = 0.3, bias = 0.1 }
+
+[spec]
+held = "always |y| <= 0.1"
+
+[time]
+end = 10.0
+step = 0.001
+
+[[analysis]]
+kind = "faults"
+onset = 5.0
+"""

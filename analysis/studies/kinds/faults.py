@@ -16,7 +16,8 @@ from pydantic import Field
 
 from analysis.robustness import Experiment, Prepared, Uncertain, from_table, nominal, prepare
 from analysis.robustness.runs.experiment import by_diagram, simulate_rows
-from analysis.robustness.stl.spec import violates
+from analysis.robustness.stl.spec import Requirement, violates
+from analysis.robustness.stl.text import parse_formula
 from analysis.robustness.stl.violation_time import ViolationTime, violation_time
 from nlctl.errors import ParameterError
 from nlctl.faults import NEVER, Fault, with_faults
@@ -62,6 +63,11 @@ class Faults(Asked):
     tolerates: Names = Field(
         (), description="Claim: under each of these, 'SIGNAL KIND', the spec holds."
     )
+    detects: dict[str, str] = Field(
+        {},
+        description="What tells of a fault: formulas by name, such as bounds of the ledger. "
+        "When each is violated is told; none is part of the spec.",
+    )
 
     @property
     def onsets(self) -> tuple[float, ...]:
@@ -96,12 +102,22 @@ def _experiment(asked: Faults, setup: Setup) -> Experiment:
         for fault in faults.values()
     )
     space = replace(own.space, quantities=(*own.space.quantities, *onsets), choices=())
-    times = tuple(ViolationTime(requirement=r) for r in own.spec.requirements)
+    watched = (*own.spec.requirements, *_detectors(asked, own))
+    times = tuple(ViolationTime(requirement=r) for r in watched)
     return replace(
         own,
         space=space,
         build=partial(_faulty, own.build, options, tuple(faults.values())),
         metrics=(*own.metrics, *times),  # type: ignore[arg-type]
+    )
+
+
+def _detectors(asked: Faults, experiment: Experiment) -> tuple[Requirement, ...]:
+    """Return what tells of a fault, as requirements that the spec does not have."""
+    end = float(experiment.timepts[-1])
+    return tuple(
+        Requirement(key=name, formula=parse_formula(formula), until=end)
+        for name, formula in asked.detects.items()
     )
 
 
@@ -121,7 +137,17 @@ def _check(asked: Faults, setup: Setup) -> None:
     for name in asked.tolerates:
         if name not in faults:
             raise unknown("fault", name, faults)
-    _experiment(asked, setup).build()
+    taken = [requirement.key for requirement in setup.experiment.spec.requirements]
+    detectors = _detectors(asked, setup.experiment)
+    for name in {d.key for d in detectors} & set(taken):
+        raise ParameterError(
+            f"'faults' needs another name for '{name}' of detects: the spec has it"
+        )
+    diagram = _experiment(asked, setup).build()
+    for detector in detectors:
+        for signal in detector.signals:
+            if signal not in diagram.output_labels:
+                raise unknown("signal", signal, diagram.output_labels, f"of '{detector.key}'")
 
 
 def _cases(asked: Faults, setup: Setup) -> list[tuple[tuple[str, ...], float]]:
@@ -161,13 +187,15 @@ def _run(asked: Faults, ground: Ground) -> Finding | None:
             "status": table["status"].astype(str).to_numpy(),
         }
     )
-    effects = effects.join(_times(prepared, table)).rename_axis("row")
+    watched = (*setup.experiment.spec.requirements, *_detectors(asked, setup.experiment))
+    effects = effects.join(_times(prepared, table, watched)).rename_axis("row")
     return _found(asked, effects)
 
 
-def _times(prepared: Prepared, table: pd.DataFrame) -> pd.DataFrame:
+def _times(
+    prepared: Prepared, table: pd.DataFrame, requirements: Sequence[Requirement]
+) -> pd.DataFrame:
     """Return when each requirement is violated, also where the run did not reach its end."""
-    requirements = prepared.experiment.spec.requirements
     keys = {r.key: ViolationTime(requirement=r).key for r in requirements}
     times = {key: table[key].to_numpy(dtype=float).copy() for key in keys.values()}
     signals = sorted({s for r in requirements for s in r.signals})
@@ -222,6 +250,8 @@ def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
             f" {some_of(len(bad_pairs), len(pairs), 'pair', 'does too', 'do too')}, {len(only)} of "
             "them although neither fault does alone."
         )
+    if asked.detects:
+        words += f" {_detection(asked, effects)}"
     numbers = {
         "nominal_margin": alone,
         "singles": len(single),
@@ -238,6 +268,23 @@ def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
         numbers=numbers,
         tables={"effects": effects},
     )
+
+
+def _detection(asked: Faults, effects: pd.DataFrame) -> str:
+    """Return how many single faults are detected, and whether before they violate the spec."""
+    others = [k for k in effects if k.endswith(" violated at") and k[:-12] not in asked.detects]
+    found = effects[[f"{name} violated at" for name in asked.detects]].to_numpy().min(axis=1)
+    violated = effects[others].to_numpy().min(axis=1)
+    alone = ((effects["first"] != "") & (effects["second"] == "")).to_numpy()
+    bad = alone & violates(effects["margin"])
+    count, early = int(np.isfinite(found[alone]).sum()), int((found < violated)[bad].sum())
+    words = (
+        f"{some_of(count, int(alone.sum()), 'single fault', 'is', 'are')} detected; of those that "
+        f"violate the spec {early} of {int(bad.sum())} before they do."
+    )
+    if np.isfinite(found[0]):
+        words += f" Without a fault there is a false alarm at {found[0]:g} s."
+    return words
 
 
 def _in_words(margin: float) -> str:
@@ -280,7 +327,8 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
         + "; ".join(f"{n}: {margin_text(m)}" for n, m in zip(names, margin, strict=True)),
         figure=figures.fault_margins(margin),
     )
-    yield _effects(single, EFFECTS, result, finding.key)
+    watched = _columns(asked, result)
+    yield _effects(single, EFFECTS, result, finding.key, watched)
     pairs = _pairs(effects)
     if not len(pairs):
         return
@@ -294,7 +342,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
         )
     more = f" The {_MOST} worst of {len(pairs)}; {finding.key}/effects.parquet has all."
     caption = "Pairs of faults, worst first." + more * (len(pairs) > _MOST)
-    yield _effects(pairs.head(_MOST), caption, result, finding.key, folded=True)
+    yield _effects(pairs.head(_MOST), caption, result, finding.key, watched, folded=True)
     yield Paragraph(
         text="A row again, by its number:",
         code=f"nlctl replay {shlex.quote(str(result.folder))} ROW --part {finding.key}",
@@ -318,16 +366,27 @@ def _matrix(effects: pd.DataFrame, onset: float) -> pd.DataFrame:
     return pd.DataFrame(square, index=names, columns=names)
 
 
+def _columns(asked: Any, result: Result) -> dict[str, str]:
+    """Return the titles of the columns of times, by the requirement or detector."""
+    titles = {str(key): f"{key} after (s)" for key in result.requirements.index}
+    return titles | {name: f"detected by {name} after (s)" for name in asked.detects}
+
+
 def _effects(
-    effects: pd.DataFrame, caption: str, result: Result, part: str, *, folded: bool = False
+    effects: pd.DataFrame,
+    caption: str,
+    result: Result,
+    part: str,
+    watched: Mapping[str, str],
+    *,
+    folded: bool = False,
 ) -> Table:
     """Return a table of effects, with the command that runs each row again."""
-    folder = shlex.quote(str(result.folder))
-    keys, step = list(result.requirements.index), result.study.time.step
-    times = [f"{key} violated at" for key in keys]
+    folder, step = shlex.quote(str(result.folder)), result.study.time.step
+    times = [f"{key} violated at" for key in watched]
     return Table(
         caption=caption,
-        columns=("fault", "onset (s)", "margin", *(f"{k} after (s)" for k in keys), "replay"),
+        columns=("fault", "onset (s)", "margin", *watched.values(), "replay"),
         rows=[
             (
                 _label(row, with_onset=False),

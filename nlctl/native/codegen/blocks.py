@@ -34,7 +34,7 @@ from ..parameters import length
 from ..sliding.reading import with_sliding
 from .calls import Call
 from .newton import inside, solver
-from .program import count_switching_functions, memory
+from .program import check_continuous, count_switching_functions, memory
 from .solver import Solver
 from .trace import time, traced_parameters
 
@@ -382,7 +382,10 @@ class Reader:
         inputs = self.wired(node.inputs)
         if i in self.moving:
             inputs = concatenated(self.graph, [inputs, self.moving[i]])
-        return self._function(i, "events", functions, inputs, sum(count for _, count in used))
+        found = self._function(i, "events", functions, inputs, sum(count for _, count in used))
+        if not used[0][1]:
+            check_continuous(node, found, inputs)
+        return found
 
     def wired(self, combinations: Sequence[Combination | None]) -> Tracer:
         """Return linear combinations of signals, NaN for None; neighbours become vectors."""

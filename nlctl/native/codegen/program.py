@@ -11,7 +11,9 @@ import control as ct
 import numpy as np
 
 from ...blocks import Block, event_count, memory_states
-from ...errors import CompileError
+from ...errors import BlockError, CompileError
+from ...expressions.arrays import Tracer
+from ...expressions.continuity import may_jump
 from ...sampling.clock import Clock, Instants, instants, meetings
 from ...sampling.system import Happening, clocks_of
 from ...upstream.control_internals import StandIn
@@ -158,4 +160,21 @@ def _check_kind(node: Node) -> None:
         raise CompileError(
             f"block '{node.path}' is a {type(system).__name__}; only nonlinear and state-space "
             "blocks can be compiled: convert it with ct.ss first"
+        )
+
+
+def check_continuous(node: Node, committed: Tracer, inputs: Tracer) -> None:
+    """Refuse a memory without switching functions that may jump: error control does not see it.
+
+    Raises
+    ------
+    BlockError
+        If what it is committed to is not a continuous function of states, inputs and time.
+    """
+    known = {expr for expr, _ in inputs.pieces()}
+    if may_jump([expr for expr, _ in committed.pieces()], known):
+        raise BlockError(
+            f"{type(node.system.spec).__name__} (block '{node.path}') needs a method switching: "
+            "its commit may jump, and steps go past where it does unless a switching function is "
+            "0 there; one that does not jump is written with np.minimum and np.maximum"
         )

@@ -16,7 +16,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...blocks import is_delayed, within
+from ...blocks import is_delayed, slides, within
 from ...delays.lines import delayed_blocks
 from ...diagrams import places, samplings
 from ...sampling.system import Happening, Sampled
@@ -135,8 +135,17 @@ class Schedule:
 
     @property
     def ninputs(self) -> int:
-        """Number of inputs: those of the diagram, then a line for each delayed signal."""
-        return (self.system.ninputs or 0) + len(self.lines)
+        """Number of inputs: those of the diagram, a line for each delayed signal, then `rates`."""
+        return (self.system.ninputs or 0) + len(self.lines) + self.rates
+
+    @property
+    def rates(self) -> int:
+        """Number of the diagram's inputs whose rates a run gives as further inputs.
+
+        Ideal relays ask for them.
+        """
+        has_relays = any(slides(node.system) for node in self.nodes)
+        return (self.system.ninputs or 0) if has_relays else 0
 
     @property
     def simple(self) -> bool:

@@ -14,7 +14,16 @@ import numpy as np
 from .control import choose_method, choose_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
 from .events.excursions import look_between
-from .events.location import AGAIN, CLEAR, EVENT, REFUSED, locate, step_accepted
+from .events.location import (
+    AGAIN,
+    CLEAR,
+    EVENT,
+    REFUSED,
+    jumped,
+    locate,
+    locate_jump,
+    step_accepted,
+)
 from .events.near_side import look_before
 from .methods import explicit
 from .methods.dense import solution_at
@@ -49,7 +58,10 @@ def _judge(task, lanes, w, found):
         if lane.status != RUNNING or rejected(lane, w.error[j], task):
             continue
         found[j] = CLEAR
-        if w.e.shape[0]:
+        is_behind = task.memory.size > 0 and jumped(task, lane, w, j)
+        if is_behind or lane.seeks > 0:
+            found[j] = locate_jump(lane, task.rtol, is_behind)
+        elif w.e.shape[0]:
             found[j] = locate(
                 lane, task.switching, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j
             )

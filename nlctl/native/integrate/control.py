@@ -64,7 +64,7 @@ def rejected(lane, error, task):
     if error <= 1.0 or (task.fixed > 0.0 and finite):
         return False
     lane.rejected += 1
-    lane.tries = 0
+    lane.tries = lane.seeks = 0
     order = rodas5p.ORDER if lane.stiff else task.pair_order
     lane.h = lane.step * (max(0.2, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
     if task.fixed > 0.0 or not (finite or lane.h > SMALLEST * abs(lane.t)):
@@ -76,7 +76,7 @@ def rejected(lane, error, task):
 def shorten(lane, part):
     """Have part of the step just tried be tried instead, whatever was located in it."""
     lane.rejected += 1
-    lane.tries = 0
+    lane.tries = lane.seeks = 0
     lane.h = part * lane.step
 
 

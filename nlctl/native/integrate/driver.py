@@ -128,7 +128,7 @@ class Trajectory:
     outputs: np.ndarray
     states: np.ndarray
     statistics: Statistics
-    inputs: np.ndarray  # and what leaves transport delays, (inputs, m)
+    inputs: np.ndarray  # what leaves transport delays, and rates: as the program has them
 
 
 def trajectory(
@@ -310,7 +310,7 @@ def prepared(
         **_linear_equations(len(x0), WHOLE),
     )
     work = new_work(
-        x0, times, inputs.shape[0] + len(read.lines), program.events, len(read.outputs),
+        x0, times, read.ninputs, program.events, len(read.outputs),
         len(program.sampled), len(read.lines), settings.pair.stages,
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"
@@ -381,5 +381,15 @@ def made(run: Run, outputs: np.ndarray, j: int) -> Trajectory:
         outputs=outputs[:done].T,
         states=states[:done].T,
         statistics=statistics,
-        inputs=np.concatenate([run.task.inputs[:, :done], run.work.shown[:done, :, j].T]),
+        inputs=_every_input(run, j, done),
     )
+
+
+def _every_input(run: Run, j: int, done: int) -> np.ndarray:
+    """Return all that the program takes as inputs, at the times that lane `j` has reached."""
+    given, times = run.task.inputs, run.task.times
+    parts = [given[:, :done], run.work.shown[:done, :, j].T]
+    if run.work.u.shape[0] > sum(map(len, parts)):  # the rates of the segment that begins
+        rates = np.diff(given) / np.diff(times)
+        parts.append(rates[:, np.minimum(np.arange(done), times.size - 2)])
+    return np.concatenate(parts)

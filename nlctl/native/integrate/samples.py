@@ -69,7 +69,7 @@ def begin_afresh(task, lanes, w, sampled):
         gap = next_stop(task, lane, w, j) - lane.t
         lane.h = task.fixed if task.fixed > 0.0 else max(gap, 1e-12 * abs(lane.t))
         lane.log_error_before = lane.last = lane.low = lane.high = 0.0
-        lane.tries = lane.same_side = lane.short = lane.quiet = lane.slow = 0
+        lane.tries = lane.seeks = lane.same_side = lane.short = lane.quiet = lane.slow = 0
 
 
 @numba.njit(**INNER)

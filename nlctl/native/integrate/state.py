@@ -50,6 +50,7 @@ _FIELDS = [
     ("rejected", "i8"),
     ("events", "i8"),
     ("tries", "i8"),  # attempts at the event being located
+    ("seeks", "i8"),  # whether that is where a memory jumps that no switching function tells of
     ("same_side", "i8"),  # of these in a row with the event inside
     ("short", "i8"),  # events in a row right after another
     ("quiet", "i8"),  # steps in which memory events are not looked for

@@ -261,7 +261,8 @@ WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
 def inputs_at(task, lanes, w):
     """Fill w.u with the inputs at the times w.t: linear within a segment of the time grid.
 
-    What leaves transport delays then follows behind them.
+    What leaves transport delays then follows behind them, and the inputs' rates where ideal relays
+    ask for them.
     """
     t, times, inputs, u = w.t, task.times, task.inputs, w.u
     for j in range(lanes.size):
@@ -273,6 +274,18 @@ def inputs_at(task, lanes, w):
     for i in range(task.delays.shape[0]):
         for j in range(lanes.size):
             u[inputs.shape[0] + i, j] = past_value(task, w, i, j, t[j])
+    for j in range(lanes.size):
+        input_rates(task, lanes[j].segment, u, j)
+
+
+@numba.njit(**INNER)
+def input_rates(task, segment, u, j):
+    """Fill the last rows of u with the rates of the inputs in a segment, if it has such rows."""
+    first = task.inputs.shape[0] + task.delays.shape[0]
+    m = min(segment, task.times.size - 2)
+    for i in range(u.shape[0] - first):
+        rise = task.inputs[i, m + 1] - task.inputs[i, m]
+        u[first + i, j] = rise / (task.times[m + 1] - task.times[m])
 
 
 @numba.njit(**INNER)
@@ -386,6 +399,7 @@ def outputs(rhs, out, task, w):
                 w.u[i, j] = task.inputs[i, m]
             for i in range(task.delays.shape[0]):
                 w.u[task.inputs.shape[0] + i, j] = w.shown[m, i, j]
+            input_rates(task, m, w.u, j)
         if task.memory.size:
             call_rhs(rhs, w.t, states[m], w.u, task.p, w.dx_ahead, w.g)
             for i in range(task.memory.size):

@@ -47,10 +47,16 @@ class Motion:
         The derivative of each state; of memories 0.
     solutions : mapping
         As `fixed_points` of `nlctl.expressions.derivatives.tangents`.
+    inputs : int
+        Number of the diagram's inputs.
+    behind : int
+        Place, among the program's inputs, from which on their rates follow.
     """
 
     rates: Sequence[Expr]
     solutions: Mapping[str, Sequence[Expr]]
+    inputs: int = 0
+    behind: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,13 +128,16 @@ def replaced_parts(graph: Graph, exprs: Sequence[Expr], instead: Mapping[Expr, E
 def _rate(graph: Graph, relay: SlidingInput, motion: Motion) -> tuple[Expr, Expr]:
     """Return u' of a relay, and its derivative by the relay's output."""
     who = f"the ideal relay '{relay.name}'"
-    _check_input(who, relay)
+    _check_input(who, relay, motion)
     states = graph.joined([(rate, 1) for rate in motion.rates]) if motion.rates else None
 
     def along(leaf: Expr) -> Expr | None:
         array, start, step = leaf.data
         if array == "t":
             return graph.const(1.0)
+        if array == "u":
+            where = (array, motion.behind + start, step)
+            return graph.node("leaf", data=where, size=leaf.size, varies=True)
         if array != "x" or states is None:
             return None
         if leaf.size is None:
@@ -176,7 +185,7 @@ def _is_affine(expr: Expr, leaf: Expr) -> bool:
     return True
 
 
-def _check_input(who: str, relay: SlidingInput) -> None:
+def _check_input(who: str, relay: SlidingInput, motion: Motion) -> None:
     """Refuse a relay's input that jumps, or whose rate nobody knows."""
     parts = needed([relay.given])
     for call in (e for e in parts if e.op == "call"):
@@ -189,12 +198,19 @@ def _check_input(who: str, relay: SlidingInput) -> None:
             f"the input of {who} depends on the output of an ideal relay at the same instant, and "
             f"jumps with it: put a state between them, or {_SMOOTH}"
         )
-    if _reads(relay.given, "u"):
+    if any(_is_delayed(e, motion.inputs) for e in needed([relay.given])):
         raise CompileError(
-            f"the input of {who} depends on an input of the diagram or a delayed signal at the "
-            "same instant, whose rate is not known: put the signal into the diagram as a block "
-            f"(nlctl.SumOfSines, nlctl.FunctionReference) or a lag before it, or {_SMOOTH}"
+            f"the input of {who} depends on a delayed signal at the same instant, whose rate is "
+            f"not known: put a lag before it, or {_SMOOTH}"
         )
+
+
+def _is_delayed(leaf: Expr, inputs: int) -> bool:
+    """Whether a leaf has what leaves a transport delay, among the program's inputs."""
+    if leaf.op != "leaf" or leaf.data[0] != "u":
+        return False
+    _, start, step = leaf.data
+    return start + step * ((leaf.size or 1) - 1) >= inputs
 
 
 def _reads(expr: Expr, array: str) -> bool:

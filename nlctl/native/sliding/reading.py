@@ -50,7 +50,10 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
     def output(k: int, known: Sequence[Expr]) -> Expr:
         return first.relay_output(places[k], _array(graph, known))[0].only
 
-    motion = Motion(rates=_rates(first), solutions=first.fixed_points)
+    motion = Motion(
+        rates=_rates(first), solutions=first.fixed_points, inputs=schedule.system.ninputs or 0,
+        behind=schedule.ninputs - schedule.rates,
+    )  # fmt: skip
     found = sliding_rates(graph, relays, motion, output)
     return replace(
         reader,

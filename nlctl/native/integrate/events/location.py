@@ -6,6 +6,9 @@ repeated, shorter each time, until it ends right behind the event: all stages bu
 rest then lie on one side, and what the rest costs is below one local error.  Regula falsi with the
 Illinois modification finds the length; every attempt is a step of full order, so nothing rests on
 an interpolant that has seen the other side.
+
+A memory that jumps where no switching function of its block changes its sign is one more event:
+error control does not see it, since memories stand still within a step.  The length is halved.
 """
 
 from __future__ import annotations
@@ -109,11 +112,57 @@ def _narrowed(lane, switching, e_start, e_low, e_high, e, behind, j):
 
 
 @numba.njit(**INNER)
+def jumped(task, lane, w, j):
+    """Whether a memory that stands still at both ends of the step just tried is another behind it.
+
+    And no event of the step says why.  Where such a jump is being located, one at a stage counts:
+    it is the first that is sought.
+    """
+    for i in range(task.memory.size):
+        row, before = task.switching + i, w.x_new[task.memory[i], j]
+        if w.e_start[row, j] != 0.0 or w.slope[row, j] != 0.0:
+            continue  # it is carried along, also while memories are committed step by step
+        changed = _apart(task, before, w.g[row, j])
+        if lane.seeks > 0 and task.inside[1 if lane.stiff else 0, 0] != 0.0:
+            for n in range(3):
+                changed |= _apart(task, before, w.g_inside[n, row, j])
+        if changed:
+            own = first_root(lane, task.switching, w.e_start, w.e_start, w.e, w.behind, j)[0]
+            return lane.seeks > 0 or own < 0.0
+    return False
+
+
+@numba.njit(**INNER)
+def _apart(task, before, after):
+    """Whether a memory has changed by more than its tolerance."""
+    return abs(after - before) > task.atol + task.rtol * max(abs(before), abs(after))
+
+
+@numba.njit(**INNER)
+def locate_jump(lane, rtol, is_behind):
+    """Halve the way to where a memory jumps: AGAIN, or accepted with an EVENT right behind it."""
+    if lane.seeks == 0:
+        lane.seeks, lane.low, lane.high = 1, 0.0, lane.step
+    elif is_behind:
+        lane.high = lane.step
+    else:
+        lane.low = lane.step
+    lane.tries += 1
+    rest = max(min(10.0 * rtol, 1e-4) * lane.high, 4e-16 * abs(lane.t))
+    found = lane.high - lane.low <= rest
+    if found and (is_behind or lane.low == lane.high):
+        return EVENT
+    lane.step = lane.high if found else 0.5 * (lane.low + lane.high)
+    lane.ends = 0
+    return AGAIN
+
+
+@numba.njit(**INNER)
 def step_accepted(lane, event):
     """Count an accepted step; after several events without progress those of memories rest."""
     lane.accepted += 1
     lane.last = lane.step
-    lane.tries = 0
+    lane.tries = lane.seeks = 0
     lane.quiet = max(0, lane.quiet - 1)
     if event:
         lane.events += 1

@@ -45,7 +45,7 @@ def _exact(point, along, task, lanes, w):
         for i in range(m):
             w.u_along[i, j] = w.u[i, 0]
     k = min(lane.segment, task.times.size - 2)
-    for i in range(m):  # inputs change as time goes on
+    for i in range(task.inputs.shape[0]):  # inputs change as time goes on
         rise = task.inputs[i, k + 1] - task.inputs[i, k]
         w.v[last, n + i, n - last * wide] = rise / (task.times[k + 1] - task.times[k])
     call_point(point, w.t_along, w.x_along, w.u_along, task.c_along)

@@ -1,0 +1,55 @@
+"""Whether expressions may jump: where what they are made of does not."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+from .graph import Expr, needed
+
+__all__ = ["may_jump"]
+
+_JUMPING = frozenset(
+    (
+        "arctan2",
+        "ceil",
+        "copysign",
+        "floor",
+        "fmod",
+        "heaviside",
+        "remainder",
+        "rint",
+        "sign",
+        "trunc",
+    )
+)
+_ORDERS = ("lt", "le", "gt", "ge")
+_UNKNOWN = ("call", "solve")  # what they do is not written in the expression
+
+
+def may_jump(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> bool:
+    """Whether expressions have jumps of their own, as far as can be read off.
+
+    Parameters
+    ----------
+    exprs : iterable of Expr
+    known : collection of Expr, optional
+        What they are made of: it is not looked into.
+
+    Returns
+    -------
+    bool
+        False only if they are continuous functions of `known`, of states and of time.
+    """
+    own = [node for node in needed(exprs, known) if node not in known]
+    return any(
+        node.op in _JUMPING
+        or node.op in _UNKNOWN
+        or (node.op == "select" and not _is_an_extreme(node))
+        for node in own
+    )
+
+
+def _is_an_extreme(choice: Expr) -> bool:
+    """Whether a choice between two values is by which of them is larger."""
+    condition, *values = choice.args
+    return condition.op in _ORDERS and set(condition.args) == set(values)
