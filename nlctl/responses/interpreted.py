@@ -20,6 +20,7 @@ from ..sampling.system import Sampled, happening
 from ..sliding.blocks import sliding_blocks
 from .arguments import RunArguments, evaluation_array, input_array, state_array
 from .delayed import Past, break_points, by_steps, with_delays
+from .relaxation import check_relaxation
 from .sampled import from_sample_to_sample
 from .time_response import as_response
 
@@ -45,11 +46,11 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     ParameterError
         If inputs, initial state or times are refused.
     UsageError
-        If a block is an ideal relay, which it would run wrongly.
+        If a block is an ideal relay, or has a memory that it would not move.
     """
     system, times, params, solver = run.system, run.times, run.params, run.solver
     check_read(system, params)
-    _refuse_sliding(system)
+    _refuse(system)
     # a function that declares no numbers of inputs or states gets what it is given
     inputs = run.inputs if system.ninputs is None else input_array(system, run.inputs, times)
     whole = system.nstates is None and run.initial_state is not None
@@ -111,9 +112,11 @@ def _longest_step(times: np.ndarray, inputs: Any) -> float:
     return float(np.diff(ends).min()) if known.size else np.inf
 
 
-def _refuse_sliding(system: Any) -> None:
+def _refuse(system: Any) -> None:
+    """Refuse blocks that python-control would run wrongly."""
     for made in sliding_blocks(system):
         raise UsageError(f"block '{made.name}' {SLIDES}")
+    check_relaxation(system)
 
 
 def _between(simulate: Any, system: Any) -> Any:
