@@ -14,8 +14,7 @@ in the box, and so |r| <= C_0(C).  No Nussbaum function and no Lemma 1 take part
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +31,10 @@ from ..bounds.decomposition import Decomposition, check_gain, decompose
 from ..bounds.error_bounds import reference_bounds
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
 from ..bounds.provenance import Constant, per_second
+from ..loop.external_inputs import disturbed
+from ..model_reference.closing import certify_model_reference
+from ..model_reference.model_certificate import ModelReferenceCertificate, told
+from ..model_reference.model_loop import is_model_reference
 from .known_sign import KnownSignLoop, read_loop
 from .plant_bounds import Demand, demand
 
@@ -123,12 +126,7 @@ class Certificate:
         )
 
     def __str__(self) -> str:
-        verdict = f"|r| <= {self.C_0:.6g} proved for all t" if self.holds else "no bound is proved"
-        rows = [
-            f"  {c.symbol:14} {c.value:<11.6g} {c.provenance:9} {c.how}; {c.over}"
-            for c in self.constants
-        ]
-        return "\n".join([f"{verdict}: {self.reason}", *rows])
+        return told(self, f"|r| <= {self.C_0:.6g} proved for all t")
 
 
 def bound_of_r(loop: KnownSignLoop, delta_star: float) -> tuple[arb, arb, float, arb]:
@@ -146,11 +144,12 @@ def certify(
     params: Mapping[str, Any] | None = None,
     inputs: Mapping[str, float] | None = None,
     k: tuple[float, float] | None = None,
+    W: Sequence[float] | None = None,
     u_max: float = 250.0,
     tol: float = 1e-3,
     max_iterations: int = 60,
-) -> Certificate:
-    """Prove a bound of the filtered error for all time, or say why it cannot be proved.
+) -> Certificate | ModelReferenceCertificate:
+    """Prove a bound of the tracking error for all time, or say why it cannot be proved.
 
     The box is closed by a monotone iteration C -> box -> delta* -> C_0 -> C from below, in ball
     arithmetic; every constant is proved on the box that is used.
@@ -208,8 +207,17 @@ def certify(
         if not 0 < value < np.inf:
             raise ParameterError(f"certify needs a finite {name} > 0, got {value}")
     check_gain("certify", k)
+    if is_model_reference(loop):
+        return certify_model_reference(
+            loop, params=params, inputs=inputs, k=k, W=W, u_max=u_max, tol=tol,
+            max_iterations=max_iterations,
+        )  # fmt: skip
+    if W is not None:
+        raise ParameterError("certify takes W for model reference adaptive control only")
     read = read_loop(loop, params, inputs)
-    split = _disturbed(decompose(read.parts.actuator, k=k, u_max=u_max, tol=tol), read)
+    split = disturbed(
+        decompose(read.parts.actuator, k=k, u_max=u_max, tol=tol), read.disturbance
+    )
     C = abs(read.parts.gains.r_0)
     iterations = [C]
     for _ in range(max_iterations):
@@ -258,19 +266,6 @@ def _doubt(read: KnownSignLoop, split: Decomposition, u: float, u_max: float, C_
             f"|u| may reach {u:.4g}, the actuator's split is proved to {2 * u_max:g}: raise u_max"
         )
     return ""
-
-
-def _disturbed(split: Decomposition, loop: KnownSignLoop) -> Decomposition:
-    """Return the split of v = k u + (eps_u + w) with the external inputs w."""
-    if not loop.disturbance:
-        return split
-    w = Ball(arb(loop.disturbance))
-    return dataclasses.replace(
-        split,
-        eps_low=-upper(w - split.eps_low),
-        eps_high=upper(w + split.eps_high),
-        how=f"{split.how}; external inputs add {loop.disturbance:g} at most",
-    )
 
 
 def _refusal(

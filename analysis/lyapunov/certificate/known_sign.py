@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from flint import arb
 
 from nlctl.blocks import block
@@ -18,16 +17,14 @@ from nlctl.controllers import (
     RobustTerm,
     Zero,
 )
-from nlctl.diagrams import Place, initial_state, interconnect
-from nlctl.errors import DiagramError, ParameterError
-from nlctl.names import unknown
-from nlctl.params import as_numbers, equation_arguments
+from nlctl.diagrams import initial_state, interconnect
+from nlctl.params import equation_arguments
 from nlctl.references import SumOfSines
 from nlctl.upstream.control_internals import set_parameters
 
-from ...intervals.branch_and_bound import upper
+from ..loop.external_inputs import bound_of_inputs
 from ..loop.plant_form import Acceleration, acceleration, check_chain
-from ..loop.roles import Parts, Roles, joined_again, read_parts, record_of
+from ..loop.roles import Parts, check_kind, joined_again, read_parts
 from ..loop.same_loop import check_same, points_around
 
 __all__ = ["KnownSignLoop", "read_loop"]
@@ -104,10 +101,10 @@ def read_loop(
         external input has no bound.
     """
     parts = read_parts(loop, params=params, inputs=True)
-    bound = _bound_of_inputs(parts.roles, inputs or {}, loop)
+    bound = bound_of_inputs(parts.roles, inputs or {}, loop)
     for part, kinds in PROVED_FOR.items():
         if part in parts.roles.places:
-            _check_kind(parts.roles.places[part], kinds)
+            check_kind(parts.roles.places[part], kinds)
     plant = parts.roles.places["plant"]
     check_chain(plant)
     reference: Any = parts.roles.spec("reference")
@@ -127,40 +124,3 @@ def read_loop(
     check_same(loop, interconnect(again, name=str(loop.name)), points_around(x0), params)
     set_parameters(loop, dict(params or {}))
     return read
-
-
-def _check_kind(place: Place, kinds: tuple[type, ...]) -> None:
-    """Check that a block is of a kind that the proof knows, and runs the equations of that kind."""
-    spec = record_of(place)
-    if type(spec) not in kinds:
-        wanted = " or ".join(kind.__name__ for kind in kinds)
-        raise DiagramError(
-            f"the certificate is about a {wanted} in the place of '{place.path}', "
-            f"got {type(spec).__name__}: put one there"
-        )
-    for name, used in (("update", place.system.updfcn), ("output", place.system.outfcn)):
-        known = vars(type(spec)).get(name)
-        if isinstance(known, staticmethod) and used is not known.__func__:
-            raise DiagramError(
-                f"block '{place.path}' has another {name} function than {type(spec).__name__}: "
-                "the certificate is about the latter"
-            )
-
-
-def _bound_of_inputs(roles: Roles, inputs: Mapping[str, float], loop: Any) -> float:
-    """Return the bound of what external inputs add to v."""
-    for name, value in inputs.items():
-        if name not in roles.disturbances:
-            raise unknown("external input", name, loop.input_labels, "that is added to v")
-        number = as_numbers(value)
-        if number is None or number.ndim or not 0 <= number < np.inf:
-            raise ParameterError(f"certify needs a finite bound >= 0 of '{name}', got {value!r}")
-    for name in roles.disturbances:
-        if name not in inputs:
-            raise DiagramError(
-                f"external input '{name}' is added to the plant's v, and may be anything: declare "
-                f"its bound, certify(loop, inputs={{'{name}': 0.1}}), or take it away"
-            )
-    return upper(
-        sum((arb(abs(gain)) * inputs[name] for name, gain in roles.disturbances.items()), arb(0))
-    )
