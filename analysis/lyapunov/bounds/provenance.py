@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from nlctl.host.notebook import table_html
 from nlctl.names import unknown
 
 from ...intervals.arithmetic import as_ball
@@ -20,7 +22,15 @@ from .sector import Sector
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Constant", "Constants", "Provenance", "bound", "per_second"]
+__all__ = [
+    "Constant",
+    "Constants",
+    "Provenance",
+    "bound",
+    "constants_html",
+    "constants_text",
+    "per_second",
+]
 
 Provenance = Literal["proved", "computed", "sampled", "given", "undecided"]
 
@@ -156,3 +166,20 @@ def bound(alpha_0: float, alpha_1: float, V_0: float, Q: float) -> float:
 def per_second(power: int) -> str:
     """The unit 1/s^power; x1, u and v count as pure numbers."""
     return "1/s" if power == 1 else f"1/s^{power}"
+
+
+def constants_text(verdict: str, constants: Sequence[Constant]) -> str:
+    """Return constants as text, a line for each below what they prove."""
+    width = max(len(c.symbol) for c in constants)
+    rows = [
+        f"  {c.symbol:{width}} {c.value:<11.6g} {c.provenance:9} {c.how}; {c.over}"
+        for c in constants
+    ]
+    return "\n".join([verdict, *rows])
+
+
+def constants_html(verdict: str, constants: Sequence[Constant]) -> str:
+    """Return the same as a table for a notebook."""
+    columns = ("symbol", "value", "unit", "status", "how", "for")
+    rows = [(c.symbol, c.value, c.unit, c.provenance, c.how, c.over) for c in constants]
+    return table_html(verdict, columns, rows)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from flint import arb
 
 from nlctl.blocks import block
@@ -24,10 +25,10 @@ from nlctl.upstream.control_internals import set_parameters
 
 from ..loop.external_inputs import bound_of_inputs
 from ..loop.plant_form import Acceleration, acceleration, check_chain
-from ..loop.roles import Parts, check_kind, joined_again, read_parts
+from ..loop.roles import Parts, Roles, check_kind, joined_again, read_parts
 from ..loop.same_loop import check_same, points_around
 
-__all__ = ["KnownSignLoop", "read_loop"]
+__all__ = ["KnownSignLoop", "initial_errors", "read_loop"]
 
 PROVED_FOR = {
     "reference": (SumOfSines,),
@@ -107,16 +108,11 @@ def read_loop(
             check_kind(parts.roles.places[part], kinds)
     plant = parts.roles.places["plant"]
     check_chain(plant)
-    reference: Any = parts.roles.spec("reference")
-    yd = reference.output(0.0, (), (), equation_arguments(reference))
     x0 = initial_state(loop)
-    # the radius covers what double precision has lost in yd(0)
-    own = x0[plant.state_offset :][: parts.order]
-    e0 = tuple(arb(float(x)) - arb(float(y), 1e-12) for x, y in zip(own, yd, strict=False))
     read = KnownSignLoop(
         parts=parts,
-        reference=reference,
-        e0=e0,
+        reference=parts.roles.spec("reference"),
+        e0=initial_errors(parts.roles, x0),
         acceleration=acceleration(plant),
         disturbance=bound,
     )
@@ -124,3 +120,12 @@ def read_loop(
     check_same(loop, interconnect(again, name=str(loop.name)), points_around(x0), params)
     set_parameters(loop, dict(params or {}))
     return read
+
+
+def initial_errors(roles: Roles, x0: np.ndarray) -> tuple[arb, ...]:
+    """Return e_1(0), ..., e_n(0) of a plant and a reference without states."""
+    plant, reference = roles.places["plant"], roles.spec("reference")
+    yd = reference.output(0.0, (), (), equation_arguments(reference))
+    own = x0[plant.state_offset :][: plant.system.nstates]
+    # the radius covers what double precision has lost in yd(0)
+    return tuple(arb(float(x)) - arb(float(y), 1e-12) for x, y in zip(own, yd, strict=False))

@@ -7,6 +7,7 @@ these are called in the diagram; every wire is read from python-control's own ma
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -327,7 +328,7 @@ def check_kind(place: Place, kinds: tuple[type, ...]) -> None:
             f"got {type(spec).__name__}: put one there"
         )
     for name, used in (("update", place.system.updfcn), ("output", place.system.outfcn)):
-        known = vars(type(spec)).get(name)
+        known = inspect.getattr_static(type(spec), name, None)  # inherited ones, too
         if isinstance(known, staticmethod) and used is not known.__func__:
             raise DiagramError(
                 f"block '{place.path}' has another {name} function than {type(spec).__name__}: "

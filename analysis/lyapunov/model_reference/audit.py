@@ -69,7 +69,7 @@ def _both(
     E, E_rate = (of("plant", values) - of("model", values) for values in (x, rates))
     W_hat, W_rate = of("weights", x), of("weights", rates)
     true = 2 * E @ P @ E_rate + 2 * lam * (W_hat - W) @ W_rate / weights.Gamma
-    r, delta = E @ P[:, -1], _delta(match, t, x, signals)
+    r, delta = float(E @ P[:, -1]), _delta(match, t, signals)
     leak = W_hat @ W_hat + (W_hat - W) @ (W_hat - W) - W @ W
     terms = [-E @ Q @ E, 2 * r * delta, -lam * _rate_of_leakage(weights, r) * leak]
     size = abs(2 * lam * (W_hat - W) @ W_rate / weights.Gamma) + sum(map(abs, terms))
@@ -83,7 +83,7 @@ def _rate_of_leakage(weights: Any, r: float) -> float:
     return weights.sigma_1 if isinstance(weights, AdaptiveWeights) else weights.sigma * abs(r)
 
 
-def _delta(match: Matching, t: float, x: np.ndarray, signals: Mapping[str, float]) -> float:
+def _delta(match: Matching, t: float, signals: Mapping[str, float]) -> float:
     order = match.loop.order
     names = (*coordinate_names(order), *model_state_names(order), "yd", "v")
     values = {"t": t} | {name: signals[name] for name in names}

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from flint import arb
 
 from nlctl.actuators import Gain
@@ -38,13 +37,13 @@ _TIGHTER = 1e-3  # relative: the ultimate bound is looked at again as long as it
 def certify_model_reference(
     loop: Any,
     *,
-    params: Mapping[str, Any] | None,
-    inputs: Mapping[str, float] | None,
-    k: tuple[float, float] | None,
-    W: Sequence[float] | None,
-    u_max: float,
-    tol: float,
-    max_iterations: int,
+    params: Mapping[str, Any] | None = None,
+    inputs: Mapping[str, float] | None = None,
+    k: tuple[float, float] | None = None,
+    W: Sequence[float] | None = None,
+    u_max: float = 250.0,
+    tol: float = 1e-3,
+    max_iterations: int = 60,
 ) -> ModelReferenceCertificate:
     """Prove bounds of a loop that `is_model_reference`; see `certify`."""
     read = read_model_reference(loop, params, inputs)
@@ -65,7 +64,8 @@ def certify_model_reference(
         shown = f"{iterations[-1]:.6g}"
         reason = f"V still grows after {counted(max_iterations, 'iteration')}: {shown}"
     reason = reason or _doubt(read, split, need, u_max)
-    return _certificate(match, split, need, found, V_0, iterations, reason, W is not None, tol)
+    end = _in_the_end(match, split, found, tol) if not reason else found
+    return _certificate(str(loop.name), match, split, need, (found, end), V_0, iterations, reason)
 
 
 def _split(
@@ -121,9 +121,7 @@ def _doubt(read: ModelReferenceLoop, split: Decomposition, need: Region, u_max: 
     return ""
 
 
-def _in_the_end(
-    match: Matching, split: Decomposition, found: Decrease, tol: float
-) -> Decrease:
+def _in_the_end(match: Matching, split: Decomposition, found: Decrease, tol: float) -> Decrease:
     """Return bounds that hold in the end: V falls to a level on whose box delta is smaller."""
     while found.falls:
         need = region(match, split, found.error * (1 + tol) + tol * tol, tol=tol)
@@ -135,14 +133,14 @@ def _in_the_end(
 
 
 def _certificate(
-    match: Matching, split: Decomposition, need: Region, found: Decrease, V_0: arb,
-    iterations: Sequence[float], reason: str, given_W: bool, tol: float,
+    name: str, match: Matching, split: Decomposition, need: Region,
+    bounds: tuple[Decrease, Decrease], V_0: arb, iterations: Sequence[float], reason: str,
 ) -> ModelReferenceCertificate:  # fmt: skip
-    holds, form, inf = not reason, match.loop.form, float("inf")
-    end = _in_the_end(match, split, found, tol) if holds else found
+    (found, end), holds, form, inf = bounds, not reason, match.loop.form, float("inf")
     closed = f"the box closes: V < {need.C:.6g} implies V <= {iterations[-1]:.6g}"
     errors = tuple(map(upper, form.errors(found.level)))
     return ModelReferenceCertificate(
+        name=name,
         holds=holds,
         reason=reason or closed,
         e=errors[0] if holds else inf,
@@ -161,5 +159,4 @@ def _certificate(
         matching=match,
         how=found.how,
         end=found.end,
-        given_W=given_W,
     )

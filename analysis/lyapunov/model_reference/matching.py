@@ -44,6 +44,8 @@ class Matching:
         Input gain of the plant, and lambda = beta k / gain.
     W : tuple of l Fraction
         Weights that match, or were chosen.
+    chosen : bool
+        Whether they were chosen by the caller.
     rest : Sum
         What is left of the plant's equation, in the symbols t, x1, ..., xm1, ..., yd, v.
     """
@@ -53,10 +55,11 @@ class Matching:
     beta: Fraction
     lam: Fraction
     W: tuple[Fraction, ...]
+    chosen: bool
     rest: Sum
 
     @property
-    def W_squared(self) -> Fraction:
+    def W_squared(self) -> Fraction:  # noqa: N802
         """|W|^2."""
         return sum((w * w for w in self.W), Fraction(0))
 
@@ -162,7 +165,7 @@ def matching(
     given = None if W is None else [lam * exact(w) for w in W]
     weights, rest = _taken_away(target, psi, given)
     W_lam = tuple(w / lam for w in weights)
-    return Matching(loop=loop, k=k, beta=beta, lam=lam, W=W_lam, rest=rest)
+    return Matching(loop=loop, k=k, beta=beta, lam=lam, W=W_lam, chosen=W is not None, rest=rest)
 
 
 def _taken_away(

@@ -13,7 +13,7 @@ from nlctl.controllers.mrac.reference_model import model_state_names
 from nlctl.wording import counted
 
 from ..bounds.decomposition import Decomposition
-from ..bounds.provenance import Constant, per_second
+from ..bounds.provenance import Constant, constants_html, constants_text, per_second
 from .matching import Matching
 from .region import Region
 
@@ -27,10 +27,13 @@ class ModelReferenceCertificate:
     """What `certify` proved of model reference adaptive control, with every constant.
 
     The function is V = E^T P E + lambda |W_hat - W|^2 / Gamma, E = x - xm.  The bounds hold from
-    every initial state with V(0) <= C whose model state is within its bounds.
+    every initial state with V(0) <= V_max whose model starts as here or at rest; with projection
+    the weights have to start in the ball, or not farther out than here.
 
     Attributes
     ----------
+    name : str
+        Of the loop.
     holds : bool
         True: the bounds hold for all t >= 0, proved.
     reason : str
@@ -61,14 +64,13 @@ class ModelReferenceCertificate:
         What the weights are to learn, and what is left.
     how, end : str
         How V is bounded, and what is known of it in the end.
-    given_W : bool
-        Whether W was chosen by the caller.
 
     Examples
     --------
     See `certify`.
     """
 
+    name: str
     holds: bool
     reason: str
     e: float
@@ -87,10 +89,9 @@ class ModelReferenceCertificate:
     matching: Matching = field(repr=False)
     how: str
     end: str
-    given_W: bool = False
 
     @property
-    def W(self) -> tuple[float, ...]:
+    def W(self) -> tuple[float, ...]:  # noqa: N802
         """The weights that the bounds are about."""
         return tuple(map(float, self.matching.W))
 
@@ -113,7 +114,7 @@ class ModelReferenceCertificate:
         yield "beta", match.beta, per_second(n), "computed", "coefficient of v in x_n'", "all x"
         yield "lambda", match.lam, "1", "computed", "beta k / gain of the law, must be > 0", "all x"
         size = match.W_squared**0.5
-        chosen = ("given", "chosen") if self.given_W else ("computed", "elimination, exactly")
+        chosen = ("given", "chosen") if match.chosen else ("computed", "elimination, exactly")
         yield "|W|", size, "1", *chosen, "all x"
         yield "mu", form.mu, "1/s", "proved", "Q - mu P > 0, Q = -(A^T P + P A) exactly", "all E"
         q = float(int(form.q.p) / int(form.q.q))
@@ -134,7 +135,8 @@ class ModelReferenceCertificate:
         what = counted(need.boxes, "box", "boxes") if need.boxes else "all of it has cancelled"
         rest = (per_second(n), "proved", f"{what}; disturbance, and what psi does not span", over)
         yield "sup |rest|", need.rest, *rest
-        yield "D", need.D, per_second(n), sure, "sup |rest| + |beta| (eps_u* + (k_2-k_1)|u|/2)", over
+        delta = "sup |rest| + |beta| (eps_u* + (k_2 - k_1)|u|/2)"
+        yield "D", need.D, per_second(n), sure, delta, over
         yield "V(0)", self.V_0, "1", "computed", "rational", "this initial state"
         if np.isfinite(self.alpha_1):
             rate = "V' <= -alpha_1 V + alpha_0: chosen between 0 and min{mu, 2 Gamma sigma}"
@@ -159,15 +161,15 @@ class ModelReferenceCertificate:
         ball = "; the ball of the projection is invariant" if projected else ""
         return f"|W| + |W_hat - W|{ball}"
 
+    @property
+    def verdict(self) -> str:
+        """What is proved, in a sentence."""
+        bound = f"|e| <= {self.e:.6g} proved for all t, {self.ultimate:.6g} in the end"
+        return f"{bound if self.holds else 'no bound is proved'}: {self.reason}"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return constants_html(self.verdict, self.constants)
+
     def __str__(self) -> str:
-        return told(self, f"|e| <= {self.e:.6g} proved for all t, {self.ultimate:.6g} in the end")
-
-
-def told(certificate: Any, proved: str) -> str:
-    """Return a certificate as text: what is proved, or that nothing is, and its constants."""
-    verdict = proved if certificate.holds else "no bound is proved"
-    rows = [
-        f"  {c.symbol:16} {c.value:<11.6g} {c.provenance:9} {c.how}; {c.over}"
-        for c in certificate.constants
-    ]
-    return "\n".join([f"{verdict}: {certificate.reason}", *rows])
+        return constants_text(self.verdict, self.constants)

@@ -81,6 +81,7 @@ def region(match: Matching, split: Decomposition, C: arb, *, tol: float) -> Regi
     tol : float
         The suprema are proved to this, relative to their size.
     """
+    C = arb(upper(C))  # the bound that is told, and no smaller one
     loop, model = match.loop, model_reach(match)
     errors = tuple(map(upper, loop.form.errors(C)))
     modelled = tuple(map(upper, loop.model_form.errors(model)))
@@ -150,7 +151,7 @@ def _largest_rest(match: Matching, box: Box, tol: float) -> tuple[arb, int]:
         return match.rest_on(dict(zip(names, point, strict=True)))
 
     over = box.only(*names)
-    if not all(np.isfinite(high) for name, high in zip(names, over.high, strict=True) if name != "t"):
+    if not all(np.isfinite(over[name][1]) for name in names if name != "t"):
         return arb("inf"), 0
     rough = enclose(rest, over, max_boxes=1).magnitude
     fineness = tol * rough if 0 < rough < np.inf else tol
