@@ -21,7 +21,7 @@ from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition, clipped_split, decompose
 from ..loop.external_inputs import disturbed
 from .audit import check_decrease
-from .decrease import Decrease, decrease
+from .decrease import Decrease, decrease, outside_ball
 from .matching import Matching, matching
 from .model_certificate import ModelReferenceCertificate
 from .model_loop import ModelReferenceLoop, read_model_reference
@@ -49,7 +49,8 @@ def certify_model_reference(
     read = read_model_reference(loop, params, inputs)
     split = disturbed(_split(read, k, u_max, tol), read.disturbance)
     match = matching(read, split, _checked_weights(W, len(read.W_hat_0)))
-    check_decrease(loop, match, params)
+    if not outside_ball(match):
+        check_decrease(loop, match, params)
     V_0 = ball(match.energy(read.E_0, read.W_hat_0))
     C, iterations, reason = V_0, [upper(V_0)], ""
     for _ in range(max_iterations):
@@ -148,6 +149,7 @@ def _certificate(
         W_error=upper((found.level * ball(match.Gamma)).sqrt()) if holds else inf,
         ultimate=upper(form.errors(end.error)[0]) if holds else inf,
         ultimate_W_error=upper((end.weights * ball(match.Gamma)).sqrt()) if holds else inf,
+        rms=upper(form.first(end.mean)) if holds else inf,
         u_max=need.u if holds else inf,
         V_max=iterations[-1] if holds else inf,
         V_0=upper(V_0),

@@ -2,7 +2,9 @@ r"""What V = E^T P E + lambda |W_hat - W|^2 / Gamma does, for each modification 
 
 With |delta| <= D and the gradient law :math:`\dot{\hat{W}} = \Gamma r \psi` + leakage,
 V' = -E^T Q E + 2 r delta + 2 lambda (W_hat - W)^T leakage / Gamma, where r^2 <= q E^T Q E and
-E^T Q E >= mu E^T P E.  Squares are completed, in ball arithmetic.
+E^T Q E >= mu E^T P E.  Squares are completed, in ball arithmetic.  With s^2 = E^T Q E all of them
+give V' <= -s^2 + 2 a s + b: as V stays bounded, the mean of s^2 is at most (a + (a^2 + b)^(1/2))^2
+in the end, which does not depend on Gamma.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from ...intervals.normal_form import exact
 from .matching import Matching
 from .quadratic_form import ball
 
-__all__ = ["Decrease", "decrease"]
+__all__ = ["Decrease", "decrease", "largest_weights", "outside_ball"]
 
 _SQUARE = "the integral of E^T Q E is finite"
 _FINE = 1e-6  # relative: of the one-dimensional maximum of e-modification
@@ -38,6 +40,8 @@ class Decrease:
         Bound of V for all time.
     error, weights : arb
         Bounds of limsup E^T P E and of limsup lambda |W_hat - W|^2 / Gamma.
+    mean : arb
+        Bound of the limit superior of the mean of E^T Q E over [0, t].
     falls : bool
         Whether limsup V <= `error`, too.
     alpha_0, alpha_1 : float
@@ -51,6 +55,7 @@ class Decrease:
     level: arb
     error: arb
     weights: arb
+    mean: arb
     falls: bool = False
     alpha_0: float = np.nan
     alpha_1: float = np.nan
@@ -73,7 +78,7 @@ def decrease(match: Matching, D: arb, V_0: arb) -> Decrease:
     weights = match.loop.spec("weights")
     if not D.is_finite():
         endless = arb("inf")
-        return Decrease(level=endless, error=endless, weights=endless, how="", end="")
+        return Decrease(level=endless, error=endless, weights=endless, mean=endless, how="", end="")
     modified = {
         AdaptiveWeights: ("sigma_1", _sigma_modification),
         EModifiedWeights: ("sigma", _e_modification),
@@ -98,6 +103,7 @@ def _gradient(path: str, D: arb, V_0: arb) -> Decrease:
         level=V_0,
         error=arb(0),
         weights=V_0,
+        mean=arb(0),
         how="V(0): V' <= -E^T Q E",
         end=_SQUARE,
         doubt="" if D.is_zero() else doubt,
@@ -121,6 +127,7 @@ def _sigma_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrea
         level=V_0.max(ultimate),
         error=ultimate,
         weights=ultimate,
+        mean=(drive.sqrt() + (drive + leak / 2).sqrt()) ** 2,
         falls=True,
         alpha_0=upper(found),
         alpha_1=a,
@@ -164,6 +171,7 @@ def _e_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrease:
         level=level,
         error=found,
         weights=level,
+        mean=q * h_0**2,
         how="max{V(0), V_e}, V_e the largest V at which V' > 0 is possible",
         end="V <= V_e in the end, or E -> 0",
     )
@@ -171,24 +179,23 @@ def _e_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrease:
 
 def _projection(match: Matching, D: arb, V_0: arb) -> Decrease:
     """V' <= -E^T Q E + 2 r delta for W in the inner ball, and |W_hat| stays in the outer one."""
-    weights, form = match.loop.spec("weights"), match.loop.form
-    radius = exact(weights.W_max)
-    if match.W_squared * (1 + exact(weights.width)) > radius * radius:
-        size = float(ball(match.W_squared).sqrt())
-        doubt = (
-            f"the weights that match have the norm {size:.4g}, and the inner ball of the "
-            f"projection the radius {float(radius) / (1 + weights.width) ** 0.5:.4g}: raise W_max"
+    form, doubt = match.loop.form, outside_ball(match)
+    if doubt:
+        endless = arb("inf")
+        return Decrease(
+            level=V_0, error=V_0, weights=V_0, mean=endless, how="", end="", doubt=doubt
         )
-        return Decrease(level=V_0, error=V_0, weights=V_0, how="", end="", doubt=doubt)
     if D.is_zero():
         how = "V(0): V' <= -E^T Q E"
-        return Decrease(level=V_0, error=arb(0), weights=V_0, how=how, end=_SQUARE)
+        none = arb(0)
+        return Decrease(level=V_0, error=none, weights=V_0, mean=none, how=how, end=_SQUARE)
     W_part = (largest_weights(match) + ball(match.W_squared).sqrt()) ** 2 / ball(match.Gamma)
     ultimate = W_part + form.driven(D)
     return Decrease(
         level=V_0.max(ultimate),
         error=ultimate,
         weights=ultimate.min(W_part),
+        mean=4 * ball(form.q) * D * D,
         falls=True,
         how="max{V(0), lambda (W_max + |W|)^2/Gamma + 4 q D^2/mu}",
         end="V -> the second or less",
@@ -199,3 +206,18 @@ def largest_weights(match: Matching) -> arb:
     """Return the radius that |W_hat| does not leave under projection: where f >= 1 it falls."""
     start = sum((w * w for w in match.loop.W_hat_0), exact(0.0))
     return arb(match.loop.spec("weights").W_max).max(ball(start).sqrt())
+
+
+def outside_ball(match: Matching) -> str:
+    """Say that projection may take the weights away from W; nothing if it never does."""
+    weights = match.loop.spec("weights")
+    if not isinstance(weights, ProjectedWeights):
+        return ""
+    radius, width = exact(weights.W_max), exact(weights.width)
+    if match.W_squared * (1 + width) <= radius * radius:
+        return ""
+    size, inner = float(ball(match.W_squared).sqrt()), float(radius) / float(1 + width) ** 0.5
+    return (
+        f"the weights that match have the norm {size:.4g}, and the inner ball of the projection "
+        f"has the radius {inner:.4g}: raise W_max"
+    )

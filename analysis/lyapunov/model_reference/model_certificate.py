@@ -48,6 +48,9 @@ class ModelReferenceCertificate:
         Bound of limsup |e|.
     ultimate_W_error : float
         Bound of limsup |W_hat - W|.
+    rms : float
+        Bound of the limit superior of the root mean square of e over [0, t]; it does not depend on
+        Gamma.
     u_max : float
         Bound of |u| for all time.
     V_max, V_0 : float
@@ -78,6 +81,7 @@ class ModelReferenceCertificate:
     W_error: float
     ultimate: float
     ultimate_W_error: float
+    rms: float
     u_max: float
     V_max: float
     V_0: float
@@ -154,6 +158,8 @@ class ModelReferenceCertificate:
         yield "limsup |e|", self.ultimate, "1", "proved", self.end, "t -> infinity"
         weights = self.ultimate_W_error
         yield "limsup |W_hat-W|", weights, "1", "proved", self.end, "t -> infinity"
+        mean = "mean of E^T Q E: V' <= -s^2 + 2 a s + b, s^2 = E^T Q E, and V is bounded"
+        yield "limsup RMS e", self.rms, "1", "proved", mean, "over [0, t], t -> infinity"
 
     @property
     def _weights(self) -> str:

@@ -74,10 +74,9 @@ class QuadraticForm:
         n = self.P.nrows()
         return tuple(self.reach(level, [int(i == k) for i in range(n)]) for k in range(n))
 
-    def seen(self, level: arb) -> arb:
-        """Return the largest |b^T P E| where E^T P E <= level."""
-        n = self.P.nrows()
-        return (level * ball(self.P[n - 1, n - 1])).sqrt()
+    def first(self, square: arb) -> arb:
+        """Return the largest |E_1| where E^T Q E <= square."""
+        return (square * ball(self.Q.inv()[0, 0])).sqrt()
 
     def driven(self, D: arb) -> arb:
         """Return the level that E^T P E does not leave while |d| <= D.

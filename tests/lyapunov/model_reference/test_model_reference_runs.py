@@ -1,0 +1,154 @@
+"""What is proved holds along runs: with drawn disturbances, from drawn starts in the level set."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mrac_loops import e_modification, first_order, projection, sigma, wing_rock
+
+import nlctl
+from analysis.lyapunov import certify
+from analysis.lyapunov.loop.roles import read_roles
+from analysis.lyapunov.model_reference.model_loop import PIECES
+
+D, TIMES = 0.5, np.linspace(0, 60, 3001)
+INPUTS = {"w": D}
+ROUND = 1 + 1e-6  # of the integrator, relative
+
+
+def moving(kind):
+    """x' = 2 x + v with the disturbance w as an external input, and a model that moves."""
+    command = nlctl.SumOfSines(order=0, amplitudes=(1.0,), frequencies=(0.7,), phases=(0.0,))
+    weights = {"sigma": sigma, "e": e_modification, "projection": projection}[kind]()
+    return first_order(weights, inputs=["w"], k=1.0, b=1.0, reference=command)
+
+
+def rolling(kind):
+    """Wing rock with the disturbance w beside the ailerons."""
+    made = {"sigma": sigma(0.1, nodes=6), "e": e_modification(0.5, nodes=6),
+            "projection": projection(2.0, nodes=6)}  # fmt: skip
+    return wing_rock(made[kind], inputs=["w"])
+
+
+LOOPS = {f"{plant.__name__} {kind}": (plant, kind) for plant in (moving, rolling)
+         for kind in ("sigma", "e", "projection")}  # fmt: skip
+PROVED = {}
+
+
+def proved(name):
+    """Loop, machine code and certificate, made once."""
+    if name not in PROVED:
+        make, kind = LOOPS[name]
+        loop = make(kind)
+        PROVED[name] = loop, nlctl.compile(loop), certify(loop, inputs=INPUTS)
+    return PROVED[name]
+
+
+def drawn_start(loop, found, rng, share):
+    """A state with V(0) = share V_max, E and W_hat in a drawn direction, the model at rest."""
+    match, names = found.matching, list(nlctl.state_names(loop))
+    P = np.array([[float(int(v.p) / int(v.q)) for v in row] for row in match.loop.form.P.tolist()])
+    E, error = rng.standard_normal(len(P)), rng.standard_normal(len(found.W))
+    scale = np.sqrt(share * found.V_max / (E @ P @ E + error @ error / float(match.Gamma)))
+    W_hat = np.array(found.W) + scale * error
+    if isinstance(match.loop.spec("weights"), nlctl.ProjectedWeights):  # they start in the ball
+        W_hat *= min(1.0, match.loop.spec("weights").W_max / np.linalg.norm(W_hat))
+    start = nlctl.initial_state(loop)
+    start[[names.index(f"plant.x{i + 1}") for i in range(len(E))]] = scale * E
+    start[[names.index(f"weights.W_hat[{i}]") for i in range(error.size)]] = W_hat
+    return start
+
+
+def drawn_disturbance(rng, kind):
+    """A bounded signal: constant, a square wave, a chirp, or random steps."""
+    if kind == "constant":
+        return np.full(TIMES.size, D * rng.choice([-1, 1]))
+    if kind == "square":
+        return D * np.sign(np.sin(rng.uniform(0.1, 3) * TIMES + rng.uniform(0, 6)))
+    if kind == "chirp":
+        return D * np.sin(rng.uniform(0.01, 0.1) * TIMES**2)
+    return np.repeat(D * rng.uniform(-1, 1, TIMES.size // 20 + 1), 20)[: TIMES.size]
+
+
+def signals(loop, run, found):
+    """Errors, distance of the weights and V along a run."""
+    states = dict(zip(nlctl.state_names(loop), run.states, strict=True))
+    n = found.matching.loop.order
+    E = np.array([states[f"plant.x{i}"] - states[f"model.xm{i}"] for i in range(1, n + 1)])
+    W_hat = np.array([states[f"weights.W_hat[{i}]"] for i in range(len(found.W))])
+    return E, W_hat, np.linalg.norm(W_hat - np.array(found.W)[:, None], axis=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LOOPS)
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 10**6), kind=st.sampled_from(["constant", "square", "chirp", "steps"]),
+       share=st.floats(0.0, 1.0))  # fmt: skip
+def test_runs_keep_what_is_proved(name, seed, kind, share):
+    """For all time, in the end, and in the mean, whatever |w| <= D does."""
+    loop, compiled, found = proved(name)
+    assert found.holds
+    rng = np.random.default_rng(seed)
+    start, w = drawn_start(loop, found, rng, share), drawn_disturbance(rng, kind)
+    run = nlctl.input_output_response(compiled, TIMES, w, start, rtol=1e-8, atol=1e-10)
+    E, W_hat, distance = signals(loop, run, found)
+    u = run.outputs[run.output_labels.index("u")]
+    for error, bound in zip(E, found.errors, strict=True):
+        assert np.abs(error).max() <= bound * ROUND
+    assert distance.max() <= found.W_error * ROUND
+    assert np.linalg.norm(W_hat, axis=0).max() <= found.region.W_hat * ROUND
+    assert np.abs(u).max() <= found.u_max * ROUND
+    # the integral of s^2 - 2 a s - b is at most V(0): the mean of e^2 is what is proved, and V/t
+    end = TIMES >= 20
+    rest = (
+        found.V_max
+        * float(found.matching.loop.form.Q.inv()[0, 0].p)
+        / float(found.matching.loop.form.Q.inv()[0, 0].q)
+    )
+    mean = np.trapezoid(E[0] ** 2, TIMES) / TIMES[-1]
+    assert np.sqrt(mean) <= found.rms + np.sqrt(rest / TIMES[-1])
+    if name.endswith("sigma"):  # V falls to its last bound at the rate alpha_1
+        V_left = found.V_max * np.exp(-found.alpha_1 * 20) + found.alpha_0 / found.alpha_1
+        reach = np.sqrt(V_left * found.errors[0] ** 2 / found.V_max)
+        assert np.abs(E[0][end]).max() <= reach * ROUND
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["sigma", "e", "projection"])
+def test_the_disturbance_that_pushes_outwards_is_no_exception(kind):
+    """d = D tanh(50 x) pushes e away whenever it can; e comes near its bound and not beyond."""
+    outwards = nlctl.equation(lambda x, t: 0.5 * np.tanh(50 * x[0]))
+    weights = {"sigma": sigma, "e": e_modification, "projection": projection}[kind]()
+    loop = first_order(weights, d=outwards)
+    found = certify(loop)
+    start = nlctl.initial_state(loop, {"plant.x1": 1e-3, "weights.W_hat[0]": 0.0})
+    run = nlctl.input_output_response(loop, np.linspace(0, 100, 10001), 0, start)
+    x = np.abs(run.outputs[0])
+    assert found.holds
+    assert x.max() <= found.e
+    assert x[5000:].max() <= found.ultimate
+    assert x[5000:].max() >= 0.1 * found.ultimate
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("actuator", [
+    nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.4, c_l=-0.4),
+    nlctl.DeadZone(ripple_r=0.0, ripple_l=0.0, slope_l=1.0, b_r=0.3, b_l=-0.2),
+    nlctl.DeadZone(ripple_r=0.0, ripple_l=0.0, slope_l=0.98, b_r=0.1, b_l=-0.1),
+])  # fmt: skip
+def test_a_run_behind_an_actuator_keeps_the_bound(actuator):
+    half = nlctl.equation(lambda x, t: 0.5 * np.sin(t))
+    loop = first_order(sigma(), d=half, actuator=actuator, k=1.0, b=1.0,
+                       reference=nlctl.SumOfSines(order=0))  # fmt: skip
+    found = certify(loop)
+    run = nlctl.input_output_response(loop, np.linspace(0, 60, 6001))
+    e, u = (run.outputs[run.output_labels.index(label)] for label in ("e", "u"))
+    assert found.holds
+    assert 0.05 * found.e <= np.abs(e).max() <= found.e
+    assert np.abs(u).max() <= found.u_max
+
+
+def test_the_roles_are_those_that_the_loop_has():
+    """Read from the wiring, whatever a block is called in the diagram."""
+    loop = moving("sigma")
+    assert read_roles(loop, PIECES).paths == {part: part for part in PIECES}
