@@ -22,6 +22,7 @@ from nlctl.errors import CompileError, DiagramError
 from nlctl.native.diagram.wiring import Combination, Signal, Wiring
 from nlctl.native.thirdparty.checks import check_functions, check_sizes
 from nlctl.plants import coordinate_names
+from nlctl.upstream.control_internals import Around
 
 from ..bounds.final_bound import Gains
 
@@ -131,6 +132,11 @@ def _check_blocks(loop: Any, wiring: Wiring) -> None:
             raise DiagramError(
                 f"the proof is about continuous time, and '{place.path or loop.name}' is sampled "
                 f"with dt = {place.system.dt}: leave dt out"
+            )
+        if isinstance(place.system, Around):
+            raise DiagramError(
+                f"the proof is about continuous time, and '{place.path}' is sampled: put the block "
+                "itself there, without nlctl.sampled"
             )
     for place in wiring.blocks:
         try:

@@ -88,7 +88,7 @@ def _delta(match: Matching, t: float, signals: Mapping[str, float]) -> float:
     names = (*coordinate_names(order), *model_state_names(order), "yd", "v")
     values = {"t": t} | {name: signals[name] for name in names}
     balls = {name: Ball(arb(float(value))) for name, value in values.items()}
-    rest = float(as_ball(match.rest_on(balls)).value.mid())
+    rest = float(as_ball(match.rest.on(balls)).value.mid())
     return rest + float(match.beta) * (signals["v"] - float(match.k) * signals["u"])
 
 

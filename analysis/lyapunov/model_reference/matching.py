@@ -84,9 +84,17 @@ class Matching:
         if not any(atom.arguments for product in self.rest.terms for atom, _ in product):
             return tight
         plain = as_ball(self._as_written(values))
+        if tight.value.is_finite() and plain.value.is_finite():
+            self._check_overlap(tight.value.overlaps(plain.value))
         one, other = tight.gradient, plain.gradient
         both = tuple(common(a, b) for a, b in zip(one, other, strict=True)) if one and other else ()
         return Ball(common(tight.value, plain.value), both or one or other)
+
+    def _check_overlap(self, overlap: bool) -> None:
+        if not overlap:
+            raise DiagramError(
+                f"the equation of '{self.loop.roles.paths['plant']}' and its sum of products differ"
+            )
 
     def _as_written(self, values: Mapping[str, Any]) -> Any:
         loop = self.loop

@@ -263,6 +263,18 @@ EQUATIONS = {
         lambda: {k: nlctl.block(sampled(make()), k, dt=0.1) for k, make in PARTS.items()},
         r"continuous time, and 'planted' is sampled with dt = 0.1",
     ),
+    "a law that is sampled": (
+        lambda: {"law": nlctl.sampled(nlctl.block(nlctl.KnownSignLaw(), "law"), 0.1)},
+        "continuous time, and 'law' is sampled",
+    ),
+    "the weights' inherited output replaced in the record": (
+        lambda: {
+            "weights": exchanged(
+                nlctl.AdaptiveWeights(nodes=3), output=lambda t, x, u, p: (0 * x[0], x[0])
+            )
+        },
+        "'weights' has another output function than AdaptiveWeights",
+    ),
     "a plant that cannot be read on intervals": (
         lambda: {
             "plant": plant(
