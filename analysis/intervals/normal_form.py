@@ -20,7 +20,7 @@ from nlctl.expressions.functions import FUNCTIONS
 from .arithmetic import Ball, NumPyFunctions, as_ball
 from .paths import Undecided
 
-__all__ = ["Atom", "Sum", "exact", "symbol"]
+__all__ = ["Atom", "Sum", "exact", "indeterminate"]
 
 LARGEST_POWER = 12  # powers up to which a sum is multiplied out
 EVERYWHERE = ("sin", "cos", "tanh", "exp", "arctan", "arcsinh", "absolute", "minimum", "maximum")
@@ -35,11 +35,11 @@ class Atom:
     name : str
         Of the symbol, or of the function.
     arguments : tuple of frozenset
-        Terms of the sums that it is a function of; empty for a symbol.
+        Monomials of the sums that it is a function of; empty for a symbol.
     """
 
     name: str
-    arguments: tuple[Terms, ...] = ()
+    arguments: tuple[Monomials, ...] = ()
 
     @property
     def names(self) -> set[str]:
@@ -62,15 +62,15 @@ class Atom:
 
 
 Product = frozenset[tuple[Atom, int]]
-Terms = frozenset[tuple[Product, Fraction]]
-ONE: Product = frozenset()
+Monomials = frozenset[tuple[Product, Fraction]]
+_ONE: Product = frozenset()
 
 
-def _atoms(terms: Terms) -> Iterator[Atom]:
+def _atoms(terms: Monomials) -> Iterator[Atom]:
     return (atom for product, _ in terms for atom, _ in product)
 
 
-def _value(terms: Terms, values: Mapping[str, Any]) -> Any:
+def _value(terms: Monomials, values: Mapping[str, Any]) -> Any:
     total: Any = Ball(arb(0))
     for product, coefficient in terms:
         term: Any = Ball(arb(fmpq(coefficient.numerator, coefficient.denominator)))
@@ -96,8 +96,8 @@ class Sum(NumPyFunctions):
     A difference that is 0 whatever x is:
 
     >>> import numpy as np
-    >>> from analysis.intervals.normal_form import symbol
-    >>> x = symbol("x")
+    >>> from analysis.intervals.normal_form import indeterminate
+    >>> x = indeterminate("x")
     >>> difference = np.sin(2 * x) * (x + 1) - np.sin(x + x) - x * np.sin(2 * x)
     >>> len(difference.terms)
     0
@@ -120,7 +120,7 @@ class Sum(NumPyFunctions):
         inner = {name for atom in _atoms(self.key()) for name in atom.names}
         return inner.union(*(atom.names for atom in self.partial))
 
-    def key(self) -> Terms:
+    def key(self) -> Monomials:
         """Its terms, to be compared: of sums themselves no comparison has an answer."""
         return frozenset(self.terms.items())
 
@@ -189,8 +189,8 @@ class Sum(NumPyFunctions):
         other = as_sum(other)
         if other is NotImplemented:
             return other
-        constant = other.coefficient(ONE)
-        if other.key() == {(ONE, constant)} and not other.partial:
+        constant = other.coefficient(_ONE)
+        if other.key() == {(_ONE, constant)} and not other.partial:
             return self * (1 / constant)
         return self * other._function("inverse")
 
@@ -261,20 +261,20 @@ def as_sum(x: Any) -> Any:
     if isinstance(x, Sum):
         return x
     if isinstance(x, Fraction):
-        return Sum({ONE: x})
+        return Sum({_ONE: x})
     ball = as_ball(x)
     if ball is NotImplemented or isinstance(x, Ball | arb):
         return NotImplemented
-    return Sum({ONE: exact(x)})
+    return Sum({_ONE: exact(x)})
 
 
-def symbol(name: str) -> Sum:
+def indeterminate(name: str) -> Sum:
     """Return a symbol as a sum, which equations take in the place of a number.
 
     Examples
     --------
-    >>> from analysis.intervals.normal_form import symbol
-    >>> x = symbol("x")
+    >>> from analysis.intervals.normal_form import indeterminate
+    >>> x = indeterminate("x")
     >>> sorted((x * x - x + 1).terms.values())
     [Fraction(-1, 1), Fraction(1, 1), Fraction(1, 1)]
     """

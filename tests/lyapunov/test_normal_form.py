@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 import nlctl
 from analysis.intervals.arithmetic import Ball, as_ball
-from analysis.intervals.normal_form import LARGEST_POWER, Sum, exact, symbol
+from analysis.intervals.normal_form import LARGEST_POWER, Sum, exact, indeterminate
 from analysis.intervals.paths import Undecided
 from nlctl.expressions.functions import FUNCTIONS
 
-X, Y = symbol("x"), symbol("y")
+X, Y = indeterminate("x"), indeterminate("y")
 NUMBERS = st.floats(-2, 2).map(lambda v: round(v, 3))
 OPERATIONS = ("add", "subtract", "multiply", "square", "negative", "sin", "absolute", "maximum")
 
@@ -118,6 +118,8 @@ def test_blocks_compute_with_it():
     for one, number in zip(psi, known, strict=True):
         assert float(at(one, 0.3, 0.4).mid()) == pytest.approx(number)
     wing = nlctl.block(nlctl.WingRock(), "wing")
-    rate = wing.updfcn(0.0, u, np.array([symbol("v")], dtype=object), wing._current_params)[1]
-    by_v = next(iter(symbol("v").terms))
+    rate = wing.updfcn(0.0, u, np.array([indeterminate("v")], dtype=object), wing._current_params)[
+        1
+    ]
+    by_v = next(iter(indeterminate("v").terms))
     assert rate.coefficient(by_v) == Fraction(3)

@@ -41,14 +41,14 @@ from .plant_bounds import Demand, demand, feedforward
 
 __all__ = ["SlidingModeCertificate", "SlidingModeLoop", "certify_sliding_mode", "is_sliding_mode"]
 
-PIECES: Pieces = {
+_PIECES: Pieces = {
     "reference": ("yd", ()),
     "plant": ("y", ()),
     "actuator": ("v", ()),
     "filtered_error": ("r", ("lambdas",)),
     "law": ("u", ()),
 }
-PROVED_FOR = {
+_PROVED_FOR = {
     "reference": (SumOfSines,),
     "filtered_error": (FilteredError,),
     "law": (SlidingModeLaw,),
@@ -210,10 +210,10 @@ def read_sliding_mode(
     loop: Any, params: Mapping[str, Any] | None, inputs: Mapping[str, float] | None
 ) -> SlidingModeLoop:
     """Read a loop with `nlctl.SlidingModeLaw`; raises as `read_loop` does."""
-    roles = read_roles(loop, PIECES)
+    roles = read_roles(loop, _PIECES)
     disturbance = bound_of_inputs(roles, inputs or {}, loop)
     override(loop, dict(params or {}))
-    for part, kinds in PROVED_FOR.items():
+    for part, kinds in _PROVED_FOR.items():
         check_kind(roles.places[part], kinds)
     check_chain(roles.places["plant"])
     x0 = initial_state(loop)

@@ -22,7 +22,7 @@ from nlctl.errors import DiagramError
 from nlctl.plants import coordinate_names
 
 from ...intervals.arithmetic import Ball, as_ball, common
-from ...intervals.normal_form import Sum, as_sum, exact, symbol
+from ...intervals.normal_form import Sum, as_sum, exact, indeterminate
 from ...intervals.paths import Undecided
 from ..bounds.decomposition import Decomposition
 from .model_loop import ModelReferenceLoop
@@ -127,7 +127,7 @@ def feedback(loop: ModelReferenceLoop, values: Mapping[str, Any], number: Any) -
 def symbols(loop: ModelReferenceLoop) -> dict[str, Sum]:
     """Return the symbols of the equations by name."""
     names = (*coordinate_names(loop.order), *model_state_names(loop.order))
-    return {name: symbol(name) for name in ("t", *names, "yd", "v")}
+    return {name: indeterminate(name) for name in ("t", *names, "yd", "v")}
 
 
 def matching(

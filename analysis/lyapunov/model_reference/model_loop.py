@@ -50,7 +50,7 @@ from .quadratic_form import QuadraticForm, quadratic_form
 
 __all__ = ["ModelReferenceLoop", "is_model_reference", "read_model_reference"]
 
-PIECES: Pieces = {
+ADAPTIVE_PIECES: Pieces = {
     "reference": ("yd", ()),
     "plant": ("y", ()),
     "actuator": ("v", ()),
@@ -60,7 +60,7 @@ PIECES: Pieces = {
     "weights": ("W_psi", ()),
     "law": ("u", ()),
 }
-PROVED_FOR = {
+_PROVED_FOR = {
     "reference": (SumOfSines, FilteredStep, FunctionReference),
     "model": (ReferenceModel,),
     "error": (ModelError,),
@@ -154,10 +154,10 @@ def read_model_reference(
         block's function, is another one; if the plant is not a chain of integrators; if the
         reference has no proved bound, or an external input none.
     """
-    roles = read_roles(loop, PIECES)
+    roles = read_roles(loop, ADAPTIVE_PIECES)
     disturbance = bound_of_inputs(roles, inputs or {}, loop)
     override(loop, dict(params or {}))
-    for part, kinds in PROVED_FOR.items():
+    for part, kinds in _PROVED_FOR.items():
         check_kind(roles.places[part], kinds)
     plant, model, error = (roles.places[part] for part in ("plant", "model", "error"))
     check_chain(plant)

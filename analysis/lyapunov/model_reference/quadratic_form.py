@@ -63,11 +63,11 @@ class QuadraticForm:
 
     def value(self, E: Sequence[Any]) -> fmpq:
         """Return E^T P E of exact numbers."""
-        return product(self.P, E)
+        return quadratic(self.P, E)
 
     def reach(self, level: arb, direction: Sequence[Any]) -> arb:
         """Return the largest c^T E of a direction c where E^T P E <= level."""
-        return (level * ball(product(self.inverse, direction))).sqrt()
+        return (level * ball(quadratic(self.inverse, direction))).sqrt()
 
     def errors(self, level: arb) -> tuple[arb, ...]:
         """Return the largest |E_1|, ..., |E_n| where E^T P E <= level."""
@@ -86,7 +86,7 @@ class QuadraticForm:
         return 4 * ball(self.q) * D * D / arb(self.mu)
 
 
-def product(M: fmpq_mat, x: Sequence[Any]) -> fmpq:
+def quadratic(M: fmpq_mat, x: Sequence[Any]) -> fmpq:
     """Return x^T M x."""
     column = fmpq_mat(len(x), 1, [rational(v) for v in x])
     return (column.transpose() * M * column)[0, 0]

@@ -9,7 +9,7 @@ from mrac_loops import e_modification, first_order, projection, sigma, wing_rock
 import nlctl
 from analysis.lyapunov import certify
 from analysis.lyapunov.loop.roles import read_roles
-from analysis.lyapunov.model_reference.model_loop import PIECES
+from analysis.lyapunov.model_reference.model_loop import ADAPTIVE_PIECES
 
 D, TIMES = 0.5, np.linspace(0, 60, 3001)
 INPUTS = {"w": D}
@@ -151,4 +151,4 @@ def test_a_run_behind_an_actuator_keeps_the_bound(actuator):
 def test_the_roles_are_those_that_the_loop_has():
     """Read from the wiring, whatever a block is called in the diagram."""
     loop = moving("sigma")
-    assert read_roles(loop, PIECES).paths == {part: part for part in PIECES}
+    assert read_roles(loop, ADAPTIVE_PIECES).paths == {part: part for part in ADAPTIVE_PIECES}
