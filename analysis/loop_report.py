@@ -7,9 +7,9 @@
     write_pdf(page, "reports/pendulum.pdf")
 
 What is seen to be of another loop is refused: a response whose samples are not the loop's outputs
-of its states, a study whose record is of other equations, parameters or wires, a ledger of another
-name.  That a response's states follow from the loop's equations, and that a ledger is of this very
-loop and not of a namesake, is not checked.
+of its states, a study whose record is of other equations, parameters or wires, a ledger or a
+certificate of another name.  That a response's states follow from the loop's equations, and that a
+ledger or a certificate is of this very loop and not of a namesake, is not checked.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from nlctl.names import unknown
 from nlctl.wording import counted
 
 from .figures.axes import BLUE, stacked_axes
+from .lyapunov.certificate.certify import AnyCertificate
 from .lyapunov.ledger import Ledger
 from .paper.page.proof import ledger_tables
 from .paper.page.proof_text import ledger_text
@@ -66,6 +67,7 @@ def loop_report(
     signals: Sequence[str] = (),
     params: Mapping[str, Any] | None = None,
     ledger: Ledger | None = None,
+    certificate: AnyCertificate | None = None,
     study: Result | None = None,
     sections: Sequence[Section] = (),
     claims: Sequence[Claim] = (),
@@ -94,6 +96,8 @@ def loop_report(
         The parameters that the run was made with.
     ledger : Ledger, optional
         Of `analysis.lyapunov.ledger`.
+    certificate : Certificate, ModelReferenceCertificate or SlidingModeCertificate, optional
+        Of `analysis.lyapunov.certify`.
     study : Result, optional
         Of `analysis.studies.run` or `analysis.studies.load_result`.
     sections : sequence of Section, optional
@@ -101,7 +105,8 @@ def loop_report(
     claims : sequence of Claim, optional
         One's own; those of the study follow.
     question, verdict : str, optional
-        What was asked, and what was found; by default what the study and the ledger say.
+        What was asked, and what was found; by default what the study, the ledger and the
+        certificate say.
     author, revision, date : str, optional
         For the title page.
     references : sequence of str, optional
@@ -116,7 +121,7 @@ def loop_report(
     Raises
     ------
     DiagramError
-        If the response, the ledger or the study is seen to be of another loop.
+        If the response, the ledger, the certificate or the study is seen to be of another loop.
     UnknownNameError
         If the loop has no output that `signals` names.
 
@@ -141,9 +146,13 @@ def loop_report(
         parts.append(_run(loop, response, signals))
     parts += sections
     if ledger is not None:
-        _check_ledger(loop, ledger)
+        _check_name(loop, ledger.loop, "ledger")
         found.append(ledger_text(ledger))
         parts.append(_proof(ledger))
+    if certificate is not None:
+        _check_name(loop, certificate.name, "certificate")
+        found.append(f"Certificate: {certificate.verdict}.")
+        parts.append(_certified(certificate))
     if study is not None:
         _check_study(loop, study)
         found.append(without_assumptions(study.verdict))
@@ -233,6 +242,21 @@ def _proof(found: Ledger) -> Section:
     return Section(key="ledger", title="The proof line by line", items=items, folded=True)
 
 
+def _certified(certificate: AnyCertificate) -> Section:
+    """Return a certificate: what is proved, then every constant with where it comes from."""
+    table = Table(
+        caption="The constants of the certificate, and the bounds that follow from them.",
+        columns=("symbol", "value", "unit", "status", "how", "for"),
+        rows=[
+            (c.symbol, f"{c.value:.6g}", c.unit, c.provenance, c.how, c.over)
+            for c in certificate.constants
+        ],
+        status="status",
+    )
+    items: list[Item] = [Paragraph(text=f"{certificate.verdict}."), table]
+    return Section(key="certificate", title="A bound for all time", items=items)
+
+
 def _studied(result: Result) -> list[Section]:
     """Return a study as the part behind everything else."""
     lost: list[str] = []
@@ -293,9 +317,9 @@ def _own_outputs(
         yield int(place), np.atleast_1d(np.asarray(own, dtype=float))
 
 
-def _check_ledger(loop: ct.InputOutputSystem, found: Ledger) -> None:
-    if found.loop != loop.name:
-        raise DiagramError(f"the ledger is of '{found.loop}', the report of '{loop.name}'")
+def _check_name(loop: ct.InputOutputSystem, name: str, what: str) -> None:
+    if name != loop.name:
+        raise DiagramError(f"the {what} is of '{name}', the report of '{loop.name}'")
 
 
 def _check_study(loop: ct.InputOutputSystem, result: Result) -> None:

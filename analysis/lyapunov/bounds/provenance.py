@@ -165,7 +165,7 @@ def bound(alpha_0: float, alpha_1: float, V_0: float, Q: float) -> float:
 
 def per_second(power: int) -> str:
     """The unit 1/s^power; x1, u and v count as pure numbers."""
-    return "1/s" if power == 1 else f"1/s^{power}"
+    return "1" if power == 0 else "1/s" if power == 1 else f"1/s^{power}"
 
 
 def constants_text(verdict: str, constants: Sequence[Constant]) -> str:

@@ -171,7 +171,7 @@ class SlidingModeCertificate:
         yield "sup |g + d|", need.matched, unit, "proved", boxes, f"all t, {over}"
         yield "delta*", need.delta_star, unit, sure, "sup |g + d| + G_max eps_u*", over
         yield "M", self.M, unit, sure, "delta* + sup |Y_d|", over
-        least = upper(arb(law.K) * split.k_1 * need.G_min)
+        least = -upper(-arb(law.K) * split.k_1 * need.G_min)
         yield "K k_1 G_min", least, unit, sure, "must be above M", over
 
     def _bounds(self) -> Iterator[tuple[Any, ...]]:

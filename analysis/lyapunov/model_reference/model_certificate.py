@@ -122,7 +122,7 @@ class ModelReferenceCertificate:
         yield "|W|", size, "1", *chosen, "all x"
         yield "mu", form.mu, "1/s", "proved", "Q - mu P > 0, Q = -(A^T P + P A) exactly", "all E"
         q = float(int(form.q.p) / int(form.q.q))
-        yield "q", q, "s", "computed", "b^T P Q^-1 P b, rational", "all E"
+        yield "q", q, "1", "computed", "b^T P Q^-1 P b, rational", "all E"
         if match.loop.disturbance:
             added = "declared bounds of external inputs, times their gains"
             yield "sup |w|", match.loop.disturbance, "1", "given", added, over
@@ -132,9 +132,9 @@ class ModelReferenceCertificate:
         need, n = self.region, self.matching.loop.order
         sure = "given" if self.split.provenance == "given" else "proved"
         over, box = f"V <= {need.C:.6g}", need.box
-        for name in model_state_names(n):
+        for i, name in enumerate(model_state_names(n)):
             how = "E^T P E of the model, driven by yd"
-            yield f"sup |{name}|", box[name][1], "1", "proved", how, "all t"
+            yield f"sup |{name}|", box[name][1], per_second(i), "proved", how, "all t"
         yield "sup |psi|", need.psi, "1", "proved", "one box", over
         what = counted(need.boxes, "box", "boxes") if need.boxes else "all of it has cancelled"
         rest = (per_second(n), "proved", f"{what}; disturbance, and what psi does not span", over)
@@ -151,7 +151,7 @@ class ModelReferenceCertificate:
         always = f"all t, every start with V(0) <= {self.V_max:.6g}"
         yield "V", self.V_max, "1", "proved", self.how, always
         for i, error in enumerate(self.errors):
-            yield f"|E_{i + 1}|", error, "1", "proved", "sqrt(V (P^-1)_ii)", always
+            yield f"|E_{i + 1}|", error, per_second(i), "proved", "sqrt(V (P^-1)_ii)", always
         yield "|W_hat - W|", self.W_error, "1", "proved", "sqrt(V Gamma/lambda)", always
         yield "|W_hat|", self.region.W_hat, "1", "proved", self._weights, always
         yield "max |u|", self.u_max, "1", "proved", "from V and the box", always

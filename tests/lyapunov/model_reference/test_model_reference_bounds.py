@@ -175,6 +175,17 @@ def test_a_function_that_a_network_does_not_span_is_bounded_on_the_box():
     assert better.W == (-0.9, 0.0, 0.9)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("K", [(1.5, 1.3), (9.0, 6.0), (100.0, 20.0)])
+def test_wing_rock_with_gaussian_functions_does_not_close(K):
+    """As the page on rivals says: where they vanish the plant grows faster than the model pulls."""
+    basis = nlctl.GaussianBasis(centres=nlctl.grid_centres([3, 3], -2, 2), widths=(1.5,))
+    error = nlctl.ModelError(K=K, Q=(K[0], 1.0))
+    found = certify(wing_rock(sigma(0.01, 50.0, nodes=9), basis=basis, error=error), tol=0.05)
+    assert not found.holds
+    assert "the box does not close" in found.reason
+
+
 def test_a_plant_that_is_not_affine_in_its_input():
     """x' = 2 x + v + 0.2 sin v + 0.5 sin t: at most 0.2 more."""
     f = nlctl.equation(lambda x, v: 2.0 * x[0] + v + 0.2 * np.sin(v))
