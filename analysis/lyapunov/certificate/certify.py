@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import control as ct
 import numpy as np
 
-from nlctl.errors import ParameterError
+from nlctl.controllers import KnownSignLaw
+from nlctl.diagrams import leaves
+from nlctl.errors import DiagramError, ParameterError
 from nlctl.params import integer
 
 from ..bounds.decomposition import check_gain
+from ..loop.roles import declared, record_of
 from ..model_reference.closing import certify_model_reference
 from ..model_reference.model_certificate import ModelReferenceCertificate
 from ..model_reference.model_loop import is_model_reference
@@ -123,4 +127,18 @@ def certify(
         raise ParameterError("certify takes W for loops with a reference model only")
     if is_sliding_mode(loop):
         return certify_sliding_mode(loop, **how)
+    _refuse_others(loop)
     return certify_known_sign(loop, u_max=u_max, **how)
+
+
+def _refuse_others(loop: Any) -> None:
+    """Refuse a loop whose law is none that there is a proof for."""
+    for place in leaves(loop) if isinstance(loop, ct.InterconnectedSystem) else ():
+        spec = record_of(place)
+        known = spec is None or isinstance(spec, KnownSignLaw)
+        if "u" in declared(place, "outputs") and not known:
+            raise DiagramError(
+                "certify has proofs for a KnownSignLaw or a SlidingModeLaw, and for a "
+                "ModelReferenceLaw or DirectLaw with a ReferenceModel, got "
+                f"{type(spec).__name__} in the place of '{place.path}' and no ReferenceModel"
+            )

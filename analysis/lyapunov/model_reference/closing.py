@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from flint import arb
 
 from nlctl.actuators import Gain
@@ -108,6 +109,8 @@ def _endless(need: Region, iterations: Sequence[float]) -> str:
 
 def _doubt(read: ModelReferenceLoop, split: Decomposition, need: Region, u_max: float) -> str:
     """Say why a box that closes proves nothing; nothing if it does."""
+    if not np.isfinite(need.u):
+        return f"no bound of |psi|, and so of |u|, is found on {need.box}: use another regressor"
     if split.provenance == "given":
         return (
             "it would follow from the split (2) that "

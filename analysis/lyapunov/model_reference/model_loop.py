@@ -126,9 +126,9 @@ class ModelReferenceLoop:
 
 
 def is_model_reference(loop: Any) -> bool:
-    """Whether a diagram has a reference model, a block that outputs nu."""
+    """Whether a diagram has a reference model, a block that outputs xm1 and nu."""
     return isinstance(loop, ct.InterconnectedSystem) and any(
-        "nu" in declared(place, "outputs") for place in leaves(loop)
+        {"xm1", "nu"} <= set(declared(place, "outputs")) for place in leaves(loop)
     )
 
 

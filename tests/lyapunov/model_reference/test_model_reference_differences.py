@@ -236,6 +236,10 @@ def cases(x, v):
     return 2.0 * x[0] + v
 
 
+def pole(t, x, u, p):
+    return 1.0, u[0], u[1], u[0] * u[1], 1 / (u[0] - 0.123), u[0] * u[0]
+
+
 def sampled_controller():
     pieces = {
         "reference": QUIET,
@@ -289,6 +293,13 @@ class TestNoneIsCertified:
         found = certify(first_order(sigma(), d=half_sine, actuator=actuator), k=k)
         assert not found.holds
         assert found.e == np.inf
+
+    def test_a_regressor_without_a_bound(self):
+        """Where psi has a pole in the box there is no bound of u, and no solution for all time."""
+        basis = again(nlctl.WingRockRegressor, output=pole)
+        found = certify(wing_rock(sigma(nodes=6), basis=basis), W=(0.8, 0, 0, 0, 0, 0))
+        assert not found.holds
+        assert found.u_max == np.inf
 
     def test_a_regressor_that_does_not_span_the_plant(self):
         """x1^3 of wing rock is not linear; the box that its growth asks for does not close."""

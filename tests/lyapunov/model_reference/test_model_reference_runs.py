@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mrac_loops import e_modification, first_order, projection, sigma, wing_rock
+from mrac_loops import SINE, e_modification, first_order, projection, sigma, wing_rock
 
 import nlctl
 from analysis.lyapunov import certify
@@ -33,6 +33,20 @@ def rolling(kind):
 LOOPS = {f"{plant.__name__} {kind}": (plant, kind) for plant in (moving, rolling)
          for kind in ("sigma", "e", "projection")}  # fmt: skip
 PROVED = {}
+
+
+def linear_plant(a, gain):
+    """x_n' = a^T x + gain v."""
+    a0, a1, a2 = (*map(float, a), 0.0, 0.0)[:3]
+    if len(a) == 1:
+        return nlctl.equation(lambda x, v: a0 * x[0] + gain * v)
+    if len(a) == 2:
+        return nlctl.equation(lambda x, v: a0 * x[0] + a1 * x[1] + gain * v)
+    return nlctl.equation(lambda x, v: a0 * x[0] + a1 * x[1] + a2 * x[2] + gain * v)
+
+
+def sine_of(size):
+    return nlctl.equation(lambda x, t: size * np.sin(0.9 * t))
 
 
 def proved(name):
@@ -111,6 +125,41 @@ def test_runs_keep_what_is_proved(name, seed, kind, share):
         V_left = found.V_max * np.exp(-found.alpha_1 * 20) + found.alpha_0 / found.alpha_1
         reach = np.sqrt(V_left * found.errors[0] ** 2 / found.V_max)
         assert np.abs(E[0][end]).max() <= reach * ROUND
+
+
+@pytest.mark.slow
+@settings(max_examples=8, deadline=None)
+@given(order=st.integers(1, 3), seed=st.integers(0, 10**6))
+def test_plants_of_order_one_to_three(order, seed):
+    """Drawn linear plants, models, gains and modifications, with a command and a disturbance."""
+    rng = np.random.default_rng(seed)
+    a, gain, size = rng.uniform(-2, 2, order), rng.uniform(0.5, 3), rng.uniform(0, 0.5)
+    K = np.poly(-rng.uniform(0.5, 3, order))[:0:-1]
+    model = np.poly(-rng.uniform(0.5, 3, order))[:0:-1]
+    nodes, Gamma = order + 1, float(rng.uniform(1, 50))
+    weights = [
+        sigma(float(rng.uniform(0.05, 1)), Gamma, nodes),
+        e_modification(float(rng.uniform(0.05, 1)), Gamma, nodes),
+        projection(10.0, Gamma, nodes),
+    ][rng.integers(3)]
+    f = linear_plant(a, gain)
+    loop = first_order(
+        weights,
+        plant=nlctl.PureFeedback(order=order, f=f, d=sine_of(size), initial={"x1": 0.5}),
+        reference=SINE,
+        model=nlctl.ReferenceModel(a=tuple(map(float, model)), b=float(model[0])),
+        error=nlctl.ModelError(K=tuple(map(float, K)), Q=tuple(rng.uniform(0.5, 5, order))),
+        basis=nlctl.LinearRegressor(order=order),
+        law=nlctl.ModelReferenceLaw(gain=gain),
+    )
+    found = certify(loop)
+    run = nlctl.input_output_response(loop, np.linspace(0, 40, 2001), rtol=1e-7, atol=1e-9)
+    E, _, distance = signals(loop, run, found)
+    assert found.holds
+    assert pytest.approx(size, rel=1e-3, abs=1e-12) == found.region.D
+    for error, bound in zip(E, found.errors, strict=True):
+        assert np.abs(error).max() <= bound * ROUND
+    assert distance.max() <= found.W_error * ROUND
 
 
 @pytest.mark.slow
