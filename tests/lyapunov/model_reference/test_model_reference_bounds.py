@@ -97,6 +97,7 @@ def test_the_root_mean_square_does_not_depend_on_Gamma(weights):  # noqa: N802
     assert slow.rms == pytest.approx(known[type(weights)], rel=1e-7)
 
 
+@pytest.mark.slow
 def test_what_becomes_of_it_without_a_disturbance():
     """V ends below |W|^2/Gamma with sigma-modification, whatever sigma is; e -> 0 without any."""
     for own in (0.2, 0.02, 0.002):
@@ -110,6 +111,7 @@ def test_what_becomes_of_it_without_a_disturbance():
         assert found.V_max == pytest.approx(found.V_0, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_bound_is_linear_in_the_disturbance_where_nothing_is_to_be_learned():
     """x' = v + d, so that W = 0: e <= 2 q^(1/2) D (mu P)^(-1/2) = D / k."""
     plain = nlctl.equation(lambda x, v: 1.0 * v)
@@ -162,6 +164,7 @@ def test_direct_adaptive_control_has_its_gains():
     assert found.matching.lam == Fraction(1, 2)
 
 
+@pytest.mark.slow
 def test_a_function_that_a_network_does_not_span_is_bounded_on_the_box():
     """sin 2x is below 1, cos x below 1: D is at most what is left of both, by branch and bound."""
     f = nlctl.equation(lambda x, v: np.sin(2 * x[0]) + 0.1 * np.cos(x[0]) + v)
@@ -265,6 +268,7 @@ def test_another_sign_of_both_gains_is_as_good():
     assert one.u_max == pytest.approx(other.u_max / 4)
 
 
+@pytest.mark.slow
 def test_names_and_nesting_do_not_matter():
     """The controller as `nlctl.mrac` makes it, and the blocks by themselves."""
     flat = certify(first_order(sigma(), d=half_sine))
