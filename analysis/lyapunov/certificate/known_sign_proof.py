@@ -25,7 +25,7 @@ from nlctl.wording import counted
 
 from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
-from ..bounds.decomposition import Decomposition, decompose
+from ..bounds.decomposition import Decomposition, decompose, only_declared
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
 from ..bounds.provenance import Constant, constants_html, constants_text, per_second
 from ..loop.external_inputs import disturbed
@@ -197,11 +197,7 @@ def certify_known_sign(
 def _doubt(read: KnownSignLoop, split: Decomposition, u: float, u_max: float, C_0: float) -> str:
     """Say why a box that closes proves nothing; nothing if it does."""
     if split.provenance == "given":
-        return (
-            f"|r| <= {C_0:.6g} would follow from the split (2) that "
-            f"{type(read.parts.actuator).__name__} declares; samples do not refute it, and nothing "
-            "proves it: for an actuator without memory give k=(k_1, k_2), which is proved"
-        )
+        return only_declared(f"|r| <= {C_0:.6g}", read.parts.actuator)
     if split.provenance == "proved" and u > 2 * u_max:
         return (
             f"|u| may reach {u:.4g}, the actuator's split is proved to {2 * u_max:g}: raise u_max"

@@ -21,21 +21,19 @@ from typing import Any
 import control as ct
 from flint import arb
 
-from nlctl.blocks import block
 from nlctl.controllers import FilteredError, SlidingModeLaw
-from nlctl.diagrams import initial_state, interconnect, leaves, override
+from nlctl.diagrams import leaves
 from nlctl.references import SumOfSines
-from nlctl.upstream.control_internals import set_parameters
 from nlctl.wording import counted
 
 from ...intervals.branch_and_bound import upper
-from ..bounds.decomposition import Decomposition, decompose
+from ..bounds.decomposition import Decomposition, decompose, only_declared
 from ..bounds.error_bounds import error_bounds
 from ..bounds.provenance import Constant, constants_html, constants_text, per_second
-from ..loop.external_inputs import bound_of_inputs, disturbed
-from ..loop.plant_form import Acceleration, acceleration, check_chain
-from ..loop.roles import Pieces, Roles, check_kind, joined_again, read_roles, record_of
-from ..loop.same_loop import check_same, points_around
+from ..loop.checked import read_checked
+from ..loop.external_inputs import ADDED, disturbed
+from ..loop.plant_form import Acceleration, acceleration
+from ..loop.roles import Pieces, Roles, record_of
 from .known_sign import initial_errors
 from .plant_bounds import Demand, demand, feedforward
 
@@ -166,8 +164,7 @@ class SlidingModeCertificate:
         yield "k_1", split.k_1, "1", *k
         yield "eps_u*", split.eps_star, "1", *k
         if self.loop.disturbance:
-            added = "declared bounds of external inputs, times their gains"
-            yield "sup |w|", self.loop.disturbance, "1", "given", added, "all t"
+            yield "sup |w|", self.loop.disturbance, "1", "given", ADDED, "all t"
         yield "sup |g + d|", need.matched, unit, "proved", boxes, f"all t, {over}"
         yield "delta*", need.delta_star, unit, sure, "sup |g + d| + G_max eps_u*", over
         yield "M", self.M, unit, sure, "delta* + sup |Y_d|", over
@@ -209,25 +206,17 @@ def is_sliding_mode(loop: Any) -> bool:
 def read_sliding_mode(
     loop: Any, params: Mapping[str, Any] | None, inputs: Mapping[str, float] | None
 ) -> SlidingModeLoop:
-    """Read a loop with `nlctl.SlidingModeLaw`; raises as `read_loop` does."""
-    roles = read_roles(loop, _PIECES)
-    disturbance = bound_of_inputs(roles, inputs or {}, loop)
-    override(loop, dict(params or {}))
-    for part, kinds in _PROVED_FOR.items():
-        check_kind(roles.places[part], kinds)
-    check_chain(roles.places["plant"])
-    x0 = initial_state(loop)
-    again = joined_again(loop, roles, lambda part, spec, name: block(spec, name))
-    check_same(loop, interconnect(again, name=str(loop.name)), points_around(x0), params)
-    set_parameters(loop, dict(params or {}))
+    """Read a loop with `nlctl.SlidingModeLaw`; raises as `read_checked` does."""
+    read = read_checked(loop, _PIECES, _PROVED_FOR, params, inputs)
+    roles = read.roles
     return SlidingModeLoop(
         roles=roles,
         law=roles.spec("law"),
         reference=roles.spec("reference"),
         lambdas=roles.spec("filtered_error").lambdas,
-        e0=initial_errors(roles, x0),
+        e0=initial_errors(roles, read.x0),
         acceleration=acceleration(roles.places["plant"]),
-        disturbance=disturbance,
+        disturbance=read.disturbance,
     )
 
 
@@ -257,11 +246,7 @@ def certify_sliding_mode(
     else:
         reason = f"|r| still grows after {counted(max_iterations, 'iteration')}"
     if split.provenance == "given" and not reason:
-        reason = (
-            f"it would follow from the split (2) that {type(actuator).__name__} declares; samples "
-            "do not refute it, and nothing proves it: for an actuator without memory give "
-            "k=(k_1, k_2), which is proved"
-        )
+        reason = only_declared(f"|r| <= {iterations[-1]:.6g}", actuator)
     end = _in_the_end(read, split, rho, tol) if not reason else rho
     inf, closed = float("inf"), f"the box closes: |r| < {need.C:.6g} implies |r| <= "
     limit = error_bounds(read.lambdas, (arb(0),) * len(read.e0), end)[0] if not reason else end

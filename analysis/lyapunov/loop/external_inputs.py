@@ -18,7 +18,9 @@ from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition
 from .roles import Roles
 
-__all__ = ["bound_of_inputs", "disturbed"]
+__all__ = ["ADDED", "bound_of_inputs", "disturbed"]
+
+ADDED = "declared bounds of external inputs, times their gains"
 
 
 def bound_of_inputs(roles: Roles, inputs: Mapping[str, float], loop: Any) -> float:

@@ -19,7 +19,7 @@ from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
 from ...intervals.branch_and_bound import upper
-from ..bounds.decomposition import Decomposition, clipped_split, decompose
+from ..bounds.decomposition import Decomposition, clipped_split, decompose, only_declared
 from ..loop.external_inputs import disturbed
 from .audit import check_decrease
 from .decrease import Decrease, decrease, outside_ball
@@ -112,11 +112,7 @@ def _doubt(read: ModelReferenceLoop, split: Decomposition, need: Region, u_max: 
     if not np.isfinite(need.u):
         return f"no bound of |psi|, and so of |u|, is found on {need.box}: use another regressor"
     if split.provenance == "given":
-        return (
-            "it would follow from the split (2) that "
-            f"{type(read.spec('actuator')).__name__} declares; samples do not refute it, and "
-            "nothing proves it: for an actuator without memory give k=(k_1, k_2), which is proved"
-        )
+        return only_declared(f"V <= {need.C:.6g}", read.spec("actuator"))
     if split.provenance == "proved" and need.u > 2 * u_max:
         return (
             f"|u| may reach {need.u:.4g}, the actuator's split is proved to {2 * u_max:g}: raise "

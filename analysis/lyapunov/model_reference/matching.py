@@ -165,8 +165,9 @@ def matching(
     lam = beta * k / loop.gain
     if not lam > 0:
         raise DiagramError(
-            f"the proof needs an input gain of the sign that '{paths['law']}' supposes: the plant's"
-            f" is {float(beta):g}, the actuator's {float(k):g}, the law's {float(loop.gain):g}"
+            f"the proof needs an input gain of the sign that '{paths['law']}' supposes: the "
+            f"coefficient of v alone in '{paths['plant']}' is {float(beta):g}, the actuator's gain "
+            f"{float(k):g}, the law's {float(loop.gain):g}"
         )
     target = rate - beta * values["v"]
     target = target - _feedback_share(loop, lam) * feedback(loop, values, exact)

@@ -14,6 +14,7 @@ from nlctl.wording import counted
 
 from ..bounds.decomposition import Decomposition
 from ..bounds.provenance import Constant, constants_html, constants_text, per_second
+from ..loop.external_inputs import ADDED
 from .matching import Matching
 from .region import Region
 
@@ -124,8 +125,7 @@ class ModelReferenceCertificate:
         q = float(int(form.q.p) / int(form.q.q))
         yield "q", q, "1", "computed", "b^T P Q^-1 P b, rational", "all E"
         if match.loop.disturbance:
-            added = "declared bounds of external inputs, times their gains"
-            yield "sup |w|", match.loop.disturbance, "1", "given", added, over
+            yield "sup |w|", match.loop.disturbance, "1", "given", ADDED, over
         yield "sup |yd|", match.loop.command, "1", "proved", "enclosed", over
 
     def _of_box(self) -> Iterator[tuple[Any, ...]]:

@@ -9,9 +9,7 @@ from typing import Any
 
 import control as ct
 import numpy as np
-from flint import arb
 
-from nlctl.blocks import block
 from nlctl.controllers import (
     AdaptiveWeights,
     DirectLaw,
@@ -23,29 +21,19 @@ from nlctl.controllers import (
 )
 from nlctl.controllers.mrac.model_error import lyapunov_matrix
 from nlctl.controllers.mrac.reference_model import model_state_names
-from nlctl.diagrams import Place, initial_state, interconnect, leaves, override
+from nlctl.diagrams import Place, leaves
 from nlctl.errors import DiagramError
 from nlctl.plants import coordinate_names
 from nlctl.references import FilteredStep, FunctionReference, SumOfSines
-from nlctl.upstream.control_internals import current_parameters, set_parameters
+from nlctl.upstream.control_internals import current_parameters
 
-from ...intervals.arithmetic import Ball
 from ...intervals.box import Box
-from ...intervals.branch_and_bound import enclose, upper
+from ...intervals.branch_and_bound import enclose
 from ...intervals.normal_form import exact
 from ..bounds.error_bounds import reference_bounds
-from ..loop.external_inputs import bound_of_inputs
-from ..loop.plant_form import Acceleration, acceleration, check_chain, on_intervals
-from ..loop.roles import (
-    Pieces,
-    Roles,
-    check_kind,
-    declared,
-    joined_again,
-    read_roles,
-    record_of,
-)
-from ..loop.same_loop import check_same, points_around
+from ..loop.checked import read_checked
+from ..loop.plant_form import Acceleration, acceleration, on_intervals
+from ..loop.roles import Pieces, Roles, declared, record_of
 from .quadratic_form import QuadraticForm, quadratic_form
 
 __all__ = ["ModelReferenceLoop", "is_model_reference", "read_model_reference"]
@@ -150,43 +138,29 @@ def read_model_reference(
     Raises
     ------
     DiagramError
-        If a block is missing, or is none of those that the proof is about; if the wiring, or a
-        block's function, is another one; if the plant is not a chain of integrators; if the
-        reference has no proved bound, or an external input none.
+        As `read_checked` does; if plant, model and error differ in their order; if the regressor
+        has memory or takes other signals; if the reference has no proved bound.
     """
-    roles = read_roles(loop, ADAPTIVE_PIECES)
-    disturbance = bound_of_inputs(roles, inputs or {}, loop)
-    override(loop, dict(params or {}))
-    for part, kinds in _PROVED_FOR.items():
-        check_kind(roles.places[part], kinds)
-    plant, model, error = (roles.places[part] for part in ("plant", "model", "error"))
-    check_chain(plant)
-    order = _checked_orders(roles)
-    x0 = initial_state(loop)
-    own = {p: x0[f.state_offset :][: f.system.nstates or 0] for p, f in roles.places.items()}
-    x, xm, W_hat = (tuple(map(exact, own[part])) for part in ("plant", "model", "weights"))
-    again = joined_again(loop, roles, lambda part, spec, name: block(spec, name))
-    understood = interconnect(again, name=str(loop.name))
-    check_same(loop, understood, points_around(x0), params)
-    set_parameters(loop, dict(params or {}))
-    model_spec = record_of(model)
-    own_P = np.atleast_2d(record_of(error).lyapunov_matrix).copy()
-    own_P[:, -1] = current_parameters(error.system).P_b
+    read = read_checked(loop, ADAPTIVE_PIECES, _PROVED_FOR, params, inputs)
+    roles, order = read.roles, _checked_orders(read.roles)
+    x, xm, W_hat = (tuple(map(exact, read.start(part))) for part in ("plant", "model", "weights"))
+    model, error = roles.spec("model"), roles.spec("error")
+    own_P = np.atleast_2d(error.lyapunov_matrix).copy()
+    own_P[:, -1] = current_parameters(roles.places["error"].system).P_b
+    P_of_model = lyapunov_matrix(model.a, (1.0,) * order)
     return ModelReferenceLoop(
         roles=roles,
         order=order,
-        form=quadratic_form(error.path, record_of(error).K, own_P),
-        model_form=quadratic_form(
-            model.path, model_spec.a, lyapunov_matrix(model_spec.a, (1.0,) * order)
-        ),
-        command=_bound_of_command(roles.places["reference"], own["reference"]),
+        form=quadratic_form(roles.paths["error"], error.K, own_P),
+        model_form=quadratic_form(roles.paths["model"], model.a, P_of_model),
+        command=_bound_of_command(roles.places["reference"], read.start("reference")),
         E_0=tuple(a - b for a, b in zip(x, xm, strict=True)),
         xm_0=xm,
         W_hat_0=W_hat,
-        acceleration=acceleration(plant),
+        acceleration=acceleration(roles.places["plant"]),
         regressor=_regressor(roles.places["basis"], order),
-        disturbance=disturbance,
-        understood=understood,
+        disturbance=read.disturbance,
+        understood=read.understood,
     )
 
 
@@ -239,7 +213,7 @@ def _bound_of_command(place: Place, x0: np.ndarray) -> float:
     def yd(point: tuple[Any, ...]) -> Any:
         return output(point[0], (), (), p)[declared(place, "outputs").index("yd")]
 
-    found = upper(Ball(arb(enclose(yd, wide, max_boxes=1).magnitude)))
+    found = enclose(yd, wide, max_boxes=1).magnitude
     if not np.isfinite(found):
         raise DiagramError(
             f"no bound of yd of block '{place.path}' for all t >= 0 is found in interval "

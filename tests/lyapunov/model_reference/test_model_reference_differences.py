@@ -143,16 +143,17 @@ REFUSED = {
         "two blocks output 'v'",
     ),
     "a plant with the other sign": (
-        lambda: first_order(sigma(), f=linear(2.0, -1.0)), "input gain of the sign .* is -1",
+        lambda: first_order(sigma(), f=linear(2.0, -1.0)), "input gain of the sign .* is -1, ",
     ),
     "a law with the other sign": (
         lambda: first_order(sigma(), gain=-1.0), "input gain of the sign .* the law's -1",
     ),
     "a plant without an input": (
-        lambda: first_order(sigma(), f=linear(2.0, 0.0)), "the plant's is 0",
+        lambda: first_order(sigma(), f=linear(2.0, 0.0)), "of v alone in 'plant' is 0",
     ),
     "wing rock with the other sign": (
-        lambda: wing_rock(sigma(nodes=6), plant=nlctl.WingRock(L=-3.0)), "the plant's is -3",
+        lambda: wing_rock(sigma(nodes=6), plant=nlctl.WingRock(L=-3.0)),
+        "of v alone in 'plant' is -3",
     ),
     "direct control of the other sign": (
         lambda: first_order(sigma(), f=linear(2.0, -1.0), law=nlctl.DirectLaw()), "is -1",
@@ -192,11 +193,12 @@ REFUSED = {
         "'error' has another output function than ModelError",
     ),
     "an error of another order": (
-        lambda: wing_rock(
-            sigma(nodes=6), error=nlctl.ModelError(K=(1.5,), Q=(1.0,)),
-            wires={"law.nu_e": {"nu_e": 1.0}},
-        ),
-        "one order, got plant 2, model 2, error 1",
+        lambda: wing_rock(sigma(nodes=6), error=nlctl.ModelError(K=(1.5,), Q=(1.0,))),
+        "'error' is a controller for plants of order 1",
+    ),
+    "a model of another order": (
+        lambda: wing_rock(sigma(nodes=6), model=nlctl.ReferenceModel(a=(1.0, 3.0, 3.0), b=1.0)),
+        "one order, got plant 2, model 3, error 2",
     ),
     "a regressor of something else": (
         lambda: first_order(sigma(), wires={"basis.yd": {"r": 1.0}}),
