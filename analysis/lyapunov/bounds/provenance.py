@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -26,9 +25,8 @@ __all__ = [
     "Constant",
     "Constants",
     "Provenance",
+    "Shown",
     "bound",
-    "constants_html",
-    "constants_text",
     "per_second",
 ]
 
@@ -168,18 +166,37 @@ def per_second(power: int) -> str:
     return "1" if power == 0 else "1/s" if power == 1 else f"1/s^{power}"
 
 
-def constants_text(verdict: str, constants: Sequence[Constant]) -> str:
-    """Return constants as text, a line for each below what they prove."""
-    width = max(len(c.symbol) for c in constants)
-    rows = [
-        f"  {c.symbol:{width}} {c.value:<11.6g} {c.provenance:9} {c.how}; {c.over}"
-        for c in constants
-    ]
-    return "\n".join([verdict, *rows])
+class Shown:
+    """What every certificate shows: what is proved in a sentence, and its constants."""
 
+    holds: bool
+    reason: str
 
-def constants_html(verdict: str, constants: Sequence[Constant]) -> str:
-    """Return the same as a table for a notebook."""
-    columns = ("symbol", "value", "unit", "status", "how", "for")
-    rows = [(c.symbol, c.value, c.unit, c.provenance, c.how, c.over) for c in constants]
-    return table_html(verdict, columns, rows)
+    @property
+    def bound(self) -> str:
+        """The bound in words, of a certificate that holds."""
+        raise NotImplementedError
+
+    @property
+    def constants(self) -> tuple[Constant, ...]:
+        """Every constant of the proof; without the bounds if nothing is proved."""
+        raise NotImplementedError
+
+    @property
+    def verdict(self) -> str:
+        """What is proved, in a sentence."""
+        return f"{self.bound if self.holds else 'no bound is proved'}: {self.reason}"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        columns = ("symbol", "value", "unit", "status", "how", "for")
+        rows = [(c.symbol, c.value, c.unit, c.provenance, c.how, c.over) for c in self.constants]
+        return table_html(self.verdict, columns, rows)
+
+    def __str__(self) -> str:
+        width = max(len(c.symbol) for c in self.constants)
+        rows = [
+            f"  {c.symbol:{width}} {c.value:<11.6g} {c.provenance:9} {c.how}; {c.over}"
+            for c in self.constants
+        ]
+        return "\n".join([self.verdict, *rows])

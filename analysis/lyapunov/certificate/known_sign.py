@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from nlctl.blocks import block
 from nlctl.controllers import (
     AdaptiveWeights,
     FilteredError,
@@ -18,15 +17,12 @@ from nlctl.controllers import (
     RobustTerm,
     Zero,
 )
-from nlctl.diagrams import initial_state, interconnect
 from nlctl.params import equation_arguments
 from nlctl.references import SumOfSines
-from nlctl.upstream.control_internals import set_parameters
 
-from ..loop.external_inputs import bound_of_inputs
-from ..loop.plant_form import Acceleration, acceleration, check_chain
-from ..loop.roles import Parts, Roles, check_kind, joined_again, read_parts
-from ..loop.same_loop import check_same, points_around
+from ..loop.checked import read_checked
+from ..loop.plant_form import Acceleration, acceleration
+from ..loop.roles import PIECES, Parts, Roles, read_parts
 
 __all__ = ["KnownSignLoop", "initial_errors", "read_loop"]
 
@@ -97,29 +93,17 @@ def read_loop(
     Raises
     ------
     DiagramError
-        If a block is missing, or is none of those that the proof is about; if the wiring, or a
-        block's function, is another one; if the plant is not a chain of integrators; if an
-        external input has no bound.
+        As `read_parts` and `read_checked` do.
     """
     parts = read_parts(loop, params=params, inputs=True)
-    bound = bound_of_inputs(parts.roles, inputs or {}, loop)
-    for part, kinds in PROVED_FOR.items():
-        if part in parts.roles.places:
-            check_kind(parts.roles.places[part], kinds)
-    plant = parts.roles.places["plant"]
-    check_chain(plant)
-    x0 = initial_state(loop)
-    read = KnownSignLoop(
+    checked = read_checked(loop, PIECES, PROVED_FOR, params, inputs)
+    return KnownSignLoop(
         parts=parts,
         reference=parts.roles.spec("reference"),
-        e0=initial_errors(parts.roles, x0),
-        acceleration=acceleration(plant),
-        disturbance=bound,
+        e0=initial_errors(parts.roles, checked.x0),
+        acceleration=acceleration(checked.roles.places["plant"]),
+        disturbance=checked.disturbance,
     )
-    again = joined_again(loop, parts.roles, lambda part, spec, name: block(spec, name))
-    check_same(loop, interconnect(again, name=str(loop.name)), points_around(x0), params)
-    set_parameters(loop, dict(params or {}))
-    return read
 
 
 def initial_errors(roles: Roles, x0: np.ndarray) -> tuple[arb, ...]:

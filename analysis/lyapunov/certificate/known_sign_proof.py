@@ -27,7 +27,7 @@ from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition, decompose, only_declared
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
-from ..bounds.provenance import Constant, constants_html, constants_text, per_second
+from ..bounds.provenance import Constant, Shown, per_second
 from ..loop.external_inputs import disturbed
 from .known_sign import KnownSignLoop, read_loop
 from .plant_bounds import Demand, demand, feedforward
@@ -39,7 +39,7 @@ _LIMIT = 1e4  # a bound of |r| beyond which the iteration counts as without end
 
 
 @dataclass(frozen=True, kw_only=True)
-class Certificate:
+class Certificate(Shown):
     """What `certify` proved, with every constant.
 
     Attributes
@@ -123,17 +123,9 @@ class Certificate:
         )
 
     @property
-    def verdict(self) -> str:
-        """What is proved, in a sentence."""
-        bound = f"|r| <= {self.C_0:.6g} proved for all t"
-        return f"{bound if self.holds else 'no bound is proved'}: {self.reason}"
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        return constants_html(self.verdict, self.constants)
-
-    def __str__(self) -> str:
-        return constants_text(self.verdict, self.constants)
+    def bound(self) -> str:
+        """What is proved, in words."""
+        return f"|r| <= {self.C_0:.6g} proved for all t"
 
 
 def bound_of_r(loop: KnownSignLoop, delta_star: float) -> tuple[arb, arb, float, arb]:

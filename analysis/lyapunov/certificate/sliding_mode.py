@@ -29,7 +29,7 @@ from nlctl.wording import counted
 from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition, decompose, only_declared
 from ..bounds.error_bounds import error_bounds
-from ..bounds.provenance import Constant, constants_html, constants_text, per_second
+from ..bounds.provenance import Constant, Shown, per_second
 from ..loop.checked import read_checked
 from ..loop.external_inputs import ADDED, disturbed
 from ..loop.plant_form import Acceleration, acceleration
@@ -88,7 +88,7 @@ class SlidingModeLoop:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlidingModeCertificate:
+class SlidingModeCertificate(Shown):
     """What `certify` proved of sliding mode with a boundary layer, with every constant.
 
     Attributes
@@ -183,17 +183,9 @@ class SlidingModeCertificate:
         yield "limsup |e|", self.ultimate_e, "1", "proved", "filters of r", "t -> infinity"
 
     @property
-    def verdict(self) -> str:
-        """What is proved, in a sentence."""
-        bound = f"|r| <= {self.C_0:.6g} proved for all t, {self.ultimate:.6g} in the end"
-        return f"{bound if self.holds else 'no bound is proved'}: {self.reason}"
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        return constants_html(self.verdict, self.constants)
-
-    def __str__(self) -> str:
-        return constants_text(self.verdict, self.constants)
+    def bound(self) -> str:
+        """What is proved, in words."""
+        return f"|r| <= {self.C_0:.6g} proved for all t, {self.ultimate:.6g} in the end"
 
 
 def is_sliding_mode(loop: Any) -> bool:

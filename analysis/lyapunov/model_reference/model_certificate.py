@@ -13,7 +13,7 @@ from nlctl.controllers.mrac.reference_model import model_state_names
 from nlctl.wording import counted
 
 from ..bounds.decomposition import Decomposition
-from ..bounds.provenance import Constant, constants_html, constants_text, per_second
+from ..bounds.provenance import Constant, Shown, per_second
 from ..loop.external_inputs import ADDED
 from .matching import Matching
 from .region import Region
@@ -24,7 +24,7 @@ _ALPHA_0 = "q D^2/(1 - alpha_1/mu) + lambda sigma |W|^2/(2 - alpha_1/(Gamma sigm
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelReferenceCertificate:
+class ModelReferenceCertificate(Shown):
     """What `certify` proved of model reference adaptive control, with every constant.
 
     The function is V = E^T P E + lambda |W_hat - W|^2 / Gamma, E = x - xm.  The bounds hold from
@@ -168,14 +168,6 @@ class ModelReferenceCertificate:
         return f"|W| + |W_hat - W|{ball}"
 
     @property
-    def verdict(self) -> str:
-        """What is proved, in a sentence."""
-        bound = f"|e| <= {self.e:.6g} proved for all t, {self.ultimate:.6g} in the end"
-        return f"{bound if self.holds else 'no bound is proved'}: {self.reason}"
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        return constants_html(self.verdict, self.constants)
-
-    def __str__(self) -> str:
-        return constants_text(self.verdict, self.constants)
+    def bound(self) -> str:
+        """What is proved, in words."""
+        return f"|e| <= {self.e:.6g} proved for all t, {self.ultimate:.6g} in the end"

@@ -12,6 +12,7 @@ from planted_loops import (
     UPDATE,
     actuator,
     again,
+    exchanged,
     nested,
     patched,
     plant,
@@ -179,12 +180,6 @@ def drawn(t, x, u, p):
 
 def without_leak(t, x, u, p):
     return (p.gamma * u[0] * np.tanh(u[0] / p.tau),)
-
-
-def exchanged(record, **functions):
-    for name, function in functions.items():
-        object.__setattr__(record, name, equation(function))
-    return record
 
 
 EQUATIONS = {

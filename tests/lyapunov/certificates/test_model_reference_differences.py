@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from flint import arb
 from mrac_loops import QUIET, first_order, half_sine, projection, sigma, wing_rock
+from planted_loops import actuator, again, exchanged
 
 import nlctl
 from analysis.lyapunov import DecompositionError, certify
@@ -14,7 +15,6 @@ from analysis.lyapunov.model_reference.audit import check_decrease
 from analysis.lyapunov.model_reference.closing import matching, read_model_reference
 from analysis.lyapunov.model_reference.decrease import decrease
 from nlctl import DiagramError
-from nlctl.equations import equation
 
 
 def linear(a, b):
@@ -27,34 +27,6 @@ def patched(record, name, **functions):
     for which, function in functions.items():
         setattr(made, which, function)
     return made
-
-
-def exchanged(record, **functions):
-    """A record whose functions were replaced after it was made."""
-    for name, function in functions.items():
-        object.__setattr__(record, name, equation(function))
-    return record
-
-
-def again(kind, *, fields=None, **functions):
-    """A kind of one's own under another name, with other functions than its parent."""
-    own = {name: staticmethod(nlctl.equation(f)) for name, f in functions.items()}
-    return type(f"Own{kind.__name__}", (kind,), own)(**(fields or {}))
-
-
-def own_actuator(output, states=(), update=None):
-    characteristic = nlctl.equation(output)
-
-    @nlctl.equation
-    def equation(t, x, u, p):
-        return (characteristic(t, u[0]),)
-
-    return nlctl.record(
-        type("Own", (), {
-            "__annotations__": {}, "inputs": ("u",), "outputs": ("v",), "states": (),
-            "feedthrough": True, "output": staticmethod(equation),
-        })
-    )()  # fmt: skip
 
 
 def without_leakage(t, x, u, p):
@@ -170,7 +142,7 @@ REFUSED = {
     ),
     "weights of another kind": (
         lambda: first_order(
-            again(nlctl.AdaptiveWeights, fields={"nodes": 2}, update=without_leakage)
+            again(nlctl.AdaptiveWeights, nodes=2, update=without_leakage)
         ),
         "got OwnAdaptiveWeights",
     ),
@@ -272,27 +244,27 @@ class TestNoneIsCertified:
         with pytest.raises(DiagramError, match=r"continuous time, and .* is sampled"):
             certify(sampled_controller())
 
-    @pytest.mark.parametrize("actuator", [
+    @pytest.mark.parametrize("machine", [
         nlctl.Saturation(limit=5.0),
         nlctl.Gain(k=-1.0),
         nlctl.Relay(),
-        own_actuator(lambda t, u: u * np.exp(-t / 100)),
-        own_actuator(lambda t, u: u * np.tanh(3 - t)),
+        actuator(lambda t, u: u * np.exp(-t / 100)),
+        actuator(lambda t, u: u * np.tanh(3 - t)),
     ])  # fmt: skip
-    def test_an_actuator_without_a_split(self, actuator):
+    def test_an_actuator_without_a_split(self, machine):
         with pytest.raises(DecompositionError):
-            certify(first_order(sigma(), actuator=actuator))
+            certify(first_order(sigma(), actuator=machine))
 
     @pytest.mark.parametrize(
-        ("actuator", "k"),
+        ("machine", "k"),
         [
             (nlctl.DeadZone(), None),
-            (own_actuator(lambda t, u: u * (1 + 0.9 * np.sin(t))), (0.1, 1.9)),
+            (actuator(lambda t, u: u * (1 + 0.9 * np.sin(t))), (0.1, 1.9)),
         ],
     )
-    def test_an_actuator_whose_gain_varies_too_much(self, actuator, k):
+    def test_an_actuator_whose_gain_varies_too_much(self, machine, k):
         """The part of the gain that varies is no matched disturbance with a bound of its own."""
-        found = certify(first_order(sigma(), d=half_sine, actuator=actuator), k=k)
+        found = certify(first_order(sigma(), d=half_sine, actuator=machine), k=k)
         assert not found.holds
         assert found.e == np.inf
 
