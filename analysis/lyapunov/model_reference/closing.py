@@ -100,6 +100,12 @@ def _endless(need: Region, iterations: Sequence[float]) -> str:
     """Say why the iteration must end without a bound; nothing if it need not."""
     if iterations[-1] < _LIMIT:
         return ""
+    if len(iterations) == 2 and not np.isfinite(need.rest):
+        return (
+            "no bound of what neither the law nor the weights know of the plant's equation is "
+            f"found on {need.box}: write disturbances with functions that are bounded for all t, "
+            "such as np.sin, or as an external input with a declared bound"
+        )
     shown = ", ".join(f"{C:.4g}" for C in iterations)
     return (
         f"the box does not close: C -> V_max(C) gives {shown} and so on without end; the largest "

@@ -209,6 +209,14 @@ def test_a_plant_that_is_not_affine_in_its_input():
     assert pytest.approx(0.7, rel=1e-2) == found.region.D
 
 
+def test_a_disturbance_without_a_bound_for_all_times_is_told():
+    """Of (1 + t)^(-1/5) intervals know none, as they know no half line."""
+    fading = nlctl.equation(lambda x, t: 0.2 * (1 + t) ** -0.2)
+    found = certify(first_order(sigma(), d=fading))
+    assert not found.holds
+    assert "bounded for all t" in found.reason
+
+
 def test_a_box_that_does_not_close_proves_nothing():
     """x^3, which the regressor lacks, against a weak model."""
     f = nlctl.equation(lambda x, v: x[0] ** 3 + 2.0 * x[0] + v)
