@@ -12,10 +12,13 @@ in rational arithmetic: where it spans all, nothing of delta is left but disturb
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
+
+from flint import arb
 
 from nlctl.controllers.mrac.reference_model import model_state_names
 from nlctl.errors import DiagramError
@@ -79,11 +82,13 @@ class Matching:
 
         Where functions take part it is what two enclosures have in common: that of the sum of
         products, in which what is equal has cancelled, and that of the equation as it is written.
+        Of symbols that have cancelled the latter is taken at 0, as it does not depend on them.
         """
         tight = as_ball(self.rest.on(values))
         if not any(atom.arguments for product in self.rest.terms for atom, _ in product):
             return tight
-        plain = as_ball(self._as_written(values))
+        anywhere = dict.fromkeys(signal_names(self.loop), Ball(arb(0)))
+        plain = as_ball(self._as_written(anywhere | dict(values)))
         if tight.value.is_finite() and plain.value.is_finite():
             self._check_overlap(tight.value.overlaps(plain.value))
         one, other = tight.gradient, plain.gradient
@@ -97,13 +102,21 @@ class Matching:
             )
 
     def _as_written(self, values: Mapping[str, Any]) -> Any:
-        loop = self.loop
+        loop, (beta, share, learned) = self.loop, self._coefficients
         x = [values[name] for name in coordinate_names(loop.order)]
-        left = loop.acceleration(values["t"], x, values["v"]) - _ball(self.beta) * values["v"]
-        left = left - _ball(_feedback_share(loop, self.lam)) * feedback(loop, values, _ball)
-        for w, psi in zip(self.W, loop.regressor(values), strict=True):
-            left = left - _ball(self.lam * w) * psi
+        left = loop.acceleration(values["t"], x, values["v"]) - beta * values["v"]
+        if not share.value.is_zero():
+            left = left - share * feedback(loop, values, _ball)
+        for w, psi in zip(learned, loop.regressor(values), strict=True):
+            if not w.value.is_zero():
+                left = left - w * psi
         return left
+
+    @functools.cached_property
+    def _coefficients(self) -> tuple[Ball, Ball, tuple[Ball, ...]]:
+        """Balls of beta, of the share of nu + nu_e, and of lambda W."""
+        share = _feedback_share(self.loop, self.lam)
+        return _ball(self.beta), _ball(share), tuple(_ball(self.lam * w) for w in self.W)
 
 
 def _ball(x: Any) -> Ball:
@@ -126,8 +139,12 @@ def feedback(loop: ModelReferenceLoop, values: Mapping[str, Any], number: Any) -
 
 def symbols(loop: ModelReferenceLoop) -> dict[str, Sum]:
     """Return the symbols of the equations by name."""
-    names = (*coordinate_names(loop.order), *model_state_names(loop.order))
-    return {name: indeterminate(name) for name in ("t", *names, "yd", "v")}
+    return {name: indeterminate(name) for name in signal_names(loop)}
+
+
+def signal_names(loop: ModelReferenceLoop) -> tuple[str, ...]:
+    """Return t, x1, ..., xm1, ..., yd, v."""
+    return ("t", *coordinate_names(loop.order), *model_state_names(loop.order), "yd", "v")
 
 
 def matching(

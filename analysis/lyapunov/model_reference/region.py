@@ -24,7 +24,7 @@ from .quadratic_form import ball
 
 __all__ = ["Region", "model_reach", "region"]
 
-_BOXES = 20_000
+_BOXES = 2_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,8 +142,7 @@ def _largest_rest(match: Matching, box: Box, tol: float) -> tuple[arb, int]:
     """Return a proved bound of the rest over a box, and the number of boxes."""
     if not match.rest.terms and not match.rest.partial:
         return arb(0), 0
-    functions = any(atom.arguments for product in match.rest.terms for atom, _ in product)
-    names = box.names if functions else tuple(n for n in box.names if n in match.rest.names)
+    names = tuple(name for name in box.names if name in match.rest.names)
     if not names:
         return abs(match.rest_on({}).value).upper(), 1
 
