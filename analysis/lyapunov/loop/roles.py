@@ -160,6 +160,19 @@ def _check_functions_are_own(place: Place) -> None:
                 f"{type(system.spec).__name__}, which the proof reads: make the block of a record "
                 "with that function"
             )
+    _check_functions_of_kind(place)
+
+
+def _check_functions_of_kind(place: Place) -> None:
+    """What is known of a kind of record is known of the functions that its class has."""
+    spec = place.system.spec
+    for name in ("update", "output", "band"):
+        known = inspect.getattr_static(type(spec), name, None)  # inherited ones, too
+        if isinstance(known, staticmethod) and getattr(spec, name) is not known.__func__:
+            raise DiagramError(
+                f"block '{place.path}' has another {name} function than {type(spec).__name__}: "
+                "the proof is about the latter, make a record of a class of its own"
+            )
 
 
 def _found(wiring: Wiring, pieces: Pieces) -> dict[str, Place]:
@@ -320,7 +333,7 @@ def joined_again(
 
 
 def check_kind(place: Place, kinds: tuple[type, ...]) -> None:
-    """Check that a block is of a kind that the proof knows, and runs the equations of that kind.
+    """Check that a block is of a kind that the proof knows.
 
     Raises
     ------
@@ -333,13 +346,6 @@ def check_kind(place: Place, kinds: tuple[type, ...]) -> None:
             f"the certificate is about a {wanted} in the place of '{place.path}', "
             f"got {type(spec).__name__}: put one there"
         )
-    for name, used in (("update", place.system.updfcn), ("output", place.system.outfcn)):
-        known = inspect.getattr_static(type(spec), name, None)  # inherited ones, too
-        if isinstance(known, staticmethod) and used is not known.__func__:
-            raise DiagramError(
-                f"block '{place.path}' has another {name} function than {type(spec).__name__}: "
-                "the certificate is about the latter"
-            )
 
 
 DAMPED = (KnownSignLaw, MonotoneNussbaumLaw)  # laws with eta = beta r + s tanh(r s / b)

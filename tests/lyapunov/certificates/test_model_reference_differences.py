@@ -158,6 +158,21 @@ REFUSED = {
         lambda: first_order(exchanged(projection(), output=counted_norm)),
         "'weights' has another output function than ProjectedWeights",
     ),
+    "the gain's output replaced in the record": (
+        lambda: first_order(
+            sigma(), actuator=exchanged(nlctl.Gain(), output=lambda t, x, u, p: (2 * u[0],))
+        ),
+        "'actuator' has another output function than Gain",
+    ),
+    "the backlash's band replaced in the record": (
+        lambda: first_order(
+            sigma(),
+            actuator=exchanged(
+                nlctl.Backlash(), band=lambda t, u, p: (u - 1e-3, u + 1e-3)
+            ),
+        ),
+        "'actuator' has another band function than Backlash",
+    ),
     "the error's output replaced in the record": (
         lambda: first_order(
             sigma(), error=exchanged(nlctl.ModelError(K=(1.0,), Q=(1.0,)), output=half_of_it)

@@ -254,6 +254,12 @@ EQUATIONS = {
         lambda: {"law": exchanged(nlctl.KnownSignLaw(), output=lambda t, x, u, p: (-u[0],))},
         "'law' has another output function than KnownSignLaw",
     ),
+    "the dead zone's output replaced in the record": (
+        lambda: {
+            "actuator": exchanged(nlctl.DeadZone(), output=lambda t, x, u, p: (0.1 * u[0],))
+        },
+        "'actuator' has another output function than DeadZone",
+    ),
     "a sampled loop": (
         lambda: {k: nlctl.block(sampled(make()), k, dt=0.1) for k, make in PARTS.items()},
         r"continuous time, and 'planted' is sampled with dt = 0.1",
