@@ -87,7 +87,7 @@ class Matching:
         tight = as_ball(self.rest.on(values))
         if not any(atom.arguments for product in self.rest.terms for atom, _ in product):
             return tight
-        anywhere = dict.fromkeys(signal_names(self.loop), Ball(arb(0)))
+        anywhere = dict.fromkeys(equation_signals(self.loop), Ball(arb(0)))
         plain = as_ball(self._as_written(anywhere | dict(values)))
         if tight.value.is_finite() and plain.value.is_finite():
             self._check_overlap(tight.value.overlaps(plain.value))
@@ -139,10 +139,10 @@ def feedback(loop: ModelReferenceLoop, values: Mapping[str, Any], number: Any) -
 
 def symbols(loop: ModelReferenceLoop) -> dict[str, Sum]:
     """Return the symbols of the equations by name."""
-    return {name: indeterminate(name) for name in signal_names(loop)}
+    return {name: indeterminate(name) for name in equation_signals(loop)}
 
 
-def signal_names(loop: ModelReferenceLoop) -> tuple[str, ...]:
+def equation_signals(loop: ModelReferenceLoop) -> tuple[str, ...]:
     """Return t, x1, ..., xm1, ..., yd, v."""
     return ("t", *coordinate_names(loop.order), *model_state_names(loop.order), "yd", "v")
 
