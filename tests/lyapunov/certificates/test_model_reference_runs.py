@@ -162,6 +162,60 @@ def test_plants_of_order_one_to_three(order, seed):
     assert distance.max() <= found.W_error * ROUND
 
 
+def drawn_plant(rng):
+    """x' = c_0 x + c_1 sin x + L v + nl (sin v + cos 3x) + d, d pushing outwards or a sine."""
+    c0, c1, gain = (float(c) for c in rng.uniform([-1.5, -1.5, 0.5], [1.5, 1.5, 3.0]))
+    nl, size = float(rng.choice([0.0, 0.1, 0.3])), float(rng.choice([0.0, 0.1, 0.5]))
+    f = nlctl.equation(
+        lambda x, v: c0 * x[0] + c1 * np.sin(x[0]) + gain * v + nl * (np.sin(v) + np.cos(3 * x[0]))
+    )
+    outwards = nlctl.equation(lambda x, t: size * np.tanh(20 * x[0]))
+    d = outwards if rng.integers(2) else sine_of(size)
+    start = {"x1": float(rng.uniform(-1, 1))}
+    return nlctl.PureFeedback(order=1, f=f, d=d, initial=start), gain
+
+
+def drawn_actuator(rng):
+    slope = float(rng.choice([1.0, 0.97]))
+    return [
+        nlctl.Gain(k=float(rng.uniform(0.5, 2))),
+        nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.2, c_l=-0.2),
+        nlctl.DeadZone(ripple_r=0.0, ripple_l=0.0, slope_l=slope, b_r=0.1, b_l=-0.2),
+    ][rng.integers(3)]
+
+
+@pytest.mark.ci
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_whatever_is_certified_holds(seed):
+    """Drawn plants that no regressor spans, gains that laws do not know, actuators: never beyond.
+
+    Many are not certified; of those that are every bound holds along a run.
+    """
+    rng = np.random.default_rng(seed)
+    plant, gain = drawn_plant(rng)
+    k, Gamma, own = rng.uniform(0.5, 8), 10 ** rng.uniform(0, 2.5), 10 ** rng.uniform(-2, 0.5)
+    weights = [
+        sigma(float(own), float(Gamma)),
+        e_modification(float(own), float(Gamma)),
+        projection(float(rng.uniform(1, 8)), float(Gamma)),
+    ][rng.integers(3)]
+    told = float(gain * rng.choice([1.0, 0.5, 1.5]))
+    law = nlctl.DirectLaw() if rng.integers(3) == 0 else nlctl.ModelReferenceLaw(gain=told)
+    loop = first_order(weights, plant=plant, actuator=drawn_actuator(rng), law=law, k=float(k),
+                       reference=SINE, b=float(rng.uniform(-2, 2)))  # fmt: skip
+    found = certify(loop, tol=0.05)
+    if not found.holds:
+        return
+    run = nlctl.input_output_response(loop, np.linspace(0, 40, 2001), rtol=1e-7, atol=1e-9)
+    E, W_hat, distance = signals(loop, run, found)
+    u = run.outputs[run.output_labels.index("u")]
+    assert np.abs(E[0]).max() <= found.e * ROUND
+    assert distance.max() <= found.W_error * ROUND
+    assert np.linalg.norm(W_hat, axis=0).max() <= found.region.W_hat * ROUND
+    assert np.abs(u).max() <= found.u_max * ROUND
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sigma", "e", "projection"])
 def test_the_disturbance_that_pushes_outwards_is_no_exception(kind):
