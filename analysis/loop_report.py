@@ -7,8 +7,8 @@
     write_pdf(page, "reports/pendulum.pdf")
 
 What is of another loop is refused: a response whose samples are not the loop's outputs or whose
-states do not follow from its equations (`analysis.response_of_loop` says how closely), a study or a
-ledger whose record is of other equations, parameters or wires.
+states do not follow from its equations (`analysis.response_of_loop` says how closely), a study, a
+ledger or a certificate whose record is of other equations, parameters or wires.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from nlctl.wording import counted
 
 from .figures.axes import BLUE, stacked_axes
 from .loop_record import difference_text, fact_differences, loop_facts
+from .lyapunov.certificate.certify import AnyCertificate
 from .lyapunov.ledger import Ledger
 from .paper.page.proof import ledger_tables
 from .paper.page.proof_text import ledger_text
@@ -65,6 +66,7 @@ def loop_report(
     signals: Sequence[str] = (),
     params: Mapping[str, Any] | None = None,
     ledger: Ledger | None = None,
+    certificate: AnyCertificate | None = None,
     study: Result | None = None,
     sections: Sequence[Section] = (),
     claims: Sequence[Claim] = (),
@@ -94,6 +96,8 @@ def loop_report(
         The parameters that the run was made with; by default what the response says.
     ledger : Ledger, optional
         Of `analysis.lyapunov.ledger`.
+    certificate : Certificate, ModelReferenceCertificate or SlidingModeCertificate, optional
+        Of `analysis.lyapunov.certify`.
     study : Result, optional
         Of `analysis.studies.run` or `analysis.studies.load_result`.
     sections : sequence of Section, optional
@@ -101,7 +105,8 @@ def loop_report(
     claims : sequence of Claim, optional
         One's own; those of the study follow.
     question, verdict : str, optional
-        What was asked, and what was found; by default what the study and the ledger say.
+        What was asked, and what was found; by default what the study, the ledger and the
+        certificate say.
     author, revision, date : str, optional
         For the title page.
     references : sequence of str, optional
@@ -116,7 +121,7 @@ def loop_report(
     Raises
     ------
     DiagramError
-        If the response, the ledger or the study is of another loop.
+        If the response, the ledger, the certificate or the study is of another loop.
     UnknownNameError
         If the loop has no output that `signals` names.
 
@@ -142,9 +147,13 @@ def loop_report(
         parts.append(_run(loop, response, signals, given))
     parts += sections
     if ledger is not None:
-        _check_ledger(loop, ledger)
+        _check_record(loop, "ledger", ledger.loop, ledger.loop_facts)
         found.append(ledger_text(ledger))
         parts.append(_proof(ledger))
+    if certificate is not None:
+        _check_record(loop, "certificate", certificate.name, certificate.loop_facts)
+        found.append(f"Certificate: {certificate.verdict}.")
+        parts.append(_certified(certificate))
     if study is not None:
         _check_study(loop, study)
         found.append(without_assumptions(study.verdict))
@@ -208,10 +217,8 @@ def _run(
         key="run-history", caption=caption, description=told, time=t, signals=curves,
         shown=tuple(shown),
     )  # fmt: skip
-    values = ", ".join(f"{name} = {value}" for name, value in params.items())
-    own = [Paragraph(text=f"This run has values of its own: {values}.")] if params else []
     items: list[Item] = [
-        *own,
+        *_own_values("This run", params),
         Figure(key="run-signals", caption=caption, description=told, figure=figure),
         history,
         Table(
@@ -221,6 +228,12 @@ def _run(
         ),
     ]
     return Section(key="run", title="A run", items=items)
+
+
+def _own_values(what: str, params: Mapping[str, Any]) -> list[Item]:
+    """Return a paragraph with the values that are not those of the loop as it stands."""
+    values = ", ".join(f"{name} = {value}" for name, value in params.items())
+    return [Paragraph(text=f"{what} has values of its own: {values}.")] if params else []
 
 
 def _signals(response: Any) -> dict[str, np.ndarray]:
@@ -237,6 +250,22 @@ def _proof(found: Ledger) -> Section:
     """Return a ledger: a sentence, then its lines."""
     items: list[Item] = [Paragraph(text=ledger_text(found)), *ledger_tables(found.lines)]
     return Section(key="ledger", title="The proof line by line", items=items, folded=True)
+
+
+def _certified(certificate: AnyCertificate) -> Section:
+    """Return a certificate: what is proved, then every constant with where it comes from."""
+    table = Table(
+        caption="The constants of the certificate, and the bounds that follow from them.",
+        columns=("symbol", "value", "unit", "status", "how", "for"),
+        rows=[
+            (c.symbol, f"{c.value:.6g}", c.unit, c.provenance, c.how, c.over)
+            for c in certificate.constants
+        ],
+        status="status",
+    )
+    own = _own_values("The loop of the proof", certificate.params)
+    items: list[Item] = [Paragraph(text=f"{certificate.verdict}."), *own, table]
+    return Section(key="certificate", title="A bound for all time", items=items)
 
 
 def _studied(result: Result) -> list[Section]:
@@ -263,11 +292,14 @@ def _numbers(response: Any, study: Result | None) -> dict[str, Any]:
     return told
 
 
-def _check_ledger(loop: ct.InputOutputSystem, found: Ledger) -> None:
-    if told := difference_text([*fact_differences(found.loop_facts, loop_facts(loop))]):
+def _check_record(
+    loop: ct.InputOutputSystem, what: str, name: str, facts: Mapping[str, Mapping[str, str]]
+) -> None:
+    """Refuse what has a record of another loop."""
+    if told := difference_text([*fact_differences(facts, loop_facts(loop))]):
         raise DiagramError(
-            f"the ledger is of another loop '{found.loop}' than '{loop.name}' ({told}): give the "
-            "loop that it was made of"
+            f"the {what} is of another loop '{name}' than '{loop.name}' ({told}): give the loop "
+            "that it was made of"
         )
 
 

@@ -9,8 +9,10 @@ from .bounds.premises import Premises, literal, premises
 from .bounds.provenance import Constant, Constants
 from .bounds.sector import Sector, sector
 from .bounds.weights import approximation_error, minimax_weights, tightest_weights
-from .certificate.certify import Certificate, certify
+from .certificate.certify import certify
 from .certificate.gains import GainDesign, design
+from .certificate.known_sign_proof import Certificate
+from .certificate.sliding_mode import SlidingModeCertificate
 from .conservatism import Conservatism, DirectBound, comparison, conservatism
 from .examination import Examination, examine
 from .inequalities import inequalities
@@ -20,6 +22,7 @@ from .loop.instrumented import observed
 from .loop.integral import NussbaumIntegral, sharpest
 from .loop.roles import Parts, read_parts
 from .loop.signals import Margin, Signals, signals_of
+from .model_reference.model_certificate import ModelReferenceCertificate
 from .nussbaum.energy import Drift, drift, drift_margin, safe_horizon
 from .nussbaum.property import nussbaum_property
 from .nussbaum.slow_drift import SlowDrift, burst_peak, slow_drift
@@ -40,6 +43,7 @@ __all__ = [
     "Ledger",
     "Line",
     "Margin",
+    "ModelReferenceCertificate",
     "NussbaumIntegral",
     "Parts",
     "Premises",
@@ -47,6 +51,7 @@ __all__ = [
     "Range",
     "Sector",
     "Signals",
+    "SlidingModeCertificate",
     "SlowDrift",
     "Tightened",
     "approximation_error",

@@ -17,7 +17,7 @@ from nlctl.response import input_output_response
 
 from ..lyapunov.assumptions import assumptions
 from ..lyapunov.bounds.premises import premises
-from ..lyapunov.certificate.certify import Certificate, certify
+from ..lyapunov.certificate.known_sign_proof import Certificate, certify_known_sign
 from ..lyapunov.conservatism import Conservatism, conservatism
 from ..lyapunov.examination import compile_examination_ahead as examine_ahead
 from ..lyapunov.examination import examine
@@ -103,7 +103,7 @@ def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
         ledger=ledger(study),
         conservatism=conservatism(study),
         slow_drift=long_run(loop, LOOK, rtol=1e-7).predictions[0],
-        certificate=certify(tame, k=SPLIT.get(str(loop.name))),
+        certificate=certify_known_sign(tame, k=SPLIT.get(str(loop.name))),
         certified_max_r=_max_r(tame, s.t),
         t=s.t,
         curves={

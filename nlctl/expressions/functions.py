@@ -68,6 +68,11 @@ def _cube_root(x: Any) -> Any:
     return low.union(high)
 
 
+def _hyperbolic_tangent(x: Any) -> Any:
+    # flint has no number for an argument without bounds, where it lies between -1 and 1
+    return x.tanh() if x.is_finite() or x.is_nan() else type(x)(0, 1)
+
+
 def _row(
     name: str,
     code: str,
@@ -86,7 +91,8 @@ _ROWS = (
     _row("exp", "own", r"e^{{{0}}}", lambda x: np.exp(x), ball=lambda x: x.exp()),
     _row("sin", "own", r"\sin {0}", lambda x: np.cos(x), ball=lambda x: x.sin()),
     _row("cos", "own", r"\cos {0}", lambda x: -np.sin(x), ball=lambda x: x.cos()),
-    _row("tanh", "own", r"\tanh {0}", lambda x: 1.0 - np.tanh(x) ** 2, ball=lambda x: x.tanh()),
+    _row("tanh", "own", r"\tanh {0}", lambda x: 1.0 - np.tanh(x) ** 2,
+         ball=_hyperbolic_tangent),
     _row("sqrt", "llvm.sqrt", r"\sqrt{{{0}}}", lambda x: 0.5 / np.sqrt(x),
          ball=lambda x: x.sqrt()),
     _row("absolute", "llvm.fabs", r"\left|{0}\right|", lambda x: np.where(x < 0.0, -1.0, 1.0),

@@ -236,6 +236,13 @@ def test_the_cube_root_of_a_ball_undoes_the_cube(ends):
     assert abs(float(root.upper()) ** 3 - float(ball.value.upper())) <= room
 
 
+@pytest.mark.parametrize(("name", "largest"), [("sin", 1), ("cos", 1), ("tanh", 1), ("arctan", 2)])
+def test_what_is_bounded_everywhere_is_bounded_on_the_whole_line(name, largest):
+    """Also where a side of the box is infinite, as time is; what is not a number stays none."""
+    assert abs(getattr(np, name)(Ball(arb(0, "inf"))).value) <= largest + 0.1
+    assert getattr(np, name)(Ball(arb("nan"))).value.is_nan()
+
+
 def test_numbers_of_numpy_on_the_left_of_a_ball():
     """np.float64 and arrays compute with balls as plain numbers do."""
     ball = Ball(arb(2), (arb(1),))

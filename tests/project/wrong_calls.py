@@ -501,6 +501,7 @@ LYAPUNOV = {
     "certify u_max": lambda: lyapunov.certify(certified(), u_max=NAN),
     "certify u_max neg": lambda: lyapunov.certify(certified(), u_max=-1),
     "certify tol": lambda: lyapunov.certify(certified(), tol=0.0),
+    "certify W": lambda: lyapunov.certify(certified(), W=(1.0,)),
     "certify k": lambda: lyapunov.certify(certified(), k=(1.0,)),
     "certify k number": lambda: lyapunov.certify(certified(), k=1.0),
     "certify k order": lambda: lyapunov.certify(certified(), k=(2.0, 1.0)),

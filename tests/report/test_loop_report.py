@@ -1,5 +1,6 @@
 """A page about a loop of one's own: what is given stands on it as text, of that loop alone."""
 
+import html
 import html.parser
 import json
 import re
@@ -13,6 +14,7 @@ from rows import each_row
 
 import nlctl
 from analysis.loop_report import loop_report
+from analysis.lyapunov import certify
 from analysis.report import (
     Claim,
     Figure,
@@ -79,6 +81,34 @@ def test_what_was_computed_is_on_the_page_and_in_the_file(tmp_path):
     assert [part["title"] for part in kept["sections"].values()][:2] == [
         "The loop", "The equations of the loop",
     ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_certificate_stands_on_the_page_with_its_constants():
+    """What is proved, each constant with its status; one of another loop is refused."""
+    plant = nlctl.PureFeedback(order=1, f=lambda x, v: 2.0 * x[0] + v)
+    weights = nlctl.AdaptiveWeights(nodes=2, Gamma=5.0, sigma_1=0.2)
+    blocks = {
+        "reference": nlctl.SumOfSines(order=0),
+        "plant": plant,
+        "controller": nlctl.mrac(nlctl.ReferenceModel(a=(1.0,), b=1.0), weights=weights),
+        "actuator": nlctl.Gain(),
+    }
+    loop = nlctl.interconnect(blocks, outputs=["x1"], name="adaptive <loop>")
+    found = certify(loop)
+    made = loop_report(loop, title="Adaptive", certificate=found)
+    text = re.sub(r"\s+", " ", html.unescape(re.sub("<[^>]*>", " ", render_html(made))))
+    assert found.verdict in made.verdict
+    for constant in found.constants:
+        assert constant.symbol in text
+        assert f"{constant.value:.6g}" in text.replace("−", "-")
+    other = nlctl.interconnect(
+        {**blocks, "actuator": nlctl.Gain(k=2.0)}, outputs=["x1"], name="adaptive <loop>"
+    )
+    with pytest.raises(nlctl.DiagramError, match=r"actuator.k was 1.0, now 2.0"):
+        loop_report(other, title="A namesake", certificate=found)
+    with pytest.raises(nlctl.DiagramError, match="is of another loop 'adaptive <loop>'"):
+        loop_report(LOOP, title="Decay", certificate=found)
 
 
 def test_nothing_that_is_given_is_markup():

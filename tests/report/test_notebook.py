@@ -8,7 +8,7 @@ import pytest
 import studies_example
 
 import nlctl
-from analysis.lyapunov import ledger
+from analysis.lyapunov import certify, ledger
 from analysis.studies import read_study, run
 from nlctl.host.notebook import table_html
 
@@ -98,6 +98,30 @@ def test_a_ledger_shows_each_line_with_its_status():
     found = ledger(nlctl.paper.example_1(), 1.0)
     rows = shown(found).rows[1:]
     assert [tuple(row[:2]) for row in rows] == [(line.key, line.status) for line in found.lines]
+
+
+@pytest.mark.slow
+def test_a_certificate_shows_each_constant_with_its_status():
+    """Of every kind, and of one that proves nothing."""
+    law, robust = nlctl.KnownSignLaw(), nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
+    known = nlctl.adaptive_neural(2, law=law, robust=robust)
+    sliding = nlctl.controllers.sliding_mode(law=nlctl.SlidingModeLaw(K=20.0))
+    plant = nlctl.PureFeedback(order=1, f=lambda x, v: 2.0 * x[0] + v)
+    blocks = {"reference": nlctl.SumOfSines(order=0), "plant": plant, "actuator": nlctl.Gain()}
+    blocks["controller"] = nlctl.mrac(nlctl.ReferenceModel(a=(1.0,), b=1.0))
+    for loop in (
+        nlctl.paper.example_1(controller=known),
+        nlctl.paper.example_1(controller=sliding),
+        nlctl.paper.example_1(controller=sliding, actuator=nlctl.Gain()),
+        nlctl.interconnect(blocks, outputs=["x1"]),
+    ):
+        found = certify(loop)
+        page = shown(found)
+        assert page.told == [found.verdict]
+        assert [tuple(row[:1] + row[3:4]) for row in page.rows[1:]] == [
+            (c.symbol, c.provenance) for c in found.constants
+        ]
+        assert str(found).splitlines()[0] == found.verdict
 
 
 def test_a_study_shows_what_each_analysis_found(tmp_path):

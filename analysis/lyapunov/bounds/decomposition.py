@@ -287,6 +287,15 @@ def _declared_split(actuator: Any, u_max: float, tol: float) -> Decomposition:
     return dataclasses.replace(proved, eps_low=low, eps_high=high)
 
 
+def only_declared(what: str, actuator: Any) -> str:
+    """Say that something follows from a split which a record declares, and nothing proves."""
+    return (
+        f"{what} would follow from the split (2) that {type(actuator).__name__} declares; samples "
+        "do not refute it, and nothing proves it: for an actuator without memory give "
+        "k=(k_1, k_2), which is proved"
+    )
+
+
 def _refute(actuator: Any, split: Decomposition, u_max: float) -> None:
     """Look for an input and a time at which a memoryless actuator breaks what it declares."""
     if len(actuator.states):

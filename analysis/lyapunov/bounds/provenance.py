@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from nlctl.host.notebook import table_html
 from nlctl.names import unknown
 
 from ...intervals.arithmetic import as_ball
@@ -20,7 +22,14 @@ from .sector import Sector
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Constant", "Constants", "Provenance", "bound", "per_second"]
+__all__ = [
+    "Constant",
+    "Constants",
+    "Provenance",
+    "Shown",
+    "bound",
+    "per_second",
+]
 
 Provenance = Literal["proved", "computed", "sampled", "given", "undecided"]
 
@@ -155,4 +164,55 @@ def bound(alpha_0: float, alpha_1: float, V_0: float, Q: float) -> float:
 
 def per_second(power: int) -> str:
     """The unit 1/s^power; x1, u and v count as pure numbers."""
-    return "1/s" if power == 1 else f"1/s^{power}"
+    return "1" if power == 0 else "1/s" if power == 1 else f"1/s^{power}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """What every certificate has and shows: what is proved in a sentence, and its constants.
+
+    Attributes
+    ----------
+    holds : bool
+        Whether the bounds hold for all t >= 0, proved.
+    reason : str
+        Why they hold, or why not.
+    params : mapping
+        Parameters of the proof that are not those of the loop as it stands.
+    loop_facts : mapping
+        What the loop consists of, see `analysis.loop_record`.
+    """
+
+    holds: bool
+    reason: str
+    params: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    loop_facts: Mapping[str, Mapping[str, str]] = field(default_factory=dict, repr=False)
+
+    @property
+    def bound(self) -> str:
+        """The bound in words, of a certificate that holds."""
+        raise NotImplementedError
+
+    @property
+    def constants(self) -> tuple[Constant, ...]:
+        """Every constant of the proof; without the bounds if nothing is proved."""
+        raise NotImplementedError
+
+    @property
+    def verdict(self) -> str:
+        """What is proved, in a sentence."""
+        return f"{self.bound if self.holds else 'no bound is proved'}: {self.reason}"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        columns = ("symbol", "value", "unit", "status", "how", "for")
+        rows = [(c.symbol, c.value, c.unit, c.provenance, c.how, c.over) for c in self.constants]
+        return table_html(self.verdict, columns, rows)
+
+    def __str__(self) -> str:
+        width = max(len(c.symbol) for c in self.constants)
+        rows = [
+            f"  {c.symbol:{width}} {c.value:<11.6g} {c.provenance:9} {c.how}; {c.over}"
+            for c in self.constants
+        ]
+        return "\n".join([self.verdict, *rows])

@@ -1,143 +1,31 @@
-r"""A bound that holds for all time: the loop with `nlctl.KnownSignLaw`, proved by intervals.
-
-With W = 0 in (19), which is as good as any other fixed W, and as long as x stays in a box on which
-delta* >= |g + d + G eps_u| and k G >= 1/N_0 hold,
-
-.. math:: V' \le -\alpha_1 V + 0.2785 (\tau \delta^* + b) + \sigma_2 \delta^{*2} / 2, \quad
-   \alpha_1 = \min\{2\beta, \sigma_1 \Gamma, \sigma_2 \gamma\},
-
-hence |r| <= C_0 = sqrt(2 max{V(0), alpha_0/alpha_1}), alpha_0 being all that stands behind
--alpha_1 V.  A bound C of |r| gives the box, the box gives delta*, and delta* gives C_0(C), which
-grows with C.  If C_0(C) < C, then |r| never reaches C: up to the first time that it did, x stayed
-in the box, and so |r| <= C_0(C).  No Nussbaum function and no Lemma 1 take part.
-"""
+"""Bounds that hold for all time: which proof a loop is one for."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+import control as ct
 import numpy as np
-from flint import arb
 
-from nlctl.errors import ParameterError
+from nlctl.controllers import KnownSignLaw
+from nlctl.diagrams import leaves
+from nlctl.errors import DiagramError, ParameterError
 from nlctl.params import integer
-from nlctl.wording import counted
 
-from ...intervals.arithmetic import Ball
-from ...intervals.branch_and_bound import upper
-from ..bounds.decomposition import Decomposition, check_gain, decompose
-from ..bounds.error_bounds import reference_bounds
-from ..bounds.final_bound import alpha_0, alpha_1, initial_V
-from ..bounds.provenance import Constant, per_second
-from .known_sign import KnownSignLoop, read_loop
-from .plant_bounds import Demand, demand
+from ...loop_record import loop_facts
+from ..bounds.decomposition import check_gain
+from ..loop.roles import declared, record_of
+from ..model_reference.closing import certify_model_reference
+from ..model_reference.model_certificate import ModelReferenceCertificate
+from ..model_reference.model_loop import is_model_reference
+from .known_sign_proof import Certificate, certify_known_sign
+from .sliding_mode import SlidingModeCertificate, certify_sliding_mode, is_sliding_mode
 
-__all__ = ["Certificate", "bound_of_r", "certify"]
+__all__ = ["AnyCertificate", "certify"]
 
-OUTWARD = 1 + arb("1e-14")  # covers what the products of float gains round off
-_LIMIT = 1e4  # a bound of |r| beyond which the iteration counts as without end
-
-
-@dataclass(frozen=True, kw_only=True)
-class Certificate:
-    """What `certify` proved, with every constant.
-
-    Attributes
-    ----------
-    holds : bool
-        True: |r| <= C_0 for all t >= 0, proved.
-    reason : str
-        Why it holds, or why not.
-    C_0 : float
-        Bound of |r| for all time; infinite if nothing is proved.
-    ultimate : float
-        Bound of limsup |r|, sqrt(2 alpha_0 / alpha_1).
-    u_max : float
-        Bound of |u| for all time: proved, and as a rule far above what happens.
-    C, alpha_0, alpha_1, V_0 : float
-        The bound that is not reached, the constants of V' <= -alpha_1 V + alpha_0, and V(0).
-    iterations : tuple of float
-        C, C_0(C), C_0(C_0(C)), ...: the iteration that closed or was given up.
-    demand : Demand
-        The box and its constants at the last step.
-    split : Decomposition
-        Of the actuator.
-    loop : KnownSignLoop
-        The parameters that it is about.
-
-    Examples
-    --------
-    See `certify`.
-    """
-
-    holds: bool
-    reason: str
-    C_0: float
-    ultimate: float
-    u_max: float
-    C: float
-    alpha_0: float
-    alpha_1: float
-    V_0: float
-    iterations: tuple[float, ...]
-    demand: Demand
-    split: Decomposition
-    loop: KnownSignLoop
-
-    @property
-    def constants(self) -> tuple[Constant, ...]:
-        """Every constant of the proof; without the bounds if nothing is proved."""
-        need, split, law = self.demand, self.split, self.loop.law
-        gain, over, n = law.N_0 * split.k_1 * need.G_min, str(need.box), self.loop.parts.order
-        alpha_0 = "0.2785 (tau delta* + b) + sigma_2 delta*^2/2"
-        alpha_1 = "min{2 beta, sigma_1 Gamma, sigma_2 gamma}"
-        unit, error, energy = per_second(n), per_second(n - 1), per_second(2 * n - 2)
-        boxes, k = counted(need.boxes, "box", "boxes"), (split.provenance, split.how, split.over)
-        sure = "given" if split.provenance == "given" else "proved"
-        rows: list[tuple[str, float, str, Any, str, str]] = [
-            ("G_min", need.G_min, unit, "proved", "F/v", f"all v, {over}"),
-            ("G_max", need.G_max, unit, "proved", "F/v", f"all v, {over}"),
-            ("k_1", split.k_1, "1", *k),
-            ("k_2", split.k_2, "1", *k),
-            ("eps_u*", split.eps_star, "1", *k),
-            ("N_0 k_1 G_min", gain, "1", sure, "must be at least 1", over),
-            ("sup |g + d|", need.matched, unit, "proved", boxes, f"all t, {over}"),
-            ("delta*", need.delta_star, unit, sure, "sup |g + d| + G_max eps_u*", over),
-            ("alpha_0", self.alpha_0, per_second(2 * n - 1), sure, alpha_0, over),
-            ("alpha_1", self.alpha_1, "1/s", "computed", alpha_1, "all t"),
-            ("V(0)", self.V_0, energy, sure, "(21) with W = 0", "this initial state"),
-        ]
-        if self.holds:
-            bound, ultimate = "sqrt(2 max{V(0), alpha_0/alpha_1})", "sqrt(2 alpha_0/alpha_1)"
-            rows += [
-                ("C_0", self.C_0, error, "proved", bound, "all t"),
-                ("limsup |r|", self.ultimate, error, "proved", ultimate, "t -> infinity"),
-                ("max |u|", self.u_max, "1", "proved", "from V <= C_0^2/2 and the box", "all t"),
-            ]
-        return tuple(
-            Constant(symbol=s, value=v, unit=per, provenance=p, how=how, over=where)
-            for s, v, per, p, how, where in rows
-        )
-
-    def __str__(self) -> str:
-        verdict = f"|r| <= {self.C_0:.6g} proved for all t" if self.holds else "no bound is proved"
-        rows = [
-            f"  {c.symbol:14} {c.value:<11.6g} {c.provenance:9} {c.how}; {c.over}"
-            for c in self.constants
-        ]
-        return "\n".join([f"{verdict}: {self.reason}", *rows])
-
-
-def bound_of_r(loop: KnownSignLoop, delta_star: float) -> tuple[arb, arb, float, arb]:
-    """Return C_0, alpha_0, alpha_1 and V(0) for W = 0 and a bound delta*."""
-    gains, delta = loop.parts.gains, Ball(arb(delta_star))
-    rate = alpha_1(gains)
-    drive = alpha_0(gains, delta, 0.0).value * OUTWARD
-    V_0 = initial_V(gains, delta, sum(w * w for w in gains.W_hat_0)).value * OUTWARD
-    return (2 * V_0.max(drive / rate * OUTWARD)).sqrt(), drive, rate, V_0
+AnyCertificate = Certificate | ModelReferenceCertificate | SlidingModeCertificate
 
 
 def certify(
@@ -146,20 +34,26 @@ def certify(
     params: Mapping[str, Any] | None = None,
     inputs: Mapping[str, float] | None = None,
     k: tuple[float, float] | None = None,
+    W: Sequence[float] | None = None,
     u_max: float = 250.0,
     tol: float = 1e-3,
     max_iterations: int = 60,
-) -> Certificate:
-    """Prove a bound of the filtered error for all time, or say why it cannot be proved.
+) -> AnyCertificate:
+    """Prove a bound of the tracking error for all time, or say why it cannot be proved.
 
-    The box is closed by a monotone iteration C -> box -> delta* -> C_0 -> C from below, in ball
+    Which proof it is depends on the controller.  With `nlctl.KnownSignLaw`: |r| <= C_0 by (31) with
+    a known sign.  With a reference model, as `nlctl.mrac` makes one: V = E^T P E + lambda |W_hat -
+    W|^2 / Gamma, for weights with sigma- or e-modification or projection, and without any if
+    nothing disturbs.  With `nlctl.SlidingModeLaw`: |r| falls wherever K dominates.  The box is
+    closed by a monotone iteration bound -> box -> disturbance -> bound from below, in ball
     arithmetic; every constant is proved on the box that is used.
 
     Parameters
     ----------
     loop : control.InterconnectedSystem
-        Of the blocks that `nlctl.paper.example_1` connects, with `nlctl.KnownSignLaw` in the place
-        of the Nussbaum law and a `nlctl.SumOfSines` reference.
+        A plant of class (1), an actuator with a split (2), a reference, and one of these
+        controllers; of the blocks that `nlctl.paper.example_1` connects, with `nlctl.KnownSignLaw`
+        in the place of the Nussbaum law and a `nlctl.SumOfSines` reference.
     params : mapping, optional
         Overrides by qualified name, as in a run.
     inputs : mapping, optional
@@ -168,6 +62,9 @@ def certify(
     k : (k_1, k_2), optional
         Bounds that the actuator's k shall have, see `decompose`; a tight choice makes eps_u*
         small.
+    W : sequence of l floats, optional
+        Of model reference adaptive control: the weights that V is about, any choice; by default
+        those by which the regressor spans the plant's equation, as far as it does.
     u_max : float, optional
         Half the range of u for which the actuator's split is proved; the bound of |u| must lie
         in the range.
@@ -178,8 +75,8 @@ def certify(
 
     Returns
     -------
-    Certificate
-        The proved bound with its constants and box, or why there is none.
+    Certificate, ModelReferenceCertificate or SlidingModeCertificate
+        The proved bounds with their constants and box, or why there are none.
 
     Raises
     ------
@@ -189,7 +86,8 @@ def certify(
     DecompositionError
         If the actuator has no split (2).
     ParameterError
-        If `u_max`, `tol` or `max_iterations` is not positive, or a bound of an input is refused.
+        If `u_max`, `tol` or `max_iterations` is not positive, a bound of an input is refused,
+        or `W` is of another size, or of a loop without a reference model.
 
     Examples
     --------
@@ -202,101 +100,53 @@ def certify(
     >>> known = (2 * max(found.V_0, found.alpha_0 / found.alpha_1)) ** 0.5
     >>> print(found.holds, abs(found.C_0 - known) < 1e-9)
     True True
+
+    Model reference adaptive control of x' = 2 x + v + 0.5 sin t with sigma-modification; the closed
+    form of completed squares, with k = 1, P = 1/2, D = 1/2, sigma = 0.2, W = 2, is V <= 0.925:
+
+    >>> import numpy as np
+    >>> plant = nlctl.PureFeedback(
+    ...     order=1, f=lambda x, v: 2.0 * x[0] + v, d=lambda x, t: 0.5 * np.sin(t)
+    ... )
+    >>> weights = nlctl.AdaptiveWeights(nodes=2, Gamma=5.0, sigma_1=0.2)
+    >>> controller = nlctl.mrac(nlctl.ReferenceModel(a=(1.0,), b=0.0), weights=weights)
+    >>> blocks = {"reference": nlctl.SumOfSines(order=0), "actuator": nlctl.Gain()}
+    >>> found = certify(nlctl.interconnect({**blocks, "plant": plant, "controller": controller}))
+    >>> print(found.holds, round(found.V_max, 6))
+    True 0.925
     """
     max_iterations = integer("certify", "max_iterations", max_iterations, at_least=1)
     for name, value in (("u_max", u_max), ("tol", tol)):
         if not 0 < value < np.inf:
             raise ParameterError(f"certify needs a finite {name} > 0, got {value}")
     check_gain("certify", k)
-    read = read_loop(loop, params, inputs)
-    split = _disturbed(decompose(read.parts.actuator, k=k, u_max=u_max, tol=tol), read)
-    C = abs(read.parts.gains.r_0)
-    iterations = [C]
-    for _ in range(max_iterations):
-        need = demand(read, split, C * (1 + tol) + tol * tol, tol=tol)
-        C_0, drive, rate, V_0 = bound_of_r(read, need.delta_star)
-        closed = bool(arb(need.C) > C_0)
-        iterations.append(upper(C_0))
-        reason = _refusal(read, split, need, iterations)
-        if closed or reason:
-            break
-        C = upper(C_0)
-    else:
-        reason = (
-            f"C_0 still grows after {counted(max_iterations, 'iteration')}: {iterations[-1]:.6g}"
-        )
-    u = _bound_of_u(read, need, C_0)
-    reason = reason or _doubt(read, split, u, u_max, iterations[-1])
-    proved = f"the box closes: |r| < {need.C:.6g} implies |r| <= {iterations[-1]:.6g}"
-    return Certificate(
-        holds=not reason,
-        reason=reason or proved,
-        C_0=np.inf if reason else iterations[-1],
-        ultimate=np.inf if reason else upper((2 * drive / rate * OUTWARD).sqrt()),
-        u_max=np.inf if reason else u,
-        C=need.C,
-        alpha_0=upper(drive),
-        alpha_1=rate,
-        V_0=upper(V_0),
-        iterations=tuple(iterations),
-        demand=need,
-        split=split,
-        loop=read,
-    )
+    how: dict[str, Any] = {
+        "params": params, "inputs": inputs, "k": k, "tol": tol, "max_iterations": max_iterations,
+    }  # fmt: skip
+    found = _certified(loop, W, u_max, how)
+    return replace(found, params=dict(params or {}), loop_facts=loop_facts(loop))
 
 
-def _doubt(read: KnownSignLoop, split: Decomposition, u: float, u_max: float, C_0: float) -> str:
-    """Say why a box that closes proves nothing; nothing if it does."""
-    if split.provenance == "given":
-        return (
-            f"|r| <= {C_0:.6g} would follow from the split (2) that "
-            f"{type(read.parts.actuator).__name__} declares; samples do not refute it, and nothing "
-            "proves it: for an actuator without memory give k=(k_1, k_2), which is proved"
-        )
-    if split.provenance == "proved" and u > 2 * u_max:
-        return (
-            f"|u| may reach {u:.4g}, the actuator's split is proved to {2 * u_max:g}: raise u_max"
-        )
-    return ""
+def _certified(loop: Any, W: Any, u_max: float, how: Mapping[str, Any]) -> AnyCertificate:
+    """Return what the proof finds that is one for the loop's controller."""
+    if is_model_reference(loop):
+        return certify_model_reference(loop, W=W, u_max=u_max, **how)
+    if W is not None:
+        raise ParameterError("certify takes W for loops with a reference model only")
+    if is_sliding_mode(loop):
+        return certify_sliding_mode(loop, **how)
+    _refuse_others(loop)
+    return certify_known_sign(loop, u_max=u_max, **how)
 
 
-def _disturbed(split: Decomposition, loop: KnownSignLoop) -> Decomposition:
-    """Return the split of v = k u + (eps_u + w) with the external inputs w."""
-    if not loop.disturbance:
-        return split
-    w = Ball(arb(loop.disturbance))
-    return dataclasses.replace(
-        split,
-        eps_low=-upper(w - split.eps_low),
-        eps_high=upper(w + split.eps_high),
-        how=f"{split.how}; external inputs add {loop.disturbance:g} at most",
-    )
-
-
-def _refusal(
-    loop: KnownSignLoop, split: Decomposition, need: Demand, iterations: list[float]
-) -> str:
-    """Say why the iteration must end without a bound; nothing if it need not."""
-    if not np.isfinite(iterations[-1]) or not iterations[-1] < _LIMIT:
-        shown = ", ".join(f"{C:.4g}" for C in iterations)
-        return f"the box does not close: C -> C_0(C) gives {shown} and so on without end"
-    if not arb(loop.law.N_0) * split.k_1 * need.G_min >= 1:
-        least = split.k_1 * need.G_min
-        return (
-            f"N_0 = {loop.law.N_0:g} is below 1/(k_1 G_min) = {1 / least:.6g}"
-            if least > 0
-            else f"k G may be {least:.4g} on {need.box}: Assumption 3 fails there"
-        )
-    return ""
-
-
-def _bound_of_u(loop: KnownSignLoop, need: Demand, C_0: arb) -> float:
-    """Bound |u| <= N_0 (beta |r| + |W_hat^T psi| + |delta_hat| + |Y_d|) from V <= C_0^2 / 2."""
-    A = [abs(arb(a)) for a in reversed(loop.lambdas)]
-    wanted = reference_bounds(loop.reference)
-    Y_d = arb(wanted[len(A) + 1]) + sum(
-        (a * e for a, e in zip(A, need.errors[1:], strict=True)), arb(0)
-    )
-    s: arb = Y_d + arb(need.delta_star) + C_0 * arb(loop.parts.gains.gamma).sqrt()
-    s = s + C_0 * (arb(loop.parts.gains.Gamma) * loop.nodes).sqrt()
-    return upper(loop.law.N_0 * (loop.law.beta * C_0 + s))
+def _refuse_others(loop: Any) -> None:
+    """Refuse a loop whose law is none that there is a proof for."""
+    for place in leaves(loop) if isinstance(loop, ct.InterconnectedSystem) else ():
+        spec = record_of(place)
+        known = spec is None or isinstance(spec, KnownSignLaw)
+        if "u" in declared(place, "outputs") and not known:
+            raise DiagramError(
+                "certify has proofs for a KnownSignLaw or a SlidingModeLaw, and for a "
+                "ModelReferenceLaw or DirectLaw with a ReferenceModel, got "
+                f"{type(spec).__name__} in the place of '{place.path}' and no ReferenceModel"
+            )

@@ -16,8 +16,8 @@ from nlctl.response import input_output_response
 
 from ...metrics import peak
 from ..bounds.decomposition import decompose
-from .certify import Certificate, bound_of_r, certify
 from .known_sign import KnownSignLoop, read_loop
+from .known_sign_proof import Certificate, bound_of_r, certify_known_sign
 from .plant_bounds import Demand, demand
 
 __all__ = ["GainCandidate", "GainDesign", "design"]
@@ -244,7 +244,7 @@ def _proved(
     """Prove the best trial that keeps the limit; if that fails, the next one."""
     allowed = [t for t in trials if np.isfinite(t.C_0) and t.u <= u_limit]
     for trial in sorted(allowed, key=lambda t: t.C_0)[:5]:
-        certificate = certify(loop, params=trial.gains, **how)
+        certificate = certify_known_sign(loop, params=trial.gains, **how)
         if certificate.holds:
             return GainDesign(
                 gains=trial.gains,

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from nlctl.blocks import block
 from nlctl.controllers import (
     AdaptiveWeights,
     FilteredError,
@@ -18,19 +17,14 @@ from nlctl.controllers import (
     RobustTerm,
     Zero,
 )
-from nlctl.diagrams import Place, initial_state, interconnect
-from nlctl.errors import DiagramError, ParameterError
-from nlctl.names import unknown
-from nlctl.params import as_numbers, equation_arguments
+from nlctl.params import equation_arguments
 from nlctl.references import SumOfSines
-from nlctl.upstream.control_internals import set_parameters
 
-from ...intervals.branch_and_bound import upper
-from ..loop.plant_form import Acceleration, acceleration, check_chain
-from ..loop.roles import Parts, Roles, joined_again, read_parts, record_of
-from ..loop.same_loop import check_same, points_around
+from ..loop.checked import read_checked
+from ..loop.plant_form import Acceleration, acceleration
+from ..loop.roles import PIECES, Parts, Roles, read_parts
 
-__all__ = ["KnownSignLoop", "read_loop"]
+__all__ = ["KnownSignLoop", "initial_errors", "read_loop"]
 
 PROVED_FOR = {
     "reference": (SumOfSines,),
@@ -99,68 +93,23 @@ def read_loop(
     Raises
     ------
     DiagramError
-        If a block is missing, or is none of those that the proof is about; if the wiring, or a
-        block's function, is another one; if the plant is not a chain of integrators; if an
-        external input has no bound.
+        As `read_parts` and `read_checked` do.
     """
     parts = read_parts(loop, params=params, inputs=True)
-    bound = _bound_of_inputs(parts.roles, inputs or {}, loop)
-    for part, kinds in PROVED_FOR.items():
-        if part in parts.roles.places:
-            _check_kind(parts.roles.places[part], kinds)
-    plant = parts.roles.places["plant"]
-    check_chain(plant)
-    reference: Any = parts.roles.spec("reference")
-    yd = reference.output(0.0, (), (), equation_arguments(reference))
-    x0 = initial_state(loop)
-    # the radius covers what double precision has lost in yd(0)
-    own = x0[plant.state_offset :][: parts.order]
-    e0 = tuple(arb(float(x)) - arb(float(y), 1e-12) for x, y in zip(own, yd, strict=False))
-    read = KnownSignLoop(
+    checked = read_checked(loop, PIECES, PROVED_FOR, params, inputs)
+    return KnownSignLoop(
         parts=parts,
-        reference=reference,
-        e0=e0,
-        acceleration=acceleration(plant),
-        disturbance=bound,
+        reference=parts.roles.spec("reference"),
+        e0=initial_errors(parts.roles, checked.x0),
+        acceleration=acceleration(checked.roles.places["plant"]),
+        disturbance=checked.disturbance,
     )
-    again = joined_again(loop, parts.roles, lambda part, spec, name: block(spec, name))
-    check_same(loop, interconnect(again, name=str(loop.name)), points_around(x0), params)
-    set_parameters(loop, dict(params or {}))
-    return read
 
 
-def _check_kind(place: Place, kinds: tuple[type, ...]) -> None:
-    """Check that a block is of a kind that the proof knows, and runs the equations of that kind."""
-    spec = record_of(place)
-    if type(spec) not in kinds:
-        wanted = " or ".join(kind.__name__ for kind in kinds)
-        raise DiagramError(
-            f"the certificate is about a {wanted} in the place of '{place.path}', "
-            f"got {type(spec).__name__}: put one there"
-        )
-    for name, used in (("update", place.system.updfcn), ("output", place.system.outfcn)):
-        known = vars(type(spec)).get(name)
-        if isinstance(known, staticmethod) and used is not known.__func__:
-            raise DiagramError(
-                f"block '{place.path}' has another {name} function than {type(spec).__name__}: "
-                "the certificate is about the latter"
-            )
-
-
-def _bound_of_inputs(roles: Roles, inputs: Mapping[str, float], loop: Any) -> float:
-    """Return the bound of what external inputs add to v."""
-    for name, value in inputs.items():
-        if name not in roles.disturbances:
-            raise unknown("external input", name, loop.input_labels, "that is added to v")
-        number = as_numbers(value)
-        if number is None or number.ndim or not 0 <= number < np.inf:
-            raise ParameterError(f"certify needs a finite bound >= 0 of '{name}', got {value!r}")
-    for name in roles.disturbances:
-        if name not in inputs:
-            raise DiagramError(
-                f"external input '{name}' is added to the plant's v, and may be anything: declare "
-                f"its bound, certify(loop, inputs={{'{name}': 0.1}}), or take it away"
-            )
-    return upper(
-        sum((arb(abs(gain)) * inputs[name] for name, gain in roles.disturbances.items()), arb(0))
-    )
+def initial_errors(roles: Roles, x0: np.ndarray) -> tuple[arb, ...]:
+    """Return e_1(0), ..., e_n(0) of a plant and a reference without states."""
+    plant, reference = roles.places["plant"], roles.spec("reference")
+    yd = reference.output(0.0, (), (), equation_arguments(reference))
+    own = x0[plant.state_offset :][: plant.system.nstates]
+    # the radius covers what double precision has lost in yd(0)
+    return tuple(arb(float(x)) - arb(float(y), 1e-12) for x, y in zip(own, yd, strict=False))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from flint import arb
 
 from nlctl.plants import coordinate_names
+from nlctl.references import SumOfSines
 
 from ...intervals.arithmetic import as_ball
 from ...intervals.box import Box
@@ -17,9 +18,33 @@ from ..bounds.decomposition import Decomposition
 from ..bounds.error_bounds import error_bounds, reference_bounds
 from ..bounds.final_bound import total_error
 from ..bounds.sector import quotient_range
-from .known_sign import KnownSignLoop
+from ..loop.plant_form import Acceleration
 
-__all__ = ["Demand", "demand"]
+__all__ = ["Demand", "FilteredLoop", "demand", "feedforward"]
+
+
+class FilteredLoop(Protocol):
+    """A loop whose controller sees the plant through the filtered error r of (14)."""
+
+    @property
+    def lambdas(self) -> tuple[float, ...]:
+        """lambda_1, ..., lambda_{n-1} of the filtered error."""
+        ...
+
+    @property
+    def reference(self) -> SumOfSines:
+        """What the plant shall follow."""
+        ...
+
+    @property
+    def e0(self) -> tuple[arb, ...]:
+        """Initial errors e_1(0), ..., e_n(0)."""
+        ...
+
+    @property
+    def acceleration(self) -> Acceleration:
+        """x_n' as ``acceleration(t, x, v)``."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,12 +79,12 @@ class Demand:
     boxes: int
 
 
-def demand(loop: KnownSignLoop, split: Decomposition, C: float, *, tol: float = 1e-3) -> Demand:
+def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1e-3) -> Demand:
     """Bound what the plant asks of the controller while |r| <= C.
 
     Parameters
     ----------
-    loop : KnownSignLoop
+    loop : FilteredLoop
     split : Decomposition
         Of the loop's actuator.
     C : float
@@ -107,3 +132,11 @@ def demand(loop: KnownSignLoop, split: Decomposition, C: float, *, tol: float = 
         delta_star=upper(total_error(as_ball(gain.G_max), split.eps_star, fine.magnitude, 0.0)),
         boxes=fine.boxes + gain.boxes,
     )
+
+
+def feedforward(loop: FilteredLoop, need: Demand) -> arb:
+    """Bound |Y_d| of (18) by the errors and the n-th derivative of the reference."""
+    A = [abs(arb(a)) for a in reversed(loop.lambdas)]
+    wanted = reference_bounds(loop.reference)
+    own = (a * e for a, e in zip(A, need.errors[1:], strict=True))
+    return arb(wanted[len(A) + 1]) + sum(own, arb(0))

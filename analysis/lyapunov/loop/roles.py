@@ -7,6 +7,7 @@ these are called in the diagram; every wire is read from python-control's own ma
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,13 +22,15 @@ from nlctl.errors import CompileError, DiagramError
 from nlctl.native.diagram.wiring import Combination, Signal, Wiring
 from nlctl.native.thirdparty.checks import check_functions, check_sizes
 from nlctl.plants import coordinate_names
+from nlctl.upstream.control_internals import Around
 
 from ..bounds.final_bound import Gains
 
-__all__ = ["Parts", "Roles", "joined_again", "read_parts", "read_roles"]
+__all__ = ["PIECES", "Parts", "Roles", "check_kind", "joined_again", "read_parts", "read_roles"]
 
+Pieces = Mapping[str, tuple[str, tuple[str, ...]]]
 # A block is known by a signal that it outputs, and by what the proof reads of its record.
-PIECES = {
+PIECES: Pieces = {
     "reference": ("yd", ()),
     "plant": ("y", ("f", "d")),
     "actuator": ("v", ()),
@@ -83,13 +86,15 @@ def declared(place: Place, kind: str) -> list[str]:
     return list(labels if spec is None else getattr(spec, kind))
 
 
-def read_roles(loop: Any) -> Roles:
+def read_roles(loop: Any, pieces: Pieces = PIECES) -> Roles:
     """Find the blocks of a closed loop and check every wire between them.
 
     Parameters
     ----------
     loop : control.InterconnectedSystem
         In continuous time, nested to any depth, its signals called whatever they are.
+    pieces : mapping, optional
+        By what a block of each part is known, those of the paper's controller by default.
 
     Returns
     -------
@@ -103,11 +108,12 @@ def read_roles(loop: Any) -> Roles:
         with gain 1; if an output of the diagram has the name of a signal and is another one; if a
         block's function does not depend on its arguments alone.
     """
-    if not isinstance(loop, ct.InterconnectedSystem) or "r" not in loop.output_labels:
+    diagram = isinstance(loop, ct.InterconnectedSystem)
+    if not diagram or (pieces is PIECES and "r" not in loop.output_labels):
         raise DiagramError("the proof needs a closed loop, a diagram with the output r")
     wiring = Wiring(loop)
     _check_blocks(loop, wiring)
-    places = _found(wiring)
+    places = _found(wiring, pieces)
     named = {
         name: Signal(i, k)
         for i, place in enumerate(wiring.blocks)
@@ -126,6 +132,11 @@ def _check_blocks(loop: Any, wiring: Wiring) -> None:
             raise DiagramError(
                 f"the proof is about continuous time, and '{place.path or loop.name}' is sampled "
                 f"with dt = {place.system.dt}: leave dt out"
+            )
+        if isinstance(place.system, Around):
+            raise DiagramError(
+                f"the proof is about continuous time, and '{place.path}' is sampled: put the block "
+                "itself there, without nlctl.sampled"
             )
     for place in wiring.blocks:
         try:
@@ -149,26 +160,39 @@ def _check_functions_are_own(place: Place) -> None:
                 f"{type(system.spec).__name__}, which the proof reads: make the block of a record "
                 "with that function"
             )
+    _check_functions_of_kind(place)
 
 
-def _found(wiring: Wiring) -> dict[str, Place]:
+def _check_functions_of_kind(place: Place) -> None:
+    """What is known of a kind of record is known of the functions that its class has."""
+    spec = place.system.spec
+    for name in ("update", "output", "band"):
+        known = inspect.getattr_static(type(spec), name, None)  # inherited ones, too
+        if isinstance(known, staticmethod) and getattr(spec, name) is not known.__func__:
+            raise DiagramError(
+                f"block '{place.path}' has another {name} function than {type(spec).__name__}: "
+                "the proof is about the latter, make a record of a class of its own"
+            )
+
+
+def _found(wiring: Wiring, pieces: Pieces) -> dict[str, Place]:
     """Return the block of every part."""
     found: dict[str, Place] = {}
     for place in wiring.blocks:
         outputs = declared(place, "outputs")
-        part = next((p for p, (signal, _) in PIECES.items() if signal in outputs), None)
+        part = next((p for p, (signal, _) in pieces.items() if signal in outputs), None)
         if part is None:
             raise DiagramError(
                 f"the proof does not know what block '{place.path}' ({', '.join(outputs)}) is for: "
-                "it is about a plant, an actuator, a reference and the paper's controller only"
+                f"it knows {', '.join(pieces)} only"
             )
         if part in found:
             raise DiagramError(
-                f"two blocks output '{PIECES[part][0]}', '{found[part].path}' and '{place.path}': "
+                f"two blocks output '{pieces[part][0]}', '{found[part].path}' and '{place.path}': "
                 f"the proof is about one {part}"
             )
         found[part] = place
-    for part, (signal, needed) in PIECES.items():
+    for part, (signal, needed) in pieces.items():
         if part in found:
             _check_record(found[part], part, needed)
         elif part != "basis" or isinstance(_weights(found), AdaptiveWeights):
@@ -306,6 +330,22 @@ def joined_again(
                 yield system.copy(name=system.name)
 
     return list(copied(loop, ""))
+
+
+def check_kind(place: Place, kinds: tuple[type, ...]) -> None:
+    """Check that a block is of a kind that the proof knows.
+
+    Raises
+    ------
+    DiagramError
+    """
+    spec = record_of(place)
+    if type(spec) not in kinds:
+        wanted = " or ".join(kind.__name__ for kind in kinds)
+        raise DiagramError(
+            f"the certificate is about a {wanted} in the place of '{place.path}', "
+            f"got {type(spec).__name__}: put one there"
+        )
 
 
 DAMPED = (KnownSignLaw, MonotoneNussbaumLaw)  # laws with eta = beta r + s tanh(r s / b)

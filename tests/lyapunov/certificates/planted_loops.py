@@ -151,6 +151,13 @@ def again(kind, **changed):
     return type(f"Own{kind.__name__}", (kind,), functions)(**rest)
 
 
+def exchanged(record, **functions):
+    """A record whose functions were replaced after it was made."""
+    for name, function in functions.items():
+        object.__setattr__(record, name, nlctl.equation(function))
+    return record
+
+
 def patched(part, **functions):
     """A block whose functions were replaced after it was made."""
     block = system(PARTS[part](), part)

@@ -12,6 +12,7 @@ from planted_loops import (
     UPDATE,
     actuator,
     again,
+    exchanged,
     nested,
     patched,
     plant,
@@ -181,12 +182,6 @@ def without_leak(t, x, u, p):
     return (p.gamma * u[0] * np.tanh(u[0] / p.tau),)
 
 
-def exchanged(record, **functions):
-    for name, function in functions.items():
-        object.__setattr__(record, name, equation(function))
-    return record
-
-
 EQUATIONS = {
     "x1' = x2 + 0.1": (
         lambda: {"plant": plant(lambda t, x, u, p: (x[1] + 0.1, UPDATE(t, x, u, p)[1]))},
@@ -259,9 +254,27 @@ EQUATIONS = {
         lambda: {"law": exchanged(nlctl.KnownSignLaw(), output=lambda t, x, u, p: (-u[0],))},
         "'law' has another output function than KnownSignLaw",
     ),
+    "the dead zone's output replaced in the record": (
+        lambda: {
+            "actuator": exchanged(nlctl.DeadZone(), output=lambda t, x, u, p: (0.1 * u[0],))
+        },
+        "'actuator' has another output function than DeadZone",
+    ),
     "a sampled loop": (
         lambda: {k: nlctl.block(sampled(make()), k, dt=0.1) for k, make in PARTS.items()},
         r"continuous time, and 'planted' is sampled with dt = 0.1",
+    ),
+    "a law that is sampled": (
+        lambda: {"law": nlctl.sampled(nlctl.block(nlctl.KnownSignLaw(), "law"), 0.1)},
+        "continuous time, and 'law' is sampled",
+    ),
+    "the weights' inherited output replaced in the record": (
+        lambda: {
+            "weights": exchanged(
+                nlctl.AdaptiveWeights(nodes=3), output=lambda t, x, u, p: (0 * x[0], x[0])
+            )
+        },
+        "'weights' has another output function than AdaptiveWeights",
     ),
     "a plant that cannot be read on intervals": (
         lambda: {

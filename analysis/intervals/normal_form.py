@@ -1,0 +1,281 @@
+"""Equations as sums of products, in which what is equal cancels exactly.
+
+Balls enclose f(x) - f(x) by twice the width of f.  A plant that a regressor spans leaves nothing
+of its equation when the right multiple of the regressor is taken away; that is seen only if both
+are brought into one form first: sums of products of atoms, with rational coefficients.  An atom is
+a symbol, or a function of a sum such as sin(2 x1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from flint import arb, fmpq
+
+from nlctl.expressions.functions import FUNCTIONS
+
+from .arithmetic import Ball, NumPyFunctions, as_ball
+from .paths import Undecided
+
+__all__ = ["Atom", "Sum", "exact", "indeterminate"]
+
+LARGEST_POWER = 12  # powers up to which a sum is multiplied out
+EVERYWHERE = ("sin", "cos", "tanh", "exp", "arctan", "arcsinh", "absolute", "minimum", "maximum")
+
+
+@dataclass(frozen=True)
+class Atom:
+    """A symbol, or a function of sums that is not divided any further.
+
+    Attributes
+    ----------
+    name : str
+        Of the symbol, or of the function.
+    arguments : tuple of frozenset
+        Monomials of the sums that it is a function of; empty for a symbol.
+    """
+
+    name: str
+    arguments: tuple[Monomials, ...] = ()
+
+    @property
+    def names(self) -> set[str]:
+        """Names of the symbols that it depends on."""
+        inner = (atom for terms in self.arguments for atom in _atoms(terms))
+        return {self.name} if not self.arguments else {n for atom in inner for n in atom.names}
+
+    def on(self, values: Mapping[str, Any]) -> Any:
+        """Return the value where symbols have these values."""
+        if not self.arguments:
+            return values[self.name]
+        given = [_value(terms, values) for terms in self.arguments]
+        if self.name == "inverse":
+            return 1 / given[0]
+        if self.name == "absolute":
+            return abs(given[0])
+        if self.name in ("minimum", "maximum"):
+            return getattr(given[0], self.name)(given[1])
+        return given[0].apply(self.name)
+
+
+Product = frozenset[tuple[Atom, int]]
+Monomials = frozenset[tuple[Product, Fraction]]
+_ONE: Product = frozenset()
+
+
+def _atoms(terms: Monomials) -> Iterator[Atom]:
+    return (atom for product, _ in terms for atom, _ in product)
+
+
+def _value(terms: Monomials, values: Mapping[str, Any]) -> Any:
+    total: Any = Ball(arb(0))
+    for product, coefficient in terms:
+        term: Any = Ball(arb(fmpq(coefficient.numerator, coefficient.denominator)))
+        for atom, n in product:
+            term = term * atom.on(values) ** n
+        total = total + term
+    return total
+
+
+class Sum(NumPyFunctions):
+    """A sum of products of atoms, as equations compute with it.
+
+    Attributes
+    ----------
+    terms : dict
+        Rational coefficient of every product, a set of pairs (atom, power); none is 0.
+    partial : frozenset of Atom
+        Atoms without a value somewhere, or with a jump, which took part even if they have
+        cancelled: the sum is what the equation is only where they have a value.
+
+    Examples
+    --------
+    A difference that is 0 whatever x is:
+
+    >>> import numpy as np
+    >>> from analysis.intervals.normal_form import indeterminate
+    >>> x = indeterminate("x")
+    >>> difference = np.sin(2 * x) * (x + 1) - np.sin(x + x) - x * np.sin(2 * x)
+    >>> len(difference.terms)
+    0
+    """
+
+    __slots__ = ("partial", "terms")
+
+    def __init__(
+        self, terms: Mapping[Product, Fraction], partial: frozenset[Atom] = frozenset()
+    ) -> None:
+        self.terms = {product: c for product, c in terms.items() if c}
+        self.partial = partial
+
+    def __repr__(self) -> str:
+        return f"Sum({self.terms})"
+
+    @property
+    def names(self) -> set[str]:
+        """Names of the symbols that it depends on."""
+        inner = {name for atom in _atoms(self.key()) for name in atom.names}
+        return inner.union(*(atom.names for atom in self.partial))
+
+    def key(self) -> Monomials:
+        """Its terms, to be compared: of sums themselves no comparison has an answer."""
+        return frozenset(self.terms.items())
+
+    def _refused(self, *_: Any) -> bool:
+        raise Undecided("a comparison of symbols has no answer for all values")
+
+    __lt__ = __le__ = __gt__ = __ge__ = __bool__ = _refused  # type: ignore[assignment]
+    __eq__ = __ne__ = _refused  # type: ignore[assignment]
+    __hash__ = None  # type: ignore[assignment]
+
+    def coefficient(self, product: Product) -> Fraction:
+        """Return the coefficient of a product; 0 where it does not occur."""
+        return self.terms.get(product, Fraction(0))
+
+    def on(self, values: Mapping[str, Any]) -> Any:
+        """Return the value where symbols have these values, balls by name.
+
+        Raises
+        ------
+        Undecided
+            If an atom may jump or has no value there.
+        """
+        for atom in self.partial:
+            if not as_ball(atom.on(values)).value.is_finite():
+                raise Undecided(f"{atom.name} has no value somewhere")
+        return _value(self.key(), values)
+
+    def __neg__(self) -> Sum:
+        return Sum({product: -c for product, c in self.terms.items()}, self.partial)
+
+    def __pos__(self) -> Sum:
+        return self
+
+    def __add__(self, other: Any) -> Any:
+        other = as_sum(other)
+        if other is NotImplemented:
+            return other
+        terms = dict(self.terms)
+        for product, c in other.terms.items():
+            terms[product] = terms.get(product, Fraction(0)) + c
+        return Sum(terms, self.partial | other.partial)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        other = as_sum(other)
+        return other if other is NotImplemented else self + -other
+
+    def __rsub__(self, other: Any) -> Any:
+        return -self + other
+
+    def __mul__(self, other: Any) -> Any:
+        other = as_sum(other)
+        if other is NotImplemented:
+            return other
+        terms: dict[Product, Fraction] = {}
+        for one, c in self.terms.items():
+            for two, d in other.terms.items():
+                product = _times(one, two)
+                terms[product] = terms.get(product, Fraction(0)) + c * d
+        return Sum(terms, self.partial | other.partial)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        other = as_sum(other)
+        if other is NotImplemented:
+            return other
+        constant = other.coefficient(_ONE)
+        if other.key() == {(_ONE, constant)} and not other.partial:
+            return self * (1 / constant)
+        return self * other._function("inverse")
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return as_sum(other) / self
+
+    def __pow__(self, n: Any) -> Sum:
+        if n != int(n):
+            return (self.apply("log") * n).apply("exp")
+        if n < 0:
+            return 1 / self ** (-n)
+        if n > LARGEST_POWER:
+            raise Undecided(f"a power of {n}")
+        result = as_sum(1)
+        for _ in range(int(n)):
+            result = result * self
+        return result
+
+    def __abs__(self) -> Sum:
+        return self._function("absolute")
+
+    def minimum(self, other: Any) -> Sum:
+        """Smaller one, an atom."""
+        return self._function("minimum", as_sum(other))
+
+    def maximum(self, other: Any) -> Sum:
+        """Larger one, an atom."""
+        return self._function("maximum", as_sum(other))
+
+    def apply(self, name: str) -> Sum:
+        """Return a function of the table that has an enclosure, as an atom."""
+        assert FUNCTIONS[name].enclosure is not None
+        return self._function(name)
+
+    def _function(self, name: str, *others: Sum) -> Sum:
+        atom = Atom(name, tuple(argument.key() for argument in (self, *others)))
+        own = frozenset([] if name in EVERYWHERE else [atom])
+        partial = own.union(self.partial, *(argument.partial for argument in others))
+        return Sum({frozenset([(atom, 1)]): Fraction(1)}, partial)
+
+
+def _times(one: Product, two: Product) -> Product:
+    powers = dict(one)
+    for atom, n in two:
+        powers[atom] = powers.get(atom, 0) + n
+    return frozenset(powers.items())
+
+
+def exact(number: Any) -> Fraction:
+    """Return a number as the fraction that it is.
+
+    Raises
+    ------
+    ValueError, OverflowError
+        If it is not finite.
+
+    Examples
+    --------
+    >>> from analysis.intervals.normal_form import exact
+    >>> print(exact(0.5))
+    1/2
+    """
+    return number if isinstance(number, Fraction) else Fraction(float(number))
+
+
+def as_sum(x: Any) -> Any:
+    """Return a number as a sum; NotImplemented for what is not a number."""
+    if isinstance(x, Sum):
+        return x
+    if isinstance(x, Fraction):
+        return Sum({_ONE: x})
+    ball = as_ball(x)
+    if ball is NotImplemented or isinstance(x, Ball | arb):
+        return NotImplemented
+    return Sum({_ONE: exact(x)})
+
+
+def indeterminate(name: str) -> Sum:
+    """Return a symbol as a sum, which equations take in the place of a number.
+
+    Examples
+    --------
+    >>> from analysis.intervals.normal_form import indeterminate
+    >>> x = indeterminate("x")
+    >>> sorted((x * x - x + 1).terms.values())
+    [Fraction(-1, 1), Fraction(1, 1), Fraction(1, 1)]
+    """
+    return Sum({frozenset([(Atom(name), 1)]): Fraction(1)})

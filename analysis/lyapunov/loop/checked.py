@@ -1,0 +1,91 @@
+"""A loop that was read by its wiring, and compared with the same blocks connected by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl.blocks import block
+from nlctl.diagrams import initial_state, interconnect, override
+from nlctl.upstream.control_internals import set_parameters
+
+from .external_inputs import bound_of_inputs
+from .plant_form import check_chain
+from .roles import Pieces, Roles, check_kind, joined_again, read_roles
+from .same_loop import check_same, points_around
+
+__all__ = ["CheckedLoop", "read_checked"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckedLoop:
+    """What a loop is made of, after every check that does not depend on the proof.
+
+    Attributes
+    ----------
+    roles : Roles
+        Places of the blocks, with the parameters of the run.
+    disturbance : float
+        Bound of what external inputs add to the plant's v.
+    x0 : ndarray of shape (n,)
+        Initial state of the loop.
+    understood : control.InterconnectedSystem
+        The loop, connected again by name, with all its signals as outputs.
+    """
+
+    roles: Roles
+    disturbance: float
+    x0: np.ndarray
+    understood: ct.InterconnectedSystem = field(repr=False)
+
+    def start(self, part: str) -> np.ndarray:
+        """Return the initial state of a part."""
+        place = self.roles.places[part]
+        return self.x0[place.state_offset :][: place.system.nstates or 0]
+
+
+def read_checked(
+    loop: Any,
+    pieces: Pieces,
+    kinds: Mapping[str, tuple[type, ...]],
+    params: Mapping[str, Any] | None,
+    inputs: Mapping[str, float] | None,
+) -> CheckedLoop:
+    """Read a loop by its wiring; its blocks have the parameters of the run from then on.
+
+    Parameters
+    ----------
+    loop : control.InterconnectedSystem
+    pieces : mapping
+        By what a block of each part is known, as for `read_roles`.
+    kinds : mapping
+        Types of records that the proof is about, by part.
+    params : mapping or None
+        Overrides by qualified name, as in a run.
+    inputs : mapping or None
+        Bound of |w| for every external input w that is added to the plant's v, by name.
+
+    Raises
+    ------
+    DiagramError
+        If a block is missing, or is none of those that the proof is about; if the wiring, or a
+        block's function, is another one; if the plant is not a chain of integrators; if an
+        external input has no bound.
+    """
+    roles = read_roles(loop, pieces)
+    disturbance = bound_of_inputs(roles, inputs or {}, loop)
+    override(loop, dict(params or {}))
+    for part, wanted in kinds.items():
+        if part in roles.places:  # a network may be left out
+            check_kind(roles.places[part], wanted)
+    check_chain(roles.places["plant"])
+    x0 = initial_state(loop)
+    again = joined_again(loop, roles, lambda part, spec, name: block(spec, name))
+    understood = interconnect(again, name=str(loop.name))
+    check_same(loop, understood, points_around(x0), params)
+    set_parameters(loop, dict(params or {}))
+    return CheckedLoop(roles=roles, disturbance=disturbance, x0=x0, understood=understood)

@@ -1,0 +1,1 @@
+"""Bounds that hold for all time: model reference adaptive control."""

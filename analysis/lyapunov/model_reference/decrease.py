@@ -1,0 +1,223 @@
+r"""What V = E^T P E + lambda |W_hat - W|^2 / Gamma does, for each modification of the weights.
+
+With |delta| <= D and the gradient law :math:`\dot{\hat{W}} = \Gamma r \psi` + leakage,
+V' = -E^T Q E + 2 r delta + 2 lambda (W_hat - W)^T leakage / Gamma, where r^2 <= q E^T Q E and
+E^T Q E >= mu E^T P E.  Squares are completed, in ball arithmetic.  With s^2 = E^T Q E all of them
+give V' <= -s^2 + 2 a s + b: as V stays bounded, the mean of s^2 is at most (a + (a^2 + b)^(1/2))^2
+in the end, which does not depend on Gamma.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import arb
+from scipy.optimize import minimize_scalar
+
+from nlctl.controllers import AdaptiveWeights, EModifiedWeights, ProjectedWeights
+
+from ...intervals.branch_and_bound import Box, enclose, upper
+from ...intervals.normal_form import exact
+from .matching import Matching
+from .quadratic_form import ball
+
+__all__ = ["Decrease", "decrease", "largest_weights", "outside_ball"]
+
+_SQUARE = "the integral of E^T Q E is finite"
+_FINE = 1e-6  # relative: of the one-dimensional maximum of e-modification
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decrease:
+    """Bounds of V while |delta| <= D.
+
+    Attributes
+    ----------
+    level : arb
+        Bound of V for all time.
+    error, weights : arb
+        Bounds of limsup E^T P E and of limsup lambda |W_hat - W|^2 / Gamma.
+    mean : arb
+        Bound of the limit superior of the mean of E^T Q E over [0, t].
+    falls : bool
+        Whether limsup V <= `error`, too.
+    alpha_0, alpha_1 : float
+        V' <= -alpha_1 V + alpha_0; NaN where there is no such inequality.
+    how, end : str
+        Where the level comes from, and the bounds in the end.
+    doubt : str
+        Why there is no bound; nothing if there is one.
+    """
+
+    level: arb
+    error: arb
+    weights: arb
+    mean: arb
+    falls: bool = False
+    alpha_0: float = np.nan
+    alpha_1: float = np.nan
+    how: str
+    end: str
+    doubt: str = ""
+
+
+def decrease(match: Matching, D: arb, V_0: arb) -> Decrease:
+    """Bound V for all time and in the end, from its value at the beginning.
+
+    Parameters
+    ----------
+    match : Matching
+    D : arb
+        Bound of |delta|.
+    V_0 : arb
+        V(0).
+    """
+    weights = match.loop.spec("weights")
+    if not D.is_finite():
+        endless = arb("inf")
+        return Decrease(level=endless, error=endless, weights=endless, mean=endless, how="", end="")
+    modified = {
+        AdaptiveWeights: ("sigma_1", _sigma_modification),
+        EModifiedWeights: ("sigma", _e_modification),
+    }
+    if type(weights) is ProjectedWeights:
+        return _projection(match, D, V_0)
+    name, bounds = modified[type(weights)]
+    sigma = exact(getattr(weights, name))
+    if not sigma:
+        return _gradient(match.loop.roles.paths["weights"], D, V_0)
+    return bounds(match, ball(sigma * match.lam), D, V_0)
+
+
+def _gradient(path: str, D: arb, V_0: arb) -> Decrease:
+    """V' <= -E^T Q E without a disturbance; with one the weights may drift without end."""
+    doubt = (
+        f"parameter drift: the weights '{path}' have no modification, and |delta| may be "
+        f"{float(D.upper()):.4g}, so that nothing bounds them; give them sigma-modification "
+        "(AdaptiveWeights with sigma_1 > 0), e-modification or projection"
+    )
+    return Decrease(
+        level=V_0,
+        error=arb(0),
+        weights=V_0,
+        mean=arb(0),
+        how="V(0): V' <= -E^T Q E",
+        end=_SQUARE,
+        doubt="" if D.is_zero() else doubt,
+    )
+
+
+def _sigma_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrease:
+    """V' <= -a V + q D^2/(1 - a/mu) + sigma |W|^2/(2 - a/(Gamma sigma)) for every small rate a."""
+    form, W_squared = match.loop.form, ball(match.W_squared)
+    mu, Gamma = arb(form.mu), ball(match.Gamma)
+    drive, leak = ball(form.q) * D * D, sigma * W_squared
+
+    def alpha_0(a: arb) -> arb:
+        return drive / (1 - a / mu) + leak / (2 - a / (Gamma * sigma))
+
+    fastest = min(form.mu, 2 * float(Gamma * sigma))
+    a = _best_rate(lambda a: float(alpha_0(arb(a))) / a, fastest)
+    found = alpha_0(arb(a))
+    ultimate = found / a
+    return Decrease(
+        level=V_0.max(ultimate),
+        error=ultimate,
+        weights=ultimate,
+        mean=(drive.sqrt() + (drive + leak / 2).sqrt()) ** 2,
+        falls=True,
+        alpha_0=upper(found),
+        alpha_1=a,
+        how="max{V(0), alpha_0/alpha_1}",
+        end="V -> alpha_0/alpha_1 or less",
+    )
+
+
+def _best_rate(cost: Callable[[float], float], fastest: float) -> float:
+    """Return a rate between 0 and the fastest; any is as good for the proof."""
+    found: Any = minimize_scalar(
+        lambda share: cost(share * fastest), bounds=(1e-3, 1 - 1e-3), method="bounded"
+    )
+    return float(found.x * fastest)
+
+
+def _e_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrease:
+    """V' <= -E^T Q E + |r| h(s) with h = 2 D + sigma |W|^2/2 - 2 sigma s^2, s = |W_hat - W/2|.
+
+    V' > 0 only where the root of E^T Q E is below sqrt(q) h(s): the largest V there is the level.
+    Where V stays above it in the end, the integral of E^T Q E is finite, and E -> 0.
+    """
+    form, W = match.loop.form, ball(match.W_squared).sqrt()
+    mu, Gamma, q = arb(form.mu), ball(match.Gamma), ball(form.q)
+    h_0 = 2 * D + sigma * W * W / 2
+    widest = (h_0 / (2 * sigma)).sqrt()
+
+    def largest(point: tuple[Any, ...]) -> Any:
+        (share,) = point
+        distance = share * widest + W / 2
+        h = (1 - share**2) * h_0
+        return h**2 * (q / mu) + distance**2 * (1 / Gamma)
+
+    rough = float((q / mu * h_0**2 + (widest + W / 2) ** 2 / Gamma).upper())
+    if rough == 0:
+        found = arb(0)
+    else:
+        found = arb(enclose(largest, Box.of(share=(0.0, 1.0)), tol=_FINE * rough).high)
+    level = V_0.max(found)
+    return Decrease(
+        level=level,
+        error=found,
+        weights=level,
+        mean=q * h_0**2,
+        how="max{V(0), V_e}, V_e the largest V at which V' > 0 is possible",
+        end="V <= V_e in the end, or E -> 0",
+    )
+
+
+def _projection(match: Matching, D: arb, V_0: arb) -> Decrease:
+    """V' <= -E^T Q E + 2 r delta for W in the inner ball, and |W_hat| stays in the outer one."""
+    form, doubt = match.loop.form, outside_ball(match)
+    if doubt:
+        endless = arb("inf")
+        return Decrease(
+            level=V_0, error=V_0, weights=V_0, mean=endless, how="", end="", doubt=doubt
+        )
+    if D.is_zero():
+        how = "V(0): V' <= -E^T Q E"
+        none = arb(0)
+        return Decrease(level=V_0, error=none, weights=V_0, mean=none, how=how, end=_SQUARE)
+    W_part = (largest_weights(match) + ball(match.W_squared).sqrt()) ** 2 / ball(match.Gamma)
+    ultimate = W_part + form.driven(D)
+    return Decrease(
+        level=V_0.max(ultimate),
+        error=ultimate,
+        weights=ultimate.min(W_part),
+        mean=4 * ball(form.q) * D * D,
+        falls=True,
+        how="max{V(0), lambda (W_max + |W|)^2/Gamma + 4 q D^2/mu}",
+        end="V -> the second or less",
+    )
+
+
+def largest_weights(match: Matching) -> arb:
+    """Return the radius that |W_hat| does not leave under projection: where f >= 1 it falls."""
+    start = sum((w * w for w in match.loop.W_hat_0), exact(0.0))
+    return arb(match.loop.spec("weights").W_max).max(ball(start).sqrt())
+
+
+def outside_ball(match: Matching) -> str:
+    """Say that projection may take the weights away from W; nothing if it never does."""
+    weights = match.loop.spec("weights")
+    if not isinstance(weights, ProjectedWeights):
+        return ""
+    radius, width = exact(weights.W_max), exact(weights.width)
+    if match.W_squared * (1 + width) <= radius * radius:
+        return ""
+    size, inner = float(ball(match.W_squared).sqrt()), float(radius) / float(1 + width) ** 0.5
+    return (
+        f"the weights that match have the norm {size:.4g}, and the inner ball of the projection "
+        f"has the radius {inner:.4g}: raise W_max"
+    )
