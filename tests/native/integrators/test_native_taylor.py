@@ -7,9 +7,11 @@ import pickle
 import control as ct
 import numpy as np
 import pytest
+import user_functions
+from user_function_checks import quiet
 
 import nlctl
-from nlctl.errors import DivergedError, ParameterError
+from nlctl.errors import DivergedError, ParameterError, UsageError
 from nlctl.expressions.functions import FUNCTIONS
 from nlctl.native.machine.routine import entry
 from nlctl.native.taylor.method import order_for
@@ -65,8 +67,8 @@ def coefficients(compiled, t, x, order=ORDER):
     made = series(compiled, p, 1)
     c = made.parameters(p, order=order, rtol=1e-6, atol=1e-8)
     k = np.zeros((order + 1, made.layout.rows, 1))
-    nothing = np.zeros((0, 1))
-    given = np.array([t]), np.array(x, dtype=float)[:, None], nothing, nothing, c, k
+    still = np.zeros((compiled.schedule.ninputs, 1))
+    given = np.array([t]), np.array(x, dtype=float)[:, None], still, still, c, k
     fill = entry(made.functions[0])
     if callable(fill):
         fill(*given)
@@ -151,6 +153,44 @@ def test_coefficients_of_vectors_are_those_of_their_elements():
                                                                        strict=True)]  # fmt: skip
     wanted = [[float(s[k].mid()) for s in states] for k in range(ORDER + 1)]
     assert found == pytest.approx(np.array(wanted), rel=1e-9, abs=1e-9)
+
+
+def defect(compiled, k, t, h):
+    """Return how far a polynomial's slope is at h from the right-hand side, relatively."""
+    powers = h ** np.arange(len(k))
+    rates = np.arange(1, len(k))[:, None] * k[1:]
+    wanted = compiled.dynamics(t + h, powers @ k, np.zeros(compiled.schedule.ninputs))
+    return np.max(np.abs(powers[:-1] @ rates - wanted)) / (1.0 + np.max(np.abs(wanted)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("states", [2, 9])
+def test_polynomials_of_users_functions_have_the_slopes_of_their_functions(states):
+    """Wherever there are coefficients, at a distance at which the last term is 1e-9.
+
+    Where a kink or jump lies within that distance: at a hundredth of it.
+    """
+    judged, beyond = 0, []
+    for case in user_functions.ENTRIES:
+        x = np.random.default_rng(2).uniform(0.3, 0.9, states)
+        with quiet():
+            try:
+                compiled = nlctl.compile(user_functions.system(case.make(states), case.name))
+                if compiled.system.nstates != states:
+                    continue
+                k = coefficients(compiled, 0.31, x, order=10)
+            except UsageError:  # not compiled, or refused
+                continue
+            last = np.max(np.abs(k[-2:]))
+            if not (np.isfinite(k).all() and last > 0.0):
+                continue
+            h = min((1e-9 / last) ** (1 / 9), 0.1)
+            if not defect(compiled, k, 0.31, h) < 1e-6:
+                beyond.append(case.name)
+                assert defect(compiled, k, 0.31, 0.01 * h) < 1e-6, case.name
+        judged += 1
+    assert judged > 50
+    assert len(beyond) < 0.1 * judged, beyond
 
 
 def test_at_a_kink_the_side_counts_on_which_the_solution_goes_on():
