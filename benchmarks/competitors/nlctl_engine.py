@@ -1,4 +1,4 @@
-"""nlctl's native engine, from unmodified block functions."""
+"""nlctl's native engine, from unmodified block functions: its default method, and Taylor's."""
 
 import numpy as np
 
@@ -8,13 +8,23 @@ from .problem import Problem, Solver
 
 
 def solvers(problem: Problem) -> list[Solver]:
-    """Return nlctl's solver with its default method."""
+    """Return nlctl's solvers; Taylor's method does not integrate the backlash of Example 2."""
+    methods = {"nlctl": "auto", "nlctl, Taylor": "taylor"}
+    return [
+        solver(problem, name, method)
+        for name, method in methods.items()
+        if problem.example == 1 or method == "auto"
+    ]
+
+
+def solver(problem: Problem, name: str, method: str) -> Solver:
+    """Return nlctl's solver with one of its methods."""
     compiled, n = problem.compiled, problem.order
     names = [f"x{i}" for i in range(1, n + 1)]
 
     def run(rtol):
         return nlctl.input_output_response(
-            compiled, problem.times, rtol=rtol, atol=rtol * 1e-2
+            compiled, problem.times, rtol=rtol, atol=rtol * 1e-2, method=method
         ).states
 
     def ensemble(rtol, x1, threads):
@@ -26,7 +36,11 @@ def solvers(problem: Problem) -> list[Solver]:
             threads=threads,
             rtol=rtol,
             atol=rtol * 1e-2,
+            method=method,
         )
         return np.stack([made.signals[name] for name in names], axis=1)
 
-    return [Solver(name="nlctl", rhs=compiled.dynamics, run=run, ensemble=ensemble)]
+    return Solver(
+        name=name, rhs=compiled.dynamics, run=run, ensemble=ensemble,
+        tolerances=tuple(10 ** -(k / 2) for k in range(8, 24)),
+    )  # fmt: skip

@@ -14,7 +14,7 @@ from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
 from .stage import Stage
 
-__all__ = ["tangents"]
+__all__ = ["partials", "tangents"]
 
 
 def tangents(
@@ -49,6 +49,17 @@ def tangents(
         If an opaque function, which has no expressions, is among what results are made of.
     """
     return _Reader(graph, seed, fixed_points or {}).read(list(results))
+
+
+def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
+    """Return what gives the partial derivatives of a function of the table, by argument.
+
+    Parameters
+    ----------
+    graph : Graph
+        Where they are kept.
+    """
+    return _Reader(graph, lambda _: None, {}).partial
 
 
 class _Reader:
@@ -152,11 +163,11 @@ class _Reader:
         found: Expr | None = None
         for i, part in enumerate(parts):
             if part is not None:
-                term = self.graph.op("mul", self._partial(node, i), part)
+                term = self.graph.op("mul", self.partial(node, i), part)
                 found = self.graph.op("add", found, term) if found else term
         return found
 
-    def _partial(self, node: Expr, i: int) -> Expr:
+    def partial(self, node: Expr, i: int) -> Expr:
         """Return a partial derivative of a function of the table; its row is traced for that."""
         if (node.op, i) not in self._partials:
             function = FUNCTIONS[node.op].derivative[i]

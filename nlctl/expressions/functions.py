@@ -37,6 +37,11 @@ class RealFunction:
         Format string with ``{0}`` and ``{1}`` for the arguments.
     math : tuple of str
         Names in Python's `math` module.
+    series : str or callable
+        How the Taylor coefficients of f(x(t)) follow from those of x(t).  ``"derivative"``: from
+        y' = f'(x) x', where f' is made of functions that have theirs.  A callable writes the
+        function as a choice, whose side is that on which x(t) goes on.  ``"unknown"``: the
+        function is refused where they are needed.
     """
 
     name: str
@@ -45,6 +50,7 @@ class RealFunction:
     enclosure: Callable[..., Any] | None
     latex: str
     math: tuple[str, ...] = ()
+    series: str | Callable[..., Any] = "derivative"
 
     @property
     def count(self) -> int:
@@ -80,11 +86,13 @@ def _row(
     *derivative: Callable[..., Any],
     ball: Callable[..., Any] | None = None,
     math: str = "",
+    series: str | Callable[..., Any] = "derivative",
 ) -> RealFunction:
     names = tuple((math or name).split()) if math != "-" else ()
     return RealFunction(
-        name=name, code=code, derivative=derivative, enclosure=ball, latex=latex, math=names
-    )
+        name=name, code=code, derivative=derivative, enclosure=ball, latex=latex, math=names,
+        series=series,
+    )  # fmt: skip
 
 
 _ROWS = (
@@ -96,16 +104,20 @@ _ROWS = (
     _row("sqrt", "llvm.sqrt", r"\sqrt{{{0}}}", lambda x: 0.5 / np.sqrt(x),
          ball=lambda x: x.sqrt()),
     _row("absolute", "llvm.fabs", r"\left|{0}\right|", lambda x: np.where(x < 0.0, -1.0, 1.0),
-         math="fabs"),
+         math="fabs", series=lambda x: np.where(x < 0.0, -x, x)),
     _row("floor", "llvm.floor", r"\left\lfloor {0} \right\rfloor", _zero,
-         ball=lambda x: x.floor(), math="-"),
+         ball=lambda x: x.floor(), math="-", series="unknown"),
     _row("copysign", "llvm.copysign", r"\left|{0}\right| \operatorname{{sgn}} {1}",
-         lambda x, y: np.where(x < 0.0, -1.0, 1.0) * np.copysign(1.0, y), _zero),
-    _row("sign", "own", r"\operatorname{{sgn}} {0}", _zero, ball=lambda x: x.sgn(), math="-"),
+         lambda x, y: np.where(x < 0.0, -1.0, 1.0) * np.copysign(1.0, y), _zero,
+         series="unknown"),
+    _row("sign", "own", r"\operatorname{{sgn}} {0}", _zero, ball=lambda x: x.sgn(), math="-",
+         series=lambda x: np.where(x < 0.0, -1.0, 1.0)),
     _row("minimum", "own", r"\min\left({0}, {1}\right)",
-         lambda x, y: np.where(x < y, 1.0, 0.0), lambda x, y: np.where(x < y, 0.0, 1.0), math="-"),
+         lambda x, y: np.where(x < y, 1.0, 0.0), lambda x, y: np.where(x < y, 0.0, 1.0), math="-",
+         series=lambda x, y: np.where(x < y, x, y)),
     _row("maximum", "own", r"\max\left({0}, {1}\right)",
-         lambda x, y: np.where(x > y, 1.0, 0.0), lambda x, y: np.where(x > y, 0.0, 1.0), math="-"),
+         lambda x, y: np.where(x > y, 1.0, 0.0), lambda x, y: np.where(x > y, 0.0, 1.0), math="-",
+         series=lambda x, y: np.where(x > y, x, y)),
     _row("log", "log", r"\ln {0}", lambda x: 1.0 / x, ball=lambda x: x.log()),
     _row("log2", "log2", r"\log_2 {0}", lambda x: 1.0 / (x * _log_of(2.0, x)),
          ball=lambda x: x.log() / type(x)(2).log()),
@@ -133,9 +145,9 @@ _ROWS = (
     _row("arctanh", "atanh", r"\operatorname{{artanh}} {0}",
          lambda x: 1.0 / ((1.0 - x) * (1.0 + x)), ball=lambda x: x.atanh(), math="atanh"),
     _row("ceil", "llvm.ceil", r"\left\lceil {0} \right\rceil", _zero,
-         ball=lambda x: x.ceil(), math="-"),
-    _row("trunc", "llvm.trunc", r"\operatorname{{trunc}} {0}", _zero, math="-"),
-    _row("rint", "llvm.rint", r"\operatorname{{round}} {0}", _zero, math="-"),
+         ball=lambda x: x.ceil(), math="-", series="unknown"),
+    _row("trunc", "llvm.trunc", r"\operatorname{{trunc}} {0}", _zero, math="-", series="unknown"),
+    _row("rint", "llvm.rint", r"\operatorname{{round}} {0}", _zero, math="-", series="unknown"),
     _row("cbrt", "cbrt", r"\sqrt[3]{{{0}}}", lambda x: 1.0 / (3.0 * np.cbrt(x) ** 2),
          ball=_cube_root),
     _row("arctan2", "atan2", r"\operatorname{{atan2}}\left({0}, {1}\right)",
@@ -144,16 +156,17 @@ _ROWS = (
          lambda x, y: x / np.hypot(x, y), lambda x, y: y / np.hypot(x, y)),
     _row("power", "pow", r"{0}^{{{1}}}",
          lambda x, y: y * np.power(x, y - 1.0), lambda x, y: np.log(x) * np.power(x, y),
-         math="pow"),
+         math="pow", series="unknown"),
     _row("heaviside", "own", r"\operatorname{{H}}_{{{1}}}\left({0}\right)",
-         _zero, lambda x, y: np.where(x == 0.0, 1.0, 0.0), math="-"),
+         _zero, lambda x, y: np.where(x == 0.0, 1.0, 0.0), math="-",
+         series="unknown"),
     _row("logaddexp", "own", r"\ln\left(e^{{{0}}} + e^{{{1}}}\right)",
          lambda x, y: np.exp(x - np.logaddexp(x, y)), lambda x, y: np.exp(y - np.logaddexp(x, y)),
          math="-"),
     _row("remainder", "own", r"{0} \bmod {1}",
-         lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.floor(x / y), math="-"),
+         lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.floor(x / y), math="-", series="unknown"),
     _row("fmod", "fmod", r"\operatorname{{fmod}}\left({0}, {1}\right)",
-         lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.trunc(x / y)),
+         lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.trunc(x / y), series="unknown"),
 )  # fmt: skip
 
 FUNCTIONS = {row.name: row for row in _ROWS}

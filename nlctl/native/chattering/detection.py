@@ -161,12 +161,15 @@ class _Evaluated:
         return np.concatenate([dx[:, 0], g[task.switching :, 0]])
 
     def points(self, attempt: Attempt) -> Iterator[tuple[float, np.ndarray]]:
-        """Yield where a step has been: at its ends and, of the explicit method, at its stages."""
+        """Yield where a step has been: at its ends and, of an explicit pair, at its stages."""
         j, h = self.j, attempt.h[self.j]
         t, x, A, C = attempt.t[j], attempt.x[:, j], self.run.task.A, self.run.task.C
         yield t, x
         if attempt.stiff:
             yield t, attempt.x_new[:, j]
+            return
+        if self.run.task.highest:
+            yield t + h, attempt.x_new[:, j]
             return
         slopes = np.vstack([attempt.first[None, :, j], attempt.k[1:, :, j]])
         for s in range(1, C.size):

@@ -7,7 +7,7 @@ generator makes machine code of the plan (`codegen.ir`), and one interpreter car
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -115,10 +115,7 @@ def lower(
     """
     if found is None:
         found = equations(schedule, program.layout, meetings=program.meetings)
-    stores = {
-        name: [part for row, array in rows for part in _stores(_array(name), row, array)]
-        for name, rows in found.results.items()
-    }
+    stores = stores_of(found, found.results)
     wanted = {"rhs": [*stores["dx"], *stores["g"]], "out": stores["y"]}
     samples = {name: SAMPLE for name in stores if name.startswith("sample")}
     wanted |= {name: stores[name] for name in samples}
@@ -167,9 +164,9 @@ def _lowered(
     wanted: Mapping[str, list[Store]],
     lanes: int,
 ) -> Lowered:
-    stores, exact = rewritten(found.graph, wanted)
+    stores, exact, _ = rewritten(found.graph, wanted)
     parameters = length(program.layout)
-    functions, size = _planned(stores, arguments, parameters)
+    functions, size = planned(stores, arguments, parameters)
     n, m = schedule.system.nstates or 0, schedule.ninputs
     rows = {
         "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n, "g": program.events,
@@ -181,7 +178,17 @@ def _lowered(
     )  # fmt: skip
 
 
-def _planned(
+def stores_of(found: Equations, names: Iterable[str]) -> dict[str, list[Store]]:
+    """Return what is to be written for some of the results."""
+    return {
+        name: [
+            part for row, array in found.results[name] for part in _stores(_array(name), row, array)
+        ]
+        for name in names
+    }
+
+
+def planned(
     stores: Mapping[str, list[Store]], arguments: Mapping[str, tuple[str, ...]], parameters: int
 ) -> tuple[dict[str, Function], int]:
     """Return the plans of all functions, and how many rows of `c` they need.

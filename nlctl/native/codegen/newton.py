@@ -126,7 +126,7 @@ def _pass(
     following = Stage(graph).copied(improved)(n, state, values, jacobian)
     exprs = [e.only if isinstance(e, Tracer) else graph.const(float(e)) for e in following]
     stores = [Store(array="n", row=i, expr=e, size=1) for i, e in enumerate(exprs)]
-    written, exact = rewritten(graph, {"n": stores})
+    written, exact, _ = rewritten(graph, {"n": stores})
     return Function(arguments=PASS, plan=plan_function(written["n"], {}, 0)), exact
 
 

@@ -21,7 +21,7 @@ _LOG2_E = 1.4426950408889634
 
 def rewritten(
     graph: Graph, stores: Mapping[str, Sequence[Store]]
-) -> tuple[dict[str, list[Store]], frozenset[Expr]]:
+) -> tuple[dict[str, list[Store]], frozenset[Expr], Graph]:
     """Return the same results in other words.
 
     Parameters
@@ -36,6 +36,8 @@ def rewritten(
     stores : dict
     exact : frozenset of Expr
         Operations that are to be rounded one by one.
+    graph : Graph
+        Where the results are kept now.
     """
     nodes = needed([s.expr for part in stores.values() for s in part], ())
     decisive = _decisive(nodes)
@@ -51,7 +53,7 @@ def rewritten(
         name: [Store(array=s.array, row=s.row, expr=new[s.expr], size=s.size) for s in part]
         for name, part in stores.items()
     }
-    return made, frozenset(new[node] for node in decisive)
+    return made, frozenset(new[node] for node in decisive), fresh
 
 
 def _decisive(nodes: Sequence[Expr]) -> set[Expr]:

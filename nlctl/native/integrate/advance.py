@@ -25,7 +25,7 @@ from .events.location import (
     step_accepted,
 )
 from .events.near_side import look_before
-from .methods import explicit
+from .methods import explicit, taylor
 from .methods.dense import solution_at
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
@@ -117,6 +117,7 @@ def _take(task, w, done):
     for j in range(done.size):
         if not done[j]:
             continue
+        w.expanded[j] = 0
         for i in range(x.shape[0]):
             x[i, j] = w.x_new[i, j]
             k[0, i, j] = k[last, i, j]
@@ -145,6 +146,17 @@ def _event_functions(rhs, task, lanes, w):
             w.e[i, j] = w.g[i, j]
 
 
+@numba.njit(**INNER)
+def _attempt(rhs, point, along, task, lanes, w):
+    """Try a step in every lane, by the method of the run."""
+    if lanes[0].stiff:
+        stiff_attempt(rhs, point, along, task, lanes, w)
+    elif task.highest:
+        taylor.taylor_attempt(rhs, task, lanes, w)
+    else:
+        explicit.explicit_attempt(rhs, task, lanes, w)
+
+
 def advance(rhs, point, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
@@ -156,6 +168,8 @@ def advance(rhs, point, along, task, w, rounds):
     sampled, found = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.int64)
     for _ in range(rounds):
         running = 0
+        if task.highest:
+            taylor.expand(task, lanes, w)
         for j in range(lanes.size):
             if lanes[j].status == RUNNING:
                 over = lanes[j].segment == task.times.size - 1
@@ -166,15 +180,12 @@ def advance(rhs, point, along, task, w, rounds):
         if lanes[0].stiff and task.derivatives == UNKNOWN:
             lanes[0].status = DERIVATIVES
             return
-        if lanes[0].stiff:
-            stiff_attempt(rhs, point, along, task, lanes, w)
-        else:
-            explicit.explicit_attempt(rhs, task, lanes, w)
+        _attempt(rhs, point, along, task, lanes, w)
         if task.delays.shape[0]:
             look_within(task, lanes, w)
         _event_functions(rhs, task, lanes, w)
         _judge(task, lanes, w, found)
-        if w.e.shape[0]:
+        if w.e.shape[0] and not task.highest:
             look_between(rhs, task, lanes, w, found)
         if task.memory.size:
             look_before(rhs, task, lanes, w, found)

@@ -83,6 +83,9 @@ def shorten(lane, part):
 @numba.njit(**INNER)
 def next_step(lane, error, rate, task):
     """Propose the next step after an accepted one: PI control, and stability."""
+    if task.highest and task.fixed == 0.0:
+        lane.h = max(lane.h, lane.step)  # coefficients will say how long it is to be
+        return
     log_error, memories, slower = np.log(max(error, 1e-10)), task.memory.size, 5.0 / task.pair_order
     # at equilibrium the error is 0.17 of its tolerance; of the stiff method, whose steps cost
     # more and do not end at a limit of stability, 0.44

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -22,6 +23,7 @@ from ..compiled import Compiled
 from ..histories import lines_of, variations, with_past, with_room
 from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
+from ..taylor.method import taylor_task
 from .discrete import simulate_discrete
 from .memory import with_table
 from .methods import EXPLICIT_PAIRS
@@ -36,12 +38,18 @@ from .workspace import (
     EXPLICIT,
     IMPLICIT,
     TASK,
+    TAYLOR,
     UNKNOWN,
     Task,
     new_work,
 )
 
-METHODS = {"auto": AUTO, **dict.fromkeys(EXPLICIT_PAIRS, EXPLICIT), "rodas5p": IMPLICIT}
+METHODS = {
+    "auto": AUTO,
+    **dict.fromkeys(EXPLICIT_PAIRS, EXPLICIT),
+    "rodas5p": IMPLICIT,
+    "taylor": TAYLOR,
+}
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
 
 
@@ -55,9 +63,10 @@ class Settings:
         Tolerances; the error of a step is weighed with atol + rtol |x|.
     max_steps : int
         Attempted steps after which a run ends as STEP_LIMIT.
-    method : {"auto", "tsit5", "rodas5p"} or Tableau
-        Explicit pair of orders 5(4), stiff method of orders 5(4), or whichever is faster; an
-        explicit pair of your own as its tableau.
+    method : {"auto", "tsit5", "rodas5p", "taylor"} or Tableau
+        Explicit pair of orders 5(4), stiff method of orders 5(4), or whichever is faster;
+        Taylor's method, of an order that follows from rtol, for equations that can be written as
+        expressions and have no memories; an explicit pair of your own as its tableau.
     step : float
         Fixed step (s) instead of error control; 0 for error control.
     """
@@ -280,6 +289,7 @@ def prepared(
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, count, read = compiled.program, x0.shape[1], compiled.schedule
     method = _method(compiled, settings)
+    expansion, terms = taylor_task(compiled, p, settings) if method == "taylor" else ({}, ())
     due = instants_of(compiled.schedule, program, times, p)
     code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     c = np.zeros((code.rows, count))
@@ -297,9 +307,7 @@ def prepared(
         fixed=float(settings.step),
         max_steps=int(settings.max_steps),
         method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
-        pair_order=float(settings.pair.order),
-        stable=float(settings.pair.stable),
-        **settings.pair.arrays(),
+        **_pair(settings.pair) | expansion,
         alone=int(count == 1),
         **_instants(compiled, code, due),
         derivatives=UNKNOWN,
@@ -311,7 +319,8 @@ def prepared(
     )
     work = new_work(
         x0, times, read.ninputs, program.events, len(read.outputs),
-        len(program.sampled), len(read.lines), settings.pair.stages,
+        len(program.sampled), len(read.lines), 2 if terms else settings.pair.stages,
+        terms or (1, 0),
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"
     work = with_past(compiled, task, work, p)
@@ -328,6 +337,16 @@ def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
             f"method={settings.method!r}"
         )
     return "tsit5"
+
+
+@functools.cache
+def _pair(pair: Tableau) -> dict[str, Any]:
+    """Return what the explicit method takes of a pair."""
+    none = {
+        "highest": 0, "series": np.zeros(0, dtype=np.int64), "c_series": np.zeros((1, 1)),
+        "sides": np.zeros((0, 2), dtype=np.int64),
+    }  # fmt: skip
+    return {"pair_order": float(pair.order), "stable": float(pair.stable), **pair.arrays(), **none}
 
 
 def _linear_equations(n: int, order: Elimination) -> dict[str, Any]:

@@ -8,6 +8,7 @@ time of a run.
 from __future__ import annotations
 
 import functools
+import math
 from typing import Any
 
 import numba
@@ -25,6 +26,7 @@ from ...upstream.numba_internals import (
 )
 
 _INT = ir.IntType(64)
+_LINE = 8  # floats in a line of the cache
 _ENTRY = 5  # numbers in the table for each field: a number, or an address and up to four lengths
 
 
@@ -90,6 +92,14 @@ def with_table(record: Any, like: Any = None, **values: Any) -> Any:
             row = [int(np.asarray(value).view(np.int64))]  # a float's bits, or an integer
         rows.append(row + [0] * (_ENTRY - len(row)))
     return record(**values, table=np.array(rows, dtype=np.int64))
+
+
+def zeros(shape: tuple[int, ...]) -> np.ndarray:
+    """Return zeros that begin with a line of the cache, so that no SIMD register reads two."""
+    size = math.prod(shape)
+    whole = np.zeros(size + _LINE)
+    first = -whole.ctypes.data // whole.itemsize % _LINE
+    return whole[first : first + size].reshape(shape)
 
 
 def _named(record: Any) -> tuple[str, ...]:

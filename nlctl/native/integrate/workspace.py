@@ -13,12 +13,12 @@ import numba
 import numpy as np
 
 from ..machine.address import call_out, call_rhs
-from .memory import type_of, with_table
+from .memory import type_of, with_table, zeros
 from .methods import rodas5p
 from .methods.lu import WHOLE
 from .state import DIRECTIONS, INNER, new_lanes
 
-AUTO, EXPLICIT, IMPLICIT = 0, 1, 2
+AUTO, EXPLICIT, IMPLICIT, TAYLOR = 0, 1, 2, 3
 UNKNOWN, DIFFERENCES, EXACT = 0, 1, 2  # where the stiff method has its Jacobian from
 DEGREE = 5  # of the polynomials that delayed signals are kept as
 
@@ -69,6 +69,10 @@ class Task(NamedTuple):
     column: np.ndarray
     source: np.ndarray
     target: np.ndarray
+    highest: int  # order of Taylor's method, 0 for others
+    series: np.ndarray  # its functions
+    sides: np.ndarray  # rows of comparisons, see `taylor.recurrences.Recurrences`
+    c_series: np.ndarray  # and what they read besides their arguments
     table: np.ndarray
 
 
@@ -150,6 +154,10 @@ class Work(NamedTuple):
     missed_at_end: np.ndarray
     shown: np.ndarray  # what leaves the lines at the task's times: (times, lines, lanes)
     shown_to: np.ndarray  # up to which of these
+    terms: np.ndarray  # Taylor coefficients: (orders, rows, lanes), see `taylor.routine.Series`
+    expanded: np.ndarray  # 1 where they are those of the step being tried
+    u_rate: np.ndarray
+    largest: np.ndarray  # of coefficients, or of what a step lacks, over the tolerance
     table: np.ndarray
 
 
@@ -165,10 +173,12 @@ def new_work(
     sampled: int = 0,
     lines: int = 0,
     stages: int = 3,
+    terms: tuple[int, int] = (1, 0),
 ) -> Work:
     """Return the arrays for integrating members from `x0` (states, lanes) on.
 
-    The inputs include the lines, and so do the outputs what arrives there.
+    The inputs include the lines, and so do the outputs what arrives there.  `terms` are the
+    numbers of orders and rows of Taylor coefficients.
     """
     n, lanes = x0.shape
     stiff = n if lanes == 1 else 0  # the stiff method is for single runs
@@ -185,7 +195,7 @@ def new_work(
         "g_inside": (4, events, lanes),
         "hh": (n * lanes,),
         "k": (stages, n, lanes),
-        "u": (inputs, lanes),
+        **dict.fromkeys(("u", "u_rate"), (inputs, lanes)),
         "s": (sampled, lanes),
         "jacobian": (stiff // DIRECTIONS + 1, stiff, DIRECTIONS),
         "columns": (stiff, stiff),
@@ -197,8 +207,9 @@ def new_work(
         "u_along": (inputs, DIRECTIONS),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-    counted = ("wanted", "sought", "attempts")
+    counted = ("wanted", "sought", "attempts", "expanded")
     arrays |= {name: np.zeros(lanes, dtype=np.int64) for name in counted}
+    arrays |= {"terms": zeros((*terms, lanes)), "largest": np.zeros((4, lanes))}
     arrays |= _past(times.size, outputs, lines, lanes)
     arrays["x"][:] = x0
     for name, rows in (("samples", n), ("y", outputs)):
@@ -207,9 +218,8 @@ def new_work(
     flat["jacobian_flat"] = arrays["jacobian"].reshape(-1)
     arrays["v"] = directions(stiff, inputs)
     k_flat = arrays["k"].reshape(stages, n * lanes)
-    pivots = np.zeros(stiff, dtype=np.int64)
-    records = new_lanes(times, lanes)
-    return with_table(Work, lanes=records, **arrays, **flat, k_flat=k_flat, pivots=pivots)
+    arrays |= {"k_flat": k_flat, "pivots": np.zeros(stiff, dtype=np.int64)}
+    return with_table(Work, lanes=new_lanes(times, lanes), **arrays, **flat)
 
 
 def _past(times: int, outputs: int, lines: int, lanes: int) -> dict[str, np.ndarray]:
@@ -251,7 +261,7 @@ TASK = type_of(  # only the types of these matter
         delays=_GRID, varied=_NONE, vary_t=_GRID, vary_h=_GRID,
         vary=np.zeros((1, 1, 1)), kinks=_GRID,
         direct=_PLACES, signals=_NONE, outputs=0,
-        cost=0.0, **vars(WHOLE),
+        cost=0.0, highest=0, series=_NONE, sides=_PLACES, c_series=_GRID, **vars(WHOLE),
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
@@ -275,17 +285,16 @@ def inputs_at(task, lanes, w):
         for j in range(lanes.size):
             u[inputs.shape[0] + i, j] = past_value(task, w, i, j, t[j])
     for j in range(lanes.size):
-        input_rates(task, lanes[j].segment, u, j)
+        input_rates(task, lanes[j].segment, inputs.shape[0] + task.delays.shape[0], u, j)
 
 
 @numba.njit(**INNER)
-def input_rates(task, segment, u, j):
-    """Fill the last rows of u with the rates of the inputs in a segment, if it has such rows."""
-    first = task.inputs.shape[0] + task.delays.shape[0]
+def input_rates(task, segment, first, rates, j):
+    """Fill rows of `rates` from `first` on, if there are any, with the inputs' slopes."""
     m = min(segment, task.times.size - 2)
-    for i in range(u.shape[0] - first):
+    for i in range(min(task.inputs.shape[0], rates.shape[0] - first)):
         rise = task.inputs[i, m + 1] - task.inputs[i, m]
-        u[first + i, j] = rise / (task.times[m + 1] - task.times[m])
+        rates[first + i, j] = rise / (task.times[m + 1] - task.times[m])
 
 
 @numba.njit(**INNER)
@@ -399,7 +408,7 @@ def outputs(rhs, out, task, w):
                 w.u[i, j] = task.inputs[i, m]
             for i in range(task.delays.shape[0]):
                 w.u[task.inputs.shape[0] + i, j] = w.shown[m, i, j]
-            input_rates(task, m, w.u, j)
+            input_rates(task, m, task.inputs.shape[0] + task.delays.shape[0], w.u, j)
         if task.memory.size:
             call_rhs(rhs, w.t, states[m], w.u, task.p, w.dx_ahead, w.g)
             for i in range(task.memory.size):

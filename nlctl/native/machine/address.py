@@ -30,6 +30,31 @@ def call_along(along, t, x, u, c, v, dx):
     along(t, x, u, c, v, dx)
 
 
+def call_expansion(expansion, t, x, u, v, c, k):
+    """Evaluate the Taylor coefficients of the solution through a point."""
+    expansion(t, x, u, v, c, k)
+
+
+def call_growth(growth, x, c, k, largest):
+    """Evaluate the last of these coefficients over the tolerance."""
+    growth(x, c, k, largest)
+
+
+def call_step(step, h, c, k, x, slope):
+    """Evaluate the polynomials of the states at the end of a step."""
+    step(h, c, k, x, slope)
+
+
+def call_judge(judge, h, x, x_new, slope, dx, c, k, largest):
+    """Evaluate what a step lacks, over the tolerance."""
+    judge(h, x, x_new, slope, dx, c, k, largest)
+
+
+def call_values(values, h, c, k, g):
+    """Evaluate the polynomials of switching functions."""
+    values(h, c, k, g)
+
+
 def _by_address(typing_context: Any, function: Any, *arrays: Any) -> Any:
     def generate(context, builder, sig, args):
         pointer = ir.DoubleType().as_pointer()
@@ -58,3 +83,13 @@ _register(call_point, lambda typing_context, f, t, x, u, c: _by_address(
     typing_context, f, t, x, u, c))  # fmt: skip
 _register(call_along, lambda typing_context, f, t, x, u, c, v, dx: _by_address(
     typing_context, f, t, x, u, c, v, dx))  # fmt: skip
+_register(call_expansion, lambda typing_context, f, t, x, u, v, c, k: _by_address(
+    typing_context, f, t, x, u, v, c, k))  # fmt: skip
+_register(call_growth, lambda typing_context, f, x, c, k, largest: _by_address(
+    typing_context, f, x, c, k, largest))  # fmt: skip
+_register(call_step, lambda typing_context, f, h, c, k, x, slope: _by_address(
+    typing_context, f, h, c, k, x, slope))  # fmt: skip
+_register(call_judge, lambda typing_context, f, h, x, x_new, slope, dx, c, k, largest: _by_address(
+    typing_context, f, h, x, x_new, slope, dx, c, k, largest))  # fmt: skip
+_register(call_values, lambda typing_context, f, h, c, k, g: _by_address(
+    typing_context, f, h, c, k, g))  # fmt: skip

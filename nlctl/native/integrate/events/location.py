@@ -38,6 +38,12 @@ def triggered(start, end, is_memory, behind):
 
 
 @numba.njit(**INNER)
+def behind_event(rtol):
+    """Return the part of a step by which it may end behind a break point."""
+    return min(10.0 * rtol, 1e-4)
+
+
+@numba.njit(**INNER)
 def first_root(lane, switching, e_start, e_low, e_high, behind, j):
     """Return where the first event between the lengths low and high lies, -1 if there is none.
 
@@ -71,7 +77,7 @@ def locate(lane, switching, rtol, e_start, e_low, e_high, e, behind, j):
         return CLEAR
     lane.tries += 1
     # behind a break point stages are wrong by the rest; what a memory misses is quadratic in it
-    tolerance = lane.high * (0.3 * np.sqrt(rtol) if memory else min(10.0 * rtol, 1e-4))
+    tolerance = lane.high * (0.3 * np.sqrt(rtol) if memory else behind_event(rtol))
     is_behind = lane.high == lane.step
     if is_behind and (lane.high - root <= tolerance or lane.tries > TRIES):
         return EVENT

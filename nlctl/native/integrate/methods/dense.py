@@ -6,7 +6,7 @@ import numba
 
 from ..state import INNER
 from ..workspace import evaluate
-from . import explicit, rodas5p
+from . import explicit, rodas5p, taylor
 
 
 @numba.njit(**INNER)
@@ -14,6 +14,8 @@ def solution_at(theta, task, lane, w, j, result):
     """Fill column `j` of `result` with the solution at the fraction theta of a lane's step."""
     if lane.stiff:
         rodas5p.interpolate(theta, w.x, w.x_new, w.U, result)
+    elif task.highest:
+        taylor.interpolate(theta, lane.step, task.highest, w.terms, j, result)
     else:
         explicit.interpolate(theta, lane.step, w.x, w.k, task.B, j, result)
 

@@ -1,0 +1,356 @@
+"""One step of Taylor's method for batched members: the polynomial is a step and its dense output.
+
+The routine of a diagram fills its coefficients where the step begins, see `nlctl.native.taylor`.
+The right-hand side itself judges the polynomial: at the end of a step its slope must be what the
+right-hand side is there.  That defect sees whatever the coefficients do not know of, such as a kink
+that was passed over.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from ...machine.address import (
+    call_expansion,
+    call_growth,
+    call_judge,
+    call_rhs,
+    call_step,
+    call_values,
+)
+from ..events.location import behind_event, triggered
+from ..state import INNER, RUNNING
+from ..workspace import input_rates, inputs_at
+
+_AIM = 0.25  # of the tolerance: what the error of a step is to be
+FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
+_LOOKS = 16  # parts of a step
+_BRIEF = 0.01  # part of a step: a nearer event is located by trying
+_PLACES = 4  # at 0.9, 0.99, ... of a step that ends at an event
+_BEFORE = 3.0  # times as far before an event as a step may end behind it
+_SHORTEST = 1e-12  # of the times: a step in which nothing is compared
+_EXPANSION, _GROWTH, _STEP, _JUDGE, _VALUES = 0, 1, 2, 3, 4  # functions of task.series
+
+
+@numba.njit(**INNER)
+def expand(task, lanes, w):
+    """Fill the coefficients of lanes that have gone on, and propose the steps that these allow.
+
+    A step that is tried again with another length has its coefficients already.
+    """
+    stale, series = False, task.series
+    for j in range(lanes.size):
+        w.t[j] = lanes[j].t
+        stale |= lanes[j].status == RUNNING and w.expanded[j] == 0
+    if not stale:
+        return
+    if w.u.shape[0]:
+        inputs_at(task, lanes, w)
+        for j in range(lanes.size):
+            input_rates(task, lanes[j].segment, 0, w.u_rate, j)
+    call_expansion(series[_EXPANSION], w.t, w.x, w.u, w.u_rate, task.c_series, w.terms)
+    call_growth(series[_GROWTH], w.x, task.c_series, w.terms, w.largest)
+    for j in range(lanes.size):
+        if w.expanded[j] == 0 and task.fixed == 0.0:
+            h = _length(task.highest, w.largest, j)
+            if h > 0.0:
+                lanes[j].h = h
+            if _begins_at_jump(task, lanes[j], w.terms, j):
+                lanes[j].h = _shortest(task)
+        w.expanded[j] = 1
+
+
+@numba.njit(**INNER)
+def _begins_at_jump(task, lane, terms, j):
+    """Whether something compared is equal where the step begins, and is not right behind.
+
+    The right-hand side may have another value there than on the side on which the solution goes
+    on, and with it the first coefficients: a step that leaves the place is tried first, once.
+    """
+    if lane.accepted and lane.last <= _shortest(task):
+        return False
+    for i in range(task.sides.shape[0]):
+        side = task.sides[i, 1]
+        if terms[0, side, j] == 0.0 and terms[task.highest - 1, side, j] != 0.0:
+            return True
+    return False
+
+
+@numba.njit(**INNER)
+def _shortest(task):
+    """Return the step up to which nothing is compared."""
+    return _SHORTEST * max(abs(task.times[0]), abs(task.times[task.times.size - 1]))
+
+
+@numba.njit(**INNER)
+def _length(highest, largest, j):
+    """Return the step whose error is likely to be `_AIM`, by how the last terms grow."""
+    a, b, c, d = largest[0, j], largest[1, j], largest[2, j], largest[3, j]
+    ratio = 0.0
+    for each in (a / b, np.sqrt(a / c), np.sqrt(b / d)):
+        if ratio < each < np.inf:  # where a term vanishes the others say it
+            ratio = each
+    return (_AIM / max(a * ratio, b * ratio * ratio)) ** (1.0 / (highest + 1.0))
+
+
+@numba.njit(**INNER)
+def taylor_attempt(rhs, task, lanes, w):
+    """Try a step in all lanes: fill w.x_new, the slope there, the event functions, the error."""
+    series, dx = task.series, w.k[w.k.shape[0] - 1]
+    if task.switching:
+        _aim(task, lanes, w)
+    for j in range(lanes.size):
+        w.h[j], w.hh[j] = lanes[j].step, lanes[j].step
+        w.t[j] = lanes[j].t + w.h[j]
+    call_step(series[_STEP], w.h, task.c_series, w.terms, w.x_new, w.dx_ahead)
+    if w.u.shape[0]:
+        inputs_at(task, lanes, w)
+    call_rhs(rhs, w.t, w.x_new, w.u, task.p, dx, w.g)
+    call_judge(series[_JUDGE], w.h, w.x, w.x_new, w.dx_ahead, dx, task.c_series, w.terms, w.largest)
+    _look_inside(rhs, task, lanes, w)
+    for j in range(lanes.size):
+        w.error[j], w.rate[j], w.resolved[j] = _error(task, w, j), 0.0, np.inf
+
+
+@numba.njit(**INNER)
+def _look_inside(rhs, task, lanes, w):
+    """Look at what is on another side in steps, and at the defect in those that end at an event.
+
+    There it is right before the event, and at places ever closer to it: the end lies behind, and
+    at an event a defect may vanish that is large before, of friction near rest for instance.
+    """
+    wanted = False
+    for j in range(lanes.size):
+        _compare(task, lanes[j], w, j)
+        w.wanted[j] = w.looked[j] == 0.0 and _ends_at_event(task, lanes[j], w, j)
+        if w.wanted[j]:
+            w.looked[j], w.foreseen[j] = 1.0 - _BEFORE * behind_event(task.rtol), 0.5
+        wanted |= w.looked[j] > 0.0
+    away = 1.0
+    for _ in range(_PLACES + 1):
+        if wanted:
+            _look_across(rhs, task, lanes, w)
+        wanted, away = False, 0.1 * away
+        for j in range(lanes.size):
+            if away > 0.1 ** (_PLACES + 1) and w.wanted[j] and w.looked[j] == 0.0:
+                w.looked[j], wanted = 1.0 - away, True
+
+
+@numba.njit(**INNER)
+def _aim(task, lanes, w):
+    """Shorten steps to right behind the first event that polynomials of the lanes foresee.
+
+    That is where `locate` would end after some attempts.
+    """
+    for j in range(lanes.size):
+        w.part[j] = 1.0
+    events_at(task, lanes, w, w.g_ahead)
+    for j in range(lanes.size):
+        lane, first = lanes[j], 1.0
+        for i in range(task.switching if lane.tries == 0 else 0):
+            if triggered(w.e_start[i, j], w.g_ahead[i, j], False, w.behind[i, j] != 0.0):
+                first = min(first, _root(task, w, i, lane.step, j))
+        if _BRIEF < first < 1.0:
+            lane.step *= min(1.0, first * (1.0 + 0.5 * behind_event(task.rtol)))
+            lane.ends = 0
+
+
+@numba.njit(**INNER)
+def _root(task, w, i, h, j):
+    """Return the part of a step h at which the polynomial of an event function is 0."""
+    low, high, row, p = 0.0, 1.0, w.x.shape[0] + i, task.highest - 1
+    f_low, f_high = w.e_start[i, j], w.g_ahead[i, j]
+    for n in range(60):
+        part = f_low / (f_low - f_high)
+        middle = low + (high - low) * (0.5 if n % 3 == 2 else min(max(part, 0.01), 0.99))
+        f = _value_and_slope(p, middle * h, w.terms, row, j)[0]
+        if f * f_low > 0.0:
+            low, f_low = middle, f
+        else:
+            high, f_high = middle, f
+        if high - low < 0.01 * behind_event(task.rtol):
+            break
+    return high
+
+
+@numba.njit(**INNER)
+def events_at(task, lanes, w, g):
+    """Fill `g` with the polynomials of the switching functions at w.part of the steps."""
+    for j in range(lanes.size):
+        w.t[j] = w.part[j] * lanes[j].step
+    call_values(task.series[_VALUES], w.t, task.c_series, w.terms, g)
+
+
+@numba.njit(**INNER)
+def _error(task, w, j):
+    """Return the error of a lane's step over its tolerance; not finite if a state is not.
+
+    What the polynomial lacks is e h^(p+1), and its defect (p + 1) e h^p.  Where the last term does
+    not foresee a defect of that size, the solution is not smooth, and the defect counts in full.
+    In a step with an event the right-hand side has changed before the end: the last term counts.
+    """
+    defect, term = w.largest[0, j], w.largest[1, j]
+    if w.looked[j] != 0.0:  # on another side inside of the step: a shorter one is to be tried
+        return (0.9 / min(w.foreseen[j], 0.8)) ** task.pair_order + 0.0 * (defect + term)
+    for i in range(task.switching):
+        if triggered(w.e_start[i, j], w.g[i, j], False, w.behind[i, j] != 0.0):
+            return term + 0.0 * defect
+    share = defect / (task.highest + 1.0)
+    return share if share <= term else defect + 0.0 * term
+
+
+@numba.njit(**INNER)
+def _compare(task, lane, w, j):
+    """Look whether something compared is on another side inside of a lane's step.
+
+    w.foreseen becomes the first part of the step at which it is, and w.looked where it is farthest
+    there, 0 if nothing is; below 0 if that is more than one comparison.  Before an event, if there
+    is one: it is located by itself.
+
+    What changes so fast that its polynomial says little asks for a shorter step as well.
+
+    The polynomials of what is compared are looked at in `_LOOKS` places, unless their terms
+    together are less than the first.  A shorter step is not asked for without end: what begins so
+    near to a kink that rounding cannot tell may go through it.
+    """
+    w.looked[j], w.foreseen[j] = 0.0, 1.0
+    if not w.largest[2, j] > 0.0:
+        return
+    if w.h[j] <= _shortest(task):
+        return
+    until, p, n = 1.0, task.highest - 1, w.x.shape[0]
+    for i in range(task.switching):
+        before, now = w.e_start[i, j], w.g[i, j]
+        if triggered(before, now, False, w.behind[i, j] != 0.0):
+            until = min(until, lane.low / lane.step if lane.tries else before / (before - now))
+    for i in range(task.switching):
+        if not _is_followed(p, w.h[j], w.terms, n + i, j):
+            w.looked[j], w.foreseen[j] = -1.0, 0.5
+        elif not w.e_start[i, j] * w.g[i, j] < 0.0:
+            first, farthest = _crossing(p, w.h[j], w.terms, n + i, w.e_start[i, j], until, j)
+            if first < until:  # a step that ends there has an event
+                w.looked[j], w.foreseen[j] = -1.0, min(w.foreseen[j], farthest)
+    for i in range(task.sides.shape[0]):
+        first, farthest, row = 0.5, -1.0, task.sides[i, 0]
+        if _is_followed(p, w.h[j], w.terms, row, j):
+            side = w.terms[p, task.sides[i, 1], j]
+            first, farthest = _crossing(p, w.h[j], w.terms, row, side, until, j)
+        if first < until:
+            w.looked[j] = -1.0 if w.looked[j] != 0.0 else farthest
+            w.foreseen[j] = min(w.foreseen[j], first)
+
+
+@numba.njit(**INNER)
+def _ends_at_event(task, lane, w, j):
+    """Whether a step may end right behind an event, so that it is accepted."""
+    for i in range(task.switching):
+        before, now = w.e_start[i, j], w.g[i, j]
+        if triggered(before, now, False, w.behind[i, j] != 0.0):
+            low = 0.0
+            if lane.tries:
+                low, before = lane.low / lane.step, w.e_low[i, j]
+            root = low + (1.0 - low) * before / (before - now)
+            if not 1.0 - root > 0.8 * _BEFORE * behind_event(task.rtol):
+                return True
+    return False
+
+
+@numba.njit(**INNER)
+def _is_followed(highest, h, terms, row, j):
+    """Whether a polynomial's terms have become small at h: its last two add little to the rest."""
+    total, power, last = abs(terms[0, row, j]), 1.0, 0.0
+    for k in range(1, highest + 1):
+        power *= h
+        part = abs(power * terms[k, row, j])
+        total += part
+        if k >= highest - 1:
+            last += part
+    return not last > FOLLOWED * total  # NaN is found elsewhere
+
+
+@numba.njit(**INNER)
+def _crossing(p, h, terms, row, side, until, j):
+    """Return where a polynomial is on another side first, 1 for nowhere, and where farthest."""
+    first, farthest, most, steep = 1.0, 1.0, 0.0, 0.0
+    side = 1.0 if side > 0.0 else -1.0
+    extent = abs(terms[p, row, j])
+    for k in range(p - 1, 0, -1):
+        extent = extent * h + abs(terms[k, row, j])
+    if extent * h < abs(terms[0, row, j]):
+        return first, farthest
+    fell, part = False, 0.0
+    for n in range(_LOOKS + 1):
+        before, part = part, n / _LOOKS
+        if before >= until:
+            break
+        value, slope = _value_and_slope(p, part * h, terms, row, j)
+        if fell and slope * side > 0.0:  # in between it is least where the slope is 0, about
+            least = before + steep / (steep - slope) / _LOOKS
+            under = _value_and_slope(p, least * h, terms, row, j)[0] * side
+            if under < 0.0 and least < until:
+                first, farthest, most = min(first, least), least, max(most, -under)
+        fell, steep = slope * side < 0.0, slope
+        if value * side < 0.0 and part < until:
+            first = min(first, part)
+            if -value * side > most:
+                farthest, most = part, -value * side
+    return first, farthest
+
+
+@numba.njit(**INNER)
+def _value_and_slope(highest, h, terms, row, j):
+    """Return a polynomial and its derivative at h."""
+    value, slope = terms[highest, row, j], 0.0
+    for k in range(highest - 1, -1, -1):
+        slope = slope * h + value
+        value = value * h + terms[k, row, j]
+    return value, slope
+
+
+@numba.njit(**INNER)
+def _look_across(rhs, task, lanes, w):
+    """Forget what is on another side where the right-hand side is what it would be on this one.
+
+    That is the case of a comparison whose result does not matter there, or not yet.  Where a step
+    ends behind an event, look at the defect right before the event instead.
+    """
+    dx, p = w.x_stage, task.highest
+    for j in range(lanes.size):
+        if w.looked[j] > 0.0:
+            w.t[j] = lanes[j].t + w.looked[j] * w.h[j]
+            interpolate(w.looked[j], w.h[j], p, w.terms, j, w.x_ahead)
+        else:  # anything finite
+            w.t[j] = lanes[j].t
+            for i in range(w.x.shape[0]):
+                w.x_ahead[i, j] = w.x[i, j]
+    if w.u.shape[0]:
+        inputs_at(task, lanes, w)
+    call_rhs(rhs, w.t, w.x_ahead, w.u, task.p, dx, w.g_ahead)
+    for j in range(lanes.size):
+        limit = p + 1.0 if w.wanted[j] else 1.0
+        if w.looked[j] > 0.0 and _defect(task, w, dx, j) <= limit:
+            w.looked[j] = 0.0
+
+
+@numba.njit(**INNER)
+def _defect(task, w, dx, j):
+    """Return a lane's defect times the step over the tolerance, with dx at the part w.looked."""
+    largest = 0.0
+    for i in range(w.x.shape[0]):
+        slope = _value_and_slope(task.highest, w.looked[j] * w.h[j], w.terms, i, j)[1]
+        defect = abs(w.h[j] * (dx[i, j] - slope))
+        part = defect / (task.atol + task.rtol * abs(w.x_ahead[i, j]))
+        largest = part if part > largest or part != part else largest
+    return largest
+
+
+@numba.njit(**INNER)
+def interpolate(theta, h, highest, terms, j, result):
+    """Fill column `j` of `result` with the solution at the fraction theta of its step."""
+    distance = theta * h
+    for i in range(result.shape[0]):
+        result[i, j] = terms[highest, i, j]
+    for k in range(highest - 1, -1, -1):
+        for i in range(result.shape[0]):
+            result[i, j] = result[i, j] * distance + terms[k, i, j]

@@ -1,0 +1,1 @@
+"""Taylor's method: the coefficients of the solution, from the expressions of a diagram."""

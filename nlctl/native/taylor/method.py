@@ -1,0 +1,82 @@
+"""Taylor's method for a run: what it cannot do is refused by name, what it needs is laid out."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import ParameterError
+from ..machine.routine import entry
+from ..sliding.reading import relay_places
+from .routine import series
+
+if TYPE_CHECKING:
+    from ..compiled import Compiled
+    from ..integrate.driver import Settings
+
+LEAST, MOST = 4, 30  # orders
+
+
+def order_for(rtol: float) -> int:
+    """Return the order of Taylor's method for a tolerance: 1 - ln(rtol) / 2, rounded up.
+
+    With it the work per unit of time is least for long steps of a given part of the radius of
+    convergence: A. Jorba, M. Zou, Experimental Mathematics 14:99 (2005).
+
+    Examples
+    --------
+    >>> order_for(1e-6), order_for(1e-12)
+    (8, 15)
+    """
+    return min(max(math.ceil(1.0 - 0.5 * math.log(rtol)), LEAST), MOST)
+
+
+def taylor_task(
+    compiled: Compiled, p: np.ndarray, settings: Settings
+) -> tuple[dict[str, Any], Any]:
+    """Return what `Task` has for Taylor's method, and the shape of the coefficients.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    p : ndarray
+        Parameter vectors, shape (parameters, members).
+    settings : Settings
+
+    Raises
+    ------
+    ParameterError
+        If there is what it cannot do.
+    """
+    _check(compiled)
+    order, made = order_for(settings.rtol), series(compiled, p, p.shape[1])
+    found = [entry(function) for function in made.functions]
+    plain = any(callable(each) for each in found)
+    task = {
+        "highest": order,
+        "pair_order": order + 1.0,  # the power of the step size in its error
+        "stable": np.inf,
+        "series": np.array(found, dtype=object if plain else np.int64),
+        "sides": made.sides,
+        "c_series": made.parameters(p, order=order, rtol=settings.rtol, atol=settings.atol),
+    }
+    return task, (order + 1, made.layout.rows)
+
+
+def _check(compiled: Compiled) -> None:
+    """Refuse what has no coefficients, whatever its equations are."""
+    name, schedule = compiled.system.name, compiled.schedule
+    if not compiled.system.nstates:
+        raise ParameterError(
+            f"'{name}' has no states, which method='taylor' needs: use method='tsit5'"
+        )
+    memories = [compiled.state_labels[i] for i in compiled.program.memory]
+    relays = [schedule.nodes[i].path for i in relay_places(schedule.nodes)]
+    for what, found in (("memory", memories), ("an ideal relay", relays)):
+        if found:
+            raise ParameterError(
+                f"'{name}' has {what} ('{found[0]}'), which method='taylor' does not integrate: "
+                "use method='tsit5'"
+            )

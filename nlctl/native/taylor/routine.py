@@ -1,0 +1,142 @@
+"""The routine that fills the Taylor coefficients of a diagram's solution, as machine code."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import ParameterError
+from ...upstream.numba_internals import is_jit_disabled
+from ..codegen.blocks import equations
+from ..codegen.lower import Lowered, planned, stores_of
+from ..codegen.rewrite import rewritten
+from ..integrate.memory import zeros
+from ..machine.finish import finished
+from ..machine.routine import Routine
+from ..parameters import length
+from .folds import WIDE, SeriesLayout, taylor_text
+from .plain import plain_series
+from .recurrences import NoSeriesError, Recurrences, recurrences
+from .steps import steps_text
+
+if TYPE_CHECKING:
+    from ..compiled import Compiled
+
+_FIRST = ("t", "x", "u", "c", "o", "k")
+_FOLLOWING = ("t", "x", "u", "c", "v", "w", "o", "b", "a", "q", "k")
+_LAST = ("w", "b", "k")
+_STEP_FUNCTIONS = ("taylor", "growth", "step", "judge", "values")
+_SETTINGS = ("order", "rtol", "atol")
+_ONCE = threading.Lock()  # of several threads that need it one compiles
+
+
+@dataclass(frozen=True, kw_only=True)
+class Series:
+    """Machine code of the coefficients of some members.
+
+    Attributes
+    ----------
+    lowered : Lowered
+    prepare : callable
+        ``prepare(p, c)``.
+    functions : tuple of callable
+        Those of `_STEP_FUNCTIONS`.  The first one fills coefficients `k` of shape (orders, rows,
+        members): the states' are in the first rows, then those of the switching functions.
+    layout : SeriesLayout
+    sides : ndarray of shape (comparisons, 2)
+        See `Recurrences.sides`.
+    """
+
+    lowered: Lowered
+    prepare: Any
+    functions: tuple[Any, ...]
+    layout: SeriesLayout
+    sides: np.ndarray
+
+    def parameters(self, p: np.ndarray, **settings: float) -> np.ndarray:
+        """Return the `c` of parameter vectors, shape (parameters, members), and of `_SETTINGS`."""
+        c = zeros((self.layout.size, p.shape[1]))
+        self.prepare(np.ascontiguousarray(p), c)
+        for name in _SETTINGS:
+            c[self.layout.at[name]] = settings[name]
+        return c
+
+
+def series(compiled: Compiled, p: np.ndarray, width: int) -> Series:
+    """Return the coefficients of `width` members' solutions, made when they are first needed.
+
+    Raises
+    ------
+    ParameterError
+        If the diagram has something without Taylor coefficients.
+    """
+    with _ONCE:
+        known: list[Series] = compiled.__dict__.setdefault("_series", [])
+        for made in known:
+            if made.lowered.lanes == width and made.lowered.holds_for(p):
+                return made
+        known.append(_made(compiled, p, width))
+        return known[-1]
+
+
+def _made(compiled: Compiled, p: np.ndarray, width: int) -> Series:
+    found = compiled.equations
+    if not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
+        found = equations(compiled.schedule, compiled.program.layout, p[:, 0])
+    lowered, wanted = _lowered(compiled, found, width)
+    layout, switching = _layout(lowered), compiled.program.switching
+    if is_jit_disabled():
+        prepare, *functions = plain_series(lowered, wanted, switching, layout)
+    else:
+        compared = [row for row, _ in wanted.sides]
+        steps = steps_text(lowered.rows["x"], switching, compared, layout)
+        text = "\n".join([lowered.text, taylor_text(wanted.folds, layout), steps])
+        loaded = finished(text, ("prepare", *_STEP_FUNCTIONS))
+        prepared = ((lowered.rows["p"], width), (layout.size, width))
+        prepare, *functions = (
+            Routine(
+                address=address, loaded=loaded, opaque=(),
+                shapes=prepared if name == "prepare" else (),  # others are integrators' alone
+            )
+            for name, address in loaded.addresses.items()
+        )  # fmt: skip
+    sides = np.array(wanted.sides, dtype=np.int64).reshape(-1, 2)
+    return Series(
+        lowered=lowered, prepare=prepare, functions=tuple(functions), layout=layout, sides=sides
+    )
+
+
+def _layout(lowered: Lowered) -> SeriesLayout:
+    """Give what a step needs its rows behind the parameters in `c`."""
+    at, row = {}, lowered.size
+    for name in ("w", "o", "a", "q", *_SETTINGS):
+        at[name], row = row, row + (1 if name in _SETTINGS else lowered.rows[name] + WIDE)
+    return SeriesLayout(rows=lowered.rows["k"], at=at, lanes=lowered.lanes, size=row)
+
+
+def _lowered(compiled: Compiled, found: Any, width: int) -> tuple[Lowered, Recurrences]:
+    program, n, m = compiled.program, compiled.system.nstates or 0, compiled.schedule.ninputs
+    stores, exact, graph = rewritten(found.graph, stores_of(found, ("dx", "g")))
+    try:
+        wanted = recurrences(graph, stores, {"x": n, "g": program.events}, packed=width == 1)
+    except NoSeriesError as error:
+        raise ParameterError(
+            f"'{compiled.system.name}' cannot be integrated with method='taylor': {error}; use "
+            "method='tsit5'"
+        ) from error
+    parameters = length(program.layout)
+    functions, size = planned(
+        {"first": wanted.first, "following": wanted.following, "last": wanted.last},
+        {"first": _FIRST, "following": _FOLLOWING, "last": _LAST},
+        parameters,
+    )
+    wanted.rows["k"] = (wanted.rows["k"] + WIDE) // WIDE * WIDE + WIDE
+    rows = {"p": parameters, "t": 1, "x": n, "u": m, "v": m, "c": max(size, 1), **wanted.rows}
+    lowered = Lowered(
+        functions=functions, exact=exact, calls={}, solvers={}, rows=rows | {"b": rows["k"]},
+        lanes=width, assumed=found.graph.assumptions,
+    )  # fmt: skip
+    return lowered, wanted

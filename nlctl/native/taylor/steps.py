@@ -1,0 +1,332 @@
+"""What a step of Taylor's method does with coefficients, as LLVM IR.
+
+    void growth(double *x, double *c, double *k, double *largest)
+    void step(double *h, double *c, double *k, double *x, double *slope)
+    void judge(double *h, double *x, double *x_new, double *slope, double *dx, double *c,
+               double *k, double *largest)
+    void values(double *h, double *c, double *k, double *g)
+
+Rows are taken one after the other, of several members each as a vector, of a single member eight
+at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ..codegen.ir.memory import load_value, store
+from ..codegen.ir.text import Body, Module, Value, constant
+from ..integrate.methods.taylor import FOLLOWED
+from .folds import WIDE, SeriesLayout
+
+GROWN = 4  # coefficients by whose growth a step is chosen
+_Write = Callable[[str, Sequence[Value]], Sequence[Value]]  # of a place and of largest values
+
+
+def steps_text(n: int, switching: int, compared: Sequence[int], layout: SeriesLayout) -> str:
+    """Return the IR of the functions.
+
+    Parameters
+    ----------
+    n, switching : int
+        Numbers of states and of switching functions.
+    compared : sequence of int
+        Rows of the differences of what is compared.
+    layout : SeriesLayout
+    """
+    functions = {
+        "growth": ("x c k largest", lambda f: f.growth(n)),
+        "step": ("h c k x slope", lambda f: f.step(n)),
+        "judge": ("h x x_new slope dx c k largest", lambda f: f.judge(n, switching, compared)),
+        "values": ("h c k g", lambda f: f.values(n, switching)),
+    }
+    texts = []
+    for name, (arguments, write) in functions.items():
+        function = _Function(layout)
+        write(function)
+        function.b.write("ret void")
+        given = ", ".join(f"ptr noalias %{a}" for a in arguments.split())
+        texts.append(f"define void @{name}({given}) nounwind {{\nentry:\n{function.b.text()}}}\n")
+    return "\n".join(texts)
+
+
+class _Function:
+    """Writes one function."""
+
+    def __init__(self, layout: SeriesLayout) -> None:
+        self.b, self.lanes = Body(Module(inlined=False)), layout.lanes
+        self.size = layout.rows * layout.lanes
+        self.at = layout.at
+
+    def setting(self, name: str) -> Value:
+        """Read a setting from `c`."""
+        where = self.place("c", str(self.at[name] * self.lanes))
+        return load_value(self.b, where, 0)
+
+    def highest(self) -> str:
+        """Return the highest order."""
+        return self.b.new(f"fptosi {self.setting('order')} to i64").text
+
+    def below(self, order: str) -> str:
+        """Return an order less by one: the highest of all but the states."""
+        return self.b.new(f"add i64 {order}, -1").text
+
+    def place(self, array: str, at: str) -> str:
+        return self.b.new(f"getelementptr double, ptr %{array}, i64 {at}").text
+
+    def coefficients(self, order: str) -> str:
+        """Return where the coefficients of an order are."""
+        return self.place("k", self.b.new(f"mul i64 {order}, {self.size}").text)
+
+    def read(self, array: str, at: str, width: int) -> Value:
+        return load_value(self.b, self.place(array, at), width)
+
+    # -- loops
+
+    def rows(self, count: int, carried: int, write: _Write) -> list[Value]:
+        """Write what is done with the numbers from a place on; return the largest values.
+
+        The last rows of a single member are taken once more together with those before them.
+        """
+        width, total = self.width(count), count * self.lanes
+        step = width or 1
+        zeros = [constant(0.0, width)] * carried
+        turns = total // step
+        largest = self._loop(turns, step, zeros, write) if turns else zeros
+        if total % step:
+            largest = list(write(str(total - step), largest))
+        return largest
+
+    def width(self, count: int) -> int:
+        """Return how many numbers are taken together."""
+        return self.lanes if self.lanes > 1 else WIDE if count >= WIDE else 0
+
+    def _loop(self, turns: int, step: int, zeros: list[Value], write: _Write) -> list[Value]:
+        b, loop, after, before = self.b, self.b.label("rows"), self.b.label("end"), self.b.block
+        b.write(f"br label %{loop}")
+        b.begin(loop)
+        index, first = f"%i.{loop}", len(b.lines)
+        entries = [Value(f"%l{i}.{loop}", z.width) for i, z in enumerate(zeros)]
+        b.lines += [""] * (1 + len(zeros))
+        found = list(write(index, entries))
+        following = b.new(f"add i64 {index}, {step}").text
+        more = b.new(f"icmp slt i64 {following}, {turns * step}").text
+        b.lines[first] = f"{index} = phi i64 [0, %{before}], [{following}, %{b.block}]"
+        for i, (entry, zero, new) in enumerate(zip(entries, zeros, found, strict=True)):
+            ways = f"[{zero.text}, %{before}], [{new.text}, %{b.block}]"
+            b.lines[first + 1 + i] = f"{entry.text} = phi {entry.type} {ways}"
+        b.write(f"br i1 {more}, label %{loop}, label %{after}")
+        b.begin(after)
+        return found
+
+    def polynomial(
+        self, highest: str, at: str, h: Value, *, slope: bool, magnitudes: bool = False
+    ) -> list[Value]:
+        """Return a polynomial's value at h, and its slope: from the highest order downwards.
+
+        With `magnitudes` the terms' magnitudes are added up, for h > 0.
+        """
+        b, loop, after, width = self.b, self.b.label("orders"), self.b.label("value"), h.width
+        top = b.new(f"getelementptr double, ptr {self.coefficients(highest)}, i64 {at}").text
+        read = self.magnitude if magnitudes else lambda value: value
+        start = [read(load_value(b, top, width))] + [constant(0.0, width)] * slope
+        before = b.block
+        b.write(f"br label %{loop}")
+        b.begin(loop)
+        head = len(b.lines)
+        b.lines += [""] * (2 + len(start))
+        entries = [Value(f"%p{i}.{loop}", width) for i in range(len(start))]
+        below = b.new(f"getelementptr double, ptr %c.{loop}, i64 {-self.size}").text
+        found = [b.add(b.mul(entries[0], h), read(load_value(b, below, width)))]
+        if slope:
+            found.append(b.add(b.mul(entries[1], h), entries[0]))
+        left = b.new(f"add i64 %left.{loop}, -1").text
+        more = b.new(f"icmp sgt i64 {left}, 0").text
+        b.lines[head] = f"%c.{loop} = phi ptr [{top}, %{before}], [{below}, %{loop}]"
+        b.lines[head + 1] = f"%left.{loop} = phi i64 [{highest}, %{before}], [{left}, %{loop}]"
+        for i, (entry, first, new) in enumerate(zip(entries, start, found, strict=True)):
+            ways = f"[{first.text}, %{before}], [{new.text}, %{loop}]"
+            b.lines[head + 2 + i] = f"{entry.text} = phi {entry.type} {ways}"
+        b.write(f"br i1 {more}, label %{loop}, label %{after}")
+        b.begin(after)
+        return found
+
+    def power(self, highest: str, h: Value) -> Value:
+        """Return h to the power of the highest order."""
+        b, loop, after, before = self.b, self.b.label("power"), self.b.label("known"), self.b.block
+        b.write(f"br label %{loop}")
+        b.begin(loop)
+        head = len(b.lines)
+        b.lines += ["", ""]
+        entry = Value(f"%p.{loop}", h.width)
+        new = b.mul(entry, h)
+        left = b.new(f"add i64 %left.{loop}, -1").text
+        more = b.new(f"icmp sgt i64 {left}, 0").text
+        one = constant(1.0, h.width).text
+        b.lines[head] = f"{entry.text} = phi {entry.type} [{one}, %{before}], [{new.text}, %{loop}]"
+        b.lines[head + 1] = f"%left.{loop} = phi i64 [{highest}, %{before}], [{left}, %{loop}]"
+        b.write(f"br i1 {more}, label %{loop}, label %{after}")
+        b.begin(after)
+        return new
+
+    # -- largest values
+
+    def larger(self, a: Value, b: Value) -> Value:
+        """Return the larger of two values; NaN is larger than all."""
+        first = self.b.logic("or", self.b.compare("ogt", a, b), self.b.compare("uno", a, a))
+        return self.b.select(first, a, b)
+
+    def over_lanes(self, value: Value) -> Value:
+        """Return the largest of a single member's rows; those of several are apart already."""
+        if self.lanes > 1 or not value.width:
+            return value
+        width = value.width
+        while width > 1:
+            width //= 2
+            low, high = (
+                self.b.shuffled(value, Value("poison", value.width), range(k, k + width))
+                for k in (0, width)
+            )
+            value = self.larger(low, high)
+        return self.b.element(value, 0)
+
+    def write_largest(self, values: Sequence[Value]) -> None:
+        """Write the largest of each member."""
+        for i, value in enumerate(values):
+            store(self.b, value, self.place("largest", str(i * self.lanes)))
+
+    def tolerances(self, count: int) -> tuple[Value, Value]:
+        """Read rtol and atol."""
+        rtol, atol = (self.setting(name) for name in ("rtol", "atol"))
+        width = self.width(count)
+        return (self.b.wide(rtol, width), self.b.wide(atol, width)) if width else (rtol, atol)
+
+    def weight(self, size: Value, tolerances: tuple[Value, Value]) -> Value:
+        """Return 1 / (atol + rtol |x|)."""
+        rtol, atol = tolerances
+        return self.b.op("fdiv", 1.0, self.b.add(self.b.mul(rtol, size), atol))
+
+    # -- the functions
+
+    def magnitude(self, x: Value) -> Value:
+        """Return |x|: its bits without the sign."""
+        return self.b.real(self.b.integer("and", self.b.bits(x), 2**63 - 1))
+
+    def growth(self, n: int) -> None:
+        """Write the last coefficients over the tolerance, that of the highest order first."""
+        b, highest, width = self.b, self.highest(), self.width(n)
+        tolerances = self.tolerances(n)
+        orders = [self.coefficients(b.new(f"add i64 {highest}, {-i}").text) for i in range(GROWN)]
+
+        def write(at: str, largest: Sequence[Value]) -> list[Value]:
+            size = self.magnitude(self.read("x", at, width))
+            scale = self.weight(size, tolerances)
+            found = []
+            for order, before in zip(orders, largest, strict=True):
+                where = b.new(f"getelementptr double, ptr {order}, i64 {at}").text
+                part = b.mul(self.magnitude(load_value(b, where, width)), scale)
+                found.append(self.larger(before, part))
+            return found
+
+        self.write_largest([self.over_lanes(value) for value in self.rows(n, GROWN, write)])
+
+    def step(self, n: int) -> None:
+        """Write the states and their polynomials' slopes at the ends of steps h."""
+        highest, h = self.highest(), self.steps(n)
+
+        def write(at: str, _: Sequence[Value]) -> list[Value]:
+            found = self.polynomial(highest, at, h, slope=True)
+            for array, value in zip(("x", "slope"), found, strict=True):
+                store(self.b, value, self.place(array, at))
+            return []
+
+        self.rows(n, 0, write)
+
+    def steps(self, count: int) -> Value:
+        """Read h."""
+        width = self.width(count)
+        h = load_value(self.b, "%h", self.lanes if self.lanes > 1 else 0)
+        return self.b.wide(h, width) if width else h
+
+    def judge(self, n: int, switching: int, compared: Sequence[int]) -> None:
+        """Write h times the defect, and the last term, over the tolerance.
+
+        Both are not finite where a state is not.  A third number is above 0 where something that
+        is compared may change its side, or its polynomial is not to be trusted.
+        """
+        b, width, highest = self.b, self.width(n), self.highest()
+        h, tolerances = self.steps(n), self.tolerances(n)
+        power, last = self.power(highest, h), self.coefficients(highest)
+
+        def write(at: str, largest: Sequence[Value]) -> list[Value]:
+            x, x_new, slope, dx = (self.read(a, at, width) for a in ("x", "x_new", "slope", "dx"))
+            size = self.larger(self.magnitude(x), self.magnitude(x_new))
+            scale = self.weight(size, tolerances)
+            missed = b.mul(self.magnitude(b.mul(h, b.sub(dx, slope))), scale)
+            missed = b.add(missed, b.mul(x_new, 0.0))
+            where = b.new(f"getelementptr double, ptr {last}, i64 {at}").text
+            term = b.mul(self.magnitude(b.mul(power, load_value(b, where, width))), scale)
+            parts = zip(largest, (missed, term), strict=True)
+            return [self.larger(before, part) for before, part in parts]
+
+        found = [self.over_lanes(value) for value in self.rows(n, 2, write)]
+        doubts = constant(-1.0, self.lanes if self.lanes > 1 else 0)
+        for row, count in runs([*range(n, n + switching), *compared]):
+            doubts = self._doubts(row, count, self.below(highest), doubts)
+        self.write_largest([*found, doubts])
+
+    def _doubts(self, row: int, count: int, highest: str, before: Value) -> Value:
+        """Return the largest doubt of some rows, or that of rows before."""
+        b, width, h = self.b, self.width(count), self.steps(count)
+        power = b.op("fdiv", self.power(highest, h), h)  # NaN for h = 0: a lane that has ended
+
+        def write(at: str, largest: Sequence[Value]) -> list[Value]:
+            here = b.new(f"add i64 {at}, {row * self.lanes}").text
+            total = self.polynomial(highest, here, h, slope=False, magnitudes=True)[0]
+            first = self.magnitude(self.read("k", here, width))
+            orders = [b.new(f"add i64 {highest}, {-i}").text for i in range(2)]
+            last, other = (
+                self.magnitude(load_value(b, b.new(
+                    f"getelementptr double, ptr {self.coefficients(order)}, i64 {here}"
+                ).text, width))
+                for order in orders
+            )  # fmt: skip
+            ending = b.mul(power, b.add(other, b.mul(last, h)))
+            doubt = b.sub(ending, b.mul(total, FOLLOWED))
+            crossing = b.sub(total, b.mul(first, 2.0))
+            doubt = b.select(b.compare("ogt", crossing, doubt), crossing, doubt)
+            return [b.select(b.compare("ogt", doubt, largest[0]), doubt, largest[0])]
+
+        (found,) = self.rows(count, 1, write)
+        found = self.over_lanes(found)
+        return b.select(b.compare("ogt", found, before), found, before)
+
+    def values(self, n: int, count: int) -> None:
+        """Write the switching functions' polynomials at h."""
+        if not count:
+            return
+        highest, h = self.below(self.highest()), self.steps(count)
+
+        def write(at: str, _: Sequence[Value]) -> list[Value]:
+            here = self.b.new(f"add i64 {at}, {n * self.lanes}").text
+            store(self.b, self.polynomial(highest, here, h, slope=False)[0], self.place("g", at))
+            return []
+
+        self.rows(count, 0, write)
+
+
+def runs(rows: Sequence[int]) -> list[tuple[int, int]]:
+    """Return consecutive rows as pairs of the first and how many.
+
+    Examples
+    --------
+    >>> runs([7, 3, 4, 5])
+    [(3, 3), (7, 1)]
+    """
+    found: list[tuple[int, int]] = []
+    for row in sorted(rows):
+        if found and row == sum(found[-1]):
+            found[-1] = (found[-1][0], found[-1][1] + 1)
+        else:
+            found.append((row, 1))
+    return found
