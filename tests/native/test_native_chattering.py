@@ -3,45 +3,13 @@
 import control as ct
 import numpy as np
 import pytest
+from own_relay import Side
 
 import nlctl
 from nlctl.native import Status
 
 TIMES = np.linspace(0, 10, 101)
 FULLER = np.sqrt((np.sqrt(33) - 1) / 24)  # of its optimal switching curve x = -C x' |x'|
-
-
-@nlctl.record
-class Side:
-    """A relay with hysteresis whose output is its memory."""
-
-    width: float = nlctl.param(1.0, unit="1", meaning="threshold", above=0)
-    inputs, outputs, states, feedthrough = ("u",), ("v",), ("side",), False
-    memory, initial = ("side",), {"side": -1.0}
-
-    @staticmethod
-    @nlctl.equation
-    def update(t, x, u, p):
-        return (0.0,)
-
-    @staticmethod
-    @nlctl.equation
-    def output(t, x, u, p):
-        return (x[0],)
-
-    @staticmethod
-    @nlctl.equation
-    def commit(t, x, u, p):
-        if u[0] > p.width:
-            return (1.0,)
-        if u[0] < -p.width:
-            return (-1.0,)
-        return (x[0],)
-
-    @staticmethod
-    @nlctl.equation
-    def switching(t, x, u, p):
-        return u[0] - p.width, u[0] + p.width
 
 
 def plain(function, start, name="loop"):

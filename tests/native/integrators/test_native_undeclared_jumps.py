@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from own_relay import Side
 
 import nlctl
 from nlctl.native import Status
@@ -11,34 +12,10 @@ TIMES = np.linspace(0, 10, 101)
 
 
 @nlctl.record
-class AsItIs:
-    """A relay with hysteresis that declares one of its two thresholds only.
-
-    v = side, +1 where u > width, -1 where u < -width
-    """
+class AsItIs(Side):
+    """It declares one of its two thresholds only."""
 
     width: float = nlctl.param(0.1, unit="1", meaning="threshold", at_least=0)
-    inputs, outputs, states, feedthrough = ("u",), ("v",), ("side",), False
-    memory, initial = ("side",), {"side": -1.0}
-
-    @staticmethod
-    @nlctl.equation
-    def update(t, x, u, p):
-        return (0.0,)
-
-    @staticmethod
-    @nlctl.equation
-    def output(t, x, u, p):
-        return (x[0],)
-
-    @staticmethod
-    @nlctl.equation
-    def commit(t, x, u, p):
-        if u[0] > p.width:
-            return (1.0,)
-        if u[0] < -p.width:
-            return (-1.0,)
-        return (x[0],)
 
     @staticmethod
     @nlctl.equation
