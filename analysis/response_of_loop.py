@@ -129,13 +129,12 @@ def check_shape(loop: Any, response: Any, names: Sequence[str]) -> None:
     DiagramError
         Which says what both have.
     """
-    states: Any = response.x
-    if states is None or np.ndim(response.y) != 2:
+    if response.x is None or np.ndim(response.y) != 2:
         raise DiagramError(
-            f"a response of '{loop.name}' needs states and one trace, got states of shape "
-            f"{np.shape(states)} and outputs of shape {np.shape(response.y)}"
+            f"a response of '{loop.name}' needs states and one trace, got outputs of shape "
+            f"{np.shape(response.y)}" + (", and no states" if response.x is None else "")
         )
-    known, count = list(response.output_labels), np.shape(states)[0]
+    known, count = list(response.output_labels), np.shape(response.x)[0]
     same = set(names) <= set(known) if names else known == list(loop.output_labels)
     if not same or count != loop.nstates:
         raise DiagramError(
