@@ -2,7 +2,6 @@
 
 import math
 import re
-import shutil
 import subprocess
 
 import pytest
@@ -460,9 +459,7 @@ def test_a_page_is_printed_to_pdf(chromium, pages, tmp_path):
 
 def test_pages_of_paper_are_numbered_and_unfolded(chromium, pages, tmp_path):
     """Each has its number and their count at its foot; what is folded on the screen is there."""
-    reader = shutil.which("pdftotext")
-    if reader is None:
-        pytest.skip("needs pdftotext of poppler-utils")
+    reader = needed_program(("pdftotext",))
     made = write_pdf(pages["paper"], tmp_path / "report.pdf")
     run = subprocess.run([reader, "-layout", made, "-"], capture_output=True, text=True, check=True)
     *sheets, _ = run.stdout.split("\f")
