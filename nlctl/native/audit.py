@@ -124,7 +124,7 @@ def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
 
 def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
     """Return what machine code computes at a point."""
-    events = compiled.program.events
+    events = code.lowered.rows["g"]
     rows = np.array(compiled.program.sampled, dtype=int)
 
     def several(t: float, x: np.ndarray, u: np.ndarray) -> Values:

@@ -175,7 +175,7 @@ class Compiled(StandIn):
         ParameterError, UnknownNameError
             If x or u has another length, or an override is refused.
         """
-        g = np.empty(self.program.events)
+        g = np.empty(self.lowered.rows["g"])
         return self._call(self.native[0], self.system.nstates, t, x, u, params, g)
 
     def output(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:

@@ -55,11 +55,11 @@ def _committed(compiled: Compiled, p: np.ndarray, jump: Jump) -> str:
     """Return which memory switches, if one does and that is what jumps."""
     program, nodes = compiled.program, compiled.schedule.nodes
     sides = [_events(compiled, p, side) for side in jump.sides()]
-    changes = np.abs(sides[1] - sides[0])[program.switching :]
+    changes = np.abs(sides[1] - sides[0])[-len(program.memory) or sides[0].size :]
     if not changes.size or not changes.max() > 1e-3:
         return ""
     m = program.memory[int(changes.argmax())]
-    place = program.switching + int(changes.argmax())
+    place = sides[0].size - changes.size + int(changes.argmax())
     node = next(node for node in nodes if m in memory(node))
     label = node.system.state_labels[m - node.state_offset]
     return _between(label, node.path, sides[0][place], sides[1][place])
@@ -68,7 +68,7 @@ def _committed(compiled: Compiled, p: np.ndarray, jump: Jump) -> str:
 def _events(compiled: Compiled, p: np.ndarray, side: Any) -> np.ndarray:
     """Return switching functions, and what memories would become."""
     rhs, _ = compiled.native
-    g = np.zeros(compiled.program.events)
+    g = np.zeros(compiled.lowered.rows["g"])
     t, x, u = side
     rhs(t, x.copy(), u.copy(), p, np.empty(x.size), g)
     return g

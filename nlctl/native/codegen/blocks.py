@@ -33,6 +33,7 @@ from ..machine.called import call_of
 from ..parameters import length
 from ..sliding.reading import with_sliding
 from .calls import Call
+from .located import Conditions, found_conditions
 from .newton import inside, solver
 from .program import check_continuous, count_switching_functions, memory
 from .solver import Solver
@@ -56,6 +57,8 @@ class Equations:
     fixed_points : dict
         By the same names: what the blocks of a loop make of the signals found, in their
         expressions; they are equal to these.
+    conditions : Conditions
+        What the equations switch at, and no block declares.
     """
 
     graph: Graph
@@ -63,6 +66,7 @@ class Equations:
     calls: dict[str, Call]
     solvers: dict[str, Solver]
     fixed_points: dict[str, list[Expr]]
+    conditions: Conditions = field(default_factory=Conditions)
 
     def pieces(self, name: str) -> list[tuple[Expr, int]]:
         """Return the expressions of some results, row by row, each with its length."""
@@ -108,10 +112,16 @@ def equations(
     with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
         reader = with_sliding(reader, schedule)
         reader.read(schedule)
+        rates = [reader.derivatives(i) for i in range(len(schedule.nodes))]
+        y = reader.wired(schedule.outputs)
+        declared, committed = _events(reader)
+        found = _conditions(schedule.system, reader, rates, [each for _, each in declared], y)
         results = {
-            "dx": [(n.state_offset, reader.derivatives(i)) for i, n in enumerate(schedule.nodes)],
-            "g": _events(reader),
-            "y": [(0, reader.wired(schedule.outputs))],
+            "dx": [(n.state_offset, rates[i]) for i, n in enumerate(schedule.nodes)],
+            "g": declared
+            + _located(reader, found)
+            + [(row + found.rows, a) for row, a in committed],
+            "y": [(0, y)],
         }
         results = reader.all_known(results)
         for k, what in enumerate(meetings):
@@ -121,8 +131,35 @@ def equations(
             results |= then.all_known({f"sample{k}": _next(then)})
     return Equations(
         graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers,
-        fixed_points=reader.fixed_points,
+        fixed_points=reader.fixed_points, conditions=found,
     )  # fmt: skip
+
+
+def _conditions(
+    system: Any, reader: Reader, rates: Sequence[Tracer], declared: Sequence[Tracer], y: Tracer
+) -> Conditions:
+    """Return what a diagram in continuous time switches at without saying so."""
+    if not ct.isctime(system):
+        return Conditions()
+    arriving = y[system.noutputs or 0 :]
+    roots = [e for array in (*rates, arriving) for e, _ in array.pieces()]
+    return found_conditions(reader, rates, declared, roots)
+
+
+def _located(reader: Reader, found: Conditions) -> list[tuple[int, Tracer]]:
+    """Return the switching functions of conditions with their rows, behind those declared."""
+    row = sum(count_switching_functions(node) for node in reader.blocks)
+    made = []
+    for function in found.functions:
+        size = function.size or 1
+        array = (
+            Tracer(reader.graph, as_array(function), 0, size)
+            if function.size
+            else scalar(reader.graph, function).reshape(1)
+        )
+        made.append((row, array))
+        row += size
+    return made
 
 
 def _next(reader: Reader) -> list[tuple[int, Tracer]]:
@@ -149,16 +186,17 @@ def _results(graph: Graph, op: str, name: str, given: Sequence[Tracer], count: i
     return concatenated(graph, items)
 
 
-def _events(reader: Reader) -> list[tuple[int, Tracer]]:
-    """Return switching functions of all blocks, then what memories are committed to."""
+def _events(reader: Reader) -> tuple[list[tuple[int, Tracer]], list[tuple[int, Tracer]]]:
+    """Return switching functions of all blocks, and what memories are committed to."""
     counts = [(count_switching_functions(node), len(memory(node))) for node in reader.blocks]
-    at, behind, found = 0, sum(count for count, _ in counts), []
-    for i, (own, committed) in enumerate(counts):
-        if own or committed:
+    at, behind, declared, committed = 0, sum(count for count, _ in counts), [], []
+    for i, (own, kept) in enumerate(counts):
+        if own or kept:
             events = reader.events(i)
-            found += [(at, events[:own]), (behind, events[own:])]
-            at, behind = at + own, behind + committed
-    return found
+            declared.append((at, events[:own]))
+            committed.append((behind, events[own:]))
+            at, behind = at + own, behind + kept
+    return declared, committed
 
 
 def _labels(blocks: Sequence[Node]) -> list[str]:

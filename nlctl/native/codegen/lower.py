@@ -8,7 +8,7 @@ generator makes machine code of the plan (`codegen.ir`), and one interpreter car
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,9 +18,11 @@ from ...expressions.arrays import Tracer
 from ...expressions.graph import Expr, needed
 from ..diagram.schedule import Schedule
 from ..parameters import length
+from ..timed.ahead import read_parameters
 from .blocks import Equations, equations
 from .calls import Call
 from .ir.program import program_text
+from .located import Conditions
 from .plan import Function, Store, plan_function, split
 from .program import Program
 from .rewrite import rewritten
@@ -57,6 +59,8 @@ class Lowered:
         Rows of every array.
     lanes : int
         Number of members.
+    conditions : Conditions
+        What it switches at.
     assumed : mapping
         Integer parameters that steer what is computed: for places in `p` the values for which the
         program holds.
@@ -69,6 +73,7 @@ class Lowered:
     rows: Mapping[str, int]
     lanes: int
     assumed: Mapping[int, int]
+    conditions: Conditions = field(default_factory=Conditions)
 
     @property
     def size(self) -> int:
@@ -78,6 +83,16 @@ class Lowered:
     def shape(self, array: str) -> tuple[int, ...]:
         """Return the shape of one of its arrays."""
         return (self.lanes,) if array == "t" else (self.rows[array], self.lanes)
+
+    @cached_property
+    def known_ahead(self) -> dict[Any, Any]:
+        """What has been found of its functions of time alone, see `nlctl.native.timed`."""
+        return {}
+
+    @cached_property
+    def read_ahead(self) -> np.ndarray:
+        """Places of the parameters that these depend on."""
+        return read_parameters(self.conditions)
 
     @property
     def opaque(self) -> dict[str, str]:
@@ -169,12 +184,13 @@ def _lowered(
     functions, size = planned(stores, arguments, parameters)
     n, m = schedule.system.nstates or 0, schedule.ninputs
     rows = {
-        "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n, "g": program.events,
+        "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n,
+        "g": program.events + found.conditions.rows,
         "y": len(schedule.outputs), "v": n + m + 1, "s": len(program.sampled),
     }  # fmt: skip
     return Lowered(
         functions=functions, exact=exact, calls=found.calls, solvers=found.solvers, rows=rows,
-        lanes=lanes, assumed=found.graph.assumptions,
+        lanes=lanes, assumed=found.graph.assumptions, conditions=found.conditions,
     )  # fmt: skip
 
 

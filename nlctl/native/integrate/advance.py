@@ -11,8 +11,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .control import choose_method, choose_step, next_step, rejected
+from .control import choose_method, choose_step, limit_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
+from .events.crossing import NOTHING, crossing
 from .events.excursions import look_between
 from .events.location import (
     AGAIN,
@@ -29,7 +30,7 @@ from .methods import explicit, taylor
 from .methods.dense import solution_at
 from .methods.stiff import stiff_attempt
 from .restart import memory_rates, restart
-from .samples import begin_afresh, next_stop, take_samples
+from .samples import begin_afresh, next_stop, pass_jumps, take_samples
 from .state import DERIVATIVES, INNER, RUNNING
 from .workspace import AUTO, UNKNOWN
 
@@ -55,7 +56,16 @@ def _judge(task, lanes, w, found):
     for j in range(lanes.size):
         lane = lanes[j]
         found[j] = REFUSED
-        if lane.status != RUNNING or rejected(lane, w.error[j], task):
+        if lane.status != RUNNING:
+            continue
+        if task.switching > task.declared:
+            found[j] = crossing(task, lane, w, j)
+            if found[j] == AGAIN:
+                lane.rejected += 1
+            if found[j] == AGAIN or (lane.across and found[j] != NOTHING):
+                continue
+        if rejected(lane, w.error[j], task):
+            found[j] = REFUSED
             continue
         found[j] = CLEAR
         is_behind = task.memory.size > 0 and jumped(task, lane, w, j)
@@ -63,10 +73,12 @@ def _judge(task, lanes, w, found):
             found[j] = locate_jump(lane, task.rtol, is_behind)
         elif w.e.shape[0]:
             found[j] = locate(
-                lane, task.switching, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j
-            )
+                lane, task.declared, task.switching, task.rtol,
+                w.e_start, w.e_low, w.e_high, w.e, w.behind, j,
+            )  # fmt: skip
         if found[j] == AGAIN:
             lane.rejected += 1
+            lane.cross = 0.0
 
 
 @numba.njit(**INNER)
@@ -87,7 +99,12 @@ def _accept(task, lanes, w, found, done, passed):
             _sample(lane, j, task, t_new, w)
         step_accepted(lane, event)
         lane.t = t_new
-        next_step(lane, w.error[j], w.rate[j], task)
+        if task.opaque:
+            lane.rests = _rests(task, w, j)
+        if lane.across:
+            lane.across, lane.cross = 0, 0.0
+        else:
+            next_step(lane, w.error[j], w.rate[j], task)
         if task.fixed == 0.0 and w.e.shape[0]:
             lane.h = min(lane.h, w.resolved[j])
         done[j] = True
@@ -99,6 +116,15 @@ def _accept(task, lanes, w, found, done, passed):
         if task.method == AUTO:
             choose_method(lane, task)
     return any_passed
+
+
+@numba.njit(**INNER)
+def _rests(task, w, j):
+    """Whether an accepted step has moved no state by more than its tolerance."""
+    for i in range(w.x.shape[0]):
+        if abs(w.x_new[i, j] - w.x[i, j]) > task.atol + task.rtol * abs(w.x[i, j]):
+            return 0
+    return 1
 
 
 @numba.njit(**INNER)
@@ -121,7 +147,7 @@ def _take(task, w, done):
         for i in range(x.shape[0]):
             x[i, j] = w.x_new[i, j]
             k[0, i, j] = k[last, i, j]
-        for i in range(switching):
+        for i in range(task.declared):
             w.behind[i, j] = w.e_start[i, j] * w.e[i, j] < 0.0
         for i in range(task.memory.size):
             m, become = task.memory[i], w.g[switching + i, j]
@@ -173,6 +199,7 @@ def advance(rhs, point, along, task, w, rounds):
         for j in range(lanes.size):
             if lanes[j].status == RUNNING:
                 over = lanes[j].segment == task.times.size - 1
+                limit_step(task, lanes[j], j)
                 choose_step(lanes[j], next_stop(task, lanes[j], w, j), over, task.max_steps)
                 running += lanes[j].status == RUNNING
         if not running or is_full(task, lanes, w):
@@ -192,11 +219,19 @@ def advance(rhs, point, along, task, w, rounds):
         any_passed = _accept(task, lanes, w, found, done, passed)
         _take(task, w, done)
         delays = task.delays.shape[0] > 0
-        jumped = delays and keep(task, lanes, w, done, passed)
-        if task.ticks.size and take_samples(task, lanes, w, sampled):
+        again = delays and keep(task, lanes, w, done, passed)
+        again |= task.memory.size > 0 and any_passed
+        for j in range(lanes.size):
+            passed[j] &= task.memory.size > 0 or delays
+        if task.jumps.shape[1] and pass_jumps(task, lanes, sampled):
+            again = True
             for j in range(lanes.size):
-                passed[j] = sampled[j] or (passed[j] and (task.memory.size > 0 or delays))
+                passed[j] |= sampled[j]
+                lanes[j].log_error_before *= 0.0 if sampled[j] else 1.0
+        if task.ticks.size and take_samples(task, lanes, w, sampled):
+            again = True
+            for j in range(lanes.size):
+                passed[j] |= sampled[j]
             begin_afresh(task, lanes, w, sampled)
-            restart(rhs, task, lanes, w, passed)
-        elif jumped or (task.memory.size and any_passed):
+        if again:
             restart(rhs, task, lanes, w, passed)

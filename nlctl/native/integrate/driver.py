@@ -24,6 +24,7 @@ from ..histories import lines_of, variations, with_past, with_room
 from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
 from ..taylor.method import taylor_task
+from ..timed.ahead import ahead
 from .discrete import simulate_discrete
 from .memory import with_table
 from .methods import EXPLICIT_PAIRS
@@ -69,6 +70,8 @@ class Settings:
         expressions and have no memories; an explicit pair of your own as its tableau.
     step : float
         Fixed step (s) instead of error control; 0 for error control.
+    max_step : float
+        Longest step (s) under error control.
     """
 
     rtol: float = 1e-8
@@ -76,6 +79,7 @@ class Settings:
     max_steps: int = 10_000_000_000
     method: str | Tableau = "auto"
     step: float = 0.0
+    max_step: float = np.inf
 
     @property
     def pair(self) -> Tableau:
@@ -89,7 +93,7 @@ class Settings:
     def __post_init__(self) -> None:
         if not isinstance(self.method, Tableau) and self.method not in METHODS:
             raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
-        for name in ("rtol", "atol", "step", "max_steps"):
+        for name in ("rtol", "atol", "step", "max_steps", "max_step"):
             if not isinstance(getattr(self, name), Real):
                 raise ParameterError(f"{name} must be one number, got {getattr(self, name)!r}")
         for name in ("rtol", "atol"):
@@ -97,6 +101,8 @@ class Settings:
                 raise ParameterError(f"{name} must be > 0, got {getattr(self, name)!r}")
         if not 0 <= self.step < np.inf:
             raise ParameterError(f"step must be > 0, or 0 for error control, got {self.step!r}")
+        if not self.max_step > 0:
+            raise ParameterError(f"max_step must be > 0, got {self.max_step!r}")
         if self.max_steps < 1:
             raise ParameterError(f"max_steps must be >= 1, got {self.max_steps!r}")
 
@@ -294,13 +300,15 @@ def prepared(
     code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     c = np.zeros((code.rows, count))
     code.prepare(np.ascontiguousarray(p), c)
+    switching = code.lowered.rows["g"] - len(program.memory)
     task = with_table(
         Task,
         like=TASK,
         times=times,
         inputs=inputs,
         p=c,
-        switching=program.switching,
+        declared=program.switching,
+        switching=program.switching if method == "taylor" else switching,
         memory=np.array(program.memory, dtype=np.int64),
         rtol=float(settings.rtol),
         atol=float(settings.atol),
@@ -310,6 +318,8 @@ def prepared(
         **_pair(settings.pair) | expansion,
         alone=int(count == 1),
         **_instants(compiled, code, due),
+        **ahead(code.lowered, p, times, settings.max_step),
+        opaque=int(bool(code.lowered.calls)),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
         **lines_of(compiled, p, varied),
@@ -318,7 +328,7 @@ def prepared(
         **_linear_equations(len(x0), WHOLE),
     )
     work = new_work(
-        x0, times, read.ninputs, program.events, len(read.outputs),
+        x0, times, read.ninputs, code.lowered.rows["g"], len(read.outputs),
         len(program.sampled), len(read.lines), 2 if terms else settings.pair.stages,
         terms or (1, 0),
     )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .samples import begin_afresh, take_samples
+from .samples import begin_afresh, pass_jumps, take_samples
 from .state import INNER
 from .workspace import evaluate
 
@@ -18,10 +18,12 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     """Fill the memory rows of w.e with the rates at which memories would be carried along.
 
     A difference over a small part of the step: its error moves the turning point by so little
-    that the turning value does not change.
+    that the turning value does not change.  Where functions of t alone jump, it is taken backwards.
     """
     for j in range(lanes.size):
         w.t[j] = w.t_end[j] + AHEAD * max(lanes[j].h, 1e-12)
+        if w.t[j] > lanes[j].left:
+            w.t[j] = w.t_end[j] - AHEAD * max(lanes[j].last, 1e-12)
         ahead = w.t[j] - w.t_end[j]  # what is left of it after rounding
         w.h[j] = ahead
         for i in range(x.shape[0]):
@@ -29,10 +31,14 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
     for i in range(w.g.shape[0]):
         for j in range(lanes.size):
-            w.slope[i, j] = (w.g_ahead[i, j] - w.g[i, j]) / max(w.h[j], 1e-300)
+            w.slope[i, j] = (w.g_ahead[i, j] - w.g[i, j]) / (
+                w.h[j] if w.h[j] < 0.0 else max(w.h[j], 1e-300)
+            )
     for i in range(task.switching, w.g.shape[0]):
         for j in range(lanes.size):
             change = w.g_ahead[i, j] - w.g[i, j]  # exactly 0 where the memory stands still
+            if w.h[j] < 0.0:
+                change = -change
             noise = 1e-15 * max(abs(w.g[i, j]), abs(w.g_ahead[i, j]))
             w.e[i, j] = change if change == 0.0 or abs(change) > noise else w.e_start[i, j]
             if lanes[j].quiet > 0:
@@ -243,6 +249,10 @@ def start(rhs, task, w):
     lanes = w.lanes
     everyone = np.ones(lanes.size, np.bool_)
     sampled = np.zeros(lanes.size, np.bool_)
+    if task.jumps.shape[1]:
+        pass_jumps(task, lanes, sampled)
+        for j in range(lanes.size):
+            sampled[j] = False
     if task.ticks.size:
         take_samples(task, lanes, w, sampled)
     restart(rhs, task, lanes, w, everyone)

@@ -43,6 +43,13 @@ _FIELDS = [
     ("jacobian_at", "f8"),  # time for which the Jacobian matrix is known
     ("judged_at", "f8"),  # time at which the methods were last compared
     ("judged_after", "i8"),  # and the steps tried until then
+    ("left", "f8"),  # the last time at which functions of t alone are what they are now
+    ("right", "f8"),  # and the first
+    ("cross", "f8"),  # width of the step that is to lead across a condition next, 0 if none is
+    ("across", "i8"),  # whether the step being tried is such a one
+    ("jump", "i8"),  # which of their break points comes next
+    ("traces", "i8"),  # whether what is being located is a condition
+    ("rests", "i8"),  # whether no state has moved by more than its tolerance in the last step
     ("segment", "i8"),  # interval of the time grid in which t lies
     ("tick", "i8"),  # what happens next to sampled blocks
     ("status", "i8"),
@@ -68,5 +75,7 @@ def new_lanes(times: np.ndarray, count: int) -> np.ndarray:
     lanes["t"] = times[0]
     lanes["jacobian_at"] = np.nan
     lanes["status"] = RUNNING
+    lanes["left"], lanes["right"] = np.inf, -np.inf
+    lanes["rests"] = 1
     lanes["patience"] = FIRST_PATIENCE
     return lanes

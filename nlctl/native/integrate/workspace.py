@@ -29,7 +29,8 @@ class Task(NamedTuple):
     times: np.ndarray  # of the samples; inputs are linear in between
     inputs: np.ndarray  # (inputs, times)
     p: np.ndarray  # (rows, lanes): what the right-hand side reads besides its arguments
-    switching: int  # number of switching functions, the first rows of g
+    declared: int  # number of switching functions that blocks declare, the first rows of g
+    switching: int  # and with those of conditions, which follow
     memory: np.ndarray  # indices of memory states; what they would become follows in g
     rtol: float
     atol: float
@@ -45,6 +46,10 @@ class Task(NamedTuple):
     inside: np.ndarray  # parts of a step at which event functions are kept: see `Tableau.arrays`
     kept: np.ndarray
     alone: int  # whether this is a single run
+    jumps: np.ndarray  # (lanes, instants): when functions of t alone jump or have kinks, then inf
+    longest: np.ndarray  # (lanes,) step in s that none may be longer than
+    reach: np.ndarray  # (lanes, cells): until when a step may lead that begins in a cell
+    opaque: int  # whether something is called as it stands: nobody knows when it jumps
     ticks: np.ndarray  # (lanes, instants): when something happens to sampled blocks, then inf
     which: np.ndarray  # (lanes, instants): which of the functions then
     samples: np.ndarray  # these functions
@@ -253,9 +258,10 @@ _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
 _PLACES = np.zeros((1, 1), dtype=np.int64)
 TASK = type_of(  # only the types of these matter
     with_table(
-        Task, times=_LINE, inputs=_GRID, p=_GRID, switching=0, memory=_NONE, rtol=0.0, atol=0.0,
+        Task, times=_LINE, inputs=_GRID, p=_GRID, declared=0, switching=0, memory=_NONE, rtol=0.0, atol=0.0,
         fixed=0.0, max_steps=0, method=0, pair_order=0.0, stable=0.0, A=_GRID, B=_GRID,
         C=_LINE, E=_LINE, inside=_GRID, kept=_NONE, alone=0,
+        jumps=_GRID, longest=_LINE, reach=_GRID, opaque=0,
         ticks=_GRID, which=_PLACES, samples=_NONE,
         due=_PLACES, sampled=_NONE, derivatives=0, c_along=_GRID,
         delays=_GRID, varied=_NONE, vary_t=_GRID, vary_h=_GRID,
@@ -265,6 +271,13 @@ TASK = type_of(  # only the types of these matter
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
+
+
+@numba.njit(**INNER)
+def on_this_side(lanes, w):
+    """Have functions of t alone seen on the side on which a step lies, also at its ends."""
+    for j in range(lanes.size):
+        w.t[j] = max(min(w.t[j], lanes[j].left), lanes[j].right)
 
 
 @numba.njit(**INNER)
@@ -387,6 +400,8 @@ def past_value(task, w, i, j, t):
 @numba.njit(**INNER)
 def evaluate(rhs, task, lanes, w, x, dx, g):
     """Evaluate the right-hand side at the times w.t; memory stands still within a step."""
+    if task.jumps.shape[1]:
+        on_this_side(lanes, w)
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
     call_rhs(rhs, w.t, x, w.u, task.p, dx, g)

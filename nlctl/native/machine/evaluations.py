@@ -130,7 +130,9 @@ def evaluations(compiled: Compiled) -> tuple[Callable[..., None], Callable[..., 
 
     def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: np.ndarray, g: np.ndarray) -> None:
         code, c = prepared_parameters(compiled, p)
-        code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], g[:, None])
+        events = np.empty((code.lowered.rows["g"], 1))  # others where integers steer what switches
+        code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], events)
+        g[:] = events[:, 0] if events.shape[0] == g.size else np.nan
 
     def out(t: float, x: Any, u: Any, p: np.ndarray, y: np.ndarray) -> None:
         code, c = prepared_parameters(compiled, p)
