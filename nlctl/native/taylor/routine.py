@@ -120,9 +120,11 @@ def _layout(lowered: Lowered) -> SeriesLayout:
 
 def _lowered(compiled: Compiled, found: Any, width: int) -> tuple[Lowered, Recurrences]:
     program, n, m = compiled.program, compiled.system.nstates or 0, compiled.schedule.ninputs
-    stores, exact, graph = rewritten(found.graph, stores_of(found, ("dx", "g")))
+    wanted = stores_of(found, ("dx", "g"))
+    wanted["g"] = [s for s in wanted["g"] if s.row < program.switching]
+    stores, exact, graph = rewritten(found.graph, wanted)
     try:
-        wanted = recurrences(
+        made = recurrences(
             graph, stores, {"x": n, "g": program.events + found.conditions.rows}, packed=width == 1
         )
     except NoSeriesError as error:
