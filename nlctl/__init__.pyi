@@ -87,6 +87,7 @@ from .errors import (
     DivergedError,
     ParameterError,
     UnknownNameError,
+    ZenoError,
 )
 from .faults import Fault, with_faults
 from .native import (
@@ -196,6 +197,7 @@ __all__ = [
     "UnknownNameError",
     "WingRock",
     "WingRockRegressor",
+    "ZenoError",
     "Zero",
     "ablations",
     "actuators",

@@ -113,6 +113,32 @@ class ChatteringError(DivergedError):
     """
 
 
+class ZenoError(DivergedError):
+    """A run whose jumps follow each other ever faster: no time lies beyond all of them.
+
+    ``time`` is where they accumulate.  What handles runs that did not reach their end handles it.
+
+    Examples
+    --------
+    A ball that loses half of its speed at each bounce comes to rest after infinitely many:
+
+    >>> @nlctl.record
+    ... class Ball:
+    ...     inputs, outputs, states, feedthrough = (), ("h",), ("h", "v"), False
+    ...     initial = {"h": 1.0}
+    ...     update = staticmethod(lambda t, x, u, p: (x[1], -2.0))
+    ...     output = staticmethod(lambda t, x, u, p: (x[0],))
+    ...     guard = staticmethod(lambda t, x, u, p: (x[0],))
+    ...     reset = staticmethod(lambda t, x, u, p: (x[0], -0.5 * x[1]))
+    >>> ball = nlctl.block(Ball(), "ball")
+    >>> try:
+    ...     nlctl.input_output_response(ball, [0.0, 4.0], engine="python-control")
+    ... except nlctl.ZenoError as error:
+    ...     print(round(error.time, 4))
+    3.0
+    """
+
+
 class CompileError(UsageError):
     """A block that cannot be compiled: the message names it and says why.
 

@@ -17,8 +17,8 @@ from .diagrams import leaves
 from .errors import ParameterError
 from .names import unknown
 from .params import checked_times
+from .reference.interpreted import SOLVE_IVP_METHODS, python_control_response
 from .responses.arguments import RunArguments, checked_params, unified, with_aliases
-from .responses.interpreted import SOLVE_IVP_METHODS, python_control_response
 from .sliding.blocks import sliding_blocks
 from .upstream.control_internals import is_system
 
@@ -71,6 +71,7 @@ def input_output_response(
     solve_ivp_method: str | None = None,
     solve_ivp_kwargs: Mapping[str, Any] | None = None,
     max_steps: int | None = None,
+    max_step: float | None = None,
     step: float | None = None,
     progress: Callable[[float], object] | None = None,
     **aliases: Any,
@@ -135,6 +136,8 @@ def input_output_response(
         Keywords of `scipy.integrate.solve_ivp`.  Machine code takes ``rtol`` and ``atol``.
     max_steps : int, optional
         Machine code: attempted steps after which a run is given up.
+    max_step : float, optional
+        Longest step of the integrator (s).
     step : float, optional
         Machine code: a fixed step in s; 0 for error control.
     progress : callable, optional
@@ -181,8 +184,9 @@ def input_output_response(
     0.632121
     """
     checked_params(params)
-    for name, tolerance in (("rtol", rtol), ("atol", atol)):
-        number("input_output_response", name, tolerance, above=0)
+    for name, value in (("rtol", rtol), ("atol", atol), ("max_step", max_step)):
+        if name != "max_step" or value is not None:
+            number("input_output_response", name, value, above=0)
     if squeeze not in (None, True, False):
         raise ParameterError(f"squeeze needs True, False or None, got {squeeze!r}")
     named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
@@ -202,6 +206,7 @@ def input_output_response(
         form=form,
         solver={
             **{"method": method, "rtol": rtol, "atol": atol, "max_steps": max_steps, "step": step},
+            "max_step": max_step,
             **{"solve_ivp_method": solve_ivp_method, "solve_ivp_kwargs": solve_ivp_kwargs},
         },
     )
@@ -222,7 +227,7 @@ def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
             if run.solver[name] is not None:
                 raise ParameterError(
                     f"{name}={run.solver[name]!r} has no meaning in python-control: "
-                    "engine='native' has it, solve_ivp_kwargs={'max_step': ...} bounds its steps"
+                    "engine='native' has it, max_step= bounds the steps of both engines"
                 )
         return python_control_response(run)
     from .native import AlgebraicLoopError, AuditError, Compiled, CompileError  # late: needs numba

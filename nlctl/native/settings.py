@@ -19,7 +19,7 @@ _METHODS = {  # of `scipy.integrate.solve_ivp` -> what comes nearest
 }
 JACOBIAN = "its stiff method makes the Jacobian itself"
 _REFUSED = {  # of the keywords of `solve_ivp` -> what there is instead
-    "max_step": "step= is a fixed step, and break points of the inputs are never stepped over",
+    "max_step": "max_step= of the run bounds its steps",
     "min_step": "step= is a fixed step, max_steps= bounds their number",
     "first_step": "it chooses its first step by the tolerances; step= is a fixed step",
     "dense_output": "evaluation_times= are the times that are wanted",

@@ -4,13 +4,14 @@
   to its parts.  ``dynamics`` and ``output`` call it first.
 - ``NonlinearIOSystem._current_params``: what the equations get from then on.
 - ``NonlinearIOSystem._rhs(t, x, u)`` and ``_out(t, x, u)``: the equations with these parameters.
+- ``InterconnectedSystem._compute_static_io(t, x, u)``: inputs of its parts, one after the other.
 - ``InputOutputSystem`` reads its own ``name``, ``dt``, sizes and ``*_index`` and writes them in its
   ``__init__`` only: a subclass can have them as properties.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import control as ct
@@ -35,6 +36,21 @@ def rates_now(system: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray
 def outputs_now(system: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Return outputs with the parameters that a system has now."""
     return np.asarray(system._out(t, x, u)).reshape(-1)
+
+
+def parts_now(
+    system: Any, t: float, x: np.ndarray, u: np.ndarray
+) -> Iterator[tuple[Any, np.ndarray, np.ndarray]]:
+    """Yield the blocks of a diagram, nested ones flattened, with their states and inputs."""
+    if not isinstance(system, ct.InterconnectedSystem):
+        yield system, x, u
+        return
+    given, _ = system._compute_static_io(t, x, u)
+    n = m = 0
+    for part in system.syslist:
+        states, inputs = part.nstates or 0, part.ninputs or 0
+        yield from parts_now(part, t, x[n : n + states], given[m : m + inputs])
+        n, m = n + states, m + inputs
 
 
 class OwnParameters(ct.NonlinearIOSystem):

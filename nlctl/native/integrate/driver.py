@@ -69,6 +69,8 @@ class Settings:
         expressions and have no memories; an explicit pair of your own as its tableau.
     step : float
         Fixed step (s) instead of error control; 0 for error control.
+    max_step : float
+        Longest step (s).
     """
 
     rtol: float = 1e-8
@@ -76,6 +78,7 @@ class Settings:
     max_steps: int = 10_000_000_000
     method: str | Tableau = "auto"
     step: float = 0.0
+    max_step: float = np.inf
 
     @property
     def pair(self) -> Tableau:

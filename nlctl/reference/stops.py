@@ -1,0 +1,82 @@
+"""Instants at which a run stops, as far as they are known before it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..sampling.clock import instants
+from ..sampling.system import Happening, clocks_of
+
+ROUNDING = 1e-14  # of a time
+_ALIKE = 4.0  # how far apart spaces of output samples may be without a stop between them
+_DISTINCT = 1e-9  # of the run: samples closer together count as one
+
+
+class Stops:
+    """Samples of clocks, break points of inputs, changes of the samples' spacing, and others.
+
+    Parameters
+    ----------
+    grid : ndarray of shape (k,)
+        Times of the run (s): those of its inputs and of its response.
+    times : ndarray of shape (m,)
+        Times of the inputs (s).
+    inputs : ndarray of shape (ninputs, m)
+    sampled : iterable of Sampled
+        Blocks with clocks.
+    others : ndarray
+        Further stops (s): where a condition of t alone changes.
+    """
+
+    def __init__(self, grid: Any, times: Any, inputs: Any, sampled: Any, others: Any = ()) -> None:
+        begin, end = float(times[0]), float(times[-1])
+        # what is due at the last instant happens there
+        due = instants(clocks_of(sampled), begin, float(np.nextafter(end, np.inf)))
+        what = (due.patterns[i] for i in due.which)
+        self.due: dict[float, Happening] = dict(zip(due.times.tolist(), what, strict=True))
+        self.borders, self.spaces = _spacing(grid)
+        known = (due.times, break_points(times, inputs), np.asarray(others, dtype=float))
+        self.breaks = np.unique(np.concatenate(known))
+        every = np.union1d(self.breaks, np.append(self.borders, end))
+        self.times = every[(every > begin) & (every <= end)]
+
+    def after(self, t: float) -> float:
+        """Return the next stop after a time."""
+        return float(self.times[np.searchsorted(self.times, t, side="right")])
+
+    def is_break(self, t: float) -> bool:
+        """Whether a signal or one of its derivatives may jump at a stop."""
+        k = np.searchsorted(self.breaks, t)
+        return bool(k < self.breaks.size and self.breaks[k] == t)
+
+    def space(self, t: float) -> float:
+        """Return the shortest space of output samples near a time (s).
+
+        No step is longer: one from rest would see nothing of what happens within it.
+        """
+        return float(self.spaces[np.searchsorted(self.borders, t, side="right") - 1])
+
+
+def _spacing(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return where samples begin to be spaced otherwise, and their shortest space from there on."""
+    apart = np.diff(grid, prepend=-np.inf) > _DISTINCT * (grid[-1] - grid[0])
+    places = grid[apart]
+    borders, spaces, least, most = [grid[0]], [], np.inf, 0.0
+    for t, space in zip(places[:-1], np.diff(places), strict=True):
+        if max(most, space) > _ALIKE * min(least, space):
+            borders.append(t)
+            spaces.append(least)
+            least, most = np.inf, 0.0
+        least, most = min(least, space), max(most, space)
+    return np.array(borders), np.array([*spaces, least])
+
+
+def break_points(times: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    """Return the times at which an input has a break point."""
+    if not np.size(inputs):
+        return np.zeros(0)
+    rises, lengths = np.diff(np.atleast_2d(inputs)), np.diff(times)
+    bent = np.any(rises[:, :-1] * lengths[1:] != rises[:, 1:] * lengths[:-1], axis=0)
+    return times[1:-1][bent]
