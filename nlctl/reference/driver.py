@@ -21,6 +21,7 @@ from .stops import ROUNDING, Stops
 
 _STANDSTILL = 200  # steps in a row that do not advance the time
 _CROWD, _CROWDED = 300, 1e-6  # so many events in this part of a run: it is chattering
+_ASIDE = 1e-3  # part of a run: how far behind its end what leaves a delay there is read
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
 
@@ -90,7 +91,7 @@ class Driver:
             stack.enter_context(happening())
             while True:
                 self.known.reach(t, is_break)
-                stop = self.known.after(t, self.stops.after(t) if t < end else np.inf)
+                stop = self.known.after(t, self.stops.after(t)) if t < end else t + _ASIDE * (t - begin)
                 self.known.step = (t, stop)
                 x, sides = self.jumps.at(t, x, what, sides)
                 self._record(t, x)

@@ -25,6 +25,7 @@ _DEGREE = 12
 _NODES = chebyshev.chebpts2(_DEGREE + 1)
 _FITTED = np.linalg.inv(chebyshev.chebvander(_NODES, _DEGREE))
 _HALVINGS = 12
+_STEPS = 256  # of the longest step between two stops
 _ASIDE = 1e-9  # part of a step: what lies so close to its end is read from inside
 
 
@@ -89,7 +90,10 @@ class Past:
         later = [self._arrival(spec, s) for s in self.breaks for spec in self.specs]
         ahead = (s for s in later if s > t + ROUNDING * abs(t))
         found = min([stop, *(self._arrival(spec, t) for spec in self.specs), *ahead])
-        return stop if stop - found <= ROUNDING * abs(stop) else found
+        found = stop if stop - found <= ROUNDING * abs(stop) else found
+        while found - t > _STEPS * min(self._read(t, found), default=math.inf):
+            found = t + 0.5 * (found - t)  # short steps only where they are needed
+        return found
 
     def _arrival(self, spec: Any, s: float) -> float:
         """Return when leaves a delay what it is given at time s; inf behind the run."""
@@ -104,19 +108,29 @@ class Past:
         """Return how long steps from a to b may be to go over no pulse that leaves a delay.
 
         A function that nobody knows between two places is looked at at 1000; pieces of the past
-        are shorter the faster their signals move, three of them together: one alone may be what
-        is left between two breaks.
+        are shorter the faster their signals move.
         """
-        found = [math.inf]
+        found = self._read(a, b)
         for spec in self.specs:
-            first, last = _sent(spec, a), _sent(spec, b)
             if spec.varying is not None:
                 found.append((self.end - self.begin) / PLACES)
-            if spec.history is not None and first < self.begin:
+            if spec.history is not None and _sent(spec, a) < self.begin:
                 found.append((self.begin - _sent(spec, self.begin)) / PLACES)
-            read = range(bisect_right(self._ends, first), bisect_right(self._starts, last) - 2)
-            found += [(self._ends[k + 2] - self._starts[k]) / 3 for k in read]
-        return min(found)
+        return min(found, default=math.inf)
+
+    def _read(self, a: float, b: float) -> list[float]:
+        """Return the lengths of the pieces that leave delays from a to b.
+
+        Of three together: one alone may be what is left between two breaks.
+        """
+        starts, ends = self._starts, self._ends
+        return [
+            (ends[k + 2] - starts[k]) / 3
+            for spec in self.specs
+            for k in range(
+                bisect_right(ends, _sent(spec, a)), bisect_right(starts, _sent(spec, b)) - 2
+            )
+        ]
 
     def reach(self, t: float, is_break: bool) -> None:
         """Note a stop: a break, or where one leaves a delay; those that all have left are gone."""
