@@ -7,8 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
 from typing import Any
 
+import control as ct
 import numpy as np
 
+from nlctl.blocks import memory_states
 from nlctl.delays.lines import delayed_blocks
 from nlctl.diagrams import leaves
 from nlctl.errors import DiagramError, DivergedError
@@ -24,6 +26,7 @@ _EQUAL = 1e-6  # of an output, relative to its largest sample, and absolute belo
 _SHORTEST = 1 / 200  # of the response: over shorter spans its states hardly move
 _FOLLOWS = 1e-2  # of how far a state moves in a span
 _STEPS = 1000  # between two samples: another loop may diverge, in ever shorter steps
+_PLAIN: Any = {"method": "LSODA", "solve_ivp_kwargs": {"rtol": 1e-8, "atol": 1e-10}}
 _LOCAL = 1e-3  # of a state's largest sample so far: python-control's default tolerance
 
 
@@ -166,8 +169,8 @@ def _check_span(
     largest = np.abs(whole[:, : span.stop]).max(axis=1)
     allowed = (_FOLLOWS * moved + _LOCAL * largest + np.finfo(float).tiny)[:, None]
     places = places[1:] - places[0]
-    for engine in ("auto",) if sliding_blocks(loop) else ("auto", "python-control"):
-        own = _again(loop, response, span, params, engine, names)  # python-control relaxes memories
+    for engine in _engines(loop):
+        own = _again(loop, response, span, params, engine, names)
         wrong = ~(np.abs(own - told)[:, places] <= allowed)
         if not wrong.any():
             return
@@ -175,6 +178,16 @@ def _check_span(
     row, k = int(np.argmax(wrong[:, first])), int(places[first])
     t = response.time[span]
     raise _another(loop, labels[row], told[row, k], t[k], own[row, k], t[0])
+
+
+def _engines(loop: Any) -> tuple[str, ...]:
+    """Return whose run a response may be: also plain python-control's, where it relaxes memories."""
+    if sliding_blocks(loop):
+        return ("auto",)
+    remembers = any(memory_states(getattr(leaf.system, "spec", None)) for leaf in leaves(loop))
+    is_plain = remembers and not delayed_blocks(loop)
+    is_plain = is_plain and not clocks_of(leaf.system for leaf in leaves(loop))
+    return ("auto", "python-control", *(["plain"] if is_plain else []))
 
 
 def _again(
@@ -191,10 +204,13 @@ def _again(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", EngineWarning)
         try:
-            run: Any = input_output_response(
-                loop, response.time[span], u if u.size else 0, response.x[:, span.start],
-                params=dict(params), engine=engine, squeeze=False, progress=bounded,
-            )  # fmt: skip
+            given = (loop, response.time[span], u if u.size else 0, response.x[:, span.start])
+            common: Any = {"params": dict(params), "squeeze": False}
+            run: Any = (
+                ct.input_output_response(*given, **common, **_PLAIN)
+                if engine == "plain"
+                else input_output_response(*given, **common, engine=engine, progress=bounded)
+            )
         except DivergedError:
             return found
     found[:] = _signals(run, names)

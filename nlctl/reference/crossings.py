@@ -1,8 +1,9 @@
 """Where something happens within a step, on the polynomial that an integrator has of it.
 
-A step is looked at in 18 places, near its ends as well.  Between two of them a sign that has
-changed is located; where a function comes close to 0 and goes away again, its least value is
-looked for.  A memory is located where it reverses, and where it jumps.
+A step is looked at in 18 places, near its ends as well; one of the short steps with which an
+integrator begins again, in 7.  Between two of them a sign that has changed is located; where a
+function comes close to 0 and goes away again, its least value is looked for.  A memory is located
+where it reverses, and where it jumps.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 PLACES = np.array([0.0, 1e-3, *(np.arange(1, 15) / 15.0), 1.0 - 1e-3, 1.0])
+FEW_PLACES = np.array([0.0, 1e-3, 0.25, 0.5, 0.75, 1.0 - 1e-3, 1.0])
 _CLOSE = 2.0  # a function that falls by half of its value from place to place may reach 0
 _ULPS = 4.0
 _RESOLVED = 1e-9  # of a bracket: how closely an extreme value is located
@@ -40,6 +42,7 @@ def first_event(
     before: np.ndarray,
     kinds: tuple[int, int],
     small: Callable[[np.ndarray], np.ndarray],
+    places: np.ndarray = PLACES,
 ) -> Event | None:
     """Return the first event in a step.
 
@@ -55,9 +58,11 @@ def first_event(
         Numbers of guards, and of switching functions.
     small : callable
         ``small(size)``: by how much a memory of that size may go back without reversing.
+    places : ndarray
+        Where it is looked at, from 0 to 1.
     """
     begin, end = ends
-    t = begin + PLACES * (end - begin)
+    t = begin + places * (end - begin)
     t[-1] = end
     seen = np.array([before, *(look(float(s)) for s in t[1:])])
     guards, signed = kinds[0], sum(kinds)

@@ -14,7 +14,7 @@ from ..blocks import past
 from ..errors import ChatteringError, DivergedError
 from ..sampling.system import happening
 from ..upstream.control_internals import outputs_now, parts_now, rates_now
-from .crossings import Event, first_event
+from .crossings import FEW_PLACES, PLACES, Event, first_event
 from .jumps import Jumps
 from .past import Past
 from .stops import ROUNDING, Stops
@@ -22,6 +22,7 @@ from .stops import ROUNDING, Stops
 _STANDSTILL = 200  # steps in a row that do not advance the time
 _CROWD, _CROWDED = 300, 1e-6  # so many events in this part of a run: it is chattering
 _ASIDE = 1e-3  # part of a run: how far behind its end what leaves a delay there is read
+_SHORT = 0.25  # of the longest step so far: an integrator that has begun again
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
 
@@ -100,7 +101,7 @@ class Driver:
                 begun = t
                 t, x, sides, pieces, event = self._flow(t, x, stop, sides)
                 self.known.keep(begun, t, lambda s, pieces=pieces: self._arriving(s, pieces))
-                what = frozenset() if event else self.stops.due.get(t, frozenset())
+                what = self.stops.due.get(t, frozenset())
                 is_break = event is not None or self.stops.is_break(t)
 
     def _flow(self, t: float, x: np.ndarray, stop: float, sides: np.ndarray) -> Any:
@@ -168,12 +169,15 @@ class Driver:
         if not self.jumps.any or not solver.t > solver.t_old:
             return None
         rtol, atol = np.max(self.settings["rtol"]), np.min(self.settings["atol"])
+        length = solver.t - solver.t_old
+        self._longest = max(self._longest, length)
         event = first_event(
             lambda t: self.jumps.look(min(t, self._last), state(t)),
             (float(solver.t_old), float(solver.t)),
             seen,
             self.jumps.kinds,
             lambda size: _REVERSES * (atol + rtol * size),
+            FEW_PLACES if length < _SHORT * self._longest else PLACES,
         )
         if event is not None:
             self._events.append((event.time, event.number))
@@ -202,7 +206,7 @@ class Driver:
         if self.progress is not None:
             self.progress(self.reached)
 
-    _repeated = 0
+    _repeated, _longest = 0, 0.0
 
     def _record_within(self, until: float, state: Any, closes: bool) -> None:
         """Record the times of the response that a step has passed, but not what is to jump."""

@@ -83,9 +83,9 @@ def _numerics(runs: _Runs, found: pd.DataFrame | None) -> Section:
             ),
             Paragraph(
                 text="The backlash is the play operator itself: within a step its memory stands "
-                "still or is carried along, and a step ends where it reverses or touches. (In "
-                "plain python-control, which has no hook for accepted steps, its memory relaxes "
-                "onto the play at 1000 1/s; the figures then hold to 5e-5.)"
+                "still or is carried along, and a step ends where it reverses or touches, in both "
+                "engines. (In plain python-control, which has no hook for accepted steps, its "
+                "memory relaxes onto the play at 1000 1/s; the figures then hold to 5e-5.)"
             ),
             *([] if found is None else [_apart(found)]),
         ],

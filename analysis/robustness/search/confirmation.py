@@ -93,7 +93,7 @@ def confirm(
         ``{name: value}``, such as `WorstCase.witness`.
     python_control : bool, optional
         Also run it in python-control, at the tighter tolerances: another engine, and other code of
-        the diagram.  There memory blocks relax instead of being exact, see `nlctl.Backlash`.
+        the diagram.
 
     Returns
     -------
