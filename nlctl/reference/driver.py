@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import math
 from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -22,6 +23,7 @@ from .stops import ROUNDING, Stops
 _STANDSTILL = 200  # steps in a row that do not advance the time
 _CROWD, _CROWDED = 300, 1e-6  # so many events in this part of a run: it is chattering
 _ASIDE = 1e-3  # part of a run: how far behind its end what leaves a delay there is read
+_PLACES = 1024  # of a run: a loop at rest is looked at in as many
 _SHORT = 0.25  # of the longest step so far: an integrator that has begun again
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
@@ -118,6 +120,10 @@ class Driver:
             if solver.status == "failed":
                 raise RuntimeError(f"solve_ivp failed: {message}")
             state = self._solution(solver)
+            if self._slept(solver, state):
+                short = {**self._bounded(t, stop), "max_step": self._span / _PLACES}
+                solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
+                continue
             event = self._event(solver, state, seen)
             until = event.time if event else float(solver.t)
             closes = event is not None or solver.status == "finished"
@@ -134,6 +140,15 @@ class Driver:
                 self.jumps.check_resolved(until, seen)
             if closes:
                 return until, x, sides, pieces, event
+
+    def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
+        """Whether the step just made, from rest, has passed something that moves the state."""
+        begin, end, space = float(solver.t_old), float(solver.t), self._span / _PLACES
+        allowed = self.settings["atol"] + self.settings["rtol"] * np.abs(solver.y)
+        if end - begin <= 1.01 * space or np.any(np.abs(state(end) - self._held) > allowed):
+            return False
+        places = np.linspace(begin, end, math.ceil((end - begin) / space) + 1)[1:-1].tolist()
+        return any(np.any(space * np.abs(self._rates(t, state(t))) > allowed) for t in places)
 
     def _rates(self, t: float, y: np.ndarray) -> np.ndarray:
         """Return derivatives: of the side of the next stop that the run comes from."""
@@ -155,9 +170,11 @@ class Driver:
     def _solution(self, solver: Any) -> Callable[[float], np.ndarray]:
         """Return the state within the step just made, with what stands still as it is held."""
         found, held, still = solver.dense_output(), self._held, self.jumps.still
-        end, last = float(solver.t), np.array(solver.y, dtype=float)
+        begin, end, last = float(solver.t_old), float(solver.t), np.array(solver.y, dtype=float)
 
         def state(t: float) -> np.ndarray:
+            if t == begin:  # exactly the state, not its interpolant
+                return held.copy()
             x = last.copy() if t == end else np.array(found(t), dtype=float)
             x[still] = held[still]
             return x

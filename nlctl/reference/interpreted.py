@@ -42,11 +42,22 @@ _KEYWORDS = ("rtol", "atol", "max_step", "min_step", "first_step")  # and those 
 _JACOBIAN = ("jac", "jac_sparsity", "lband", "uband")
 
 
-def python_control_response(run: RunArguments) -> ct.TimeResponseData:
+def python_control_response(
+    run: RunArguments, stops: Any = (), crossings: Callable[..., Any] | None = None
+) -> ct.TimeResponseData:
     """Run a diagram in python-control's equations.
 
     In discrete time, and where functions do not declare their sizes, by
     `control.input_output_response`; otherwise by the `Driver`.
+
+    Parameters
+    ----------
+    run : RunArguments
+    stops : array_like
+        Times (s) at which conditions of t alone change.
+    crossings : callable, optional
+        ``crossings(t, x, u)``: numbers that change their sign where other conditions of the
+        diagram's equations change.
 
     Raises
     ------
@@ -75,7 +86,7 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     with np.errstate(over="ignore", invalid="ignore"):  # reported as divergence, not as warnings
         if system.isdtime(strict=True) or None in sizes:
             return _by_python_control(run, inputs, x0, wanted, (method, settings))
-        return _driven(run, inputs, x0, wanted, (method, settings))
+        return _driven(run, (inputs, x0, wanted), (method, settings), (stops, crossings))
 
 
 def _integrator(run: RunArguments) -> tuple[Any, dict[str, Any]]:
@@ -108,16 +119,16 @@ def _integrator(run: RunArguments) -> tuple[Any, dict[str, Any]]:
     return method, {"rtol": solver["rtol"], "atol": solver["atol"], "max_step": longest, **keywords}
 
 
-def _driven(run: RunArguments, inputs: Any, x0: Any, wanted: Any, how: Any) -> Response:
+def _driven(run: RunArguments, given: Any, how: Any, conditions: Any) -> Response:
     """Run a diagram in continuous time."""
-    system, times, (method, settings) = run.system, run.times, how
+    system, times, (inputs, x0, wanted), (method, settings) = run.system, run.times, given, how
     set_parameters(system, run.params)
     begin, end, at = float(times[0]), float(times[-1]), _linear(times, inputs)
-    jumps = Jumps(system, at)
+    jumps = Jumps(system, at, conditions[1])
     grid = times if wanted is None else np.union1d(times, wanted)
     driver = Driver(
         system, at, wanted, jumps=jumps, method=method, settings=settings, progress=run.progress,
-        stops=Stops(grid, times, inputs, jumps.sampled.values()),
+        stops=Stops(grid, times, inputs, jumps.sampled.values(), conditions[0]),
         known=Past(delayed_blocks(system), begin, end, (settings["rtol"], settings["atol"])),
     )  # fmt: skip
     message = None

@@ -15,7 +15,7 @@ from ..upstream.control_internals import current_parameters, parts_now, rates_no
 from ..wording import counted
 
 MOST = 100  # jumps without progress of time
-_STILL = 1e-13  # of a time: less is no progress
+_STILL = 1e-11  # of a time: less is no progress
 _ALIKE, _SHRUNK, _FEW = 0.02, 1e-4, 4  # a geometric sequence: of what ratios, how far, how long
 _AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
 

@@ -52,9 +52,9 @@ class Stops:
         return bool(k < self.breaks.size and self.breaks[k] == t)
 
     def space(self, t: float) -> float:
-        """Return the shortest space of output samples near a time (s).
+        """Return how long steps may be: the shortest space of output samples near a time (s).
 
-        No step is longer: one from rest would see nothing of what happens within it.
+        A longer one from rest would see nothing of what happens within it.
         """
         return float(self.spaces[np.searchsorted(self.borders, t, side="right") - 1])
 

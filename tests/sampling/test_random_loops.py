@@ -112,7 +112,7 @@ def loops(draw):
 
 @pytest.mark.ci
 @given(drawn=loops())
-@settings(max_examples=8)
+@settings(max_examples=6)
 def test_machine_code_is_python_control(drawn):
     """All outputs, at samples and between them."""
     loop, x0, w = drawn
