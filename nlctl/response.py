@@ -1,4 +1,4 @@
-"""Simulating a diagram in python-control at a tolerance that suits adaptive loops."""
+"""Simulating a diagram in either engine, at a tolerance that suits adaptive loops."""
 
 from __future__ import annotations
 
@@ -157,7 +157,9 @@ def input_output_response(
     DivergedError
         If the state becomes infinite or NaN.
     ChatteringError
-        If machine code switches over and over again at a jump; the message names block and values.
+        If a run switches over and over again at a jump; the message names the block.
+    ZenoError
+        If jumps follow each other ever faster.
     KeyboardInterrupt
         After Ctrl-C; machine code with ``ignore_errors`` returns what it has until then.
     CompileError, AlgebraicLoopError

@@ -342,8 +342,8 @@ def sampled(
 
     Notes
     -----
-    A run ends before what happens at its last instant: another one that starts from its last
-    state resumes there.
+    What is due at the last instant of a run happens there; a run that begins at an instant takes
+    the sample that is due there.
 
     The numbers are parameters, ``"sampling.dt"`` and so on, that runs, ensembles and studies
     override without compiling again.  Whether there are a delay and converters is part of the
