@@ -181,7 +181,7 @@ def _check_span(
 
 
 def _engines(loop: Any) -> tuple[str, ...]:
-    """Return whose run a response may be: also plain python-control's, where it relaxes memories."""
+    """Whose run a response may be: plain python-control's as well, which relaxes memories."""
     if sliding_blocks(loop):
         return ("auto",)
     remembers = any(memory_states(getattr(leaf.system, "spec", None)) for leaf in leaves(loop))
@@ -204,7 +204,7 @@ def _again(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", EngineWarning)
         try:
-            given = (loop, response.time[span], u if u.size else 0, response.x[:, span.start])
+            given: Any = (loop, response.time[span], u if u.size else 0, response.x[:, span.start])
             common: Any = {"params": dict(params), "squeeze": False}
             run: Any = (
                 ct.input_output_response(*given, **common, **_PLAIN)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-PLACES = np.array([0.0, 1e-3, *(np.arange(1, 15) / 15.0), 1.0 - 1e-3, 1.0])
+STEP_PLACES = np.array([0.0, 1e-3, *(np.arange(1, 15) / 15.0), 1.0 - 1e-3, 1.0])
 FEW_PLACES = np.array([0.0, 1e-3, 0.25, 0.5, 0.75, 1.0 - 1e-3, 1.0])
 _CLOSE = 2.0  # a function that falls by half of its value from place to place may reach 0
 _ULPS = 4.0
@@ -42,7 +42,7 @@ def first_event(
     before: np.ndarray,
     kinds: tuple[int, int],
     small: Callable[[np.ndarray], np.ndarray],
-    places: np.ndarray = PLACES,
+    places: np.ndarray = STEP_PLACES,
 ) -> Event | None:
     """Return the first event in a step.
 
@@ -112,7 +112,7 @@ def _crossing(look, t, side, i, k, values, is_guard) -> Event:
         b = _lowest(lambda s: side * look(s)[i], a, b)
         if stays(look(b)[i]):
             return Event(np.inf, -1)
-    return Event(behind(lambda s: look(s)[i], stays, a, b), i)
+    return Event(first_behind(lambda s: look(s)[i], stays, a, b), i)
 
 
 def _lowest(value: Callable[[float], float], a: float, b: float) -> float:
@@ -123,7 +123,7 @@ def _lowest(value: Callable[[float], float], a: float, b: float) -> float:
     return a + float(found.x)
 
 
-def behind(
+def first_behind(
     value: Callable[[float], float], stays: Callable[[float], bool], a: float, b: float
 ) -> float:
     """Return the first time behind a crossing between a, where it `stays`, and b, where not.

@@ -15,10 +15,10 @@ from ..blocks import past
 from ..errors import ChatteringError, DivergedError
 from ..sampling.system import happening
 from ..upstream.control_internals import outputs_now, parts_now, rates_now
-from .crossings import FEW_PLACES, PLACES, Event, first_event
+from .crossings import FEW_PLACES, STEP_PLACES, Event, first_event
 from .jumps import Jumps
 from .past import Past
-from .stops import ROUNDING, Stops
+from .stops import TIME_ROUNDING, Stops
 
 _STANDSTILL = 200  # steps in a row that do not advance the time
 _CROWD, _CROWDED = 300, 1e-6  # so many events in this part of a run: it is chattering
@@ -94,7 +94,11 @@ class Driver:
             stack.enter_context(happening())
             while True:
                 self.known.reach(t, is_break)
-                stop = self.known.after(t, self.stops.after(t)) if t < end else t + _ASIDE * (t - begin)
+                stop = (
+                    self.known.after(t, self.stops.after(t))
+                    if t < end
+                    else t + _ASIDE * (t - begin)
+                )
                 self.known.step = (t, stop)
                 x, sides = self.jumps.at(t, x, what, sides)
                 self._record(t, x)
@@ -109,7 +113,7 @@ class Driver:
     def _flow(self, t: float, x: np.ndarray, stop: float, sides: np.ndarray) -> Any:
         """Integrate to a stop, or to where something happens before it."""
         self._held, self._last = x, float(np.nextafter(stop, -np.inf))
-        if stop - t <= ROUNDING * max(abs(t), abs(stop)):  # only rounding sets them apart
+        if stop - t <= TIME_ROUNDING * max(abs(t), abs(stop)):  # only rounding sets them apart
             self._record_within(stop, lambda _: x, closes=True)
             return stop, x + (stop - t) * self._rates(t, x), sides, [], None
         solver = self.method(self._rates, t, x, stop, **self._bounded(t, stop))
@@ -194,7 +198,7 @@ class Driver:
             seen,
             self.jumps.kinds,
             lambda size: _REVERSES * (atol + rtol * size),
-            FEW_PLACES if length < _SHORT * self._longest else PLACES,
+            FEW_PLACES if length < _SHORT * self._longest else STEP_PLACES,
         )
         if event is not None:
             self._events.append((event.time, event.number))

@@ -14,7 +14,7 @@ from ..sampling.system import Happening, Sampled, happening
 from ..upstream.control_internals import current_parameters, parts_now, rates_now
 from ..wording import counted
 
-MOST = 100  # jumps without progress of time
+_MOST = 100  # jumps without progress of time
 _STILL = 1e-11  # of a time: less is no progress
 _ALIKE, _SHRUNK, _FEW = 0.02, 1e-4, 4  # a geometric sequence: of what ratios, how far, how long
 _AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
@@ -133,7 +133,7 @@ class Jumps:
             rows = [i for i, block in self.sampled.items() if block.acts(what)]
             x = x.copy()
             x[rows] = after[rows]
-        for _ in range(MOST + 1):
+        for _ in range(_MOST + 1):
             for _ in range(self.memories.size + 1):  # one that commits may move the next
                 before, x = x, self.committed(t, x)
                 if np.array_equal(before, x, equal_nan=True):
@@ -202,7 +202,7 @@ class Jumps:
     def _check_progress(self, i: int, t: float) -> None:
         """End a run whose jumps accumulate: without progress of time, or geometrically."""
         times = self._taken[i]
-        if len(times) > MOST and t - times[-MOST - 1] <= _STILL * max(abs(t), 1e-300):
+        if len(times) > _MOST and t - times[-_MOST - 1] <= _STILL * max(abs(t), 1e-300):
             raise self._zeno(i, t)
         apart = np.diff(times[-2000:])
         if apart.size <= _FEW or not np.all(apart > 0.0):

@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from ..blocks import Block, DelayLine
 from ..delays.pieces import PLACES
 from ..delays.variation import check_positive, variation
-from .stops import ROUNDING
+from .stops import TIME_ROUNDING
 
 _DEGREE = 12
 _NODES = chebyshev.chebpts2(_DEGREE + 1)
@@ -88,9 +88,9 @@ class Past:
         if not self.specs:
             return stop
         later = [self._arrival(spec, s) for s in self.breaks for spec in self.specs]
-        ahead = (s for s in later if s > t + ROUNDING * abs(t))
+        ahead = (s for s in later if s > t + TIME_ROUNDING * abs(t))
         found = min([stop, *(self._arrival(spec, t) for spec in self.specs), *ahead])
-        found = stop if stop - found <= ROUNDING * abs(stop) else found
+        found = stop if stop - found <= TIME_ROUNDING * abs(stop) else found
         while found - t > _STEPS * min(self._read(t, found), default=math.inf):
             found = t + 0.5 * (found - t)  # short steps only where they are needed
         return found
@@ -136,7 +136,7 @@ class Past:
         """Note a stop: a break, or where one leaves a delay; those that all have left are gone."""
         if not self.specs:
             return
-        near = ROUNDING * abs(t)
+        near = TIME_ROUNDING * abs(t)
         left = (self._arrival(spec, s) for s in self.breaks for spec in self.specs)
         if is_break or any(abs(s - t) <= near for s in left):
             oldest = min(_sent(spec, t) for spec in self.specs)
@@ -148,7 +148,7 @@ class Past:
         self, a: float, b: float, arriving: Callable[[float], list[np.ndarray]], halvings: int = 0
     ) -> None:
         """Keep what has arrived from a to b, at each delay: ``arriving(t)``."""
-        if not self.specs or b - a <= ROUNDING * abs(b):
+        if not self.specs or b - a <= TIME_ROUNDING * abs(b):
             return
         nodes = 0.5 * ((b - a) * _NODES + (a + b))
         nodes[0], nodes[-1] = a, b

@@ -9,7 +9,7 @@ import numpy as np
 from ..sampling.clock import instants
 from ..sampling.system import Happening, clocks_of
 
-ROUNDING = 1e-14  # of a time
+TIME_ROUNDING = 1e-14  # of a time
 _ALIKE = 4.0  # how far apart spaces of output samples may be without a stop between them
 _DISTINCT = 1e-9  # of the run: samples closer together count as one
 

@@ -95,9 +95,7 @@ def test_plain_python_controls_relaxed_memory_is_taken():
     loop, start = nlctl.paper.example_2(), nlctl.initial_state(nlctl.paper.example_2())
     times = np.linspace(0, 4, 81)
     tight = {"rtol": 1e-8, "atol": 1e-10}
-    plain = ct.input_output_response(
-        loop, times, 0, start, method="LSODA", solve_ivp_kwargs=tight
-    )
+    plain = ct.input_output_response(loop, times, 0, start, method="LSODA", solve_ivp_kwargs=tight)
     check_response(loop, plain)
 
 
