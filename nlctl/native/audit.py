@@ -24,11 +24,13 @@ from ..upstream.control_internals import outputs_now, rates_now, set_parameters
 from .codegen.blocks import equations
 from .codegen.lower import lower
 from .codegen.program import instants_of
+from .codegen.solver import searched
 from .compiled import Compiled
 from .diagram.block_inputs import block_inputs
-from .diagram.schedule import Signal, signal_name
+from .diagram.schedule import Schedule, Signal, signal_name
 from .machine.evaluations import Machine, prepared_parameters
 from .machine.routine import lowered_code
+from .rounding.nudged import COLUMNS, nudged_values
 from .sliding.reading import relay_places
 
 _POINTS = 5  # of a trajectory, its start and end among them
@@ -37,6 +39,7 @@ _PART_OF_RUN = 0.01
 _DIFFERENCES = 1e-4  # part of a rate that differences may miss
 _APART = 1e-5  # way, relative to the state, over which a rate is taken
 SHAKEN = 1e-13  # relative change of states and inputs that shows what rounding does to a value
+_OF_STATES = 100  # as many times as far as states are shaken
 _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
 
 Audit = bool | Literal["every run"]
@@ -174,17 +177,27 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
     after = [system.state_labels[i] for i in compiled.program.sampled]
     arrivals = [signal_name(compiled.schedule.nodes, s) for s in compiled.schedule.lines]
     names = [system.state_labels, [*system.output_labels, *arrivals], *[after] * (len(ours) - 2)]
-    for labels, a, b, moved in zip(names, ours, theirs, shaken, strict=True):
-        wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
+    if all(np.all(_close(*v)) for v in zip(ours, theirs, _tolerances(shaken), strict=True)):
+        return
+    allowed = _tolerances(shaken, rounding(compiled, trial, point))
+    for labels, a, b, most in zip(names, ours, theirs, allowed, strict=True):
+        wrong = np.flatnonzero(~_close(a, b, most))
         if wrong.size:
             if not compiled.program.sampled:
                 _compare_blocks(compiled, trial, ours, point)  # it names the block, if it can
             raise _difference(labels[wrong[0]], system.name, (a[wrong[0]], b[wrong[0]]), point[0])
 
 
-def _close(a: np.ndarray, b: np.ndarray, relative: float = _ROUNDING, absolute: Any = 0.0) -> Any:
+def _close(a: np.ndarray, b: np.ndarray, absolute: Any = 0.0) -> Any:
     """Whether values are equal to rounding; NaN equals nothing."""
-    return (a == b) | (np.abs(a - b) <= relative * np.maximum(np.abs(a), np.abs(b)) + absolute)
+    return (a == b) | (np.abs(a - b) <= _ROUNDING * np.maximum(np.abs(a), np.abs(b)) + absolute)
+
+
+def _tolerances(shaken: Values, rounded: Values | None = None) -> Values:
+    """Return what states and inputs that are rounded may do, with what operations round."""
+    if rounded is None:
+        return tuple(_OF_STATES * moved for moved in shaken)
+    return tuple(_OF_STATES * a + b for a, b in zip(shaken, rounded, strict=True))
 
 
 def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> Values:
@@ -314,7 +327,9 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
     nodes = compiled.schedule.nodes
     if compiled.system.nstates:
         set_parameters(compiled.system, dict(trial.params) if trial.params else None)
+    schedule = _with_every_output(compiled)
     y = block_outputs(compiled, trial.p, point)
+    rates, every = rounding(compiled, replace(trial, meetings=()), point, schedule)
     counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
     outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
     given = list(block_inputs(compiled.system, u[: compiled.system.ninputs or 0], outputs))
@@ -323,14 +338,16 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
         if is_delayed(block) or slides(block):
             continue
         own = slice(node.state_offset, node.state_offset + (block.nstates or 0))
-        pairs = [(outputs[i], outputs_now, block.output_labels)]
-        pairs += [(ours[0][own], rates_now, block.state_labels)] if block.nstates else []
-        for a, function, labels in pairs if block.noutputs else pairs[1:]:
+        pairs = [(outputs[i], every[counts[i] : counts[i + 1]], outputs_now, block.output_labels)]
+        pairs += (
+            [(ours[0][own], rates[own], rates_now, block.state_labels)] if block.nstates else []
+        )
+        for a, most, function, labels in pairs if block.noutputs else pairs[1:]:
             b = function(block, t, x[own], inputs).astype(float)
             moved = np.zeros_like(b)
             for near in _near((t, x[own], inputs), trial):
                 np.maximum(moved, np.abs(function(block, *near) - b), out=moved)
-            wrong = np.flatnonzero(~_close(a, b, absolute=100 * moved))
+            wrong = np.flatnonzero(~_close(a, b, _OF_STATES * moved + most))
             if wrong.size:
                 raise _difference(labels[wrong[0]], node.path, (a[wrong[0]], b[wrong[0]]), t)
 
@@ -340,12 +357,63 @@ def block_outputs(compiled: Compiled, p: np.ndarray, point: Any) -> np.ndarray:
     return every_output(compiled, p)(point)
 
 
+def _with_every_output(compiled: Compiled) -> Schedule:
+    """Return the schedule with the outputs of all blocks as those of the diagram."""
+    counts = [node.system.noutputs or 0 for node in compiled.schedule.nodes]
+    every = tuple({Signal(i, k): 1.0} for i, count in enumerate(counts) for k in range(count))
+    return replace(compiled.schedule, outputs=every)
+
+
+def rounding(
+    compiled: Compiled, trial: Trial, point: Any, schedule: Schedule | None = None
+) -> Values:
+    """Return how far results may be moved by what the operations before them round.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    trial : Trial
+    point : tuple
+        Time, states and inputs of the program.
+    schedule : Schedule, optional
+        With other outputs than those of the diagram.
+
+    Returns
+    -------
+    tuple of ndarray
+        For the rates, the outputs, and the states after each meeting.
+    """
+    schedule = schedule or compiled.schedule
+    found = equations(schedule, compiled.program.layout, trial.p, trial.meetings)
+    t, x, u = point
+    arrays = {"t": [t], "x": x, "u": u, "p": trial.p}
+    names = [name for name in found.results if name != "g"]
+    values = iter(
+        nudged_values(
+            [expr for name in names for expr, _ in found.pieces(name)],
+            {name: np.asarray(v, dtype=float).reshape(-1, 1) for name, v in arrays.items()},
+            {name: searched(one) for name, one in found.solvers.items()},
+            {name: call.function for name, call in found.calls.items()},
+            found.fixed_points,
+        )
+    )
+    sizes = [x.size, len(schedule.outputs)]
+    sizes += [len(compiled.program.sampled)] * len(trial.meetings)
+    moved = [np.zeros(size) for size in sizes]
+    for name, total in zip(names, moved, strict=True):
+        for row, array in found.results[name]:
+            at = row
+            for _, size in array.pieces():
+                ways = np.broadcast_to(next(values), (size, COLUMNS))
+                far = np.abs(ways - ways[:, :1])
+                total[at : at + size] = np.where(np.isfinite(far), far, 0.0).max(axis=1)
+                at += size
+    return tuple(moved)
+
+
 def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], np.ndarray]:
     """Return what computes the outputs of all blocks at a point."""
-    nodes = compiled.schedule.nodes
-    counts = [node.system.noutputs or 0 for node in nodes]
-    every = tuple({Signal(i, k): 1.0} for i, count in enumerate(counts) for k in range(count))
-    schedule = replace(compiled.schedule, outputs=every)
+    schedule = _with_every_output(compiled)
     found = equations(schedule, compiled.program.layout, p)
     lowered = lower(schedule, compiled.program, 1, found)
     prepare, _, out = lowered_code(lowered)
@@ -354,7 +422,7 @@ def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], np.ndarra
 
     def outputs(point: Any) -> np.ndarray:
         t, x, u = point
-        y = np.empty((len(every), 1))
+        y = np.empty((len(schedule.outputs), 1))
         out(np.array([t]), x[:, None], u[:, None], c, y)
         return y[:, 0]
 
