@@ -15,7 +15,12 @@ from .errors import BlockError, ParameterError, UsageError
 from .host.notebook import table_html
 from .names import Parameters, base_name, unknown
 from .params import declared_params, ensure_checked, equation_arguments, is_checked, with_overrides
-from .upstream.control_internals import OwnParameters, current_parameters, set_parameters
+from .upstream.control_internals import (
+    Around,
+    OwnParameters,
+    current_parameters,
+    set_parameters,
+)
 from .wording import counted
 
 
@@ -422,22 +427,22 @@ def default_state(system: ct.InputOutputSystem) -> np.ndarray:
 
 def within(system: Any) -> Any:
     """Return the block that has a block's equations: the one that it samples, or itself."""
-    return getattr(system, "inner", system)
+    return system.inner if isinstance(system, Around) else system
 
 
 def is_delayed(system: Any) -> bool:
     """Whether a block's outputs are its inputs at earlier times."""
-    return bool(getattr(getattr(system, "spec", None), "delayed", False))
+    return isinstance(system, Block) and bool(getattr(system.spec, "delayed", False))
 
 
 def slides(system: Any) -> bool:
     """Whether a block's equations ask for the rate that the diagram gives its input."""
-    return bool(getattr(getattr(system, "spec", None), "sliding", False))
+    return isinstance(system, Block) and bool(getattr(system.spec, "sliding", False))
 
 
 def sampling_of(system: Any) -> Any:
     """Return the block with the parameters of a sampled block's sampling; None of any other."""
-    return getattr(system, "sampling", None)
+    return system.sampling if isinstance(system, Around) else None
 
 
 def memory_states(spec: Any) -> tuple[str, ...]:

@@ -203,9 +203,11 @@ class Parameters(dict[str, Any]):
     def _override(self, name: str, value: Any) -> None:
         """Set a parameter by a name that a user wrote."""
         if "." not in name:
-            self._refuse_bare_twin(name)
-            dict.__setitem__(self, name, value)
-            return
+            path = self._path_of_bare(name)
+            if not path:
+                dict.__setitem__(self, name, value)
+                return
+            name = f"{path}.{name}"
         base = base_name(name)
         names, clashes = self._known_names()
         if self.table is None and base in self:
@@ -239,16 +241,32 @@ class Parameters(dict[str, Any]):
         self.strays.append(name)
         return True
 
-    def _refuse_bare_twin(self, name: str) -> None:
-        """A bare name is a third-party block's, unless it looks like one of ours cut short."""
+    def _path_of_bare(self, name: str) -> str:
+        """Return the path of the block that a name without one means, if it means one.
+
+        It is a third-party block's, unless it looks like one of ours cut short.
+        """
         names, _ = self._known_names()
         twins = [k for k in names if k.endswith("." + base_name(name))]
-        if name not in names and twins:
-            raise UnknownNameError(
-                f"unknown parameter '{name}'; parameters carry their block's name: "
-                f"{' or '.join(repr(t) for t in twins)} (a block of your own that reads "
-                f"'{name}' declares it in its params)"
-            )
+        if name in names or not twins:
+            return ""
+        table = self if self.table is None else self.table
+        prefix = self.prefix if self.table is None else ""
+        theirs = [k for k in twins if _reads_a_dict(table.owners.get(k.removeprefix(prefix)))]
+        if len(theirs) > 1:
+            raise AmbiguousNameError(f"parameter '{name}' could be {' or '.join(sorted(theirs))}")
+        if theirs:
+            return theirs[0].rpartition(".")[0]
+        raise UnknownNameError(
+            f"unknown parameter '{name}'; parameters carry their block's name: "
+            f"{' or '.join(repr(t) for t in twins)} (a block of your own that reads "
+            f"'{name}' declares it in its params)"
+        )
+
+
+def _reads_a_dict(block: Any) -> bool:
+    """Whether a block is a third-party one, whose parameters may go without its name."""
+    return bool(getattr(type(block), "reads_a_dict", False))
 
 
 def _same_block(name: str, names: Iterable[str]) -> bool:

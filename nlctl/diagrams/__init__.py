@@ -19,10 +19,13 @@ from .places import (
     places,
     state_names,
 )
+from .third_party import Apart, apart
 
 __all__ = [
+    "Apart",
     "Place",
     "all_parameter_rows",
+    "apart",
     "as_system",
     "check_read",
     "continuous_blocks",

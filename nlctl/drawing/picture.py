@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Polygon, Rectangle
 
+from ..blocks import Block
 from ..wording import counted
 from .figure import Drawing
 from .records import (
@@ -123,7 +124,7 @@ def _kind(system: Any) -> str:
     """What a block is, in a word; a static sum or gain as its formula."""
     if isinstance(system, ct.InterconnectedSystem):
         return counted(len(system.syslist), "block")
-    if hasattr(system, "spec"):
+    if isinstance(system, Block):
         return type(system.spec).__name__
     if not isinstance(system, ct.StateSpace):
         return ""

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..blocks import DelayLine, is_delayed, past, slides
 from ..delays.lines import delayed_blocks
+from ..diagrams import Apart, apart, override
 from ..errors import ParameterError, UsageError
 from ..sampling.system import Happening, happening
 from ..upstream.control_internals import outputs_now, rates_now, set_parameters
@@ -69,6 +70,8 @@ class Trial:
         What may happen to sampled blocks in that machine code.
     relays : mapping
         What ideal relays output at a point, by the number of their blocks.
+    apart : Apart or None
+        The diagram that python-control evaluates, with the parameters of this run.
     """
 
     time: np.ndarray
@@ -79,6 +82,16 @@ class Trial:
     width: int
     meetings: tuple[Happening, ...] = ()
     relays: Mapping[int, float] = field(default_factory=dict)
+    apart: Apart | None = None
+
+    def of(self, thing: Any) -> Any:
+        """Return what stands for a block in the diagram that is evaluated."""
+        return thing if self.apart is None else self.apart.of(thing)
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """What python-control's evaluations are given."""
+        return {"params": dict(self.params)} if self.params else {}
 
 
 def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
@@ -110,12 +123,19 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
         if wanted is True and any(known is code for known in done):
             return
         done.append(code)
-        evaluated, trial = _evaluated(compiled, code, c), replace(trial, meetings=code.meetings)
+        evaluated, trial = _evaluated(compiled, code, c), _with_own_diagram(compiled, trial, code)
         relays = relay_places(compiled.schedule.nodes)
         outputs = every_output(compiled, trial.p) if relays else None
         for point in _points(trial):
             known = _relay_outputs(compiled, outputs(point)) if outputs else {}
             _compare(compiled, replace(trial, relays=known), evaluated, point)
+
+
+def _with_own_diagram(compiled: Compiled, trial: Trial, code: Machine) -> Trial:
+    """Return a trial with a diagram that nobody else writes parameters into."""
+    own = apart(compiled.schedule.system)
+    params = override(own.system, trial.params)
+    return replace(trial, meetings=code.meetings, apart=own, params=params)
 
 
 def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
@@ -201,7 +221,7 @@ def _tolerances(shaken: Values, rounded: Values | None = None) -> Values:
 
 
 def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> Values:
-    system, given = compiled.system, {"params": dict(trial.params)} if trial.params else {}
+    system, given = trial.of(compiled.schedule.system), trial.given
     lines, point = _lines(compiled, trial, point)
     with past(lines), happening():
         rates = system.dynamics(*point, **given) if system.nstates else np.empty(0)
@@ -209,7 +229,8 @@ def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> Values:
     arriving = [line.arriving for made, line in lines.items() if is_delayed(made)]
     after, rows = [], list(compiled.program.sampled)
     for what in trial.meetings:
-        with past(lines), happening(what):
+        now = frozenset(moment._replace(owner=trial.of(moment.owner)) for moment in what)
+        with past(lines), happening(now):
             after.append(system.dynamics(*point, **given)[rows])
     outputs = np.concatenate([np.reshape(outputs, -1), *arriving])
     return tuple(np.asarray(v, dtype=float).reshape(-1) for v in (rates, outputs, *after))
@@ -230,7 +251,7 @@ def _compare_sliding(compiled: Compiled, trial: Trial, point: Any) -> None:
     """
     for i, v in trial.relays.items():
         node = compiled.schedule.nodes[i]
-        spec = node.system.current_spec  # python-control has resolved the run's parameters by now
+        spec = trial.of(node.system).current_spec  # the run's parameters are resolved by now
         if point[1][node.state_offset] != 0:
             continue
         sides = [replace(trial, relays={**trial.relays, i: k * spec.height}) for k in (-1, 1)]
@@ -265,10 +286,9 @@ def _rates_of_input(compiled: Compiled, trial: Trial, i: int, point: Any) -> np.
 def _arriving(compiled: Compiled, trial: Trial, i: int, point: Any) -> float:
     """Return what python-control finds at the input of an ideal relay."""
     lines, point = _lines(compiled, trial, point)
-    given = {"params": dict(trial.params)} if trial.params else {}
     with past(lines), happening():
-        compiled.system.dynamics(*point, **given)
-    return float(lines[compiled.schedule.nodes[i].system].arriving[0])
+        trial.of(compiled.schedule.system).dynamics(*point, **trial.given)
+    return float(lines[trial.of(compiled.schedule.nodes[i].system)].arriving[0])
 
 
 def _lines(compiled: Compiled, trial: Trial, point: Any) -> tuple[dict[Any, DelayLine], Any]:
@@ -276,9 +296,10 @@ def _lines(compiled: Compiled, trial: Trial, point: Any) -> tuple[dict[Any, Dela
     t, x, u = point
     own = compiled.system.ninputs or 0
     nodes = compiled.schedule.nodes
-    lines = {nodes[i].system: _line(np.array([v])) for i, v in trial.relays.items()}
+    lines = {trial.of(nodes[i].system): _line(np.array([v])) for i, v in trial.relays.items()}
     at = own
-    for made in delayed_blocks(compiled.system) if compiled.schedule.lines else ():
+    system = trial.of(compiled.schedule.system)
+    for made in delayed_blocks(system) if compiled.schedule.lines else ():
         count = made.noutputs or 0
         values = u[at : at + count]
         lines[made], at = _line(values), at + count
@@ -325,14 +346,15 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: Values, point: Any) 
     """Compare block by block: each with python-control's equations at the inputs it has here."""
     t, x, u = point
     nodes = compiled.schedule.nodes
-    if compiled.system.nstates:
-        set_parameters(compiled.system, dict(trial.params) if trial.params else None)
+    system = trial.of(compiled.schedule.system)
+    if system.nstates:
+        set_parameters(system, dict(trial.params) if trial.params else None)
     schedule = _with_every_output(compiled)
     y = block_outputs(compiled, trial.p, point)
     rates, every = rounding(compiled, replace(trial, meetings=()), point, schedule)
     counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
     outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
-    given = list(block_inputs(compiled.system, u[: compiled.system.ninputs or 0], outputs))
+    given = list(block_inputs(system, u[: system.ninputs or 0], outputs))
     for i in dict.fromkeys((*compiled.schedule.order, *range(len(nodes)))):
         node, (block, inputs) = nodes[i], given[i]
         if is_delayed(block) or slides(block):

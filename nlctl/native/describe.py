@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
+from ..blocks import Block
 from ..wording import counted
 from .codegen.program import Program, count_switching_functions, memory
 from .diagram.schedule import Node, signal_name
@@ -76,7 +77,7 @@ def _timebase(system: Any) -> str:
 
 
 def _kind(node: Node) -> str:
-    spec = getattr(node.system, "spec", node.system)
+    spec = node.system.spec if isinstance(node.system, Block) else node.system
     text = "feedthrough" if node.direct.any() else "no feedthrough"
     if node.direct.any() and not node.direct.all():
         text = "feedthrough from some inputs to some outputs"

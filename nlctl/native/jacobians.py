@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 from scipy.linalg import expm
 
+from ..blocks import Block
 from ..delays.lines import delayed_blocks
 from ..errors import CompileError, ParameterError, UnknownKeywordError, UsageError
 from ..expressions.derivatives import tangents
@@ -310,7 +311,7 @@ def parameter_jacobian(
 
 def _check_enters_alone(node: Node, name: str) -> None:
     """Refuse a parameter that numbers follow from: these are constants to the equations."""
-    spec: Any = getattr(node.system, "current_spec", None)
+    spec: Any = node.system.current_spec if isinstance(node.system, Block) else None
     field, _, place = name.removeprefix(f"{node.path}.").partition("[")
     if not hasattr(spec, "derived") or field not in declared_params(spec):
         return

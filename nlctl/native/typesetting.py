@@ -17,7 +17,7 @@ import control as ct
 import numpy as np
 
 from ..blocks import Block, slides
-from ..diagrams import override
+from ..diagrams import apart, override
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
 from ..expressions.graph import Expr, Graph, needed
@@ -104,6 +104,7 @@ def typeset(
     u = -\\kappa \\left(\\beta r + W_{\\psi} + \\mathrm{robust} + Y_{d}\\right)
     """
     system = ct.ss(system) if isinstance(system, ct.TransferFunction) else system
+    system = apart(system).system
     override(system, params)
     read = schedule(system, solve_loops=True)
     return tuple(_block(read, node, values) for node in read.nodes)

@@ -13,7 +13,7 @@ from scipy.integrate import OdeSolver
 
 from ..blocks import SLIDES
 from ..delays.lines import delayed_blocks
-from ..diagrams import check_read, leaves
+from ..diagrams import apart, leaves, override
 from ..errors import DivergedError, ParameterError, UsageError
 from ..names import unknown
 from ..sampling.system import Sampled, happening
@@ -48,8 +48,8 @@ def python_control_response(run: RunArguments) -> ct.TimeResponseData:
     UsageError
         If a block is an ideal relay, or has a memory that it would not move.
     """
-    system, times, params, solver = run.system, run.times, run.params, run.solver
-    check_read(system, params)
+    system, times, solver = apart(run.system).system, run.times, run.solver
+    params = override(system, run.params)
     _refuse(system)
     # a function that declares no numbers of inputs or states gets what it is given
     inputs = run.inputs if system.ninputs is None else input_array(system, run.inputs, times)

@@ -7,7 +7,7 @@ from typing import Any
 import control as ct
 
 from ..arguments import number, one_of
-from ..blocks import memory_states, sampling_of
+from ..blocks import Block, memory_states, sampling_of
 from ..diagrams import leaves, not_a_system
 from ..errors import ParameterError
 from ..upstream.control_internals import is_system
@@ -117,7 +117,7 @@ def _discretised(system: Any, dt: float, method: str) -> Any:
             f"discretise needs method='euler' for '{system.name}', which is not linear, got "
             f"{method!r}"
         )
-    spec = getattr(system, "spec", None)
+    spec = system.spec if isinstance(system, Block) else None
     for name in memory_states(spec)[:1]:
         raise ParameterError(
             f"'{system.name}' has a memory, '{name}', that is a state in continuous time only: "

@@ -16,6 +16,9 @@ from typing import Any
 import control as ct
 import numpy as np
 
+RESOLVED = ("_current_params",)
+"""Attributes that a run writes into a system."""
+
 
 def set_parameters(system: Any, params: Mapping[str, Any] | None) -> None:
     """Let a system's equations have these overrides from now on; None for its own values."""
@@ -38,7 +41,15 @@ def outputs_now(system: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarr
 
 
 class OwnParameters(ct.NonlinearIOSystem):
-    """A system that makes what its equations get of the overrides that python-control has."""
+    """A system that makes what its equations get of the overrides that python-control has.
+
+    Attributes
+    ----------
+    reads_a_dict : bool
+        Whether that is a dict: of a third-party system.
+    """
+
+    reads_a_dict = False
 
     def taken(self, params: Mapping[str, Any]) -> Any:
         """Return what the equations get, of the overrides of a run."""
@@ -49,16 +60,20 @@ class OwnParameters(ct.NonlinearIOSystem):
         return super()._out(t, x, u)
 
     def _update_params(self, params: Mapping[str, Any] | None) -> None:
-        self._current_params = self.taken(params or {})
+        self._current_params = type(self).taken(self, params or {})
 
     def _out(self, t: float, x: Any, u: Any) -> Any:
-        return self.answer(t, x, u)
+        return type(self).answer(self, t, x, u)  # an object of others may have one of its own
 
 
 class Around(ct.NonlinearIOSystem):
-    """A system around another one, ``inner``, with its parameters and equations of its own."""
+    """A system around another one, ``inner``, with its parameters and equations of its own.
+
+    ``sampling`` is the block with the parameters of its clock.
+    """
 
     inner: Any
+    sampling: Any
 
     def rates(self, t: float, x: Any, u: Any) -> np.ndarray:
         """Return its derivatives."""
@@ -120,3 +135,9 @@ class StandIn(ct.InputOutputSystem):
 def is_system(thing: Any) -> bool:
     """Whether a thing is a system itself, and does not stand for one."""
     return isinstance(thing, ct.InputOutputSystem) and not isinstance(thing, StandIn)
+
+
+def takes_a_dict(system: Any) -> bool:
+    """Whether a system's equations get its parameters as python-control has them, in a dict."""
+    usual = type(system)._update_params is ct.NonlinearIOSystem._update_params
+    return usual or (isinstance(system, OwnParameters) and type(system).reads_a_dict)

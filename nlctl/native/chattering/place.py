@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ...upstream.control_internals import rates_now, set_parameters
+from ...diagrams import apart, override
+from ...upstream.control_internals import rates_now
 from ..audit import block_outputs
 from ..codegen.program import count_switching_functions, memory
 from ..compiled import Compiled
@@ -79,10 +80,10 @@ def _changed(
 ) -> str:
     """Return the block whose values change most for what changes at its inputs and states."""
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
-        if compiled.system.nstates:
-            set_parameters(compiled.system, dict(params) if params else None)
+        system = apart(compiled.schedule.system).system
+        override(system, params)
         for wider in _WIDER:  # it rounds otherwise than machine code
-            before, after = (list(_blocks(compiled, p, side)) for side in jump.sides(wider))
+            before, after = (list(_blocks(compiled, system, p, side)) for side in jump.sides(wider))
             found = _sharpest(compiled, p, jump, before, after)
             if found:
                 return found
@@ -109,7 +110,7 @@ def _sharpest(compiled: Compiled, p: np.ndarray, jump: Jump, before: list, after
 
 
 def _blocks(
-    compiled: Compiled, p: np.ndarray, point: Any
+    compiled: Compiled, system: Any, p: np.ndarray, point: Any
 ) -> Iterator[tuple[np.ndarray, list[str], np.ndarray]]:
     """Yield for each block what it is given, and its outputs and rates with their names."""
     t, x, u = point
@@ -117,7 +118,7 @@ def _blocks(
     y = block_outputs(compiled, p, point)
     counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
     outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
-    given = block_inputs(compiled.system, u[: compiled.system.ninputs or 0], outputs)
+    given = block_inputs(system, u[: system.ninputs or 0], outputs)
     for i, (node, (block, inputs)) in enumerate(zip(nodes, given, strict=True)):
         own = x[node.state_offset :][: block.nstates or 0]
         values, labels = [np.asarray(outputs[i], dtype=float)], list(block.output_labels)
