@@ -18,7 +18,7 @@ from ..blocks import Block, within
 from ..errors import AmbiguousNameError, ParameterError
 from ..names import Parameters, base_name, unknown
 from .places import leaves
-from .reads import may_read
+from .reads import may_read, texts_of
 from .third_party import Named, declared, is_third_party
 
 _NUMBERS = (int, float, np.number, np.ndarray)
@@ -71,7 +71,7 @@ def divided(system: Any, params: Mapping[str, Any] | None) -> Divided:
         block, key = law.meant(name)
         law.check(name, value)
         if block is None:
-            found.given[name] = value
+            found.given[key] = value
         else:
             found.alone.setdefault(id(block), {})[key] = value
     return found
@@ -100,8 +100,7 @@ class _Law:
         base = base_name(name)
         path, dot, key = base.rpartition(".")
         if not dot:
-            self._check_bare(name, base)
-            return None, name
+            return None, self._bare(name, base)
         blocks = self._blocks(path)
         ours = [k for k in self.others if k == base or k.endswith(f".{base}")]
         if not blocks:
@@ -143,8 +142,11 @@ class _Law:
         twins = len({shown for shown, _ in found.values()}) < len(found)
         return {f"{s}#{i}" if twins else s: b for i, (s, b) in enumerate(found.values())}
 
-    def _check_bare(self, name: str, base: str) -> None:
-        """Refuse a name without a block that nobody reads, or that means more than one block."""
+    def _bare(self, name: str, base: str) -> str:
+        """Return what python-control calls a parameter that is named without its block.
+
+        Refuse one that nobody reads, or that means more than one block.
+        """
         own = [f"{p}.{base}" for p, _, b in self.theirs if isinstance(b, Named) and
                base in b.nlctl_own]  # fmt: skip
         if len(own) > 1:
@@ -152,6 +154,10 @@ class _Law:
         is_read = any(may_read(block, base) for _, _, block in self.theirs)
         if not (own or self.open or base in self.params or is_read):
             self._refuse(name, base)
+        others = [b for _, _, b in self.theirs if base not in declared(b)]
+        if own and not any(base in texts_of(f) for b in others for f in (b.updfcn, b.outfcn)):
+            return own[0] + name[len(base) :]
+        return name
 
     def names(self) -> list[str]:
         """Return all names that are known."""

@@ -154,7 +154,7 @@ class Compiled(StandIn):
             other = changed(self.schedule.captured)
             if other is not None:
                 raise UsageError(
-                    f"'{other.name}' was {_short(other.then)} when '{self.system.name}' was "
+                    f"'{other.title}' was {_short(other.then)} when '{self.system.name}' was "
                     f"compiled and is {_short(other.now)} now: compile again, or make it a "
                     "parameter"
                 )
