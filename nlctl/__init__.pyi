@@ -87,10 +87,12 @@ from .errors import (
     DivergedError,
     ParameterError,
     UnknownNameError,
+    UsageError,
 )
 from .faults import Fault, with_faults
 from .native import (
     AlgebraicLoopError,
+    AuditError,
     BlockEquations,
     CacheWarning,
     Compiled,
@@ -116,6 +118,7 @@ __all__ = [
     "AlgebraicLoopError",
     "AmbiguousNameError",
     "AsymmetricSaturation",
+    "AuditError",
     "Backlash",
     "BacklashInverse",
     "BandLimitedNoise",
@@ -194,6 +197,7 @@ __all__ = [
     "SuperTwistingLaw",
     "TransportDelay",
     "UnknownNameError",
+    "UsageError",
     "WingRock",
     "WingRockRegressor",
     "Zero",

@@ -2,7 +2,16 @@
 
 
 class UsageError(ValueError):
-    """Base of the errors that bad input causes; the command line shows them as one sentence."""
+    """Base of the errors that bad input causes; the command line shows them as one sentence.
+
+    Examples
+    --------
+    >>> try:
+    ...     nlctl.interconnect({"gain": nlctl.Gain(k="high")})
+    ... except nlctl.UsageError as error:
+    ...     print(error)
+    Gain needs numbers for k, got 'high'
+    """
 
 
 class ParameterError(UsageError):

@@ -19,7 +19,7 @@ from ..errors import AmbiguousNameError, ParameterError
 from ..names import Parameters, base_name, unknown
 from .places import leaves
 from .reads import may_read, texts_of
-from .third_party import Named, declared, is_third_party
+from .third_party import Named, declared_keys, is_third_party
 
 _NUMBERS = (int, float, np.number, np.ndarray)
 
@@ -115,7 +115,7 @@ class _Law:
         if ours and (isinstance(block, Named) or others):
             return None, name  # python-control knows it by this name
         if not may_read(block, key):
-            names = [f"{path}.{k}" for k in declared(block)] or self.names()
+            names = [f"{path}.{k}" for k in declared_keys(block)] or self.names()
             raise unknown("parameter", name, names, f"of block '{path}'")
         return block, key + name[len(base) :]
 
@@ -154,14 +154,14 @@ class _Law:
         is_read = any(may_read(block, base) for _, _, block in self.theirs)
         if not (own or self.open or base in self.params or is_read):
             self._refuse(name, base)
-        others = [b for _, _, b in self.theirs if base not in declared(b)]
+        others = [b for _, _, b in self.theirs if base not in declared_keys(b)]
         if own and not any(base in texts_of(f) for b in others for f in (b.updfcn, b.outfcn)):
             return own[0] + name[len(base) :]
         return name
 
     def names(self) -> list[str]:
         """Return all names that are known."""
-        qualified = [f"{p}.{key}" for p, _, block in self.theirs for key in declared(block)]
+        qualified = [f"{p}.{key}" for p, _, block in self.theirs for key in declared_keys(block)]
         bare = [k for k in self.params if isinstance(k, str) and "." not in k]
         return list(dict.fromkeys([*bare, *qualified, *self.others]))
 

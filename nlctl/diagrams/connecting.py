@@ -13,7 +13,7 @@ from ..errors import DiagramError
 from ..names import Parameters, unknown
 from ..upstream.control_internals import StandIn, is_system
 from .places import leaves
-from .third_party import named
+from .third_party import with_own_values
 
 
 def as_system(thing: Any, name: str) -> ct.InputOutputSystem:
@@ -113,7 +113,7 @@ def interconnect(
     sources = _signal_sources(systems)
     _check_inputs(systems, sources, inputs)
     _check_orders(systems, sources)
-    systems = [named(system) for system in systems]
+    systems = [with_own_values(system) for system in systems]
     outputs = list(sources) if outputs is None else list(outputs)
     for signal in outputs:
         if signal not in sources:

@@ -15,7 +15,7 @@ from ..params import declared_params
 from ..upstream.control_internals import current_parameters, set_parameters
 from .addresses import divided
 from .places import known_system, leaves
-from .third_party import apart, declared, is_third_party, put
+from .third_party import apart, declared_keys, is_third_party, set_key
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,7 +68,7 @@ def override(system: Any, params: Mapping[str, Any] | None) -> dict[str, Any]:
     for made in blocks:
         if "nlctl_overrides" not in vars(made):  # not a run's own
             for name, value in found.alone.get(id(made), {}).items():
-                put(current_parameters(made), name, value)
+                set_key(current_parameters(made), name, value)
     return found.given
 
 
@@ -120,7 +120,7 @@ def _third_party_rows(made: Any, path: str) -> list[ParameterRow]:
     values = current_parameters(made)
     return [
         ParameterRow(name=f"{path}.{key}", value=values[key], unit="", meaning="", bounds="")
-        for key in declared(made)
+        for key in declared_keys(made)
         if isinstance(key, str) and np.asarray(values[key]).dtype.kind in "fib"
     ]
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..upstream.control_internals import current_parameters
-from .third_party import declared
+from .third_party import declared_keys
 
 _MOST = 2000  # objects that are looked at
 _VALUES = (0.0, 0.25, 1.0)  # of states and inputs at which it is called
@@ -34,7 +34,7 @@ def may_read(block: Any, key: str) -> bool:
         were called, and did not look at all names.
     """
     functions = [f for f in (block.updfcn, block.outfcn) if f is not None]
-    if key in declared(block) or any(key in texts_of(f) for f in functions):
+    if key in declared_keys(block) or any(key in texts_of(f) for f in functions):
         return True
     return any(_reads(f, block, key) for f in functions)
 

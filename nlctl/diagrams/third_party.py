@@ -1,8 +1,8 @@
 """Third-party blocks whose parameters go by qualified names, as those of nlctl's blocks do.
 
 python-control has one flat dict of parameters for a diagram: of equal names the last one wins for
-every block, and wins over each block's own values.  `named` gives the blocks of a diagram values
-of their own, and `apart` gives a run a diagram of its own.
+every block, and wins over each block's own values.  `with_own_values` gives the blocks of a diagram
+values of their own, and `apart` gives a run a diagram of its own.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def is_third_party(system: Any) -> bool:
     return is_nonlinear and not isinstance(system, Block) and takes_a_dict(system)
 
 
-def declared(block: Any) -> list[str]:
+def declared_keys(block: Any) -> list[str]:
     """Return the parameters that a third-party block declares, by the names that it reads."""
     return list(block.nlctl_own if isinstance(block, Named) else block.params)
 
@@ -80,7 +80,7 @@ class Named(_TakesADict):
         """Return what its functions read: its own values, overridden."""
         found, prefix = dict(self.nlctl_own), f"{self.name}."
         for name, value in [*params.items(), *vars(self).get("nlctl_overrides", {}).items()]:
-            put(found, str(name).removeprefix(prefix), value)
+            set_key(found, str(name).removeprefix(prefix), value)
         return found
 
 
@@ -97,11 +97,11 @@ class Overridden(_TakesADict):
         """Return what its functions read."""
         found = {**self.params, **params}
         for name, value in self.nlctl_overrides.items():
-            put(found, name, value)
+            set_key(found, name, value)
         return found
 
 
-def put(values: dict[str, Any], name: str, value: Any) -> None:
+def set_key(values: dict[str, Any], name: str, value: Any) -> None:
     """Set a parameter, or an element of one, in a dict."""
     base = base_name(name)
     if base == name or name in values or base not in values:
@@ -130,7 +130,7 @@ def _again(kind: type, base: type) -> Any:
 # -- values of their own ---------------------------------------------------------------------------
 
 
-def named(system: Any) -> Any:
+def with_own_values(system: Any) -> Any:
     """Return a system whose third-party blocks have values of their own; itself if all have.
 
     Parameters
@@ -177,9 +177,9 @@ def _named_diagram(diagram: Any, parts: list[Any]) -> Any:
     made = copy.copy(diagram)
     made.syslist = parts
     params: Any = functools.reduce(operator.or_, (part.params for part in parts), {})
-    declared = {base_name(name).rpartition(".")[2] for name in params}
+    keys = {base_name(name).rpartition(".")[2] for name in params}
     for name, value in diagram.params.items():
-        if name in params or ("." not in name and name not in declared):
+        if name in params or ("." not in name and name not in keys):
             dict.__setitem__(params, name, value)
     if isinstance(diagram.params, Parameters) and diagram.params.scope is not None:
         params.scope = made
@@ -238,6 +238,11 @@ def apart(system: Any) -> Apart:
     ----------
     system : control.InputOutputSystem
         A diagram or a block; its functions, matrices and records are those of the copy.
+
+    Returns
+    -------
+    Apart
+        The copy, and which block stands for which.
     """
     found = Apart(system=None, pairs={})
 

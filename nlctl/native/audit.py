@@ -31,7 +31,7 @@ from .diagram.block_inputs import block_inputs
 from .diagram.schedule import Schedule, Signal, signal_name
 from .machine.evaluations import Machine, prepared_parameters
 from .machine.routine import lowered_code
-from .rounding.nudged import COLUMNS, nudged_values
+from .rounding.nudged import ROUNDINGS, nudged_values
 from .sliding.reading import relay_places
 
 _POINTS = 5  # of a trajectory, its start and end among them
@@ -49,7 +49,17 @@ Evaluated = Callable[[float, np.ndarray, np.ndarray], Values]
 
 
 class AuditError(UsageError):
-    """Machine code and python-control differ; the message names the block and both numbers."""
+    """Machine code and python-control differ; the message names the block and both numbers.
+
+    Examples
+    --------
+    A function that reads a clock is not one of its arguments; the audit sees it where reading its
+    code does not.  With ``engine="auto"`` python-control takes over, and an `EngineWarning` says
+    so:
+
+    >>> issubclass(nlctl.AuditError, nlctl.UsageError)
+    True
+    """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -426,7 +436,7 @@ def rounding(
         for row, array in found.results[name]:
             at = row
             for _, size in array.pieces():
-                ways = np.broadcast_to(next(values), (size, COLUMNS))
+                ways = np.broadcast_to(next(values), (size, ROUNDINGS))
                 far = np.abs(ways - ways[:, :1])
                 total[at : at + size] = np.where(np.isfinite(far), far, 0.0).max(axis=1)
                 at += size

@@ -8,7 +8,7 @@ from numba.core import config
 import nlctl
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.native.audit import AuditError, Trial, rounding
-from nlctl.native.rounding.nudged import COLUMNS, nudged_values
+from nlctl.native.rounding.nudged import ROUNDINGS, nudged_values
 from nlctl.native.rounding.shaken import Shaken, unit
 
 TIMES = np.linspace(0, 1, 23)
@@ -173,6 +173,6 @@ def test_values_are_those_of_expressions_where_nothing_is_nudged():
     plain = evaluate_expressions(results, arrays)
     for one, other in zip(plain, nudged_values(results, arrays, {}, {}, {}), strict=True):
         size = one.shape[:-1] if one.ndim else ()
-        ways = np.broadcast_to(other, (*size, COLUMNS))
+        ways = np.broadcast_to(other, (*size, ROUNDINGS))
         np.testing.assert_allclose(ways[..., 0], one.reshape(size), rtol=1e-14)
         np.testing.assert_allclose(ways, ways[..., :1] + 0 * ways, rtol=1e-9, atol=1e-9)

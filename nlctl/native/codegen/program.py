@@ -19,7 +19,7 @@ from ...sampling.system import Happening, clocks_of
 from ...upstream.control_internals import StandIn
 from ..diagram.schedule import Node, Schedule
 from ..parameters import Slot, current_values, slots
-from ..thirdparty.captured import snapshot
+from ..thirdparty.captured import recorded
 
 _MOST = 40  # ways in which clocks meet
 
@@ -90,7 +90,7 @@ def program(schedule: Schedule) -> Program:
         _check_kind(node)
     layout = slots(schedule.holders)
     fixed = {
-        i: {k: snapshot(v) for k, v in current_values(node.system).items() if k not in layout[i]}
+        i: {k: recorded(v) for k, v in current_values(node.system).items() if k not in layout[i]}
         for i, node in enumerate(schedule.holders)
     }
     return Program(

@@ -17,7 +17,7 @@ from ...expressions.evaluate import value_of
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, needed
 from .shaken import Shaken, unit
 
-COLUMNS = 24  # ways of rounding that are tried; the first is none
+ROUNDINGS = 24  # ways of rounding that are tried; the first is none
 _EXACT = {"leaf", "item", "slice", "concat", "select", "neg", "absolute", "sign", "copysign",
           "minimum", "maximum", "floor", "ceil", "trunc", "rint", *COMPARISONS, *LOGIC}  # fmt: skip
 Functions = Mapping[str, Callable[[np.ndarray], np.ndarray]]
@@ -30,7 +30,7 @@ def nudged_values(
     calls: Functions,
     fixed_points: Mapping[str, list[Expr]],
 ) -> list[np.ndarray]:
-    """Return the values of expressions at one point, in `COLUMNS` ways of rounding.
+    """Return the values of expressions at one point, in `ROUNDINGS` ways of rounding.
 
     Parameters
     ----------
@@ -47,10 +47,10 @@ def nudged_values(
     Returns
     -------
     list of ndarray
-        Of shape (COLUMNS,) or (size, COLUMNS), or such that they broadcast to it.
+        Of shape (ROUNDINGS,) or (size, ROUNDINGS), or such that they broadcast to it.
     """
     results = list(results)
-    given = {name: np.repeat(array, COLUMNS, axis=1) for name, array in arrays.items()}
+    given = {name: np.repeat(array, ROUNDINGS, axis=1) for name, array in arrays.items()}
     reader = _Reader(given, searches, calls)
     if fixed_points:  # a search is as exact as what it compares
         again = [expr for exprs in fixed_points.values() for expr in exprs]
@@ -62,10 +62,10 @@ def nudged_values(
 
 def _moved(search: Any, made: Iterable[np.ndarray]) -> Any:
     """Return a search whose results are moved as far as their fixed points were."""
-    far = [np.broadcast_to(v, (COLUMNS,)) - np.broadcast_to(v, (COLUMNS,))[0] for v in made]
+    far = [np.broadcast_to(v, (ROUNDINGS,)) - np.broadcast_to(v, (ROUNDINGS,))[0] for v in made]
 
     def search_with_rounding(given: np.ndarray) -> np.ndarray:
-        found = np.broadcast_to(search(given), (len(far), COLUMNS)).copy()
+        found = np.broadcast_to(search(given), (len(far), ROUNDINGS)).copy()
         return found + np.nan_to_num(np.array(far))
 
     return search_with_rounding
@@ -91,7 +91,7 @@ class _Reader:
                 parts = [self.rounded(arg, values[arg]) for arg in node.args]
                 values[node] = value_of(node, parts, self.arrays, self.functions)
                 if node.op == "sum":  # relative to its terms: their order is not said
-                    scale = np.broadcast_to(np.abs(parts[0]).sum(axis=0), (COLUMNS,))
+                    scale = np.broadcast_to(np.abs(parts[0]).sum(axis=0), (ROUNDINGS,))
                     values[node] = values[node] + scale * self.ways(None)
             return [self.rounded(expr, values[expr]) for expr in results]
 
@@ -104,7 +104,7 @@ class _Reader:
 
     def ways(self, size: int | None) -> np.ndarray:
         """Return relative changes."""
-        shape = (size, COLUMNS) if size else (COLUMNS,)
+        shape = (size, ROUNDINGS) if size else (ROUNDINGS,)
         found = unit() * self.drawn.choice((-1.0, 1.0), size=shape)
         found[..., 0] = 0.0
         return found
@@ -119,7 +119,7 @@ def _columns(
     """
 
     def called(given: np.ndarray) -> np.ndarray:
-        given = np.broadcast_to(given, (given.shape[0], COLUMNS))
+        given = np.broadcast_to(given, (given.shape[0], ROUNDINGS))
         plain = np.asarray(function(given[:, 0].copy()))
         follows = _same(function, Shaken.of(given[:, 0], None), plain)
         found = [plain]

@@ -65,7 +65,7 @@ class Captured:
 
 def noted(holder: Any, name: str, value: Any) -> Captured:
     """Return the note of a value that has just been read."""
-    return Captured(holder, name, snapshot(value))
+    return Captured(holder, name, recorded(value))
 
 
 def noted_function(function: FunctionType) -> Iterator[Captured]:
@@ -85,14 +85,14 @@ def changed(values: Iterable[Captured]) -> Captured | None:
     return next((v for v in values if not same(v.now, v.then)), None)
 
 
-def snapshot(value: Any) -> Any:
+def recorded(value: Any) -> Any:
     """Return what a value is compared with: copies of arrays and containers, else itself."""
     if isinstance(value, np.ndarray):
         return value.copy()
     if isinstance(value, dict):
-        return _Kept(type(value), tuple((k, snapshot(v)) for k, v in value.items()))
+        return _Kept(type(value), tuple((k, recorded(v)) for k, v in value.items()))
     if isinstance(value, _SEQUENCES):
-        return _Kept(type(value), tuple(map(snapshot, value)))
+        return _Kept(type(value), tuple(map(recorded, value)))
     if isinstance(value, set | frozenset):
         return _Kept(type(value), frozenset(value))
     return value
@@ -112,7 +112,7 @@ class _Kept:
 
 
 def same(now: Any, then: Any) -> bool:
-    """Whether a value is what its snapshot says."""
+    """Whether a value is what was recorded."""
     if isinstance(then, _Kept):
         return type(now) is then.kind and _same_held(now, then.held)
     if type(now) is not type(then):
