@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import control as ct
 
-from .arguments import number
+from .arguments import tolerances
 from .blocks import sampling_of
 from .diagrams import leaves
 from .errors import ParameterError
@@ -181,8 +181,9 @@ def input_output_response(
     0.632121
     """
     checked_params(params)
-    for name, tolerance in (("rtol", rtol), ("atol", atol)):
-        number("input_output_response", name, tolerance, above=0)
+    tolerances("input_output_response", rtol, atol)
+    if isinstance(solve_ivp_kwargs, Mapping) and "rtol" in solve_ivp_kwargs:
+        tolerances("solve_ivp_kwargs", solve_ivp_kwargs["rtol"], atol)
     if squeeze not in (None, True, False):
         raise ParameterError(f"squeeze needs True, False or None, got {squeeze!r}")
     named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
@@ -205,7 +206,7 @@ def input_output_response(
             **{"solve_ivp_method": solve_ivp_method, "solve_ivp_kwargs": solve_ivp_kwargs},
         },
     )
-    return _computed(unified(run), engine or "auto")
+    return _computed(unified(run), "auto" if engine is None else engine)
 
 
 @functools.cache

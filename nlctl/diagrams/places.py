@@ -13,6 +13,7 @@ from ..blocks import Block, default_state, within
 from ..errors import DiagramError, ParameterError
 from ..names import Parameters, find_name
 from ..params import as_numbers
+from ..upstream.control_internals import StandIn
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -171,7 +172,7 @@ def known_system(who: str, system: Any) -> Any:
     ParameterError
         If it is neither.
     """
-    inner = getattr(system, "system", system)
+    inner = system.system if isinstance(system, StandIn) else system
     if not isinstance(inner, ct.InputOutputSystem):
         raise ParameterError(not_a_system(who, system))
     return inner

@@ -211,8 +211,8 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("settings", "message"),
         [
-            ({"rtol": 0}, "finite rtol > 0, got 0"),
-            ({"rtol": np.nan}, "finite rtol > 0, got nan"),
+            ({"rtol": 0}, "0 < rtol < 1, got 0"),
+            ({"rtol": np.nan}, "0 < rtol < 1, got nan"),
             ({"atol": -1.0}, "finite atol > 0"),
             ({"step": -0.1}, "step must be > 0"),
             ({"step": np.nan}, "step must be > 0"),

@@ -92,9 +92,10 @@ class Settings:
         for name in ("rtol", "atol", "step", "max_steps"):
             if not isinstance(getattr(self, name), Real):
                 raise ParameterError(f"{name} must be one number, got {getattr(self, name)!r}")
-        for name in ("rtol", "atol"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise ParameterError(f"{name} must be > 0, got {getattr(self, name)!r}")
+        for name, most in (("rtol", 1), ("atol", np.inf)):
+            if not 0 < getattr(self, name) < most:
+                rule = "> 0 and < 1" if most == 1 else "> 0"
+                raise ParameterError(f"{name} must be {rule}, got {getattr(self, name)!r}")
         if not 0 <= self.step < np.inf:
             raise ParameterError(f"step must be > 0, or 0 for error control, got {self.step!r}")
         if self.max_steps < 1:
