@@ -1,4 +1,4 @@
-"""A user's own class of systems is not taken for one of ours, whatever its attributes are called."""
+"""A user's own class of systems is not taken for one of ours, whatever its attributes' names."""
 
 from typing import Any
 
