@@ -8,6 +8,7 @@ from .bounds.decomposition import Decomposition, DecompositionError, clipped_spl
 from .bounds.premises import Premises, literal, premises
 from .bounds.provenance import Constant, Constants
 from .bounds.sector import Sector, sector
+from .bounds.starts import Starts
 from .bounds.weights import approximation_error, minimax_weights, tightest_weights
 from .certificate.certify import certify
 from .certificate.gains import GainDesign, design
@@ -53,6 +54,7 @@ __all__ = [
     "Signals",
     "SlidingModeCertificate",
     "SlowDrift",
+    "Starts",
     "Tightened",
     "approximation_error",
     "burst_peak",

@@ -18,11 +18,13 @@ from ..loop.roles import Parts
 from .decomposition import Decomposition
 from .final_bound import final_bound
 from .sector import Sector
+from .starts import Starts
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
+    "STARTS",
     "Constant",
     "Constants",
     "Provenance",
@@ -31,6 +33,7 @@ __all__ = [
     "per_second",
 ]
 
+STARTS = "all t, from the starts"
 Provenance = Literal["proved", "computed", "sampled", "given", "undecided"]
 
 
@@ -174,9 +177,9 @@ class Shown:
     Attributes
     ----------
     holds : bool
-        Whether the bounds hold for all t >= 0, proved.
+        Whether the bounds hold for all t >= 0 from the starts, proved.
     reason : str
-        Why they hold, or why not.
+        Why they hold, or what is missing.
     params : mapping
         Parameters of the proof that are not those of the loop as it stands.
     loop_facts : mapping
@@ -194,6 +197,32 @@ class Shown:
         raise NotImplementedError
 
     @property
+    def starts(self) -> Starts:
+        """The initial states that the bounds hold for."""
+        raise NotImplementedError
+
+    @property
+    def disturbance(self) -> float:
+        """Bound of what external inputs add to the plant's v."""
+        raise NotImplementedError
+
+    @property
+    def status(self) -> Literal["proved", "undecided"]:
+        """Whether the bound is proved; a bound that is not is not refuted by that."""
+        return "proved" if self.holds else "undecided"
+
+    @property
+    def missing(self) -> str:
+        """What a proof would need; nothing if there is one."""
+        return "" if self.holds else self.reason
+
+    @property
+    def claim(self) -> str:
+        """What is proved, with the starts and inputs that it is about."""
+        added = f", whatever external inputs add up to {self.disturbance:.6g} to v"
+        return f"{self.bound} from {self.starts}{added if self.disturbance else ''}"
+
+    @property
     def constants(self) -> tuple[Constant, ...]:
         """Every constant of the proof; without the bounds if nothing is proved."""
         raise NotImplementedError
@@ -201,7 +230,8 @@ class Shown:
     @property
     def verdict(self) -> str:
         """What is proved, in a sentence."""
-        return f"{self.bound if self.holds else 'no bound is proved'}: {self.reason}"
+        lost = f"no bound is proved from {self.starts}, and none is refuted; undecided"
+        return f"{self.claim if self.holds else lost}: {self.reason}"
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

@@ -87,7 +87,7 @@ class GainDesign:
     def __str__(self) -> str:
         gains = ", ".join(f"{name} = {value:.5g}" for name, value in self.gains.items())
         lines = [
-            f"|r| <= {self.certificate.C_0:.6g} for all t, proved; max |u| = {self.u:.5g} over "
+            f"{self.certificate.claim}; max |u| = {self.u:.5g} over "
             f"{self.horizon:g} s (sampled; limit {self.u_limit:g})",
             gains,
             "trade-off (max |u|, C_0): "

@@ -40,6 +40,7 @@ def certify_model_reference(
     *,
     params: Mapping[str, Any] | None = None,
     inputs: Mapping[str, float] | None = None,
+    starts: Any = None,
     k: tuple[float, float] | None = None,
     W: Sequence[float] | None = None,
     u_max: float = 250.0,
@@ -47,12 +48,12 @@ def certify_model_reference(
     max_iterations: int = 60,
 ) -> ModelReferenceCertificate:
     """Prove bounds of a loop that `is_model_reference`; see `certify`."""
-    read = read_model_reference(loop, params, inputs)
+    read = read_model_reference(loop, params, inputs, starts)
     split = disturbed(_split(read, k, u_max, tol), read.disturbance)
     match = matching(read, split, _checked_weights(W, len(read.W_hat_0)))
     if not outside_ball(match):
         check_decrease(loop, match, params)
-    V_0 = ball(match.energy(read.E_0, read.W_hat_0))
+    V_0 = ball(match.V_0)
     C, iterations, reason = V_0, [upper(V_0)], ""
     for _ in range(max_iterations):
         need = region(match, split, C * (1 + tol) + tol * tol, tol=tol)
