@@ -6,8 +6,9 @@ result encloses every value that the equation takes for numbers inside the balls
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -15,61 +16,26 @@ from flint import arb
 
 from nlctl.expressions.functions import FUNCTIONS
 
-from .paths import Undecided, branch
+from .numpy_functions import JUMPS, NumPyFunctions, interpolated
+from .pairs import PAIRS
+from .paths import Undecided, decided
 
 __all__ = ["Ball", "NumPyFunctions", "as_ball", "common", "power"]
 
 
-def _function(name: str) -> Callable[[Any], Any]:
-    def method(self: Any) -> Any:
-        return self.apply(name)
-
-    method.__doc__ = f"NumPy calls this for np.{name}(x)."
-    return method
+_ANY = arb(0, "inf")
+_SINC_SLOPE = 1.3707  # above the largest slope of sin(pi x)/(pi x)
+_QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
 
 
-JUMPS = ("floor", "ceil", "sign")
-_Comparison = Callable[[arb, arb], Any]
-
-
-class NumPyFunctions:
-    """What balls and difference quotients share: the functions that NumPy looks for.
-
-    Those of one argument in the table `nlctl.expressions.functions` that have an enclosure, and
-    minimum and maximum.
-    """
-
-    __slots__ = ()
-    __hash__ = None  # type: ignore[assignment]  # equality may be undecided
-
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
-        if ufunc in (np.minimum, np.maximum):
-            name = "minimum" if ufunc is np.minimum else "maximum"
-            ufunc = np.frompyfunc(lambda a, b: _pairwise(name, a, b), 2, 1)
-        return getattr(ufunc, method)(*map(_objects, inputs), **kwargs)
-
-
-NumPyFunctions.__floor__ = _function("floor")  # type: ignore[attr-defined]  # NumPy looks for it
-NumPyFunctions.__ceil__ = _function("ceil")  # type: ignore[attr-defined]
-for _name, _row in FUNCTIONS.items():
-    if _row.enclosure is not None and _row.count == 1:
-        setattr(NumPyFunctions, _name, _function(_name))
-
-
-def _objects(x: Any) -> np.ndarray:
-    """Return an array of plain objects: NumPy's own numbers would ask the ball in turn."""
-    plain = x.item() if isinstance(x, np.generic) else x
-    array = np.asarray(plain, dtype=object)
-    if isinstance(x, np.ndarray) and x.dtype != object:
-        array[...] = np.reshape(np.array(x.tolist(), dtype=object), x.shape)
-    return array
-
-
-def _pairwise(name: str, a: Any, b: Any) -> Any:
-    """Ask the operand that knows both: a ball knows numbers, a difference quotient balls, too."""
-    if as_ball(a) is NotImplemented or not isinstance(b, NumPyFunctions):
-        return getattr(a, name)(b)
-    return getattr(b, name)(a)
+@contextmanager
+def quiet() -> Iterator[None]:
+    """While a user's function runs its balls have no text: it would be another one of floats."""
+    token = _QUIET.set(True)
+    try:
+        yield
+    finally:
+        _QUIET.reset(token)
 
 
 class Ball(NumPyFunctions):
@@ -95,13 +61,21 @@ class Ball(NumPyFunctions):
     """
 
     __slots__ = ("gradient", "value")
+    rank = 0  # of the kinds of numbers that compute with each other
 
     def __init__(self, value: arb, gradient: tuple[arb, ...] = ()) -> None:
         self.value = value
         self.gradient = gradient
 
     def __repr__(self) -> str:
+        if _QUIET.get():
+            raise TypeError("asks for the text of its argument")
         return f"Ball({self.value}, {self.gradient})"
+
+    __str__ = __repr__
+
+    def __format__(self, form: str) -> str:
+        return repr(self)
 
     def chain(self, value: arb, slope: arb) -> Ball:
         """Return `value` with the derivatives of self times `slope`.
@@ -175,9 +149,11 @@ class Ball(NumPyFunctions):
         other = as_ball(other)
         return other if other is NotImplemented else other / self
 
-    def __pow__(self, n: Any) -> Ball:
-        if n != int(n):
-            return (self.apply("log") * n).apply("exp")
+    def __pow__(self, n: Any) -> Any:
+        if isinstance(n, Ball):
+            n = float(n.value) if n.value.is_exact() and not n.gradient else n
+        if isinstance(n, Ball) or n != int(n):
+            return self.pair("power", n)
         if n < 0:
             return 1 / self ** (-n)
         return self.chain(power(self.value, int(n)), int(n) * power(self.value, max(int(n) - 1, 0)))
@@ -233,30 +209,79 @@ class Ball(NumPyFunctions):
         Parameters
         ----------
         name : str
-            A function of the table that has an enclosure, such as ``sin``.
+            A function of the table that has an enclosure, such as ``sin``; or ``sinc``.
 
         Returns
         -------
         Ball
-            With the derivatives by the chain rule.
-
-        Raises
-        ------
-        Undecided
-            If the function may jump within the ball.
+            With the derivatives by the chain rule; where it jumps within the ball they have no
+            bound.
         """
+        if name == "sinc":
+            return self._sinc()
         row = FUNCTIONS[name]
         assert row.enclosure is not None
         value = row.enclosure(self.value)
         if name in JUMPS and not value.is_exact():
-            raise Undecided(f"{name}({self.value}) jumps")
+            low, high = (row.enclosure(end) for end in (self.value.lower(), self.value.upper()))
+            if self.value.is_finite() and low.is_exact() and high.is_exact():
+                value = low.union(high)
+            return self.chain(value, _ANY)
         if not self.gradient:
             return Ball(value)
         return self.chain(value, as_ball(row.derivative[0](Ball(self.value))).value)
 
-    def _compare(self, other: Any, yes: _Comparison, no: _Comparison) -> Any:
-        """Return yes(self, other), where `no` is its negation; see `branch`."""
+    def _sinc(self) -> Ball:
+        """Return sin(pi x)/(pi x)."""
+        x = self.value
+        value = x.sinc_pi() if x.is_finite() else arb(0, 1) if not x.is_nan() else arb.nan()
+        slope, bound = arb.nan(), arb(0, _SINC_SLOPE)
+        if x.is_finite() and not x.contains(0):
+            slope = ((arb.pi() * x).cos() - x.sinc_pi()) / x
+        return self.chain(value, common(slope, bound))
+
+    def pair(self, name: str, other: Any) -> Any:
+        """Return phi of this ball and another one, for the NumPy function of that name.
+
+        Parameters
+        ----------
+        name : str
+            A function of `analysis.intervals.pairs`.
+        other : Ball or float
+            The second argument.
+
+        Returns
+        -------
+        Ball
+        """
         other = as_ball(other)
+        if other is NotImplemented:
+            return other
+        value, by_self, by_other = PAIRS[name](self.value, other.value)
+        return self._joined(value, by_self, other, by_other)
+
+    def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Ball:
+        """Return the linear interpolation of a table, constant beyond its ends.
+
+        Parameters
+        ----------
+        xp, fp : tuple of m floats
+            Increasing break points, and the values there.
+
+        Returns
+        -------
+        Ball
+        """
+        return self.chain(*interpolated(self.value, xp, fp))
+
+    @staticmethod
+    def lifted(number: Any) -> Any:
+        """Return a number as a ball."""
+        return as_ball(number)
+
+    def _compare(self, other: Any, holds: frozenset[int], what: str) -> Any:
+        """Return whether the order of self and other is one of those; see `decided`."""
+        given, other = other, as_ball(other)
         if other is NotImplemented:
             return other
         a, b = self.value, other.value
@@ -264,25 +289,29 @@ class Ball(NumPyFunctions):
             raise Undecided(
                 "a comparison with a ball that is not a number (a division by 0, perhaps)"
             )
-        return branch(bool(yes(a, b)), bool(no(a, b)), f"{yes.__name__}({a}, {b})")
+        if given is self:
+            return 0 in holds
+        possible = {k for k, no in ((-1, a >= b), (0, a != b), (1, a <= b)) if not no}
+        key = (self, given if given is other else b)
+        return decided(possible, holds, key, f"{what}({a}, {b})")
 
     def __lt__(self, other: Any) -> bool:
-        return self._compare(other, operator.lt, operator.ge)
+        return self._compare(other, frozenset({-1}), "lt")
 
     def __le__(self, other: Any) -> bool:
-        return self._compare(other, operator.le, operator.gt)
+        return self._compare(other, frozenset({-1, 0}), "le")
 
     def __gt__(self, other: Any) -> bool:
-        return self._compare(other, operator.gt, operator.le)
+        return self._compare(other, frozenset({1}), "gt")
 
     def __ge__(self, other: Any) -> bool:
-        return self._compare(other, operator.ge, operator.lt)
+        return self._compare(other, frozenset({0, 1}), "ge")
 
     def __eq__(self, other: object) -> bool:
-        return self._compare(other, operator.eq, operator.ne)
+        return self._compare(other, frozenset({0}), "eq")
 
     def __ne__(self, other: object) -> bool:
-        return self._compare(other, operator.ne, operator.eq)
+        return self._compare(other, frozenset({-1, 1}), "ne")
 
     def __bool__(self) -> bool:
         return self != 0
@@ -326,6 +355,8 @@ def as_ball(x: Any) -> Any:
         return x
     if isinstance(x, arb):
         return Ball(x)
+    if isinstance(x, np.ndarray) and x.dtype == object and not x.ndim:  # of np.where
+        return as_ball(x.item())
     if isinstance(x, int | float | np.integer | np.floating | np.bool_):
         return Ball(arb(float(x)))
     return NotImplemented

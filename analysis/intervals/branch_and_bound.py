@@ -15,17 +15,20 @@ import itertools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from flint import arb
 
 from nlctl.arguments import a_function, integer, of_type
 from nlctl.errors import ParameterError
+from nlctl.wording import counted
 
+from .agreement import agreeing
 from .arithmetic import Ball, as_ball, common
 from .box import Box, Cell
 from .paths import Undecided, every_way
+from .type_questions import is_of_library
 
 __all__ = ["Ball", "Box", "Proof", "Range", "Undecided", "enclose", "prove", "upper"]
 
@@ -95,6 +98,33 @@ class Proof:
     value: float
     seconds: float
 
+    @property
+    def status(self) -> Literal["proved", "refuted", "undecided"]:
+        """What became of the claim."""
+        return {True: "proved", False: "refuted"}.get(self.holds, "undecided")  # type: ignore
+
+    @property
+    def missing(self) -> str:
+        """What is missing for a decision; nothing if there is one."""
+        if self.holds is not None:
+            return ""
+        what = counted(self.undecided, "box is", "boxes are")
+        return (
+            f"{what} undecided after {self.boxes}, one around {_point(self.where)}: raise "
+            "max_boxes, or leave the claim a margin there"
+        )
+
+    def __str__(self) -> str:
+        if self.holds is None:
+            return f"undecided: {self.missing}"
+        if self.holds:
+            return f"proved on {counted(self.boxes, 'box', 'boxes')}"
+        return f"refuted at {_point(self.where)}: {self.value:.6g}"
+
+
+def _point(where: dict[str, float] | None) -> str:
+    return ", ".join(f"{name} = {value:.6g}" for name, value in (where or {}).items())
+
 
 def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) -> Range:
     """Enclose the range of a function on a box, by branch and bound.
@@ -119,7 +149,8 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     Raises
     ------
     ParameterError
-        If it is not a function or not a box, `tol` is not positive, or `max_boxes` is below 1.
+        If it is not a function or not a box, `tol` is not positive, or `max_boxes` is below 1; if
+        the function asks what its arguments are, or makes of balls what it does not of floats.
 
     Examples
     --------
@@ -135,6 +166,7 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     if not tol > 0:  # infinite: the first box will do
         raise ParameterError(f"enclose needs tol > 0, got {tol}")
     integer("enclose", "max_boxes", max_boxes, at_least=1)
+    function = _also_of_floats("enclose", function)
     start = time.perf_counter()
     high, greatest, n, lost = _supremum(function, box, tol, max_boxes)
     low, least, m, missed = _supremum(lambda x: -as_ball(function(x)), box, tol, max_boxes)
@@ -182,7 +214,8 @@ def prove(
     ------
     ParameterError
         If it is not a function or not a box, the claim is not low <= high, or `max_boxes` is
-        below 1.
+        below 1; if the function asks what its arguments are, or makes of balls what it does not
+        of floats.
 
     Examples
     --------
@@ -199,6 +232,7 @@ def prove(
     integer("prove", "max_boxes", max_boxes, at_least=1)
     if not low <= high:  # refuses NaN, too
         raise ParameterError(f"prove needs low <= high, got {low} and {high}")
+    function = _also_of_floats("prove", function)
     start, queue, boxes = time.perf_counter(), [box.cell], 0
     undecided, where, value, holds = 0, None, np.nan, True
     while queue and boxes < max_boxes:
@@ -222,6 +256,16 @@ def prove(
     seconds = time.perf_counter() - start
     return Proof(
         holds=holds, boxes=boxes, undecided=undecided, where=where, value=value, seconds=seconds
+    )
+
+
+def _also_of_floats(who: str, function: _Function) -> _Function:
+    """Return a user's function, to be compared with itself on floats."""
+    if is_of_library(function):  # what it calls was compared on its own
+        return function
+    return agreeing(
+        function,
+        lambda why: ParameterError(f"{who} needs a function of numbers, of which it holds: {why}"),
     )
 
 

@@ -22,9 +22,9 @@ from nlctl.functions import clip
 from nlctl.params import equation_arguments
 from nlctl.wording import counted
 
+from ...intervals.agreement import on_balls
 from ...intervals.arithmetic import Ball, as_ball, common
 from ...intervals.branch_and_bound import Box, Range, Undecided, enclose
-from ...intervals.paths import on_balls
 from ...intervals.quotient import slope_in
 from ...intervals.time_dependence import UNREAD, reads_time
 
@@ -425,7 +425,8 @@ def _edges(actuator: Any) -> tuple[_Edge, _Edge]:
     if band is not None:
         low, high = (on_balls(lambda u, t, i=i: band(t, u, p)[i], refusal) for i in (0, 1))
         return low, high
-    output = on_balls(lambda u, t: actuator.output(t, (), (u,), p)[0], refusal)
+    function = actuator.output
+    output = on_balls(lambda u, t: function(t, (), (u,), p)[0], refusal)
     return output, output
 
 
