@@ -34,6 +34,7 @@ class Param:
     at_most: float | None
     ndim: int
     symbol: str | None
+    may_be_empty: bool = False
 
     def rules(self) -> Iterator[tuple[str, Callable[[float], bool]]]:
         """Yield each bound as ``("> 0", test)``."""
@@ -63,6 +64,7 @@ def param(
     at_least: float | None = None,
     at_most: float | None = None,
     symbol: str | None = None,
+    may_be_empty: bool = False,
 ) -> Any:
     """Declare a parameter of a block record.
 
@@ -79,6 +81,8 @@ def param(
         Bounds that the value may attain.
     symbol : str, optional
         What formulas call it, where that is not its name: ``"mu"`` for centres.
+    may_be_empty : bool, optional
+        Whether a vector may have no element.
 
     Returns
     -------
@@ -102,6 +106,7 @@ def param(
         at_most=at_most,
         ndim=np.ndim(default),
         symbol=symbol,
+        may_be_empty=may_be_empty,
     )
     return dataclasses.field(default=default, metadata={_KEY: declared})
 
@@ -236,15 +241,18 @@ def check_params(spec: Any) -> None:
     who = type(spec).__name__
     types = {f.name: f.type for f in dataclasses.fields(spec)}
     for name, rule in declared_params(spec).items():
-        value = _normalised(who, name, getattr(spec, name), rule.ndim, types[name])
+        value = _normalised(who, name, getattr(spec, name), rule, types[name])
         object.__setattr__(spec, name, value)  # the record is frozen for everybody else
         _check_bounds(who, name, value, rule)
     if hasattr(spec, "check"):
         spec.check()
 
 
-def _normalised(who: str, name: str, value: Any, ndim: int, kind: Any) -> Any:
+def _normalised(who: str, name: str, value: Any, rule: Param, kind: Any) -> Any:
     """Return `value` as bool, int, float or nested tuple of floats."""
+    ndim = rule.ndim
+    if rule.may_be_empty and isinstance(value, tuple | list | np.ndarray) and not len(value):
+        return ()
     if kind in (bool, "bool"):
         if not isinstance(value, bool | np.bool_):
             raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")

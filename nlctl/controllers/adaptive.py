@@ -94,7 +94,7 @@ def adaptive_neural(
     Raises
     ------
     ParameterError
-        If `order` is below 2 or does not fit to the filter or the basis.
+        If `order` is below 1 or does not fit to the filter or the basis.
     DiagramError
         If a replaced piece lacks a signal.
 
@@ -105,7 +105,7 @@ def adaptive_neural(
     >>> controller.input_labels
     ['x1', 'x2', 'yd', 'yd1', 'yd2']
     """
-    order = integer("adaptive_neural", "an order", order, at_least=2)
+    order = integer("adaptive_neural", "an order", order, at_least=1)
     if filtered_error is None:
         lambdas = FilteredError.lambdas if order == 2 else binomial_lambdas(order)
         filtered_error = FilteredError(lambdas=lambdas)

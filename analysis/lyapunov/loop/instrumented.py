@@ -48,10 +48,11 @@ def input_gain(f: Callable) -> Callable:
     @equation
     def gain(x, v, p):
         at_rest = f(x, 0.0, p)
-        if abs(v) >= NEAR:  # false for NaN, which then reaches G
-            return (f(x, v, p) - at_rest) / v
+        far = abs(v) >= NEAR  # false for NaN, which then reaches G
+        # a choice of values, not a case: cases of f would be followed twice
+        quotient = (f(x, v, p) - at_rest) / np.where(far, v, 1.0)
         right, left = (f(x, NEAR, p) - at_rest) / NEAR, (at_rest - f(x, -NEAR, p)) / NEAR
-        return 0.5 * (right + left) + 0.5 * (right - left) * (v / NEAR)
+        return np.where(far, quotient, 0.5 * (right + left) + 0.5 * (right - left) * (v / NEAR))
 
     return gain
 

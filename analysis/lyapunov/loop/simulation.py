@@ -13,7 +13,8 @@ from nlctl import native
 from nlctl.arguments import number
 from nlctl.diagrams import initial_state
 from nlctl.diagrams import state_names as all_states
-from nlctl.errors import ParameterError
+from nlctl.errors import DiagramError, ParameterError
+from nlctl.native import AlgebraicLoopError
 from nlctl.response import input_output_response
 from nlctl.upstream.control_internals import set_parameters
 from nlctl.wording import counted
@@ -234,7 +235,15 @@ def _reference(
 def observed_loop(loop: ct.InterconnectedSystem, split: Decomposition) -> native.Compiled:
     """Compile what `observe` runs."""
     base = read_parts(loop)
-    return native.compile(observed(loop, base, split, alpha_1(base.gains)))
+    try:
+        return native.compile(observed(loop, base, split, alpha_1(base.gains)))
+    except AlgebraicLoopError as error:
+        native.compile(loop)  # a loop that has one itself says so
+        raise DiagramError(
+            f"the rates, g, G and d of '{base.paths['plant']}' cannot be written as expressions, "
+            "which the ledger needs of them: its functions have too many cases; write those as "
+            f"np.where, or leave some out ({error})"
+        ) from error
 
 
 def _check_reproduced(member: Member, signals: Signals) -> None:
