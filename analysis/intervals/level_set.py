@@ -53,7 +53,8 @@ def prove_decrease(
         Of the same: what is held to be the gradient of V.  It is compared with the derivatives of
         V on every box, and nothing is proved if it is another function.
     box : Box
-        Must hold the level set, or the component of it that is meant.
+        Must hold the level set, or the component of it that is meant.  Sides that V does not
+        depend on, with the rate 0, are parameters and disturbances: anything between their ends.
     level, floor : float
         The values of V between which V' < 0 is claimed.
     max_boxes : int, optional
@@ -92,7 +93,8 @@ def prove_decrease(
     high, low, given = float(level), float(floor), _compared("gradient", gradient)
     V, rhs = _compared("V", V), _compared("rhs", rhs)  # type: ignore[assignment]
     _check_continuous(V, box)
-    open_face = _check_faces(V, box, high, max_boxes)
+    fixed = _parameters(V, rhs, box)  # type: ignore[arg-type]
+    open_face = _check_faces(V, box, high, [i for i in range(len(fixed)) if not fixed[i]])
     if open_face is not None:
         return open_face
 
@@ -131,14 +133,28 @@ def _check_continuous(V: Scalar, box: Box) -> None:
         ) from None
 
 
-def _check_faces(V: Scalar, box: Box, level: float, max_boxes: int) -> Proof | None:
-    """Prove V > level on every face of a box; return the proof of one that stays open."""
+def _parameters(V: Scalar, rhs: Vector, box: Box) -> list[bool]:
+    """Return which sides are parameters: V does not depend on them, and their rates are 0."""
+    n, wide = len(box.names), _wide(box)
+    unit = [tuple(arb(int(i == j)) for i in range(n)) for j in range(n)]
+    inner = tuple(Ball(x.value, row) for x, row in zip(wide, unit, strict=True))
+    slopes = as_ball(V(inner)).gradient or (arb(0),) * n
+    try:
+        rates = [as_ball(rate).value for rate in rhs(wide)]
+    except Undecided:
+        return [False] * n
+    return [bool(s.is_zero() and r.is_zero()) for s, r in zip(slopes, rates, strict=False)]
+
+
+def _check_faces(V: Scalar, box: Box, level: float, sides: Sequence[int]) -> Proof | None:
+    """Prove V > level on faces of a box; return the proof of one that stays open."""
     if not np.all(np.isfinite(box.cell)):
         raise ParameterError(f"prove_decrease needs a finite box, got {box}")
-    for i, name in enumerate(box.names):
+    for i in sides:
+        name = box.names[i]
         for end in box.cell[i]:
-            sides = [box.low, box.high]
-            low, high = (tuple(end if j == i else a for j, a in enumerate(s)) for s in sides)
+            ends = (box.low, box.high)
+            low, high = (tuple(end if j == i else a for j, a in enumerate(s)) for s in ends)
             face = dataclasses.replace(box, low=low, high=high)
             found = prove(V, face, low=float(np.nextafter(level, np.inf)), max_boxes=_FACE)
             if found.holds is False:
