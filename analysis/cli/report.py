@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json as json_text
 import shlex
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -16,6 +14,7 @@ import typer
 
 from nlctl.wording import counted
 
+from .printing import error_line, in_json, say
 from .studies import EXIT_CODES, INCOMPLETE, INTERRUPTED, Json, Trust, exit_codes, run_folder
 
 if TYPE_CHECKING:
@@ -81,7 +80,7 @@ def report(
                 study, out, jobs, pdf=pdf, interactive=interactive, force=force, trust=trust
             )
         )
-        print(made)
+        say(made)
         finish_report(page, pdf=pdf, open_=open_)
         if code:
             raise typer.Exit(code)
@@ -160,7 +159,7 @@ def _study(
     if result.complete:
         return result.verdict, page, EXIT_CODES.get(result.answer, 0)
     if study.suffix == ".toml":
-        print("nlctl: incomplete; the same command resumes", file=sys.stderr)
+        error_line("nlctl: incomplete; the same command resumes")
     return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE
 
 
@@ -216,17 +215,18 @@ def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
     """
     from analysis.report.browser import open_page, write_pdf
 
-    print(page)
+    say(page)
     if pdf:
-        print(write_pdf(page, page.with_name("report.pdf")))
+        say(write_pdf(page, page.with_name("report.pdf")))
     if open_ and not open_page(page):
-        print("no browser was found to show it")
+        say("no browser was found to show it")
 
 
 def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:
     """Print what differs, one thing a line; return whether nothing does.
 
-    Two runs are compared by their results where one of them has no report.
+    Two runs are compared by their results where one of them has no report.  The folder of a run
+    has to be whole.
 
     Raises
     ------
@@ -235,8 +235,13 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
     """
     from analysis.report.compare import compare_contents
     from analysis.studies import origin_differences, run_differences
+    from analysis.studies.folder import checked
+    from analysis.studies.whole.contents import CONTENTS
 
     paths = (first, second)
+    for folder in paths:
+        if (folder / "run.json").exists() or (folder / CONTENTS).exists():
+            checked(folder)
     without = [p for p in paths if p.is_dir() and not (p / "report.json").exists()]
     as_runs = bool(without) and all((p / "results.json").exists() for p in paths)
     if not as_runs:
@@ -246,14 +251,14 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
         run_differences(first, second) if as_runs else compare_contents(first, second, rtol=rtol)
     )
     if as_runs and (told := origin_differences(first, second)):
-        print(f"nlctl: the two runs were not computed from the same: {told}", file=sys.stderr)
+        error_line(f"nlctl: the two runs were not computed from the same: {told}")
     if as_json:
         told = [text if isinstance(text, str) else vars(text) for text in found]
-        print(json_text.dumps(told, indent=1, ensure_ascii=False))
+        print(in_json(told))
         return not found
     for difference in found:
-        print(difference)
-    print(counted(len(found), "difference") if found else "no difference")
+        say(difference)
+    say(counted(len(found), "difference") if found else "no difference")
     return not found
 
 
@@ -288,6 +293,6 @@ def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
 
     check_writable(folder)
     page = write_gallery(folder, force=force)
-    print(page)
+    say(page)
     if open_ and not open_page(page):
-        print("no browser was found to show it")
+        say("no browser was found to show it")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import shlex
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .printing import error_line
 from .studies import run_folder
 
 if TYPE_CHECKING:
@@ -91,4 +91,4 @@ def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trus
 
 def tell(words: str) -> None:
     """Print what a page will lack."""
-    print(f"nlctl: {words}", file=sys.stderr)
+    error_line(f"nlctl: {words}")

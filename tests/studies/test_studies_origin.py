@@ -85,8 +85,8 @@ EDITS = {
 }  # fmt: skip
 COMMANDS = {
     "resume": ("run", "study.toml", "--resume", "--out", "out"),
-    "report": ("report", "out"),
-    "replay": ("replay", "out", "0", "--part", "worst-case"),
+    "report": ("report", "out", "--trust"),  # edited code is not what was run
+    "replay": ("replay", "out", "0", "--part", "worst-case", "--trust"),
 }
 
 

@@ -13,6 +13,7 @@ from ...report.outline import summary
 from ...report.render import file_hashes
 from ..kind import Varied
 from ..kinds import KINDS
+from ..sealed import as_written
 from . import methods as how
 from . import text as text
 from .claims import claims, verdict
@@ -57,7 +58,27 @@ def study_report(
         What was simulated; without it there is no diagram.
     published : Published, optional
         Where the loop was published.
+
+    Raises
+    ------
+    RunFolderError
+        If the folder holds findings that no analysis of nlctl writes.
     """
+    if any(":" in asked.kind for asked in result.study.analysis):
+        return _composed(
+            result, kept, command, loop, published
+        )  # errors of theirs are told as such
+    with as_written(f"'{result.folder}'"):
+        return _composed(result, kept, command, loop, published)
+
+
+def _composed(
+    result: Result,
+    kept: Histories | None,
+    command: str,
+    loop: StudyLoop | None,
+    published: Published | None,
+) -> Report:
     paragraphs, sources = how.methods(result, published)
     return Report(
         title=result.study.study.title,
