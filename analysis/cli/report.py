@@ -234,14 +234,14 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
         If a file is not a report, or cannot be read.
     """
     from analysis.report.compare import compare_contents
-    from analysis.studies import origin_differences, run_differences
-    from analysis.studies.folder import checked
+    from analysis.studies import load_result, origin_differences, run_differences
     from analysis.studies.whole.contents import CONTENTS
 
     paths = (first, second)
     for folder in paths:
-        if (folder / "run.json").exists() or (folder / CONTENTS).exists():
-            checked(folder)
+        is_run = any((folder / name).exists() for name in ("run.json", CONTENTS))
+        if (folder / "results.json").exists() or (is_run and (folder / "report.json").exists()):
+            load_result(folder)  # of a damaged folder nothing is believed
     without = [p for p in paths if p.is_dir() and not (p / "report.json").exists()]
     as_runs = bool(without) and all((p / "results.json").exists() for p in paths)
     if not as_runs:
