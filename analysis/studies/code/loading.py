@@ -26,7 +26,7 @@ Admits = Callable[[Path], str]
 """Returns why a file may not be run; nothing if it may."""
 
 _BESIDE: dict[str, set[str]] = {}  # names of modules -> those of the neighbours that they import
-_FILES: dict[str, Path] = {}
+_FILES: dict[str, tuple[Path, bytes]] = {}  # by name of the module, with what was run
 
 
 def load_file(path: Path, admits: Admits | None = None) -> ModuleType:
@@ -49,15 +49,15 @@ def load_file(path: Path, admits: Admits | None = None) -> ModuleType:
     return _loaded(_name_of(path), path, admits)
 
 
-def loaded_with(path: Path) -> list[Path]:
-    """Return a file that was loaded, and all neighbours that it has imported."""
-    todo, found = [_name_of(path.resolve())], dict[str, Path]()
+def loaded_with(path: Path) -> dict[Path, bytes]:
+    """Return what was run of a file that was loaded, and of all neighbours that it has imported."""
+    todo, found = [_name_of(path.resolve())], dict[str, tuple[Path, bytes]]()
     while todo:
         name = todo.pop()
         if name not in found and name in _FILES:
             found[name] = _FILES[name]
             todo += _BESIDE.get(name, ())
-    return list(found.values())
+    return dict(found.values())
 
 
 def _name_of(path: Path) -> str:
@@ -78,9 +78,10 @@ def _loaded(name: str, path: Path, admits: Admits | None) -> ModuleType:
     module = sys.modules[name] = importlib.util.module_from_spec(spec)
     top = path.parents[name.count(".") + (path.name == "__init__.py")]
     module.__dict__["__builtins__"] = vars(builtins) | {"__import__": _importer(name, top, admits)}
-    _FILES[name] = path
     try:
-        spec.loader.exec_module(module)
+        content = path.read_bytes()  # never what __pycache__ says of it, which others may have made
+        _FILES[name] = path, content
+        exec(compile(content, str(path), "exec", dont_inherit=True), module.__dict__)
     except BaseException:
         del sys.modules[name]
         raise

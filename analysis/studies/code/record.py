@@ -36,7 +36,7 @@ def study_digest(data: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def statement(study: str, name: str, file: Path) -> str:
+def statement(study: str, name: str, content: bytes) -> str:
     """Return what is recorded of one file of a study.
 
     Parameters
@@ -45,16 +45,11 @@ def statement(study: str, name: str, file: Path) -> str:
         Of `study_digest`.
     name : str
         What the study calls it: a path from its folder, or a module.
-    file : Path
-        Where its content is.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
+    content : bytes
+        What is in it.
     """
-    content = hashlib.sha256(file.read_bytes()).hexdigest()
-    return hashlib.sha256("\0".join((study, name, content)).encode()).hexdigest()
+    digest = hashlib.sha256(content).hexdigest()
+    return hashlib.sha256("\0".join((study, name, digest)).encode()).hexdigest()
 
 
 def remembered() -> frozenset[str]:

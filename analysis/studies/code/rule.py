@@ -105,6 +105,11 @@ class Grant:
             return f"'{name}' is outside of the study's folder"
         return f"'{name}' is code that this user has neither run nor trusted as it is"
 
+    def refuses(self, path: Path) -> str:
+        """Return why a file may not be run, and what to do; nothing if it may."""
+        reason = self.admits(path)
+        return f"{reason}: {self.remedy}" if reason else ""
+
     def admits_module(self, name: str) -> str:
         """Return why a module may not be imported; nothing if it may, or if there is none."""
         if name.partition(".")[0] in _OURS:
@@ -129,7 +134,7 @@ class Grant:
 
     def _is_recorded(self, name: str, path: Path) -> bool:
         try:
-            return statement(self.study, name, path) in remembered()
+            return statement(self.study, name, path.read_bytes()) in remembered()
         except OSError:
             return False
 
@@ -166,7 +171,7 @@ def _reason(name: str, grant: Grant) -> str:
         return ""
     if not source.endswith(".py"):
         return grant.admits_module(source)
-    path = grant.folder / source
+    path = (grant.folder / source).resolve()  # of "no-such/../file.py", too
     return grant.admits(path) if path.is_file() else ""
 
 
@@ -232,12 +237,13 @@ def _statements(names: Iterable[str], key: str, folder: Path) -> Iterator[str]:
     for name in dict.fromkeys(names):
         source = name.rpartition(":")[0]
         if source.endswith(".py"):
-            files = {os.path.relpath(p, home): p for p in loaded_with(folder / source)}
+            run = loaded_with(folder / source)
+            contents = {os.path.relpath(path, home): content for path, content in run.items()}
         elif source.partition(".")[0] in _OURS:
             continue
         else:
-            files = {f"module {source}": _source(_module_places(source)[0])}
-        yield from (statement(key, told, path) for told, path in files.items())
+            contents = {f"module {source}": _source(_module_places(source)[0]).read_bytes()}
+        yield from (statement(key, told, content) for told, content in contents.items())
 
 
 def check_place(name: str) -> None:

@@ -84,7 +84,7 @@ def checked_definition(name: str, grant: Grant) -> None:
     UsageError
         As in `named_function`, or with the rule.
     """
-    named(name, grant.folder, grant.admits)
+    named(name, grant.folder, grant.refuses)
     check_defined(named_function(name, grant.folder), name, grant)
 
 
@@ -98,7 +98,7 @@ def named_kind(name: str, grant: Grant) -> Kind:
     UnknownNameError
         If there is nothing of that name.
     """
-    found = named(name, grant.folder, grant.admits)
+    found = named(name, grant.folder, grant.refuses)
     if not isinstance(found, Kind):
         raise ParameterError(
             f"a kind of analysis is an analysis.studies.Kind, '{name}' is a {type(found).__name__}"
