@@ -20,7 +20,7 @@ import numpy as np
 
 from nlctl.blocks import Block, within
 from nlctl.diagrams import all_parameter_rows, initial_state, leaves, places, state_names
-from nlctl.native.machine.fingerprint import content_key
+from nlctl.native.machine.fingerprint import content_key, unseen_in
 from nlctl.params import declared_params
 from nlctl.sampling.clock import moments
 from nlctl.sampling.system import Sampled, clocks_of, happening
@@ -32,6 +32,7 @@ __all__ = [
     "loop_facts",
     "loop_values",
     "short_key",
+    "unseen_parts",
     "values_differ",
 ]
 
@@ -85,25 +86,48 @@ def short_key(*things: Any) -> str:
     return content_key(*things)[:16]
 
 
+def unseen_parts(system: ct.InputOutputSystem) -> dict[str, list[str]]:
+    """Return what the keys of a diagram's blocks cannot see: they may differ in it unnoticed.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+
+    Returns
+    -------
+    dict
+        By path of the block, in words; only blocks of which there is something to say.
+    """
+    found = {p.path or p.system.name: unseen_in(*_parts(p.system)) for p in leaves(system)}
+    return _steady(system, {path: told for path, told in found.items() if told})
+
+
 def _block(system: Any) -> str:
     """Return a key of a block's equations; its parameters' values are told by themselves."""
+    if isinstance(system, Sampled):
+        return short_key(_block(system.inner), *_parts(system)[1:])
+    return short_key(*_parts(system))
+
+
+def _parts(system: Any) -> list[Any]:
+    """Return all that a block's equations are made of, its parameters aside."""
     timebase = repr(system.dt)
     if isinstance(system, Sampled):
         spec = system.sampling.spec
         kind = (system.euler, system.delays, system.converters, spec.waiting, spec.own_time)
-        return short_key(_block(system.inner), repr(kind))
+        return [_parts(system.inner), repr(kind)]
     if isinstance(system, Block):
         spec, known = system.spec, declared_params(system.spec)
         held = {k: v for k, v in getattr(spec, "__dict__", {}).items() if k not in known}
         parts = [getattr(spec, name, None) for name in (*_EQUATIONS, *SHAPE)]
-        return short_key(type(spec), held, parts, timebase)
+        return [type(spec), held, parts, timebase]
     if isinstance(system, ct.StateSpace):
-        return short_key([system.A, system.B, system.C, system.D], timebase)
+        return [[system.A, system.B, system.C, system.D], timebase]
     if isinstance(system, ct.TransferFunction):
-        return short_key(*(_numbers_of(a) for a in (system.num_array, system.den_array)), timebase)
+        return [*(_numbers_of(a) for a in (system.num_array, system.den_array)), timebase]
     functions = [getattr(system, name, None) for name in ("updfcn", "outfcn")]
     signals = [system.input_labels, system.output_labels, system.state_labels]
-    return short_key(type(system).__qualname__, functions, signals, timebase)
+    return [type(system).__qualname__, functions, signals, timebase]
 
 
 def _numbers_of(polynomials: Any) -> list[Any]:

@@ -33,6 +33,7 @@ from .origin import (
     compared_differences,
     loop_differences,
     origin_of,
+    unseen_notes,
     version_differences,
 )
 from .result import Result
@@ -163,7 +164,7 @@ def run(
 def _through(file: StudyFile, prepared: Prepared, folder: Path, way: _Way) -> Result:
     """Run the main table, then every analysis that is not done yet."""
     study = file.study
-    rows, notes, findings = None, [], []
+    rows, notes, findings = None, unseen_notes(way.origin), []
     complete, interrupted = True, False
     if study.runs is not None:
         rows = _main_rows(study, prepared, folder, way)

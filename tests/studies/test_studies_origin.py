@@ -280,3 +280,21 @@ def test_edited_rows_are_refused_and_run_again(copied, done, by):
     whole, made = (load_result(f / "out") for f in (done / "rows", folder))
     columns = [c for c in whole.rows.table if c != "wall_time"]
     pd.testing.assert_frame_equal(made.rows.table[columns], whole.rows.table[columns])
+
+
+def test_what_no_key_can_see_is_told_when_it_runs_and_on_the_page(tmp_path):
+    """Here a file that is read whenever the equation is called."""
+    path = write(tmp_path, HEAD, SEARCHES)
+    reading = "import numpy as np\n\n\ndef gain():\n    with open(GAIN) as file:\n"
+    reading += f"        return float(file.read())\n\n\nGAIN = {str(tmp_path / 'gain')!r}\n"
+    (tmp_path / "gain").write_text("0.0")
+    edit(tmp_path / "loop.py", "x[0] ** 3", "x[0] ** 3 + 0.0 * gain()")
+    with (tmp_path / "loop.py").open("a", encoding="utf-8") as file:
+        file.write("\n\n" + reading)
+    words = "What 'lag' computes depends on what no key can see"
+    told = nlctl_here("run", path, "--out", "out", cwd=tmp_path)
+    if told.returncode == 2:  # the engine refuses what it knows to read files
+        pytest.skip(told.stderr)
+    assert words in told.stderr
+    assert nlctl_here("report", "out", cwd=tmp_path).returncode == 0
+    assert words.replace("'", "&#39;") in (tmp_path / "out" / "index.html").read_text()

@@ -85,7 +85,10 @@ EVIL = "import pathlib\npathlib.Path({mark!r}).touch()\n"
 def with_arguments(parts, name, arguments):
     """Give the function of a study its arguments."""
     function = f'{{ function = "{name}"'
-    return [part.replace(function, f"{function}, {arguments}" if arguments else function) for part in parts]
+    return [
+        part.replace(function, f"{function}, {arguments}" if arguments else function)
+        for part in parts
+    ]
 
 
 @pytest.mark.slow
@@ -288,7 +291,9 @@ def test_a_record_that_others_may_write_is_none(home, tmp_path):
     assert record_file().stat().st_mode & 0o077 == 0
     for spoil in (lambda p: p.chmod(0o666), lambda p: p.write_text("[1, 2"), lambda p: p.unlink()):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setenv("NLCTL_CONFIG_DIR", str(shutil.copytree(record_file().parent, tmp_path / "c")))
+            patch.setenv(
+                "NLCTL_CONFIG_DIR", str(shutil.copytree(record_file().parent, tmp_path / "c"))
+            )
             assert replay(home / "out", 1).differences == ()
             spoil(record_file())
             with pytest.raises(StudyError, match="neither run nor trusted"):

@@ -198,9 +198,11 @@ def resealed(folder, name, change):
 def without_analysis(folder):
     """A refuted analysis taken out everywhere but in the study."""
     shutil.rmtree(folder / "probability")
+
     def change(content):
         content["findings"] = [f for f in content["findings"] if f["key"] != "probability"]
         content.update(holds=True, answer="shown", verdict="The claim is shown.")
+
     resealed(folder, "results.json", change)
     record = read_json(folder / "contents.json")
     record["files"] = {k: v for k, v in record["files"].items() if not k.startswith("probability")}
@@ -223,15 +225,19 @@ def without_rows(folder):
 def without_claim(folder):
     """A finding that no longer says what it claims."""
     resealed(folder, "probability/finding.json", lambda c: c.update(claim="", answer=""))
+
     def change(content):
         content["findings"][0].update(claim="", answer="")
         content.update(holds=True, answer="shown", verdict="The claim is shown.")
+
     resealed(folder, "results.json", change)
 
 
 def other_verdict(folder):
     """Results that say something else than the findings."""
-    resealed(folder, "results.json", lambda c: c.update(holds=True, verdict="All claims are shown."))
+    resealed(
+        folder, "results.json", lambda c: c.update(holds=True, verdict="All claims are shown.")
+    )
 
 
 @pytest.mark.parametrize("change", [without_analysis, without_rows, without_claim, other_verdict])
@@ -258,7 +264,9 @@ def leaves_of(content, place=()):
     yield place
     parts = content.items() if isinstance(content, dict) else enumerate(content)
     for key, part in parts if isinstance(content, dict | list) else ():
-        yield from leaves_of(part, (*place, key)) if isinstance(part, dict | list) else [(*place, key)]
+        yield from (
+            leaves_of(part, (*place, key)) if isinstance(part, dict | list) else [(*place, key)]
+        )
 
 
 def changed(content, place, how, value):

@@ -1,0 +1,162 @@
+"""What an object holds that Python's own attributes do not show: of libraries, and of C.
+
+A spline of SciPy, a table of pandas, a bound function of a list: their content is part of what an
+equation computes.  What nobody can see into is named.
+"""
+
+from __future__ import annotations
+
+import types
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+__all__ = ["OPAQUE", "PLAIN", "held_by", "inherited"]
+
+OPAQUE = "\2"
+"""Begins a text that names what nobody can see into."""
+PLAIN = "\3"
+"""Begins a text that tells all of an object."""
+LAID_OUT = ("_mgr", "_item_cache", "_flags", "_cache")
+"""Where pandas keeps content: how it is laid out in memory may change."""
+_SEEN_INTO = {"numpy", "scipy", "pandas", "pyarrow", "builtins", "array", "collections"} | {
+    *("_collections", "copy", "datetime", "decimal", "fractions", "functools", "itertools"),
+    *("operator", "_operator", "pathlib", "re", "types", "uuid", "weakref", "_io", "io", "ctypes"),
+    *("_ctypes", "random", "mmap", "sqlite3", "subprocess", "socket", "shelve", "zoneinfo"),
+}
+_RANDOM = ("Generator", "RandomState", "BitGenerator", "SeedSequence", "Random")
+_TOLD = (type, bool, int, float, complex, bytes, range, slice, type(None), type(...), np.generic)
+_CACHES = (weakref.WeakKeyDictionary, weakref.WeakValueDictionary, weakref.WeakSet)
+_LIKE_LISTS = (type({}.keys()), type({}.values()), type({}.items()))
+_BOUND = (types.BuiltinFunctionType, types.MethodWrapperType)
+
+
+def held_by(thing: Any, is_library: Callable[[str], bool]) -> Any:
+    """Return what an object of a library holds, as data and other objects.
+
+    Parameters
+    ----------
+    thing : object
+    is_library : callable
+        Whether the version of a module stands for what is in it.
+
+    Returns
+    -------
+    object
+        A tuple of parts; or a text that begins with `PLAIN` or `OPAQUE`; or None where the object
+        is told by its text alone.
+    """
+    kind = type(thing)
+    top = kind.__module__.partition(".")[0]
+    if isinstance(thing, (*_TOLD, *_CACHES)):
+        return None
+    if any(base.__name__ in _RANDOM for base in kind.__mro__):
+        return f"{OPAQUE}a random generator ({kind.__name__})"
+    if isinstance(thing, np.ndarray):
+        return _of_array(thing)
+    if isinstance(thing, np.ufunc):
+        return _of_ufunc(thing)
+    if isinstance(thing, _BOUND):
+        return _of_bound(thing, is_library)
+    if isinstance(thing, types.MappingProxyType):
+        return ("mapping", dict(thing))
+    if isinstance(thing, memoryview):
+        return ("memory", thing.format, thing.shape, thing.tobytes())
+    if isinstance(thing, weakref.ref):
+        return ("reference", thing())
+    if isinstance(thing, _LIKE_LISTS):
+        return (kind.__name__, list(thing))
+    if top == "pandas" and (told := _of_pandas(thing)) is not None:
+        return told
+    if top == "scipy" and (told := _of_scipy(thing)) is not None:
+        return told
+    return reduced(thing) if top in _SEEN_INTO or not is_library(top) else None
+
+
+def _of_scipy(thing: Any) -> Any:
+    """Return what an object holds that keeps notes on itself besides, or memory that nobody set."""
+    kind = type(thing)
+    room = kind.__module__.split(".")[1]
+    if room == "sparse" and hasattr(thing, "tocoo"):
+        found = thing.tocoo()
+        return ("sparse", kind.__name__, found.shape, *found.coords, found.data)
+    if room == "stats" and hasattr(thing, "dist"):
+        return ("law", type(thing.dist), thing.dist.name, thing.args, thing.kwds)
+    if room == "interpolate" and hasattr(thing, "_eval_args"):
+        return ("spline", kind.__name__, thing._eval_args, getattr(thing, "ext", None))
+    if room == "spatial" and hasattr(thing, "__dict__"):
+        known = ("points", "_points", "simplices", "neighbors", "equations", "vertices", "regions")
+        return ("mesh", kind.__name__, {k: v for k, v in vars(thing).items() if k in known})
+    return None
+
+
+def inherited(thing: Any) -> Any:
+    """Return what an object of a class of one's own has of what the class inherits from."""
+    if any(base.__module__.startswith("pandas.") for base in type(thing).__mro__):
+        return _of_pandas(thing)
+    return reduced(thing)
+
+
+def reduced(thing: Any) -> Any:
+    """Return what a pickle of an object would hold, or a text that says that there is none."""
+    name = f"{type(thing).__module__}.{type(thing).__qualname__}"
+    try:
+        made = thing.__reduce_ex__(4)
+    except Exception:  # whatever an object raises that is not to be taken apart
+        return f"{OPAQUE}an object of {name}"
+    if isinstance(made, str):
+        return f"{PLAIN}{getattr(thing, '__module__', '')}.{made}"
+    parts = list(made[:3])
+    if len(parts) > 2 and isinstance(parts[2], dict):  # of laws, which draw from it
+        parts[2] = {k: v for k, v in parts[2].items() if k != "_random_state"}
+    parts += [list(part) for part in made[3:5] if part is not None]
+    return ("object", name, *parts)
+
+
+def _of_array(thing: np.ndarray) -> Any:
+    more = getattr(thing, "__dict__", None) or None
+    if isinstance(thing, np.ma.MaskedArray):
+        return ("masked", thing.filled(0), np.ma.getmaskarray(thing))
+    if thing.dtype.hasobject:
+        return ("objects", thing.shape, thing.tolist(), more)
+    return ("array of objects'", more, np.asarray(thing)) if more else None
+
+
+def _of_ufunc(thing: np.ufunc) -> Any:
+    """Return nothing for a function that NumPy or SciPy names; of another's nobody sees into."""
+    from scipy import special
+
+    for module in (np, special):
+        if getattr(module, thing.__name__, None) is thing:
+            return None
+    return f"{OPAQUE}a compiled function ('{thing.__name__}')"
+
+
+def _of_bound(thing: Any, is_library: Callable[[str], bool]) -> Any:
+    """Return what a function of C is bound to; one of a module is told by its name."""
+    held = getattr(thing, "__self__", None)
+    if held is not None and not isinstance(held, types.ModuleType | type):
+        return ("bound", thing.__name__, held)
+    top = str(getattr(thing, "__module__", None) or "builtins").partition(".")[0]
+    if is_library(top) or top == "builtins":
+        return None
+    return f"{OPAQUE}a compiled function of '{top}' ('{thing.__name__}')"
+
+
+def _of_pandas(thing: Any) -> Any:
+    """Return what a table, a column or an index holds, however it is laid out in memory."""
+    import pandas as pd
+
+    if isinstance(thing, pd.DataFrame):
+        columns = [thing.iloc[:, i] for i in range(thing.shape[1])]
+        return ("table", list(map(str, thing.columns)), thing.index, columns, dict(thing.attrs))
+    if isinstance(thing, pd.MultiIndex):
+        return ("index", list(map(str, thing.names)), thing.tolist())
+    if isinstance(thing, pd.Index | pd.Series):
+        index = thing.index if isinstance(thing, pd.Series) else None
+        return ("column", str(thing.name), str(thing.dtype), np.asarray(thing), index)
+    if isinstance(thing, pd.api.extensions.ExtensionArray):
+        return ("values", str(thing.dtype), np.asarray(thing))
+    return None
