@@ -129,6 +129,7 @@ WAYS = {
     "closure of a library": "g = np.errstate(all='ignore')(lambda v: VALUE * v)\ndef f(v): return g(v)",
     "third party's object": "g = ct.ss(-1.0, VALUE, 1.0, 0.0)\ndef f(v): return g.B[0, 0] * v",
     "third party's transfer": "g = ct.tf([VALUE], [1.0, 2.0])\ndef f(v): return g(0.0).real * v",
+    "pattern": "import re\ng = re.compile('a' * int(1e9 * (VALUE - 1) + 1.5))\ndef f(v): return len(g.pattern) * v",
     "text by text": "K = {'a': {'b': [1, (2, {'c': VALUE})]}}\ndef f(v): return K['a']['b'][1][1]['c']",
 }  # fmt: skip
 

@@ -283,18 +283,15 @@ def test_edited_rows_are_refused_and_run_again(copied, done, by):
 
 
 def test_what_no_key_can_see_is_told_when_it_runs_and_on_the_page(tmp_path):
-    """Here a file that is read whenever the equation is called."""
+    """Here a function that NumPy has made of another one."""
     path = write(tmp_path, HEAD, SEARCHES)
-    reading = "import numpy as np\n\n\ndef gain():\n    with open(GAIN) as file:\n"
-    reading += f"        return float(file.read())\n\n\nGAIN = {str(tmp_path / 'gain')!r}\n"
-    (tmp_path / "gain").write_text("0.0")
-    edit(tmp_path / "loop.py", "x[0] ** 3", "x[0] ** 3 + 0.0 * gain()")
-    with (tmp_path / "loop.py").open("a", encoding="utf-8") as file:
-        file.write("\n\n" + reading)
+    edit(tmp_path / "loop.py", "x[0] ** 3", "x[0] ** 3 + 0.0 * HIDDEN(x[0])")
+    edit(tmp_path / "loop.py", "import nlctl\n", "import nlctl\n" + HIDDEN)
     words = "What 'lag' computes depends on what no key can see"
     told = nlctl_here("run", path, "--out", "out", cwd=tmp_path)
-    if told.returncode == 2:  # the engine refuses what it knows to read files
-        pytest.skip(told.stderr)
-    assert words in told.stderr
+    assert (told.returncode, words in told.stderr) == (0, True), told
     assert nlctl_here("report", "out", cwd=tmp_path).returncode == 0
     assert words.replace("'", "&#39;") in (tmp_path / "out" / "index.html").read_text()
+
+
+HIDDEN = "import numpy as np\n\nHIDDEN = np.frompyfunc(lambda v: 2.0 * v, 1, 1)\n"

@@ -6,6 +6,7 @@ equation computes.  What nobody can see into is named.
 
 from __future__ import annotations
 
+import copyreg
 import types
 import weakref
 from collections.abc import Callable
@@ -103,7 +104,8 @@ def reduced(thing: Any) -> Any:
     """Return what a pickle of an object would hold, or a text that says that there is none."""
     name = f"{type(thing).__module__}.{type(thing).__qualname__}"
     try:
-        made = thing.__reduce_ex__(4)
+        taken_apart = copyreg.dispatch_table.get(type(thing))  # of texts to look for, and others
+        made = taken_apart(thing) if taken_apart else thing.__reduce_ex__(4)
     except Exception:  # whatever an object raises that is not to be taken apart
         return f"{OPAQUE}an object of {name}"
     if isinstance(made, str):
