@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from .printing import SHORT, error_line, is_short_of_memory
+from .memory import SHORT, is_short_of_memory
+from .printing import error_line
 from .report import register_reports
 from .studies import FAILS, OPEN, register_studies
 

@@ -19,7 +19,8 @@ import typer
 
 from nlctl.wording import counted
 
-from .printing import SHORT, error_line, in_json, is_short_of_memory, say
+from .memory import SHORT, check_memory, is_short_of_memory
+from .printing import error_line, in_json, say
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
 EXIT_CODES = {
@@ -93,6 +94,7 @@ def run_command(
 
         from .sweep_progress import sweep_bar
 
+        check_memory()
         file = asking(lambda trust: read_study(study, set_ or [], trust=trust), trust)
         with _executor(executor, jobs) as pool:
             result = run_study(
@@ -125,6 +127,7 @@ def validate(
     with exit_codes(json):
         from analysis.studies import plan, read_study
 
+        check_memory()
         file = asking(lambda trust: read_study(study, set_ or [], trust=trust), trust)
         found = plan(file, jobs or None)
         if json:
@@ -162,6 +165,7 @@ def replay_command(
 
         if plot is not None:
             check_figure(plot)
+        check_memory()
         made = asking(lambda trust: replay_row(folder, row, part, trust=trust), trust)
         if plot is not None:
             write_figure(plot, replay_figure(made))

@@ -17,6 +17,7 @@ from ..stl.spec import FAILED
 from ..uncertainty.design import Design, affordable, checked_entropy, listed, sobol_points
 from ..uncertainty.space import Space, from_quantiles, from_unit_cube
 from .guarantee import Margins, checked_confidence, series_of
+from .independence import independence_test
 from .paired import holm
 
 __all__ = ["censored", "elementary_effects", "morris", "regional", "saltelli", "sobol_indices"]
@@ -312,7 +313,8 @@ def regional(design: Design, margins: Margins) -> pd.DataFrame:
     """Return how far values in failing runs differ from those in passing ones.
 
     For numbers the statistic is the largest distance between the two empirical distributions
-    (Kolmogorov-Smirnov), for choices Cramér's V of the table of options; 0: alike, 1: apart.
+    (Kolmogorov-Smirnov, exact), for choices Cramér's V of the table of options (an exact or a
+    permutation test where counts are small, see `independence`); 0: alike, 1: apart.
 
     Parameters
     ----------
@@ -354,7 +356,8 @@ def regional(design: Design, margins: Margins) -> pd.DataFrame:
     for name in design.space.names:
         column = table[name].to_numpy()
         if name in [choice.name for choice in design.space.choices]:
-            rows.append(_cramer(column, passed))
+            counts = pd.crosstab(column, passed).to_numpy()
+            rows.append(independence_test(counts, design.entropy))
         else:
             test: Any = stats.ks_2samp(column[passed].astype(float), column[~passed].astype(float))
             rows.append((float(test.statistic), float(test.pvalue)))
@@ -362,12 +365,3 @@ def regional(design: Design, margins: Margins) -> pd.DataFrame:
     p = p if design.is_iid else np.full(p.shape, np.nan)
     columns = {"statistic": statistic, "p": p, "p_holm": holm(p)}
     return pd.DataFrame(columns, index=pd.Index(design.space.names, name="quantity"))
-
-
-def _cramer(labels: np.ndarray, passed: np.ndarray) -> tuple[float, float]:
-    """Cramér's V between options and passing, and the p-value of the chi-square test."""
-    counts = pd.crosstab(labels, passed).to_numpy()
-    if counts.shape[0] == 1:
-        return 0.0, 1.0
-    test: Any = stats.chi2_contingency(counts, correction=False)
-    return float(np.sqrt(test.statistic / counts.sum())), float(test.pvalue)

@@ -13,7 +13,7 @@ parabola's vertex at local extrema; on these lines the margins are exact, slidin
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -88,7 +88,7 @@ class Not(Formula):
 
     def __str__(self) -> str:
         if isinstance(self.part, And):
-            return f"({' or '.join(str(~part) for part in self.part.parts)})"
+            return _listed([~part for part in self.part.parts], " or ")
         return f"not {self.part}"
 
 
@@ -99,7 +99,7 @@ class And(Formula):
     parts: tuple[Formula, ...]
 
     def __str__(self) -> str:
-        return f"({' and '.join(map(str, self.parts))})"
+        return _listed(self.parts, " and ")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,6 +124,25 @@ class Always(Formula):
 
     def __str__(self) -> str:
         return f"always{_interval(self)} {self.part}"
+
+
+def _listed(parts: Sequence[Formula], word: str) -> str:
+    """Return parts in brackets; "always" has its own where it might be read as of all of them."""
+    apart = not all(map(looks_ahead, parts))
+    texts = (f"({part})" if apart and begins_window(part) else str(part) for part in parts)
+    return f"({word.join(texts)})"
+
+
+def looks_ahead(formula: Formula) -> bool:
+    """Whether a formula is of other times than the one at which it stands."""
+    return any(isinstance(part, Always | Eventually) for part in parts_of(formula))
+
+
+def begins_window(formula: Formula) -> bool:
+    """Whether the text of a formula begins with "always" or "eventually", or with "not" and one."""
+    while isinstance(formula, Not) and not isinstance(formula.part, And):
+        formula = formula.part
+    return isinstance(formula, Always | Eventually)
 
 
 def _interval(window: Always | Eventually) -> str:

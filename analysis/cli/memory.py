@@ -1,0 +1,55 @@
+"""What becomes of a run where memory is short: a message, and neither a trace nor a wait."""
+
+from __future__ import annotations
+
+import errno
+import mmap
+
+__all__ = ["SHORT", "check_memory", "is_short_of_memory"]
+
+SHORT = "this needs more memory than there is"
+NEEDED = 256 * 2**20
+"""Bytes of address space that compiling and running take beyond what is imported."""
+
+
+def check_memory() -> None:
+    """Refuse to begin where the process may not have what a run takes (``ulimit -v``).
+
+    Compilers of C++ end the process where they get no memory, and its threads may wait for others
+    that never began: neither can be told afterwards.
+
+    Raises
+    ------
+    MemoryError
+        With how much that is.
+    """
+    try:
+        import resource
+    except ImportError:  # not of this system
+        return
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit == resource.RLIM_INFINITY:
+        return
+    try:
+        mmap.mmap(-1, NEEDED).close()
+    except (OSError, ValueError):
+        raise MemoryError(
+            f"a process may take {limit / 1e9:.2g} GB here, and less than {NEEDED / 1e9:.2g} GB of "
+            "them are left: raise the limit with ulimit -v"
+        ) from None
+
+
+def is_short_of_memory(error: BaseException | None) -> bool:
+    """Whether an error, or what led to it, is that memory has run out: threads need some, too."""
+    seen = 0
+    while error is not None and seen < 100:
+        words = str(error)
+        is_thread = isinstance(error, RuntimeError) and "start new thread" in words
+        is_library = isinstance(error, ImportError | SystemError) and (
+            "allocate memory" in words or "map segment" in words
+        )
+        is_refused = isinstance(error, OSError) and error.errno == errno.ENOMEM
+        if isinstance(error, MemoryError) or is_thread or is_library or is_refused:
+            return True
+        error, seen = error.__cause__ or error.__context__, seen + 1
+    return False
