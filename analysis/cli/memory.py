@@ -5,18 +5,25 @@ from __future__ import annotations
 import errno
 import mmap
 
-__all__ = ["SHORT", "check_memory", "is_short_of_memory"]
+__all__ = ["SHORT", "TO_BEGIN", "check_memory", "is_short_of_memory"]
 
 SHORT = "this needs more memory than there is"
-NEEDED = 256 * 2**20
-"""Bytes of address space that compiling and running take beyond what is imported."""
+TO_BEGIN = 1200 * 10**6
+"""Bytes of address space that libraries, compiling and running take on two cores."""
+TO_RUN = 200 * 2**20
+"""Bytes of it that compiling and running take."""
 
 
-def check_memory() -> None:
+def check_memory(needed: int = TO_RUN) -> None:
     """Refuse to begin where the process may not have what a run takes (``ulimit -v``).
 
     Compilers of C++ end the process where they get no memory, and its threads may wait for others
     that never began: neither can be told afterwards.
+
+    Parameters
+    ----------
+    needed : int, optional
+        Bytes; `TO_BEGIN` before libraries are imported.
 
     Raises
     ------
@@ -31,10 +38,10 @@ def check_memory() -> None:
     if limit == resource.RLIM_INFINITY:
         return
     try:
-        mmap.mmap(-1, NEEDED).close()
+        mmap.mmap(-1, needed).close()
     except (OSError, ValueError):
         raise MemoryError(
-            f"a process may take {limit / 1e9:.2g} GB here, and less than {NEEDED / 1e9:.2g} GB of "
+            f"a process may take {limit / 1e9:.2g} GB here, and less than {needed / 1e9:.2g} GB of "
             "them are left: raise the limit with ulimit -v"
         ) from None
 

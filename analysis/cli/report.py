@@ -14,7 +14,7 @@ import typer
 
 from nlctl.wording import counted
 
-from .memory import check_memory
+from .memory import TO_BEGIN, check_memory
 from .printing import error_line, in_json, say
 from .studies import EXIT_CODES, INCOMPLETE, INTERRUPTED, Json, Trust, exit_codes, run_folder
 
@@ -146,7 +146,7 @@ def _study(
     from .study_report import report_study
     from .sweep_progress import sweep_bar
 
-    check_memory()
+    check_memory(TO_BEGIN)
     kept = run_folder(study) if study.suffix == ".toml" else study
     check_report_options(out or kept, pdf=pdf, force=force)
     page, result = report_study(

@@ -19,7 +19,7 @@ import typer
 
 from nlctl.wording import counted
 
-from .memory import SHORT, check_memory, is_short_of_memory
+from .memory import SHORT, TO_BEGIN, check_memory, is_short_of_memory
 from .printing import error_line, in_json, say
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
@@ -89,6 +89,7 @@ def run_command(
     options += ["--force"] * force + ["--trust"] * trust
     folder = run_folder(study) if out is None else out
     with exit_codes(json), _told_how_to_go_on(study, options, folder, resume, json):
+        check_memory(TO_BEGIN)
         from analysis.studies import read_study
         from analysis.studies import run as run_study
 
@@ -125,6 +126,7 @@ def validate(
     To know, it makes the loop and runs a few rows: the code that the file names is run.
     """
     with exit_codes(json):
+        check_memory(TO_BEGIN)
         from analysis.studies import plan, read_study
 
         check_memory()
@@ -158,6 +160,7 @@ def replay_command(
     The loop is made anew: the code that the study names is run.
     """
     with exit_codes(json):
+        check_memory(TO_BEGIN)
         from analysis.studies import replay as replay_row
         from analysis.studies import replay_figure
 

@@ -1,4 +1,5 @@
-"""Keys see through objects: whatever holds a number that an equation reads, another number shows."""
+# ruff: noqa: E501
+"""Keys see through objects: whatever holds a number of an equation, another number shows."""
 
 import subprocess
 import sys

@@ -108,8 +108,11 @@ def test_a_study_alone_calls_nobody_elses_function(home, name, where):
     assert {p for p in after if p not in before or home not in (p, *p.parents)} <= set(before)
 
 
-@pytest.mark.parametrize("name", ["analysis.cli.loops:named_loop", "analysis.loop_report:loop_report",
-                                  "nlctl.host.workers:process_pool", "pandas:read_pickle"])  # fmt: skip
+@pytest.mark.parametrize(
+    "name",
+    ["analysis.cli.loops:named_loop", "analysis.loop_report:loop_report",
+     "nlctl.host.workers:process_pool", "pandas:read_pickle"],
+)  # fmt: skip
 @pytest.mark.parametrize("where", [in_loop, in_kind])
 def test_nor_as_its_loop_or_a_kind(home, where, name):
     """`named_loop` uses nlctl, and would import whatever it is told."""
@@ -131,7 +134,9 @@ frame = pandas.DataFrame
 """
 
 
-@pytest.mark.parametrize("name", ["read_pickle", "opened", "partial", "cached", "frame", "named_function"])  # fmt: skip
+@pytest.mark.parametrize(
+    "name", ["read_pickle", "opened", "partial", "cached", "frame", "named_function"]
+)
 def test_a_name_that_a_file_has_imported_is_not_its_own(home, name):
     """Where a function was defined counts."""
     base = home.parent
@@ -140,7 +145,7 @@ def test_a_name_that_a_file_has_imported_is_not_its_own(home, name):
     ))  # fmt: skip
     with (home / "loop.py").open("a", encoding="utf-8") as file:
         file.write(IMPORTED)
-    with pytest.raises(StudyError, match="is a function of .* Trust it with --trust"):
+    with pytest.raises(StudyError, match=r"is a function of .* Trust it with --trust"):
         read_study(path)
     assert not (base / "ran").exists()
 
@@ -250,7 +255,7 @@ def test_what_this_user_has_run_is_his_wherever_it_lies(home, tmp_path):
     told = nlctl_here("report", moved / "out")
     assert (told.returncode, told.stderr) == (0, "")
     (moved / "loop.py").write_text("# edited\n" + (moved / "loop.py").read_text())
-    with pytest.raises(StudyError, match="'loop.py' is code that this user has neither run nor"):
+    with pytest.raises(StudyError, match=r"'loop\.py' is code that this user has neither run nor"):
         replay(moved / "out", 1)
     forget()
     assert replay(moved / "out", 1, trust=True).differences == ()

@@ -246,7 +246,9 @@ def with_functions(folder, name):
 def test_installed_packages_make_loops_or_are_not_called(place, name):
     """What is not built on nlctl needs trust; whoever is trusted offers mostly no diagram."""
     folder, _ = place
-    with pytest.raises(StudyError, match="reading this study would run it. Trust it with --trust"):
+    with pytest.raises(
+        StudyError, match=r"reading this study would run it\. Trust it with --trust"
+    ):
         read_study(write(folder, *in_loop(name)))
     with pytest.raises(StudyError, match=r"nothing shows|returns a diagram"):
         read_study(write(folder, *in_loop(name)), trust=True)

@@ -1,4 +1,4 @@
-"""A run folder proves that it is whole: whatever is lost, added or exchanged, no reader believes it."""
+"""A run folder proves that it is whole: what is lost, added or exchanged, no reader believes."""
 
 import hashlib
 import json
@@ -164,7 +164,7 @@ def swapped(folder):
 
 ADDED = {
     "a chunk": chunk_more,
-    "a table": lambda f: shutil.copy(f / "worst-case" / "rows.parquet", f / "worst-case" / "x.parquet"),
+    "a table": lambda f: shutil.copy(f / "worst-case/rows.parquet", f / "worst-case/x.parquet"),
     "a swap": swapped,
     "a link": lambda f: (f / "rows" / "chunks" / "1-2.parquet").symlink_to("/etc/passwd"),
 }  # fmt: skip
@@ -333,7 +333,10 @@ def test_much_resealed_nonsense_ends_in_a_sentence(done, tmp_path_factory, data)
     shutil.rmtree(folder, ignore_errors=True)
 
 
-@pytest.mark.parametrize("name", ["run.json", "results.json", "contents.json", "probability/finding.json", "rows/study.json"])  # fmt: skip
+@pytest.mark.parametrize(
+    "name",
+    ["run.json", "results.json", "contents.json", "probability/finding.json", "rows/study.json"],
+)
 @pytest.mark.parametrize("version", [1, 2, 4, "99", None, 3.5])
 def test_other_formats_are_refused_by_name(copied, name, version):
     """Of the past and of the future, whatever their keys."""
@@ -356,7 +359,7 @@ def test_other_formats_are_refused_by_name(copied, name, version):
 def test_a_run_that_goes_on_is_not_taken_for_whole(copied, done):
     """While it runs, or after a kill, the record is gone; --resume ends with the same one."""
     (copied / "contents.json").unlink()
-    with pytest.raises(RunFolderError, match="has not come to an end.*continue it with --resume"):
+    with pytest.raises(RunFolderError, match=r"has not come to an end.*continue it with --resume"):
         load_result(copied)
     again = run(read_study(done.parent / "study.toml"), copied, resume=True, threads=1)
     assert again.plain() == load_result(done).plain()

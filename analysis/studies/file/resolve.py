@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from .schema import Law
 
 __all__ = [
     "DEFAULT",
+    "check_complete",
     "checked_definition",
     "loop_function",
     "named",
@@ -174,6 +176,9 @@ def option(value: Any, folder: Path) -> Any:
             'a block is { block = "DeadZone", b_r = 0.6 } or { function = "file.py:name", ... }, '
             f"got the keys {sorted(value)}"
         )
+    for key in ("block", "function"):
+        if key in value and not isinstance(value[key], str):
+            raise ParameterError(f"{key} needs a text, got {value[key]!r}"[:200])
     arguments = {key: option(part, folder) for key, part in value.items()}
     name = arguments.pop("block", None)
     made = (
@@ -183,7 +188,27 @@ def option(value: Any, folder: Path) -> Any:
     )
     for key in arguments:
         check_keyword(made, key)
+    check_complete(made, str(value.get("function", name)), arguments)
     return made(**arguments)
+
+
+def check_complete(function: Callable[..., Any], name: str, given: Mapping[str, Any]) -> None:
+    """Refuse to call a function without what it needs.
+
+    Raises
+    ------
+    ParameterError
+        With the keywords that are missing.
+    """
+    try:
+        needed = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):  # none that Python knows
+        return
+    fixed = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    open_ = [p for p in needed if p.default is p.empty and p.kind not in fixed]
+    missing = [parameter.name for parameter in open_ if parameter.name not in given]
+    if missing:
+        raise ParameterError(f"'{name}' needs {', '.join(missing)} as well")
 
 
 def uncertain(name: str, law: Law) -> Uncertain:

@@ -296,8 +296,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     columns = {c: c.replace("_", " ") for c in t["differences"].columns} | {"p_holm": "p (Holm)"}
     pairs, only = _with_first(t["differences"], f"{finding.key}/differences.parquet")
     if "mean_trusted" in pairs:
-        trusted = pairs["mean_trusted"].map({True: "yes", False: "no"})
-        pairs = pairs.assign(mean_trusted=trusted)
+        pairs = pairs.assign(mean_trusted=np.where(pairs["mean_trusted"], "yes", "no"))
     words = _DIFFERENCES.format(confidence=confidence, rows=TRUSTED_ROWS, size=asked.runs)
     yield result_table(pairs, words + only, columns)
     columns = {c: c.replace("_", " ") for c in t["violations"].columns} | {"p_holm": "p (Holm)"}

@@ -24,7 +24,7 @@ LAWS = {  # of a difference: draws, mean, median
     "Pareto": (lambda r, n: r.pareto(2.5, size=n), 1 / 1.5, 2 ** (1 / 2.5) - 1),
     "2 % worse by 50": (lambda r, n: r.normal(size=n) + 50 * (r.random(n) < 0.02), 1.0, None),
     "5 % worse by 50": (lambda r, n: r.normal(size=n) + 50 * (r.random(n) < 0.05), 2.5, None),
-    "1 % better by 1000": (lambda r, n: r.normal(size=n) - 1000 * (r.random(n) < 0.01), -10.0, None),
+    "1 % better by 900": (lambda r, n: r.normal(size=n) - 900 * (r.random(n) < 0.01), -9.0, None),
 }  # fmt: skip
 
 
