@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .memory import SHORT, is_short_of_memory
+from .memory import TOO_LITTLE, is_short_of_memory
 from .printing import error_line
 from .report import register_reports
 from .studies import FAILS, OPEN, register_studies
@@ -254,7 +254,7 @@ def main() -> None:
         raise SystemExit(130) from None
     except Exception as error:
         if is_short_of_memory(error):
-            error_line(f"nlctl: {SHORT} ({error or type(error).__name__})")
+            error_line(f"nlctl: {TOO_LITTLE} ({error or type(error).__name__})")
             raise SystemExit(2) from None
         from .terminal import trace_of
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import errno
 import mmap
 
-__all__ = ["SHORT", "TO_BEGIN", "check_memory", "is_short_of_memory"]
+__all__ = ["TOO_LITTLE", "TO_BEGIN", "check_memory", "is_short_of_memory"]
 
-SHORT = "this needs more memory than there is"
+TOO_LITTLE = "this needs more memory than there is"
 TO_BEGIN = 1200 * 10**6
 """Bytes of address space that libraries, compiling and running take on two cores."""
 TO_RUN = 200 * 2**20

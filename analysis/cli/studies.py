@@ -19,7 +19,7 @@ import typer
 
 from nlctl.wording import counted
 
-from .memory import SHORT, TO_BEGIN, check_memory, is_short_of_memory
+from .memory import TO_BEGIN, TOO_LITTLE, check_memory, is_short_of_memory
 from .printing import error_line, in_json, say
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
@@ -187,7 +187,7 @@ def verify_command(
     """Say whether the folder of a run is whole: every file as the run has written it.
 
     Nothing is run or imported.  Exit codes: 0 it is whole, 1 something is missing, edited or too
-    much, 2 it is no folder of a run that has come to an end.
+    much, 2 it is not the folder of a run that has come to an end.
     """
     with exit_codes(json):
         from analysis.studies import verify
@@ -200,7 +200,7 @@ def verify_command(
         else:
             say(found)
             for name in found.others:
-                say(f"  '{name}' is no part of the run")
+                say(f"  '{name}' is not a part of the run")
         if not found.is_whole:
             raise typer.Exit(FAILS)
 
@@ -300,7 +300,11 @@ def exit_codes(json: bool) -> Iterator[None]:
 
 def _fail(error: Exception, json: bool) -> None:
     """Print one message: as JSON where that was asked for."""
-    told = f"{SHORT} ({error or type(error).__name__})" if is_short_of_memory(error) else str(error)
+    told = (
+        f"{TOO_LITTLE} ({error or type(error).__name__})"
+        if is_short_of_memory(error)
+        else str(error)
+    )
     if not json:
         error_line(f"nlctl: {told}")
         return

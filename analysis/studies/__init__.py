@@ -15,7 +15,7 @@ from .replay import Replay, replay, replay_figure
 from .result import Result
 from .run import run
 from .sealed import RunFolderError
-from .whole.contents import Whole, verify
+from .whole.contents import Wholeness, verify
 
 __all__ = [
     "KINDS",
@@ -33,7 +33,7 @@ __all__ = [
     "StudyError",
     "StudyFile",
     "Varied",
-    "Whole",
+    "Wholeness",
     "from_toml",
     "load_result",
     "made",

@@ -131,7 +131,7 @@ def _table_differences(first: Result, second: Result) -> list[str]:
 def _differences(place: str, old: pd.DataFrame, new: pd.DataFrame) -> Iterator[str]:
     """Yield what differs between two tables, one text for each column."""
     if len(old) != len(new):
-        yield f"the table {place} had {counted(len(old), 'line')}, now {len(new)}"
+        yield f"the table {place} had {counted(len(old), 'row')}, now {len(new)}"
         return
     one, other = ({str(c): t[c] for c in t} for t in (old.reset_index(), new.reset_index()))
     for name in dict.fromkeys([*one, *other]):

@@ -31,7 +31,7 @@ from nlctl.wording import counted
 from .build import labels, main_design
 from .code.record import study_digest
 from .code.rule import Grant
-from .file.own_kinds import GONE, own_kinds, stand_ins
+from .file.own_kinds import STAND_IN, own_kinds, stand_ins
 from .file.resolve import uncertain
 from .file.schema import Study, keyed
 from .file.toml import read_toml, study_text
@@ -331,7 +331,7 @@ def _check_contradictions(result: Result, content: Mapping[str, Any]) -> None:
             )
     for finding in result.findings:
         asked = result.asked[finding.key]
-        told = asked.claim if asked.definition.name != GONE else finding.claim
+        told = asked.claim if asked.definition.name != STAND_IN else finding.claim
         same = finding.claim == told or not (told or finding.is_answered)
         if finding.kind != asked.kind or not same or bool(finding.claim) != bool(finding.answer):
             raise RunFolderError(

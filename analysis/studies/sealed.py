@@ -16,7 +16,7 @@ from nlctl.host.files import replace_file
 
 __all__ = [
     "ANEW",
-    "FORMAT",
+    "RUN_FORMAT",
     "RunFolderError",
     "as_json",
     "as_written",
@@ -28,7 +28,7 @@ __all__ = [
     "write_json",
 ]
 
-FORMAT = 3
+RUN_FORMAT = 3
 """Of all files of a run folder; others are refused."""
 SEAL = "sha256"
 LARGEST = 200_000_000  # bytes of a file of JSON
@@ -50,7 +50,7 @@ class RunFolderError(UsageError):
 
 def write_json(path: Path, content: Any) -> None:
     """Write a file of JSON in one step, with its format and a key of its content in it."""
-    plain = as_json({"format": FORMAT, **content})
+    plain = as_json({"format": RUN_FORMAT, **content})
     sealed = plain | {SEAL: digest_of(plain)}
     text = json.dumps(sealed, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     replace_file(path, lambda file: file.write(text.encode()))
@@ -82,10 +82,10 @@ def read_json(path: Path, remedy: str = ANEW) -> Any:
         raise RunFolderError(f"'{path}' is damaged ({reason}): {remedy}") from error
     if not isinstance(content, dict):
         raise RunFolderError(f"'{path}' is not as it was written: {remedy}")
-    if content.get("format") != FORMAT:
+    if content.get("format") != RUN_FORMAT:
         known = str(content.get("format", "none"))[:20]
         raise RunFolderError(
-            f"'{path}' has the format {known!a}, and this nlctl reads {FORMAT}: read it with the "
+            f"'{path}' has the format {known!a}, and this nlctl reads {RUN_FORMAT}: read it with the "
             "nlctl that wrote it, or run the study again in another folder with --out"
         )
     if content.pop(SEAL, None) != digest_of(content):
@@ -100,10 +100,10 @@ def file_bytes(path: Path) -> bytes:
     Raises
     ------
     OSError
-        If it cannot be read, is no file, or larger than any of a run.
+        If it cannot be read, is not a file, or is larger than any of a run.
     """
     if path.exists() and not path.is_file():  # a pipe would never end
-        raise OSError(errno.EINVAL, "it is no file")
+        raise OSError(errno.EINVAL, "it is not a file")
     if path.stat().st_size > LARGEST:
         raise OSError(errno.EFBIG, "it is larger than any file of a run")
     return path.read_bytes()

@@ -34,7 +34,7 @@ from nlctl.wording import some_of
 from .experiment import Columns, typed
 from .identity import differences_of
 
-FORMAT = 2
+CHUNKS_FORMAT = 2
 SEALS = b"nlctl.seals"  # a key of each column, in a chunk's file
 
 __all__ = [
@@ -168,7 +168,7 @@ def _identify(store: ChunkStore, resume: bool) -> None:
                 "it with what it was begun with, or take another folder"
             )
         return
-    content = {"format": FORMAT, "identity": store.identity, "columns": store.columns}
+    content = {"format": CHUNKS_FORMAT, "identity": store.identity, "columns": store.columns}
     text = json.dumps(content | {"sha256": _key(content)}, indent=1)
     _write(store, store.folder / "study.json", text.encode())
 
@@ -185,7 +185,7 @@ def opened(folder: str | os.PathLike[str]) -> ChunkStore:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         kept = content["format"]
-        if kept == FORMAT and content.pop("sha256") != _key(content):
+        if kept == CHUNKS_FORMAT and content.pop("sha256") != _key(content):
             raise ValueError("it is not as it was written")
         store = ChunkStore(
             folder=path.parent, identity=content["identity"], columns=content["columns"]
@@ -194,9 +194,9 @@ def opened(folder: str | os.PathLike[str]) -> ChunkStore:
         typed(pd.DataFrame(columns=list(store.columns)), store.columns)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise StoreError(f"'{path}' is not a study of a sweep: {error}") from error
-    if kept != FORMAT:
+    if kept != CHUNKS_FORMAT:
         raise StoreError(
-            f"'{path}' has the format {str(kept)[:20]!a}, and this nlctl reads {FORMAT}: read it "
+            f"'{path}' has the format {str(kept)[:20]!a}, and this nlctl reads {CHUNKS_FORMAT}: read it "
             "with the nlctl that wrote it, or run the study again"
         )
     return store

@@ -9,10 +9,10 @@ __all__ = ["independence_test"]
 
 MOST_TABLES = 200_000
 """So many tables are gone through, one by one; of more, so many are drawn."""
-DRAWN = 99_999
+PERMUTATIONS = 99_999
 LARGE = 20.0
 """From this expected number on in every field the chi-square law is as good as exact."""
-ROUNDING = 1e-9
+_ROUNDING = 1e-9
 
 
 def independence_test(counts: np.ndarray, entropy: int) -> tuple[float, float]:
@@ -42,7 +42,7 @@ def independence_test(counts: np.ndarray, entropy: int) -> tuple[float, float]:
         return 0.0, 1.0
     found = float(_chi_square(counts[None, :, 0], rows, failing)[0])
     strength = float(np.sqrt(found / rows.sum()))
-    at_least = found * (1 - ROUNDING) - ROUNDING
+    at_least = found * (1 - _ROUNDING) - _ROUNDING
     if _count(rows, failing) <= MOST_TABLES:
         tables, probabilities = _every_table(rows, failing)
         far = _chi_square(tables, rows, failing) >= at_least
@@ -50,9 +50,9 @@ def independence_test(counts: np.ndarray, entropy: int) -> tuple[float, float]:
     if rows.min() * min(failing, rows.sum() - failing) / rows.sum() >= LARGE:
         return strength, float(stats.chi2.sf(found, len(rows) - 1))
     rng = np.random.default_rng(entropy)
-    drawn = rng.multivariate_hypergeometric(rows, failing, size=DRAWN, method="marginals")
+    drawn = rng.multivariate_hypergeometric(rows, failing, size=PERMUTATIONS, method="marginals")
     beyond = int(np.sum(_chi_square(drawn, rows, failing) >= at_least))
-    return strength, (1 + beyond) / (1 + DRAWN)
+    return strength, (1 + beyond) / (1 + PERMUTATIONS)
 
 
 def _chi_square(failing: np.ndarray, rows: np.ndarray, total: int) -> np.ndarray:

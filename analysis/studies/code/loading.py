@@ -154,7 +154,7 @@ def _inner(full: str, admits: Admits | None) -> None:
 def _neighbour(name: str, folder: Path) -> Path | None:
     """Return the file of a module that lies in a folder; None where an installed one has its name.
 
-    A folder without ``__init__.py`` is no module.
+    A folder without ``__init__.py`` is not a module.
     """
     found = [
         path.resolve()

@@ -21,7 +21,7 @@ from nlctl.host.files import replace_file
 
 __all__ = ["record_file", "remember", "remembered", "statement", "study_digest"]
 
-FORMAT = 1
+_FORMAT = 1
 
 
 def record_file() -> Path:
@@ -59,7 +59,7 @@ def remembered() -> frozenset[str]:
         if _is_others(path) or _is_others(path.parent):
             return frozenset()
         content = json.loads(path.read_bytes())
-        if content["format"] != FORMAT:
+        if content["format"] != _FORMAT:
             return frozenset()
         return frozenset(map(str, content["statements"]))
     except (OSError, ValueError, KeyError, TypeError):
@@ -83,7 +83,7 @@ def remember(statements: Iterable[str]) -> bool:
     new = frozenset(statements) - known
     if not new:
         return True
-    content = json.dumps({"format": FORMAT, "statements": sorted(known | new)}, indent=1)
+    content = json.dumps({"format": _FORMAT, "statements": sorted(known | new)}, indent=1)
     before = os.umask(0o077)  # nobody else writes what this user trusts
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -17,9 +17,9 @@ from .errors import KeyPath, Problem
 from .resolve import named_kind
 from .schema import Study, study_model
 
-__all__ = ["GONE", "model_of", "own_kinds", "stand_ins"]
+__all__ = ["STAND_IN", "model_of", "own_kinds", "stand_ins"]
 
-GONE = "gone"
+STAND_IN = "gone"
 """Name of the kinds that stand in for those that are not known."""
 
 
@@ -77,7 +77,7 @@ def _stand_in(name: str) -> Kind:
         raise ParameterError(f"the kind of analysis '{name}' has gone: put it back")
 
     title = name.rpartition(":")[2].replace("_", " ").capitalize()
-    return Kind(name=GONE, schema=_AnyTable, run=run, title=title)
+    return Kind(name=STAND_IN, schema=_AnyTable, run=run, title=title)
 
 
 class _AnyTable(Asked):

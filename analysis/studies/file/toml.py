@@ -12,7 +12,7 @@ __all__ = ["check_depth", "read_toml", "statements", "study_text"]
 _LARGEST = 200_000  # characters of a file
 _LONGEST = 8_000  # characters of a line; a key takes the square of its dots to be read
 DEEPEST = 20  # tables and lists inside of each other
-CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e]")
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e]")
 _TOKEN = re.compile(
     r'"""(?:[^\\]|\\.)*?"""|\'\'\'.*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*|[\[\]{}\n]',
     re.DOTALL,
@@ -84,7 +84,7 @@ def _check_printable(value: Any, place: str) -> None:
     elif isinstance(value, list):
         for part in value:
             _check_printable(part, place)
-    elif isinstance(value, str) and (found := CONTROL.search(value)):
+    elif isinstance(value, str) and (found := _CONTROL.search(value)):
         raise ValueError(
             f"has a control character, U+{ord(found[0]):04X}, in {place!a}: texts have lines, tabs "
             "and characters that can be printed"

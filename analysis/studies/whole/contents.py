@@ -21,7 +21,7 @@ from ..result import Result
 from ..sealed import RunFolderError, file_digest, write_json
 from .shapes import ContentsFile, shaped
 
-__all__ = ["CONTENTS", "Whole", "check_whole", "seal", "unseal", "verify"]
+__all__ = ["CONTENTS", "Wholeness", "check_whole", "seal", "unseal", "verify"]
 
 CONTENTS = "contents.json"
 _PAGE = ("index.html", "report.json", "report.pdf")
@@ -30,7 +30,7 @@ REMEDY = "continue the run with --resume, which makes it anew, or take an intact
 
 
 @dataclass(frozen=True, kw_only=True)
-class Whole:
+class Wholeness:
     """What `verify` found of a run folder.
 
     Attributes
@@ -47,7 +47,7 @@ class Whole:
     problems : tuple of str
         What is missing, edited or too much, one sentence each; empty if the folder is whole.
     others : tuple of str
-        Files that are no part of the run, its page aside.
+        Files that the run has not written, its page aside.
 
     Examples
     --------
@@ -189,7 +189,7 @@ def _contradictions(folder: Path, content: dict[str, Any], files: list[Path]) ->
             yield f"'{folder / key / 'finding.json'}' is missing"
 
 
-def verify(folder: Path) -> Whole:
+def verify(folder: Path) -> Wholeness:
     """Hold every file of a run folder against the record that its run has sealed.
 
     Nothing is imported, run or drawn.
@@ -201,7 +201,7 @@ def verify(folder: Path) -> Whole:
 
     Returns
     -------
-    Whole
+    Wholeness
         With every difference, in words.
 
     Raises
@@ -245,7 +245,7 @@ def verify(folder: Path) -> Whole:
     names = (path.relative_to(folder).as_posix() for path in every)
     problems = tuple(dict.fromkeys(_problems(folder, content)))
     told = " ".join(problems)
-    return Whole(
+    return Wholeness(
         folder=folder,
         files=len(content["files"]),
         rows=content["rows"],

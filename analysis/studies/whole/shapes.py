@@ -1,4 +1,4 @@
-"""What stands in the JSON files of a run folder: shapes, held against what is read.
+"""What stands in the JSON files of a run folder: the shapes that they are validated against.
 
 A file may be whole and carry the right key, and yet be of another version or made by hand.
 """
@@ -38,20 +38,20 @@ def _inside(value: str) -> str:
 
 
 def _name(value: str) -> str:
-    """Refuse what is no name of a file in a folder."""
+    """Refuse what cannot be the name of a file in a folder."""
     if "/" in value or value.startswith("."):
         raise ValueError("a name has neither slashes nor a dot in front")
     return _inside(value)
 
 
-Text = Annotated[str, BeforeValidator(_as_text), Field(strict=True)]
-Some = Annotated[bool, Field(strict=True)]
-Count = Annotated[int, Field(strict=True, ge=0)]
-Cell = float | Text | None
-Key = Annotated[Text, Field(min_length=1, max_length=255), AfterValidator(_name)]
-Place = Annotated[Text, Field(min_length=1, max_length=4096), AfterValidator(_inside)]
-Digest = Annotated[Text, Field(pattern="^[0-9a-f]{64}$")]
-Answer = Literal["shown", "refuted", "not shown yet", ""]
+_Text = Annotated[str, BeforeValidator(_as_text), Field(strict=True)]
+_Some = Annotated[bool, Field(strict=True)]
+_Count = Annotated[int, Field(strict=True, ge=0)]
+_Cell = float | _Text | None
+_Key = Annotated[_Text, Field(min_length=1, max_length=255), AfterValidator(_name)]
+_Place = Annotated[_Text, Field(min_length=1, max_length=4096), AfterValidator(_inside)]
+_Digest = Annotated[_Text, Field(pattern="^[0-9a-f]{64}$")]
+_Answer = Literal["shown", "refuted", "not shown yet", ""]
 
 
 class _File(BaseModel):
@@ -59,105 +59,105 @@ class _File(BaseModel):
 
 
 class _Facts(_File):
-    blocks: dict[str, Text]
-    wiring: dict[str, Text]
-    parameters: dict[str, Text]
-    initial_state: dict[str, Text]
+    blocks: dict[str, _Text]
+    wiring: dict[str, _Text]
+    parameters: dict[str, _Text]
+    initial_state: dict[str, _Text]
 
 
 class _Origin(_File):
     model_config = ConfigDict(extra="allow", frozen=True)
     study: dict[str, Any]
     diagrams: dict[str, _Facts]
-    versions: dict[str, Text]
-    values: dict[str, dict[str, float | Text]]
-    unseen: dict[str, list[Text]] = {}
+    versions: dict[str, _Text]
+    values: dict[str, dict[str, float | _Text]]
+    unseen: dict[str, list[_Text]] = {}
 
 
 class RunFile(_File):
     """``run.json``."""
 
-    study_folder: Text = Field(pattern="^[^\x00]+$", max_length=4096)
+    study_folder: _Text = Field(pattern="^[^\x00]+$", max_length=4096)
     origin: _Origin
 
 
 class _Quantity(_File):
-    name: Text
-    law: Text
-    low: Cell
-    high: Cell
-    unit: Cell
-    nominal: Cell
+    name: _Text
+    law: _Text
+    low: _Cell
+    high: _Cell
+    unit: _Cell
+    nominal: _Cell
 
 
 class _Requirement(_File):
-    key: Text
-    formula: Text
+    key: _Text
+    formula: _Text
     until: float
-    meaning: Text
+    meaning: _Text
 
 
 class _Metric(_File):
-    key: Text
-    signal: Text
-    unit: Text
-    meaning: Text
+    key: _Text
+    signal: _Text
+    unit: _Text
+    meaning: _Text
 
 
 class _Found(_File):
-    key: Key
-    kind: Text
-    title: Text
-    sentence: Text
-    claim: Text
-    answer: Answer
-    needs: Text
-    runs: Count
+    key: _Key
+    kind: _Text
+    title: _Text
+    sentence: _Text
+    claim: _Text
+    answer: _Answer
+    needs: _Text
+    runs: _Count
     numbers: dict[str, Any]
-    is_answered: Some
+    is_answered: _Some
 
 
 class _Listed(_Found):
-    tables: list[Key]
+    tables: list[_Key]
 
 
 class FindingFile(_Found):
     """``KEY/finding.json``."""
 
-    tables: dict[Key, Digest]
-    origin: Digest
+    tables: dict[_Key, _Digest]
+    origin: _Digest
 
 
 class _Done(_File):
-    done: Count
+    done: _Count
 
 
 class ResultsFile(_File):
     """``results.json``."""
 
-    title: Text
-    question: Text
-    verdict: Text
-    holds: Some
-    answer: Answer
-    complete: Some
-    notes: list[Text]
+    title: _Text
+    question: _Text
+    verdict: _Text
+    holds: _Some
+    answer: _Answer
+    complete: _Some
+    notes: list[_Text]
     rows: _Done | None
     quantities: list[_Quantity] = Field(min_length=1)
     requirements: list[_Requirement] = Field(min_length=1)
     metrics: list[_Metric]
     findings: list[_Listed]
-    origin: Digest
+    origin: _Digest
 
 
 class ContentsFile(_File):
     """``contents.json``: the record that proves that a folder is whole."""
 
-    files: dict[Place, Digest]
-    rows: dict[Key, Count]
-    analyses: list[Key]
-    done: list[Key]
-    complete: Some
+    files: dict[_Place, _Digest]
+    rows: dict[_Key, _Count]
+    analyses: list[_Key]
+    done: list[_Key]
+    complete: _Some
 
 
 def shaped(path: Path, shape: type[_Shape], remedy: str = ANEW) -> dict[str, Any]:

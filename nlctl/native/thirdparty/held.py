@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["OPAQUE", "PLAIN", "held_by", "inherited"]
+__all__ = ["NAMED", "OPAQUE", "held_by", "inherited"]
 
 OPAQUE = "\2"
 """Begins a text that names what nobody can see into."""
-PLAIN = "\3"
+NAMED = "\3"
 """Begins a text that tells all of an object."""
 LAID_OUT = ("_mgr", "_item_cache", "_flags", "_cache")
 """Where pandas keeps content: how it is laid out in memory may change."""
@@ -46,7 +46,7 @@ def held_by(thing: Any, is_library: Callable[[str], bool]) -> Any:
     Returns
     -------
     object
-        A tuple of parts; or a text that begins with `PLAIN` or `OPAQUE`; or None where the object
+        A tuple of parts; or a text that begins with `NAMED` or `OPAQUE`; or None where the object
         is told by its text alone.
     """
     kind = type(thing)
@@ -109,7 +109,7 @@ def reduced(thing: Any) -> Any:
     except Exception:  # whatever an object raises that is not to be taken apart
         return f"{OPAQUE}an object of {name}"
     if isinstance(made, str):
-        return f"{PLAIN}{getattr(thing, '__module__', '')}.{made}"
+        return f"{NAMED}{getattr(thing, '__module__', '')}.{made}"
     parts = list(made[:3])
     if len(parts) > 2 and isinstance(parts[2], dict):  # of laws, which draw from it
         parts[2] = {k: v for k, v in parts[2].items() if k != "_random_state"}

@@ -136,11 +136,11 @@ def test_many_tables_are_drawn_or_follow_chi_square(monkeypatch):
     drawn = independence_test(counts, entropy=1)[1]
     monkeypatch.setattr(independence, "LARGE", 0.0)
     law = independence_test(counts, entropy=1)[1]
-    assert drawn == pytest.approx(exact, abs=4 * math.sqrt(exact / independence.DRAWN))
+    assert drawn == pytest.approx(exact, abs=4 * math.sqrt(exact / independence.PERMUTATIONS))
     assert law == pytest.approx(exact, rel=0.3)
     monkeypatch.setattr(independence, "LARGE", 1e9)
     far = counts_of(np.array([0, 15, 30]), rows)
-    assert independence_test(far, entropy=1)[1] == 1 / (1 + independence.DRAWN)
+    assert independence_test(far, entropy=1)[1] == 1 / (1 + independence.PERMUTATIONS)
     several = counts_of(rng.multivariate_hypergeometric([40] * 8, 100), [40] * 8)
     assert independence_test(several, entropy=5) == independence_test(several, entropy=5)
 
