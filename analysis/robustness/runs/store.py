@@ -196,8 +196,8 @@ def opened(folder: str | os.PathLike[str]) -> ChunkStore:
         raise StoreError(f"'{path}' is not a study of a sweep: {error}") from error
     if kept != CHUNKS_FORMAT:
         raise StoreError(
-            f"'{path}' has the format {str(kept)[:20]!a}, and this nlctl reads {CHUNKS_FORMAT}: read it "
-            "with the nlctl that wrote it, or run the study again"
+            f"'{path}' has the format {str(kept)[:20]!a}, and this nlctl reads "
+            f"{CHUNKS_FORMAT}: read it with the nlctl that wrote it, or run the study again"
         )
     return store
 
