@@ -6,7 +6,12 @@ tell that from stiffness and from fast oscillations:
 
 * by what it moves in a mean step, a state changes by no more than some tolerances;
 * of the last steps tried many contain a jump, of the right-hand side or of what a memory becomes;
-* halving the way across, down to neighbouring numbers, does not make it smaller.
+* halving the way across, down to neighbouring numbers, does not make it smaller, and next to it on
+  both sides there is none, as there is with rounding;
+* it depends on the state: a run does not come back to what jumps with time alone.
+
+A step that got to where it had to end, at a sample of the inputs, a clock or a break of a delay,
+is as long as it could be, and no sign of anything: a run at rest is all such steps.
 
 It is looked for in windows of so many steps that a usual run has none, and rarely in a run that
 goes on as it began.  What is found of a member never depends on the members beside it.
@@ -32,6 +37,9 @@ _LONG = 8  # windows after which a run is looked at that has not become slow
 _LEAST = 0.1  # part of the range of the right-hand side that counts as a jump
 _REMAINS = 0.4  # part of it that is still there between neighbours; sign has a half at 0
 _HALVINGS = 200
+_FLAT = 0.25  # part of it by which what does not jump may change
+_BESIDE = 2.0 ** np.arange(4, 22)  # distances between neighbours, any four in a row of which do
+_WAYS = np.random.default_rng(1).choice([-1.0, 1.0], (4, 1000))  # signs, to move a state by
 _PACES = np.dtype([("t", "f8"), ("longest", "f8"), ("windows", "i8"), ("slow", "i8")])
 
 
@@ -78,6 +86,7 @@ class Attempt:
     k: np.ndarray
     u: np.ndarray
     stiff: bool
+    free: np.ndarray  # whether it did not get to a stop that was known before the run
 
 
 def new_paces(lanes: np.ndarray) -> np.ndarray:
@@ -110,15 +119,19 @@ def snapshot(work: Any, advance: Callable[[], Any]) -> tuple[Any, Attempt]:
     run = advance()
     w = run.work
     lanes = w.t.size
+    moved = w.lanes["t"] > t
     return run, Attempt(
         t=t, x=x, first=first, x_new=w.x_new.copy(), h=w.hh[:lanes].copy(), k=w.k.copy(),
-        u=w.u.copy(), stiff=bool(w.lanes["stiff"][0]),
+        u=w.u.copy(), stiff=bool(w.lanes["stiff"][0]), free=~(moved & (w.lanes["ends"] != 0)),
     )  # fmt: skip
 
 
 def jump_of(run: Any, attempts: list[Attempt], j: int) -> Jump | None:
     """Return the last jump in the steps that lane `j` has tried, if it chatters there."""
     task = run.task
+    free = [a for a in reversed(attempts) if a.free[j]]
+    if len(free) < _JUMPS:
+        return None
     slopes = np.concatenate([a.k[:, :, j] for a in attempts])
     slopes = slopes[np.isfinite(slopes).all(axis=1)]
     states = np.array([a.x[:, j] for a in attempts])
@@ -136,7 +149,7 @@ def jump_of(run: Any, attempts: list[Attempt], j: int) -> Jump | None:
     weights[extent.size :] = 1.0 / (task.atol + task.rtol)  # memories jump by what they are
     least = np.append(_LEAST * extent, np.full(task.memory.size, 1e3 * (task.atol + task.rtol)))
     found, last = 0, None
-    for attempt in reversed(attempts):
+    for attempt in free:
         jump = evaluated.jump(attempt, weights, least)
         found, last = found + (jump is not None), last or jump
         if found == _JUMPS:
@@ -186,9 +199,11 @@ class _Evaluated:
             return None
         i = int(np.argmax(change))
         low, high = places[int(values[:, i].argmin())], places[int(values[:, i].argmax())]
-        return self._narrowed(low, high, u, i)
+        return self._narrowed(low, high, u, i, weights)
 
-    def _narrowed(self, low: Any, high: Any, u: np.ndarray, i: int) -> Jump | None:
+    def _narrowed(
+        self, low: Any, high: Any, u: np.ndarray, i: int, weights: np.ndarray
+    ) -> Jump | None:
         """Halve the way from one place to another; return where component `i` jumps, if it does."""
         first, last = self(low[0], low[1], u)[i], self(high[0], high[1], u)[i]
         whole = abs(last - first)
@@ -206,4 +221,39 @@ class _Evaluated:
         # the jump itself may have a value of its own, as sign(0) has: beside it on both sides
         wider = Jump(times=(low[0], high[0]), before=low[1], after=high[1], inputs=u).sides(1.0)
         (t, before, _), (t_2, after, _) = wider
-        return Jump(times=(float(t), float(t_2)), before=before, after=after, inputs=u)
+        jump = Jump(times=(float(t), float(t_2)), before=before, after=after, inputs=u)
+        away = 1.0 / weights[: jump.before.size]
+        found = self._stands_out(jump, i) and self._depends_on_state(jump, i, away)
+        return jump if found else None
+
+    def _stands_out(self, jump: Jump, i: int) -> bool:
+        """Whether component `i` jumps by more than it changes next to the jump.
+
+        What changes by rounding does so everywhere, and what is smooth changes by more over a
+        longer way.
+        """
+        with np.errstate(all="ignore"):
+            points = [jump.sides(wider) for wider in _BESIDE]
+            below, above = (
+                np.array([self(t, x, u)[i] for t, x, u in side])
+                for side in zip(*points, strict=True)
+            )
+        for k in range(_BESIDE.size - 3):
+            low, high = below[k : k + 4], above[k : k + 4]
+            whole = abs(high[0] - low[0])
+            if max(np.ptp(low), np.ptp(high)) <= _FLAT * whole and whole > 0.0:
+                return True
+        return False
+
+    def _depends_on_state(self, jump: Jump, i: int, away: np.ndarray) -> bool:
+        """Whether states within the tolerance `away` are on the other side at the same time."""
+        if jump.times[0] == jump.times[1]:
+            return True
+        sides = jump.sides()
+        least = _FLAT * abs(np.subtract(*(self(t, x, u)[i] for t, x, u in sides)))
+        moves = np.resize(_WAYS, (len(_WAYS), away.size)) * away
+        for t, x, u in sides:
+            there = [self(t, x + move, u)[i] for move in (*moves, *-moves)]
+            if not np.all(np.abs(np.subtract(there, self(t, x, u)[i])) <= least):
+                return True
+        return False
