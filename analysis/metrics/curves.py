@@ -3,15 +3,16 @@
 A polynomial through samples says something only where the signal is smooth, and samples tell: each
 should lie where its neighbours say.  With up to 8 neighbours the *defect* of a sample is
 
-    r_k = y_k - p_k(t_k),     p_k the polynomial through the neighbours,
+    r = y_k - p(t_k),     p the polynomial through the neighbours,
 
 on even samples the eighth difference over 70: of order h^8 of a smooth signal, and of the first or
-zeroth order next to a kink or a jump.  With R the largest |r| of a sample and the two next to it,
-the curve's extreme p* counts as p* - `GUARD` R, and only where it is beyond the sample by more than
+zeroth order next to a kink or a jump.  With R the largest |r| by three windows of neighbours, each
+a sample further, the curve's extreme p* counts as p* - `GUARD` R, and only where it is beyond the sample by more than
 `CLEAR` R.  So what is lost of a smooth peak is O(h^8), and a limiter's corner is not overshot: a
-kink, wherever it lies, moves an interpolating polynomial by less than `GUARD` R.  What no sample
-has seen, such as a limit reached for less than a sampling interval, samples alone cannot say; the
-estimate is then beyond it by at most h^2 |y''| / 8.
+kink, wherever it lies, moves an interpolating polynomial by less than `GUARD` R.  A largest or
+smallest value that three samples in a row have is a limit, and no curve goes beyond it.  What no
+sample has seen, such as a limit reached for less than a sampling interval and nowhere else, samples
+alone cannot say; the estimate is then beyond it by at most h^2 |y''| / 8.
 
 *Breaks* are the times at which a signal may jump or bend.  No curve goes through one; the limits
 from both sides, extrapolated from the samples of that side, are values of the signal as well.
@@ -59,17 +60,16 @@ def pieces(t, breaks):
 
 @equation
 def _window(first, last, k):
-    """Return the samples of a piece around sample `k` that a curve goes through."""
-    count = min(2 * HALF + 1, last - first)
+    """Return the samples of a piece of five or more around sample `k` that a curve goes through."""
+    count = min(2 * HALF + 1, max(last - first - 2, 4))
     a = min(max(k - HALF, first), last - count)
     return a, a + count
 
 
 @equation
-def _defect(t, y, first, last, k):
-    """Return how far a sample is from where its neighbours say, at least what rounding makes."""
-    a, b = _window(first, last, k)
-    found, size = 0.0, 0.0
+def _defect(t, y, a, b, k):
+    """Return how far sample `k` is from where others of [a, b) say, at least what rounding makes."""
+    found, size = 0.0, abs(y[k])
     for j in range(a, b):
         size = max(size, abs(y[j]))
         if j == k:
@@ -79,17 +79,17 @@ def _defect(t, y, first, last, k):
             if m not in (j, k):
                 weight *= (t[k] - t[m]) / (t[j] - t[m])
         found += weight * (y[j] - y[k])
-    return max(abs(found), _ROUNDING * size) if b - a > 3 else np.inf
+    return max(abs(found), _ROUNDING * size)
 
 
 @equation
 def _doubt(t, y, first, last, k):
-    """Return the largest defect of a sample and the two next to it."""
-    doubt = _defect(t, y, first, last, k)
-    if k > first:
-        doubt = max(doubt, _defect(t, y, first, last, k - 1))
-    if k + 1 < last:
-        doubt = max(doubt, _defect(t, y, first, last, k + 1))
+    """Return the largest defect of a sample among the neighbours of three windows."""
+    a, b = _window(first, last, k)
+    begin = max(min(a - 1, last - (b - a) - 2), first)
+    doubt = 0.0
+    for start in range(begin, min(begin + 3, last - (b - a) + 1)):
+        doubt = max(doubt, _defect(t, y, start, start + b - a, k))
     return doubt
 
 
@@ -135,6 +135,13 @@ def _turn(t, y, first, last, k, low, high):
 
 
 @equation
+def _held(y, value):
+    """Whether three samples in a row have a value."""
+    at = y == value
+    return np.any(at[2:] & at[1:-1] & at[:-2])
+
+
+@equation
 def turning_points(t, y, breaks):
     """Return extremes between samples: before which sample each is, when, and its value.
 
@@ -148,9 +155,11 @@ def turning_points(t, y, breaks):
     place, value = np.empty(y.size), np.empty(y.size)
     before = np.zeros(y.size, np.int64)
     count = 0
+    bottom = np.min(y) if _held(y, np.min(y)) else -np.inf
+    top = np.max(y) if _held(y, np.max(y)) else np.inf
     firsts, lasts, starts, ends = pieces(t, breaks)
     for first, last, start, end in zip(firsts, lasts, starts, ends):  # noqa: B905 (numba)
-        if last - first < 4:
+        if last - first < 5:
             continue
         d = consecutive_differences(y[first:last])
         up, down = np.ones(last - first), -np.ones(last - first)
@@ -160,8 +169,8 @@ def turning_points(t, y, breaks):
         for k in np.nonzero(turns)[0] + first:
             low, high = t[k - 1] if k > first else start, t[k + 1] if k + 1 < last else end
             at, extreme, found = _turn(t, y, first, last, k, low, high)
-            after = count == 0 or at > place[count - 1]
-            if found and after and at > low and at < high and at != t[k]:
+            found &= bottom <= extreme <= top and (count == 0 or at > place[count - 1])
+            if found and at > low and at < high and at != t[k]:
                 place[count], value[count], before[count] = at, extreme, k + (at > t[k])
                 count += 1
     return before[:count], place[:count], value[:count]
@@ -236,7 +245,7 @@ def _between(t, y, first, last, k, parts):
     s = t[a:b] - t[k]
     c = _coefficients(s, y[a:b] - y[k])
     off = np.array([_at(s, c, x)[0] for x in at - t[k]]) - line
-    doubt = max(_doubt(t, y, first, last, k), _defect(t, y, first, last, min(k + 2, last - 1)))
+    doubt = max(_doubt(t, y, first, last, k), _doubt(t, y, first, last, k + 1))
     if not np.max(np.abs(off)) > CLEAR * doubt:
         off = 0.0 * off
         doubt = 0.0
@@ -272,7 +281,7 @@ def path(t, y, breaks):
             times.append(t[k : k + 1].copy())
             values.append(y[k : k + 1].copy())
             parts = _parts(t, y, first, last, k, tolerance) if k + 1 < last else 1
-            if parts > 1 and last - first > 3:
+            if parts > 1 and last - first > 4:
                 at, here = _between(t, y, first, last, k, parts)
                 times.append(at)
                 values.append(here)

@@ -7,14 +7,15 @@
     eventually(a):  max of rho_a over the same
 
 (Donzé, Maler: Robust satisfaction of temporal logic over real-valued signals, FORMATS 2010).
-rho > 0 holds, rho < 0 fails.  Signals are connected by lines between samples, through the
-parabola's vertex at local extrema; on these lines the margins are exact, sliding windows included.
+rho > 0 holds, rho < 0 fails.  Signals are connected by lines between samples, through a curve's
+extreme where samples support one; with the breaks of a run known, by curves between them (see
+`analysis.metrics.curves`).  On these lines the margins are exact, sliding windows included.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -304,11 +305,14 @@ class SampledSignals:
         Arrays of shape (m,).
     until : float
         Time (s) at which windows without an end stop, at most ``t[-1]``.
+    breaks : ndarray of shape (k,)
+        Increasing times (s) at which signals may jump or bend.
     """
 
     t: np.ndarray
     samples: Mapping[str, np.ndarray]
     until: float
+    breaks: np.ndarray = field(default_factory=lambda: np.empty(0))
 
 
 def margin_trace(formula: Formula, signals: SampledSignals, low: float, high: float) -> Trace:
@@ -350,15 +354,19 @@ def margin_trace(formula: Formula, signals: SampledSignals, low: float, high: fl
     raise TypeError(f"no formula: {formula!r}")
 
 
-def _near(
-    band: Band, signals: SampledSignals, low: float, high: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and samples of the band's signal in [low, high], with a few more around."""
+_AROUND = 6  # samples on each side of a window that its curves go through
+
+
+def _near(band: Band, signals: SampledSignals, low: float, high: float) -> tuple[np.ndarray, ...]:
+    """Return times, samples and breaks of the band's signal in [low, high] and a little around."""
     if band.signal not in signals.samples:
         raise unknown("signal", band.signal, signals.samples)
-    i, j = np.searchsorted(signals.t, low, "right"), np.searchsorted(signals.t, high, "left")
-    near = slice(max(i - 3, 0), j + 3)  # with the neighbours that vertices need
-    return signals.t[near], signals.samples[band.signal][near]
+    t, breaks = signals.t, signals.breaks
+    i, j = np.searchsorted(t, low, "right"), np.searchsorted(t, high, "left")
+    near = slice(max(i - _AROUND, 0), j + _AROUND)
+    t = t[near]
+    breaks = breaks[(breaks >= t[0]) & (breaks <= t[-1])]
+    return t, signals.samples[band.signal][near], breaks
 
 
 def _beyond(band: Band, y: np.ndarray) -> list[np.ndarray]:
@@ -368,11 +376,13 @@ def _beyond(band: Band, y: np.ndarray) -> list[np.ndarray]:
 
 
 def _band(band: Band, signals: SampledSignals, low: float, high: float) -> Trace:
-    y = with_vertices(*_near(band, signals, low, high)).between(low, high)
+    t, y, breaks = _near(band, signals, low, high)
+    y = with_vertices(t, y, breaks).between(low, high)
     return -pointwise_maximum([Trace(y.t, beyond) for beyond in _beyond(band, y.y)])
 
 
 def _worst(band: Band, signals: SampledSignals, low: float, high: float) -> float:
     """Return the largest violation in [low, high]: an extreme value has it."""
-    values = np.array(extremes(*_near(band, signals, low, high), low, high))
+    t, y, breaks = _near(band, signals, low, high)
+    values = np.array(extremes(t, y, low, high, breaks))
     return float(np.max(_beyond(band, values)))

@@ -12,7 +12,7 @@ import numpy as np
 
 from nlctl.native.machine.machine_code import kept
 
-from ...metrics import consecutive_differences, vertex
+from ...metrics.curves import path, turning_points
 
 __all__ = ["Trace", "extremes", "higher", "largest", "pointwise_maximum", "with_vertices"]
 
@@ -54,36 +54,46 @@ class Trace:
         return Trace(t, self.at(t))
 
 
-def with_vertices(t: np.ndarray, y: np.ndarray) -> Trace:
-    """Join samples by lines, through the parabola's vertex at every strict local extremum.
+_NONE = np.empty(0)
 
-    Peaks between samples are then seen as `analysis.metrics.highest` sees them.
+
+def with_vertices(t: np.ndarray, y: np.ndarray, breaks: np.ndarray = _NONE) -> Trace:
+    """Return a signal between samples: lines, through the extremes that samples support.
+
+    Peaks between samples are then seen as `analysis.metrics.highest` sees them.  With breaks it is
+    the path of `analysis.metrics.curves`: curves between them, and jumps.
     """
-    at, place, value = _vertices(t, y)
+    if breaks.size:
+        return Trace(*_path(t, y, breaks))
+    at, place, value = _vertices(t, y, breaks)
     return Trace(np.insert(t, at, place), np.insert(y, at, value)) if at.size else Trace(t, y)
 
 
 @kept(nogil=True, error_model="numpy")
-def _vertices(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the vertices between samples: before which sample each is, when, and its value."""
-    d = consecutive_differences(y)
-    i = np.nonzero(d[:-1] * d[1:] < 0)[0] + 1
-    if i.size == 0:
-        return i, t[:0], y[:0]
-    offset, value = vertex(t[i] - t[i - 1], t[i + 1] - t[i], y[i - 1], y[i], y[i + 1])
-    place = t[i] + offset
-    new = (place != t[i]) & (place > t[i - 1]) & (place < t[i + 1])
-    return (i + (offset > 0))[new], place[new], value[new]
+def _vertices(
+    t: np.ndarray, y: np.ndarray, breaks: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the extremes between samples: before which sample each is, when, and its value."""
+    return turning_points(t, y, breaks)
 
 
-def extremes(t: np.ndarray, y: np.ndarray, low: float, high: float) -> tuple[float, float]:
-    """Return the least and the largest value of ``with_vertices(t, y)`` in [low, high]."""
+@kept(nogil=True, error_model="numpy")
+def _path(t: np.ndarray, y: np.ndarray, breaks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points of a path through samples, see `analysis.metrics.curves`."""
+    return path(t, y, breaks)
+
+
+def extremes(
+    t: np.ndarray, y: np.ndarray, low: float, high: float, breaks: np.ndarray = _NONE
+) -> tuple[float, float]:
+    """Return the least and the largest value of a signal between samples in [low, high]."""
     i, j = np.searchsorted(t, low, "left"), np.searchsorted(t, high, "right")
-    if t[i] != low or t[j - 1] != high:  # ends between samples
-        inside = with_vertices(t, y).between(low, high).y
-        return float(np.min(inside)), float(np.max(inside))
-    _, place, value = _vertices(t, y)
-    inside = np.concatenate([y[i:j], value[(place > low) & (place < high)]])
+    if breaks.size or t[i] != low or t[j - 1] != high:  # ends between samples
+        inside = with_vertices(t, y, breaks).between(low, high).y
+    else:
+        inside = y[i:j]
+    _, place, value = _vertices(t, y, breaks)
+    inside = np.concatenate([inside, value[(place > low) & (place < high)]])
     return float(np.min(inside)), float(np.max(inside))
 
 
