@@ -120,11 +120,11 @@ def _layout(lowered: Lowered) -> SeriesLayout:
 
 def _lowered(compiled: Compiled, found: Any, width: int) -> tuple[Lowered, Recurrences]:
     program, n, m = compiled.program, compiled.system.nstates or 0, compiled.schedule.ninputs
-    wanted = stores_of(found, ("dx", "g"))
-    wanted["g"] = [s for s in wanted["g"] if s.row < program.switching]
-    stores, exact, graph = rewritten(found.graph, wanted)
+    asked = stores_of(found, ("dx", "g"))
+    asked["g"] = [s for s in asked["g"] if s.row < program.switching]
+    stores, exact, graph = rewritten(found.graph, asked)
     try:
-        made = recurrences(
+        wanted = recurrences(
             graph, stores, {"x": n, "g": program.events + found.conditions.rows}, packed=width == 1
         )
     except NoSeriesError as error:
