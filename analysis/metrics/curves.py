@@ -7,9 +7,9 @@ should lie where its neighbours say.  With up to 8 neighbours the *defect* of a 
 
 on even samples the eighth difference over 70: of order h^8 of a smooth signal, and of the first or
 zeroth order next to a kink or a jump.  With R the largest |r| by three windows of neighbours, each
-a sample further, the curve's extreme p* counts as p* - `GUARD` R, and only where it is beyond the sample by more than
-`CLEAR` R.  So what is lost of a smooth peak is O(h^8), and a limiter's corner is not overshot: a
-kink, wherever it lies, moves an interpolating polynomial by less than `GUARD` R.  A largest or
+a sample further, the curve's extreme p* counts as p* - `GUARD` R, and only where it is beyond the
+sample by more than `CLEAR` R.  So what is lost of a smooth peak is O(h^8), and a limiter's corner
+is not overshot: a kink, wherever it lies, moves an interpolating polynomial by less than `GUARD` R.  A largest or
 smallest value that three samples in a row have is a limit, and no curve goes beyond it.  What no
 sample has seen, such as a limit reached for less than a sampling interval and nowhere else, samples
 alone cannot say; the estimate is then beyond it by at most h^2 |y''| / 8.
@@ -68,7 +68,7 @@ def _window(first, last, k):
 
 @equation
 def _defect(t, y, a, b, k):
-    """Return how far sample `k` is from where others of [a, b) say, at least what rounding makes."""
+    """Return how far sample `k` is from where others of [a, b) say, or what rounding makes."""
     found, size = 0.0, abs(y[k])
     for j in range(a, b):
         size = max(size, abs(y[j]))
@@ -253,16 +253,22 @@ def _between(t, y, first, last, k, parts):
 
 
 @equation
-def path(t, y, breaks):
+def path(t, y, breaks, apart=0.0):
     """Return a signal as points that lines connect: curves between breaks, and jumps at them.
 
     Where samples show that a piece is smooth, lines are within 2.5e-7 of the signal's range of its
-    curve, where 32 parts of an interval are enough for that.  A jump takes 2e-12 of the time
-    covered.
+    curve, where 32 parts of an interval are enough for that.
 
-    Arguments as in `turning_points`.
+    Parameters
+    ----------
+    t, y, breaks : ndarray
+        As in `turning_points`.
+    apart : float, optional
+        A jump begins and ends so long (s) before and after a break; 1e-12 of the time covered by
+        default.
     """
-    apart, tolerance = _APART * (t[-1] - t[0]), _LINE * (np.max(y) - np.min(y))
+    apart = apart if apart > 0.0 else _APART * (t[-1] - t[0])
+    tolerance = _LINE * (np.max(y) - np.min(y))
     firsts, lasts, starts, ends = pieces(t, breaks)
     times, values = [t[:0].copy()], [y[:0].copy()]
     done = 0
@@ -273,7 +279,7 @@ def path(t, y, breaks):
         if last == first:
             continue
         own_t, own_y = t[first:last], y[first:last]
-        if start < t[first]:
+        if start + apart < t[first]:
             for at in np.linspace(start + apart, t[first], _ENDS)[:-1]:
                 times.append(np.array([at]))
                 values.append(np.array([_extrapolated(own_t, own_y, at)]))
@@ -285,7 +291,7 @@ def path(t, y, breaks):
                 at, here = _between(t, y, first, last, k, parts)
                 times.append(at)
                 values.append(here)
-        if end > t[last - 1]:
+        if end - apart > t[last - 1]:
             for at in np.linspace(t[last - 1], end - apart, _ENDS)[1:]:
                 times.append(np.array([at]))
                 values.append(np.array([_extrapolated(own_t, own_y, at)]))

@@ -314,6 +314,11 @@ class SampledSignals:
     until: float
     breaks: np.ndarray = field(default_factory=lambda: np.empty(0))
 
+    @property
+    def apart(self) -> float:
+        """How long (s) before and after a break all signals jump, at once."""
+        return 1e-12 * float(self.t[-1] - self.t[0])
+
 
 def margin_trace(formula: Formula, signals: SampledSignals, low: float, high: float) -> Trace:
     """Return the margin of a formula as a function of time in [low, high].
@@ -377,12 +382,12 @@ def _beyond(band: Band, y: np.ndarray) -> list[np.ndarray]:
 
 def _band(band: Band, signals: SampledSignals, low: float, high: float) -> Trace:
     t, y, breaks = _near(band, signals, low, high)
-    y = with_vertices(t, y, breaks).between(low, high)
-    return -pointwise_maximum([Trace(y.t, beyond) for beyond in _beyond(band, y.y)])
+    y = with_vertices(t, y, breaks, signals.apart).between(low, high)
+    return -pointwise_maximum([Trace(y.t, beyond, y.jump) for beyond in _beyond(band, y.y)])
 
 
 def _worst(band: Band, signals: SampledSignals, low: float, high: float) -> float:
     """Return the largest violation in [low, high]: an extreme value has it."""
     t, y, breaks = _near(band, signals, low, high)
-    values = np.array(extremes(t, y, low, high, breaks))
+    values = np.array(extremes(t, y, low, high, breaks, signals.apart))
     return float(np.max(_beyond(band, values)))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from analysis import metrics
 from analysis.metrics import in_machine_code
@@ -145,8 +146,9 @@ def test_a_clipped_sine_with_breaks_is_as_good_as_a_smooth_one(phase):
     x = np.exp(-0.1 * t) * np.sin(3 * t)
     limit = 0.7
     fine = np.linspace(t[0], t[-1], 400_001)
-    inside = np.abs(np.exp(-0.1 * fine) * np.sin(3 * fine)) > limit
-    breaks = fine[np.flatnonzero(np.diff(inside.astype(int))) + 1]
+    over = lambda t: np.abs(np.exp(-0.1 * t) * np.sin(3 * t)) - limit  # noqa: E731
+    changes = np.flatnonzero(np.diff((over(fine) > 0).astype(int)))
+    breaks = np.array([brentq(over, fine[k], fine[k + 1], xtol=1e-13) for k in changes])
     y = np.clip(x, -limit, limit)
     assert highest(t, y, breaks) == pytest.approx(limit, abs=1e-9)
     late = t > 5

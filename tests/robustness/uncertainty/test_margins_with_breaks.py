@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter1d
+from scipy.optimize import brentq
 
 from analysis.robustness import Requirement, always, eventually, in_band, margin
 from analysis.robustness.stl.violation_time import violation_time
@@ -27,20 +29,16 @@ SWITCHED = {
 
 def crossings(levels):
     """When the drive is at one of some levels."""
-    from scipy.optimize import brentq
-
     found = []
     for level in levels:
         above = drive(FINE) > level
-        for k in np.flatnonzero(np.diff(above.astype(int))):
-            found.append(brentq(lambda t, c=level: drive(t) - c, FINE[k], FINE[k + 1]))
+        changes = np.flatnonzero(np.diff(above.astype(int)))
+        found += [brentq(lambda t, c=level: drive(t) - c, FINE[k], FINE[k + 1]) for k in changes]
     return np.sort(found)
 
 
 def windows(values, start, end, pick):
     """Brute force: pick of values over [t + start, t + end], on the fine grid."""
-    from scipy.ndimage import maximum_filter1d
-
     i, j = round(start / END * 1e5), round(end / END * 1e5)
     size = j - i + 1
     sign = 1.0 if pick == "max" else -1.0
