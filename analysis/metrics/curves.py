@@ -9,10 +9,10 @@ on even samples the eighth difference over 70: of order h^8 of a smooth signal, 
 zeroth order next to a kink or a jump.  With R the largest |r| by three windows of neighbours, each
 a sample further, the curve's extreme p* counts as p* - `GUARD` R, and only where it is beyond the
 sample by more than `CLEAR` R.  So what is lost of a smooth peak is O(h^8), and a limiter's corner
-is not overshot: a kink, wherever it lies, moves an interpolating polynomial by less than `GUARD` R.  A largest or
-smallest value that three samples in a row have is a limit, and no curve goes beyond it.  What no
-sample has seen, such as a limit reached for less than a sampling interval and nowhere else, samples
-alone cannot say; the estimate is then beyond it by at most h^2 |y''| / 8.
+is not overshot: a kink, wherever it lies, moves an interpolating polynomial by less than `GUARD` R.
+A largest or smallest value that three samples in a row have is a limit, and no curve goes beyond
+it.  What no sample has seen, such as a limit reached for less than a sampling interval and nowhere
+else, samples alone cannot say; the estimate is then beyond it by at most h^2 |y''| / 8.
 
 *Breaks* are the times at which a signal may jump or bend.  No curve goes through one; the limits
 from both sides, extrapolated from the samples of that side, are values of the signal as well.
@@ -180,8 +180,8 @@ def turning_points(t, y, breaks):
 def _extrapolated(t, y, at):
     """Return a limit at `at`, outside of all samples, by the order that they support.
 
-    Of Neville's scheme, from the nearest sample on, the sum up to its least term; beyond all
-    samples it counts less that term.
+    Of Newton's form, from the nearest sample on, the sum up to its least term.  Beyond all samples
+    it counts less that term, times its ratio to the one before: what the next would be.
     """
     n = min(_NEAREST, t.size)
     if at < t[0]:
@@ -190,16 +190,19 @@ def _extrapolated(t, y, at):
         s, values = t[::-1][:n] - at, y[::-1][:n].copy()
     c = _coefficients(s, values)
     total, best, least, product = c[0], c[0], np.inf, 1.0
+    before, off = np.inf, np.inf
     for m in range(1, n):
         product *= -s[m - 1]
         term = c[m] * product
         total += term
         if abs(term) < least:
             best, least = total, abs(term)
+            off = least * min(1.0, least / before) if 0.0 < before < np.inf else least
+        before = abs(term)
     high, low = np.max(y), np.min(y)
     if best > high:
-        return max(high, best - least)
-    return min(low, best + least) if best < low else best
+        return max(high, best - off)
+    return min(low, best + off) if best < low else best
 
 
 @equation
