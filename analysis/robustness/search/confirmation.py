@@ -15,6 +15,7 @@ from nlctl.errors import DivergedError
 from nlctl.native import Status
 from nlctl.response import input_output_response
 
+from ...metrics import breaks_of
 from ..runs.experiment import Experiment, Prepared, by_diagram, evaluate
 from ..stl.spec import margins, unfinished_margin
 from ..uncertainty.space import arguments, checked_row
@@ -180,7 +181,8 @@ def _in_python_control(
         margin = unfinished_margin(error.time, end)
         return told(Status.DIVERGED.name, error.time, margin)
     signals = dict(zip(loop.system.output_labels, np.atleast_2d(response.outputs), strict=True))
-    margin = margins(experiment.spec, experiment.timepts, signals)["spec"]
+    breaks = breaks_of(response)
+    margin = margins(experiment.spec, experiment.timepts, signals, breaks=breaks)["spec"]
     return told(Status.OK.name, end, margin)
 
 
