@@ -7,9 +7,9 @@ should lie where its neighbours say.  With up to 8 neighbours the *defect* of a 
 
 on even samples the eighth difference over 70: of order h^8 of a smooth signal, and of the first or
 zeroth order next to a kink or a jump.  With R the largest |r| by three windows of neighbours, each
-a sample further, the curve's extreme p* counts as p* - `GUARD` R, and only where it is beyond the
-sample by more than `CLEAR` R.  So what is lost of a smooth peak is O(h^8), and a limiter's corner
-is not overshot: a kink, wherever it lies, moves an interpolating polynomial by less than `GUARD` R.
+a sample further, the curve's extreme p* counts as p* - `_GUARD` R, and only where it is beyond the
+sample by more than `_CLEAR` R.  So what is lost of a smooth peak is O(h^8), and a limiter's corner
+is not overshot: a kink, wherever it lies, moves an interpolating polynomial by less than `_GUARD` R.
 A largest or smallest value that three samples in a row have is a limit, and no curve goes beyond
 it.  What no sample has seen, such as a limit reached for less than a sampling interval and nowhere
 else, samples alone cannot say; the estimate is then beyond it by at most h^2 |y''| / 8.
@@ -26,11 +26,11 @@ from nlctl.equations import equation
 
 from .integrals import consecutive_differences
 
-__all__ = ["limits", "path", "pieces", "turning_points"]
+__all__ = ["limits_at_breaks", "path", "turning_points"]
 
-HALF = 4  # neighbours on each side that a curve goes through
-GUARD = 4.0
-CLEAR = 64.0
+_HALF = 4  # neighbours on each side that a curve goes through
+_GUARD = 4.0
+_CLEAR = 64.0
 _ROUNDING = 1e-15  # of the values: no defect is known to be smaller
 _NEAREST = 7  # samples from which a limit is extrapolated, at most
 _APART = 1e-12  # of the time covered: by how much a path jumps before and after a break
@@ -40,7 +40,7 @@ _ENDS = 17  # points from the last sample to a break
 
 
 @equation
-def pieces(t, breaks):
+def _pieces(t, breaks):
     """Return the pieces between breaks: first and last + 1 of their samples, start and end (s).
 
     Samples at a break belong to no piece: they are values of their own, of one side or the other.
@@ -61,8 +61,8 @@ def pieces(t, breaks):
 @equation
 def _window(first, last, k):
     """Return the samples of a piece of five or more around sample `k` that a curve goes through."""
-    count = min(2 * HALF + 1, max(last - first - 2, 4))
-    a = min(max(k - HALF, first), last - count)
+    count = min(2 * _HALF + 1, max(last - first - 2, 4))
+    a = min(max(k - _HALF, first), last - count)
     return a, a + count
 
 
@@ -129,8 +129,8 @@ def _turn(t, y, first, last, k, low, high):
     gain, d, dd = _at(s, c, x)
     doubt = _doubt(t, y, first, last, k)
     beyond = gain * (-1.0 if dd > 0.0 else 1.0)
-    found = beyond > CLEAR * doubt  # NaN: not
-    value = y[k] + np.sign(gain) * (abs(gain) - GUARD * doubt) if found else y[k]
+    found = beyond > _CLEAR * doubt  # NaN: not
+    value = y[k] + np.sign(gain) * (abs(gain) - _GUARD * doubt) if found else y[k]
     return t[k] + x, value, found
 
 
@@ -157,7 +157,7 @@ def turning_points(t, y, breaks):
     count = 0
     bottom = np.min(y) if _held(y, np.min(y)) else -np.inf
     top = np.max(y) if _held(y, np.max(y)) else np.inf
-    firsts, lasts, starts, ends = pieces(t, breaks)
+    firsts, lasts, starts, ends = _pieces(t, breaks)
     for first, last, start, end in zip(firsts, lasts, starts, ends):  # noqa: B905 (numba)
         if last - first < 5:
             continue
@@ -206,12 +206,12 @@ def _extrapolated(t, y, at):
 
 
 @equation
-def limits(t, y, breaks):
+def limits_at_breaks(t, y, breaks):
     """Return the limits at breaks from both sides: when, and the values.
 
     Arguments as in `turning_points`.
     """
-    firsts, lasts, starts, ends = pieces(t, breaks)
+    firsts, lasts, starts, ends = _pieces(t, breaks)
     place, value = np.empty(2 * starts.size), np.empty(2 * starts.size)
     count = 0
     for first, last, start, end in zip(firsts, lasts, starts, ends):  # noqa: B905 (numba)
@@ -249,10 +249,10 @@ def _between(t, y, first, last, k, parts):
     c = _coefficients(s, y[a:b] - y[k])
     off = np.array([_at(s, c, x)[0] for x in at - t[k]]) - line
     doubt = max(_doubt(t, y, first, last, k), _doubt(t, y, first, last, k + 1))
-    if not np.max(np.abs(off)) > CLEAR * doubt:
+    if not np.max(np.abs(off)) > _CLEAR * doubt:
         off = 0.0 * off
         doubt = 0.0
-    return at, y[k] + line + np.sign(off) * np.maximum(np.abs(off) - GUARD * doubt, 0.0)
+    return at, y[k] + line + np.sign(off) * np.maximum(np.abs(off) - _GUARD * doubt, 0.0)
 
 
 @equation
@@ -272,7 +272,7 @@ def path(t, y, breaks, apart=0.0):
     """
     apart = apart if apart > 0.0 else _APART * (t[-1] - t[0])
     tolerance = _LINE * (np.max(y) - np.min(y))
-    firsts, lasts, starts, ends = pieces(t, breaks)
+    firsts, lasts, starts, ends = _pieces(t, breaks)
     times, values = [t[:0].copy()], [y[:0].copy()]
     done = 0
     for first, last, start, end in zip(firsts, lasts, starts, ends):  # noqa: B905 (numba)

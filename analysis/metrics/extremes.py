@@ -10,7 +10,7 @@ import numpy as np
 
 from nlctl.equations import equation
 
-from .curves import limits, turning_points
+from .curves import limits_at_breaks, turning_points
 
 __all__ = [
     "final",
@@ -94,7 +94,7 @@ def highest(t, y, breaks=None):
     _, _, values = turning_points(t, y, breaks)
     if values.size:
         top = max(top, np.max(values))
-    _, values = limits(t, y, breaks)
+    _, values = limits_at_breaks(t, y, breaks)
     if values.size:
         top = max(top, np.max(values))
     return float(top)
