@@ -9,7 +9,7 @@ on even samples the eighth difference over 70: of order h^8 of a smooth signal, 
 zeroth order next to a kink or a jump.  With R the largest |r| by three windows of neighbours, each
 a sample further, the curve's extreme p* counts as p* - `_GUARD` R, and only where it is beyond the
 sample by more than `_CLEAR` R.  So what is lost of a smooth peak is O(h^8), and a limiter's corner
-is not overshot: a kink, wherever it lies, moves an interpolating polynomial by less than `_GUARD` R.
+is not overshot: a kink, wherever it lies, moves the polynomial by less than `_GUARD` R.
 A largest or smallest value that three samples in a row have is a limit, and no curve goes beyond
 it.  What no sample has seen, such as a limit reached for less than a sampling interval and nowhere
 else, samples alone cannot say; the estimate is then beyond it by at most h^2 |y''| / 8.
