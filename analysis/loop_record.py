@@ -19,8 +19,16 @@ import control as ct
 import numpy as np
 
 from nlctl.blocks import Block, within
-from nlctl.diagrams import all_parameter_rows, initial_state, leaves, places, state_names
-from nlctl.native.machine.fingerprint import content_key
+from nlctl.diagrams import (
+    all_parameter_rows,
+    initial_state,
+    leaves,
+    overridden,
+    places,
+    state_names,
+)
+from nlctl.diagrams.points import OTHER_VERSIONS, agree, values_now
+from nlctl.native.machine.fingerprint import content_key, unseen_in
 from nlctl.params import declared_params
 from nlctl.sampling.clock import moments
 from nlctl.sampling.system import Sampled, clocks_of, happening
@@ -32,6 +40,7 @@ __all__ = [
     "loop_facts",
     "loop_values",
     "short_key",
+    "unseen_parts",
     "values_differ",
 ]
 
@@ -42,7 +51,6 @@ _POINTS = 6
 GOLDEN = (math.sqrt(5) - 1) / 2
 GIVEN = re.compile(r"sys\[\d+\]")  # by python-control
 _MOST = 4  # differences that a sentence names
-RTOL, ATOL = 1e-6, 1e-9  # what processors and versions of libraries may differ by
 
 
 def loop_facts(system: ct.InputOutputSystem) -> dict[str, dict[str, str]]:
@@ -85,25 +93,48 @@ def short_key(*things: Any) -> str:
     return content_key(*things)[:16]
 
 
+def unseen_parts(system: ct.InputOutputSystem) -> dict[str, list[str]]:
+    """Return what the keys of a diagram's blocks cannot see: they may differ in it unnoticed.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+
+    Returns
+    -------
+    dict
+        By path of the block, in words; only blocks of which there is something to say.
+    """
+    found = {p.path or p.system.name: unseen_in(*_parts(p.system)) for p in leaves(system)}
+    return _steady(system, {path: told for path, told in found.items() if told})
+
+
 def _block(system: Any) -> str:
     """Return a key of a block's equations; its parameters' values are told by themselves."""
+    if isinstance(system, Sampled):
+        return short_key(_block(system.inner), *_parts(system)[1:])
+    return short_key(*_parts(system))
+
+
+def _parts(system: Any) -> list[Any]:
+    """Return all that a block's equations are made of, its parameters aside."""
     timebase = repr(system.dt)
     if isinstance(system, Sampled):
         spec = system.sampling.spec
         kind = (system.euler, system.delays, system.converters, spec.waiting, spec.own_time)
-        return short_key(_block(system.inner), repr(kind))
+        return [_parts(system.inner), repr(kind)]
     if isinstance(system, Block):
         spec, known = system.spec, declared_params(system.spec)
         held = {k: v for k, v in getattr(spec, "__dict__", {}).items() if k not in known}
         parts = [getattr(spec, name, None) for name in (*_EQUATIONS, *SHAPE)]
-        return short_key(type(spec), held, parts, timebase)
+        return [type(spec), held, parts, timebase]
     if isinstance(system, ct.StateSpace):
-        return short_key([system.A, system.B, system.C, system.D], timebase)
+        return [[system.A, system.B, system.C, system.D], timebase]
     if isinstance(system, ct.TransferFunction):
-        return short_key(*(_numbers_of(a) for a in (system.num_array, system.den_array)), timebase)
+        return [*(_numbers_of(a) for a in (system.num_array, system.den_array)), timebase]
     functions = [getattr(system, name, None) for name in ("updfcn", "outfcn")]
     signals = [system.input_labels, system.output_labels, system.state_labels]
-    return short_key(type(system).__qualname__, functions, signals, timebase)
+    return [type(system).__qualname__, functions, signals, timebase]
 
 
 def _numbers_of(polynomials: Any) -> list[Any]:
@@ -152,7 +183,7 @@ def loop_values(system: Any, end: float) -> dict[str, float | str]:
     ----------
     system : control.InputOutputSystem
     end : float
-        Values are taken at times from 0 to this (s).
+        PointValues are taken at times from 0 to this (s).
 
     Returns
     -------
@@ -160,10 +191,10 @@ def loop_values(system: Any, end: float) -> dict[str, float | str]:
         By name, a rate with a prime.  Points at which a function fails are left out, and told
         under ``"raises"`` with what it raises.
     """
-    start, width = initial_state(system), system.ninputs or 0
+    start, width, own = initial_state(system), system.ninputs or 0, overridden(system)
     reach = np.maximum(1.0, abs(start)) / 4
     rates, outputs, raised = np.zeros(start.size), np.zeros(system.noutputs or 0), []
-    clocks = clocks_of(place.system for place in leaves(system))
+    clocks = clocks_of(place.system for place in leaves(own))
     everything = happening(frozenset(moments(clocks)))  # sampled blocks' next states as well
     with warnings.catch_warnings(), np.errstate(all="ignore"), everything:
         warnings.simplefilter("ignore")
@@ -172,8 +203,8 @@ def loop_values(system: Any, end: float) -> dict[str, float | str]:
             x = start + reach * spread[: start.size] * (k > 0)
             t, u = end * k / (_POINTS - 1), spread[start.size :]
             try:
-                rate = np.ravel(system.dynamics(t, x, u, params={}))
-                outputs += (1 + k % 3) * np.ravel(system.output(t, x, u, params={}))
+                rate, output = values_now(own, (t, x, u))
+                outputs += (1 + k % 3) * output
                 rates += (1 + k % 3) * rate
             except Exception as error:  # whatever a function of the user's raises
                 raised.append(f"{type(error).__name__} at point {k}")
@@ -191,7 +222,8 @@ def values_differ(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str
 def _close(one: Any, other: Any) -> bool:
     if isinstance(one, float) and isinstance(other, float):
         both_nan = math.isnan(one) and math.isnan(other)
-        return both_nan or math.isclose(one, other, rel_tol=RTOL, abs_tol=ATOL)
+        relative, absolute = OTHER_VERSIONS
+        return both_nan or bool(agree(one, other, absolute, relative))
     return one == other
 
 

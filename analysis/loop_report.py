@@ -19,6 +19,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.diagrams import leaves
 from nlctl.errors import DiagramError, ParameterError
 from nlctl.names import unknown
@@ -58,6 +59,7 @@ _SHOWN = 6  # signals that are drawn by default
 ONE_RUN = "Runs are samples of the model: nothing follows for other values, or for later times."
 
 
+@as_annotated
 def loop_report(
     loop: ct.InputOutputSystem,
     *,

@@ -7,10 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
 from typing import Any
 
+import control as ct
 import numpy as np
 
+from nlctl.blocks import memory_states
 from nlctl.delays.lines import delayed_blocks
 from nlctl.diagrams import leaves
+from nlctl.diagrams.points import OF_RESPONSES, agree, rates_and_outputs
 from nlctl.errors import DiagramError, DivergedError
 from nlctl.response import EngineWarning, input_output_response
 from nlctl.sampling.system import clocks_of
@@ -20,10 +23,10 @@ from nlctl.wording import counted
 __all__ = ["check_response", "check_shape", "own_outputs", "own_parameters"]
 
 _PLACES = 12  # samples, and spans between samples, that are compared
-_EQUAL = 1e-6  # of an output, relative to its largest sample, and absolute below 1
 _SHORTEST = 1 / 200  # of the response: over shorter spans its states hardly move
 _FOLLOWS = 1e-2  # of how far a state moves in a span
 _STEPS = 1000  # between two samples: another loop may diverge, in ever shorter steps
+_PLAIN: Any = {"method": "LSODA", "solve_ivp_kwargs": {"rtol": 1e-8, "atol": 1e-10}}
 _LOCAL = 1e-3  # of a state's largest sample so far: python-control's default tolerance
 
 
@@ -106,12 +109,11 @@ def own_outputs(
     outputs : dict
         By name.
     """
-    x, u = _states(response), _inputs(loop, response)
+    x, u, evaluate = _states(response), _inputs(loop, response), rates_and_outputs(loop, params)
     for place in np.unique(np.linspace(0, len(response.time) - 1, _PLACES).astype(int)):
         with np.errstate(all="ignore"):
-            own = loop.output(response.time[place], x[:, place], u[:, place], dict(params) or None)
-        values = np.atleast_1d(np.asarray(own, dtype=float)).tolist()
-        yield int(place), dict(zip(loop.output_labels, values, strict=True))
+            _, own = evaluate(float(response.time[place]), x[:, place], u[:, place])
+        yield int(place), dict(zip(loop.output_labels, own.tolist(), strict=True))
 
 
 def check_shape(loop: Any, response: Any, names: Sequence[str]) -> None:
@@ -151,7 +153,7 @@ def _check_outputs(
     for name in names or loop.output_labels:
         y = np.asarray(response.y[list(response.output_labels).index(name)], dtype=float)
         scale = float(np.nanmax(np.abs(y), initial=1.0))
-        if np.isfinite(y[place]) and not abs(y[place] - own[name]) <= _EQUAL * scale:
+        if np.isfinite(y[place]) and not agree(y[place], own[name], OF_RESPONSES * scale):
             raise _another(loop, name, y[place], response.time[place], own[name])
 
 
@@ -166,8 +168,8 @@ def _check_span(
     largest = np.abs(whole[:, : span.stop]).max(axis=1)
     allowed = (_FOLLOWS * moved + _LOCAL * largest + np.finfo(float).tiny)[:, None]
     places = places[1:] - places[0]
-    for engine in ("auto",) if sliding_blocks(loop) else ("auto", "python-control"):
-        own = _again(loop, response, span, params, engine, names)  # python-control relaxes memories
+    for engine in _engines(loop):
+        own = _again(loop, response, span, params, engine, names)
         wrong = ~(np.abs(own - told)[:, places] <= allowed)
         if not wrong.any():
             return
@@ -175,6 +177,16 @@ def _check_span(
     row, k = int(np.argmax(wrong[:, first])), int(places[first])
     t = response.time[span]
     raise _another(loop, labels[row], told[row, k], t[k], own[row, k], t[0])
+
+
+def _engines(loop: Any) -> tuple[str, ...]:
+    """Whose run a response may be: plain python-control's as well, which relaxes memories."""
+    if sliding_blocks(loop):
+        return ("auto",)
+    remembers = any(memory_states(getattr(leaf.system, "spec", None)) for leaf in leaves(loop))
+    is_plain = remembers and not delayed_blocks(loop)
+    is_plain = is_plain and not clocks_of(leaf.system for leaf in leaves(loop))
+    return ("auto", "python-control", *(["plain"] if is_plain else []))
 
 
 def _again(
@@ -191,10 +203,13 @@ def _again(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", EngineWarning)
         try:
-            run: Any = input_output_response(
-                loop, response.time[span], u if u.size else 0, response.x[:, span.start],
-                params=dict(params), engine=engine, squeeze=False, progress=bounded,
-            )  # fmt: skip
+            given: Any = (loop, response.time[span], u if u.size else 0, response.x[:, span.start])
+            common: Any = {"params": dict(params), "squeeze": False}
+            run: Any = (
+                ct.input_output_response(*given, **common, **_PLAIN)
+                if engine == "plain"
+                else input_output_response(*given, **common, engine=engine, progress=bounded)
+            )
         except DivergedError:
             return found
     found[:] = _signals(run, names)

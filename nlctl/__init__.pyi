@@ -87,10 +87,13 @@ from .errors import (
     DivergedError,
     ParameterError,
     UnknownNameError,
+    UsageError,
+    ZenoError,
 )
 from .faults import Fault, with_faults
 from .native import (
     AlgebraicLoopError,
+    AuditError,
     BlockEquations,
     CacheWarning,
     Compiled,
@@ -105,7 +108,7 @@ from .params import param, record
 from .plants import ForcedDuffing, Genesio, PureFeedback, WingRock
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
-from .sampling import Clock, Sampled, Sampling, discretise, sampled
+from .sampling import Clock, Sampled, Sampling, TriggeredHold, discretise, sampled
 from .sliding import IdealRelay
 
 __all__ = [
@@ -116,6 +119,7 @@ __all__ = [
     "AlgebraicLoopError",
     "AmbiguousNameError",
     "AsymmetricSaturation",
+    "AuditError",
     "Backlash",
     "BacklashInverse",
     "BandLimitedNoise",
@@ -193,9 +197,12 @@ __all__ = [
     "SumOfSines",
     "SuperTwistingLaw",
     "TransportDelay",
+    "TriggeredHold",
     "UnknownNameError",
+    "UsageError",
     "WingRock",
     "WingRockRegressor",
+    "ZenoError",
     "Zero",
     "ablations",
     "actuators",

@@ -24,6 +24,7 @@ __all__ = [
     "one_of",
     "pairs",
     "text",
+    "tolerances",
     "tuple_of",
     "vector",
 ]
@@ -100,6 +101,18 @@ def _rule(name: str, low: tuple[float, float], high: tuple[float, float]) -> str
         limit, sign = lows[0].split()
         return f"a finite {name} {sign.replace('<', '>')} {limit}"
     return f"{lows[0]}{name}{highs[0]}" if lows else f"a finite {name}{''.join(highs)}"
+
+
+def tolerances(who: str, rtol: Any, atol: Any) -> None:
+    """Check the tolerances of an integrator: with rtol >= 1 no digit of a state need be right.
+
+    Raises
+    ------
+    ParameterError
+        If one is not a number, or out of its bounds.
+    """
+    number(who, "rtol", rtol, above=0, below=1)
+    number(who, "atol", atol, above=0)
 
 
 def vector(who: str, name: str, value: Any) -> np.ndarray:

@@ -11,11 +11,25 @@ from typing import Any, Protocol
 import control as ct
 import numpy as np
 
+from .annotations import as_annotated
 from .errors import BlockError, ParameterError, UsageError
 from .host.notebook import table_html
 from .names import Parameters, base_name, unknown
-from .params import declared_params, ensure_checked, equation_arguments, is_checked, with_overrides
-from .upstream.control_internals import OwnParameters, current_parameters, set_parameters
+from .params import (
+    ParameterRow,
+    declared_params,
+    ensure_checked,
+    equation_arguments,
+    is_checked,
+    record_rows,
+    with_overrides,
+)
+from .upstream.control_internals import (
+    Around,
+    OwnParameters,
+    current_parameters,
+    set_parameters,
+)
 from .wording import counted
 
 
@@ -53,6 +67,11 @@ class Spec(Protocol):
         that was accepted.  A step in which a memory would reverse is divided where it does.
         It must be continuous except where a switching function changes its sign; one that may
         jump is refused where none is declared.
+    guard : callable, optional
+        ``guard(t, x, u, p)`` returns a tuple of numbers: where one of them falls through 0, the
+        block jumps.  None falls at the first instant of a run.
+    reset : callable, optional
+        ``reset(t, x, u, p)`` returns all states after a jump; it comes with `guard`.
     derived : callable, optional
         ``derived(self) -> dict`` of numbers that follow from the parameters; `p` has them too.
     check : callable, optional
@@ -95,29 +114,6 @@ class Spec(Protocol):
     def output(self) -> Any:
         """The equation of the outputs, ``output(t, x, u, p)``."""
         ...
-
-
-@dataclass(frozen=True, kw_only=True)
-class ParameterRow:
-    """One line of a parameter table."""
-
-    name: str
-    value: Any
-    unit: str
-    meaning: str
-    bounds: str
-
-    @property
-    def text(self) -> str:
-        """The value as short text; long vectors are summarised."""
-        array = np.asarray(self.value)
-        if array.size > 6:
-            return (
-                f"{' x '.join(map(str, array.shape))} values in [{array.min():g}, {array.max():g}]"
-            )
-        if isinstance(self.value, tuple):
-            return "(" + ", ".join(f"{v:g}" for v in array.ravel()) + ")"
-        return str(self.value) if isinstance(self.value, bool) else f"{self.value:g}"
 
 
 @dataclass(kw_only=True)
@@ -313,20 +309,7 @@ def parameter_rows(block: Block, path: str = "") -> list[ParameterRow]:
     return record_rows(block.current_spec, path)
 
 
-def record_rows(spec: Any, path: str = "") -> list[ParameterRow]:
-    """Return the parameter table of a record, with names that begin with `path`."""
-    return [
-        ParameterRow(
-            name=f"{path}{name}",
-            value=getattr(spec, name),
-            unit=p.unit,
-            meaning=p.meaning,
-            bounds=p.bounds,
-        )
-        for name, p in declared_params(spec).items()
-    ]
-
-
+@as_annotated
 def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     """Make a python-control system of a record.
 
@@ -362,13 +345,7 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     >>> print(actuator.params["actuator.b_r"], actuator.output(0, [], [0.4]))
     0.6 [0.]
     """
-    missing = [a for a in ("inputs", "outputs", "states", "feedthrough") if not hasattr(spec, a)]
-    missing += [] if hasattr(spec, "output") else ["output"]
-    missing += ["update"] if getattr(spec, "states", ()) and not hasattr(spec, "update") else []
-    if missing or isinstance(spec, type):
-        what = spec.__name__ if isinstance(spec, type) else type(spec).__name__
-        why = "is a class: make a record of it first" if isinstance(spec, type) else None
-        raise BlockError(f"{what} {why or 'is not a block: it lacks ' + ', '.join(missing)}")
+    _check_has_equations(spec)
     if not (name is None or (isinstance(name, str) and name)):
         raise ParameterError(f"a block needs a name, got {name!r} for {type(spec).__name__}")
     ensure_checked(spec)
@@ -378,6 +355,19 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     made = Block(spec, name, **({} if dt is None else {"dt": dt}))
     _probe(made)
     return made
+
+
+def _check_has_equations(spec: Any) -> None:
+    """Refuse what lacks signals or an equation; all that is missing is named."""
+    if isinstance(spec, type):
+        raise BlockError(f"{spec.__name__} is a class: make a record of it first")
+    needed = ["inputs", "outputs", "states", "feedthrough", "output"]
+    needed += ["update"] if getattr(spec, "states", ()) else []
+    if hasattr(spec, "guard") != hasattr(spec, "reset"):
+        needed += ["guard", "reset"]
+    missing = [name for name in needed if not hasattr(spec, name)]
+    if missing:
+        raise BlockError(f"{type(spec).__name__} is not a block: it lacks {', '.join(missing)}")
 
 
 def _check_timebase(spec: Any, name: str, dt: Any) -> None:
@@ -422,22 +412,22 @@ def default_state(system: ct.InputOutputSystem) -> np.ndarray:
 
 def within(system: Any) -> Any:
     """Return the block that has a block's equations: the one that it samples, or itself."""
-    return getattr(system, "inner", system)
+    return system.inner if isinstance(system, Around) else system
 
 
 def is_delayed(system: Any) -> bool:
     """Whether a block's outputs are its inputs at earlier times."""
-    return bool(getattr(getattr(system, "spec", None), "delayed", False))
+    return isinstance(system, Block) and bool(getattr(system.spec, "delayed", False))
 
 
 def slides(system: Any) -> bool:
     """Whether a block's equations ask for the rate that the diagram gives its input."""
-    return bool(getattr(getattr(system, "spec", None), "sliding", False))
+    return isinstance(system, Block) and bool(getattr(system.spec, "sliding", False))
 
 
 def sampling_of(system: Any) -> Any:
     """Return the block with the parameters of a sampled block's sampling; None of any other."""
-    return getattr(system, "sampling", None)
+    return system.sampling if isinstance(system, Around) else None
 
 
 def memory_states(spec: Any) -> tuple[str, ...]:
@@ -447,10 +437,21 @@ def memory_states(spec: Any) -> tuple[str, ...]:
 
 def event_count(made: Block) -> int:
     """Return the number of switching functions that a block declares."""
-    if not hasattr(made.spec, "switching"):
+    return _count(made, "switching")
+
+
+def guard_count(made: Block) -> int:
+    """Return the number of guards of a block."""
+    return _count(made, "guard")
+
+
+def _count(made: Block, what: str) -> int:
+    """Return how many numbers an equation of a block returns, 0 if there is none."""
+    if not hasattr(made.spec, what):
         return 0
     u = np.full((made.ninputs or 0) + 2 * slides(made), 0.25)
-    return len(made.spec.switching(0.0, default_state(made), u, current_parameters(made)))
+    found = getattr(made.spec, what)(0.0, default_state(made), u, current_parameters(made))
+    return int(np.size(found))
 
 
 def _probe(made: Block) -> None:
@@ -465,6 +466,8 @@ def _probe(made: Block) -> None:
             results.append(("update", spec.update, made.nstates))
         if memory_states(spec):
             results.append(("commit", spec.commit, len(memory_states(spec))))
+        if hasattr(spec, "reset"):
+            results.append(("reset", spec.reset, made.nstates or 0))
         for what, function, wanted in results:
             got = np.size(function(0.0, x, u, p))
             if got != wanted:

@@ -1,8 +1,22 @@
 """What the user can put right.  Every message names the culprit, the rule and the value."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
 
 class UsageError(ValueError):
-    """Base of the errors that bad input causes; the command line shows them as one sentence."""
+    """Base of the errors that bad input causes; the command line shows them as one sentence.
+
+    Examples
+    --------
+    >>> try:
+    ...     nlctl.interconnect({"gain": nlctl.Gain(k="high")})
+    ... except nlctl.UsageError as error:
+    ...     print(error)
+    Gain needs numbers for k, got 'high'
+    """
 
 
 class ParameterError(UsageError):
@@ -111,6 +125,59 @@ class ChatteringError(DivergedError):
     ...     print(round(error.time, 3))
     1.0
     """
+
+
+class ZenoError(DivergedError):
+    """A run whose jumps follow each other ever faster: no time lies beyond all of them.
+
+    ``time`` is where they accumulate.  What handles runs that did not reach their end handles it.
+
+    Examples
+    --------
+    A ball that loses half of its speed at each bounce comes to rest after infinitely many:
+
+    >>> @nlctl.record
+    ... class Ball:
+    ...     inputs, outputs, states, feedthrough = (), ("h",), ("h", "v"), False
+    ...     initial = {"h": 1.0}
+    ...     update = staticmethod(lambda t, x, u, p: (x[1], -2.0))
+    ...     output = staticmethod(lambda t, x, u, p: (x[0],))
+    ...     guard = staticmethod(lambda t, x, u, p: (x[0],))
+    ...     reset = staticmethod(lambda t, x, u, p: (x[0], -0.5 * x[1]))
+    >>> ball = nlctl.block(Ball(), "ball")
+    >>> try:
+    ...     nlctl.input_output_response(ball, [0.0, 4.0], engine="python-control")
+    ... except nlctl.ZenoError as error:
+    ...     print(round(error.time, 4))
+    3.0
+    """
+
+    @classmethod
+    def of(cls, block: str, times: Sequence[float], reached: float) -> ZenoError:
+        """Return the error of a block whose guard has fallen at these times.
+
+        Parameters
+        ----------
+        block : str
+            Its name.
+        times : sequence of float
+            When it fell (s), in order.
+        reached : float
+            Time of the last jump (s).
+
+        Returns
+        -------
+        ZenoError
+            With the limit of these times, or the last jump where they have none.
+        """
+        limit, apart = reached, [b - a for a, b in pairwise(times[-3:])]
+        if len(apart) == 2 and 0.0 < apart[1] < apart[0]:
+            limit = times[-1] + apart[1] ** 2 / (apart[0] - apart[1])  # of a geometric sequence
+        return cls(
+            f"block '{block}' jumps without end before t = {limit:.6g} s (Zeno): a guard that "
+            "falls again and again needs a reset, or another state, that ends it",
+            float(limit),
+        )
 
 
 class CompileError(UsageError):

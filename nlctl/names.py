@@ -191,21 +191,27 @@ class Parameters(dict[str, Any]):
         for key in list(self):
             if "[" in key and key != base_name(key) and prefix + base_name(key) in outer:
                 del self[key]  # an element's default gives way to what the outside says
-        for name, value in outer.items():  # of all blocks, for each block: nothing twice
+        for key in [k for k in self if "." in prefix + k and self._means_one(prefix + k, outer)]:
+            dict.__setitem__(self, key, outer[prefix + key])
+        for name in [n for n in outer if "." not in n or "[" in n]:  # few: bare ones, elements
             own = name.removeprefix(prefix)
-            if "." not in name:
-                dict.__setitem__(self, own, value)
-                continue
-            is_own = name.startswith(prefix) and (base_name(own) if "[" in own else own) in self
-            if is_own and not (outer.clashes and base_name(name) in outer.clashes):
-                dict.__setitem__(self, own, value)
+            is_own = name.startswith(prefix) and base_name(own) in self
+            if "." not in name or (is_own and self._means_one(name, outer)):
+                dict.__setitem__(self, own, outer[name])
+
+    @staticmethod
+    def _means_one(name: str, outer: Parameters) -> bool:
+        """Whether the enclosing diagram has a parameter of one block under that name."""
+        return name in outer and not (outer.clashes and base_name(name) in outer.clashes)
 
     def _override(self, name: str, value: Any) -> None:
         """Set a parameter by a name that a user wrote."""
         if "." not in name:
-            self._refuse_bare_twin(name)
-            dict.__setitem__(self, name, value)
-            return
+            path = self._path_of_bare(name)
+            if not path:
+                dict.__setitem__(self, name, value)
+                return
+            name = f"{path}.{name}"
         base = base_name(name)
         names, clashes = self._known_names()
         if self.table is None and base in self:
@@ -239,16 +245,32 @@ class Parameters(dict[str, Any]):
         self.strays.append(name)
         return True
 
-    def _refuse_bare_twin(self, name: str) -> None:
-        """A bare name is a third-party block's, unless it looks like one of ours cut short."""
+    def _path_of_bare(self, name: str) -> str:
+        """Return the path of the block that a name without one means, if it means one.
+
+        It is a third-party block's, unless it looks like one of ours cut short.
+        """
         names, _ = self._known_names()
         twins = [k for k in names if k.endswith("." + base_name(name))]
-        if name not in names and twins:
-            raise UnknownNameError(
-                f"unknown parameter '{name}'; parameters carry their block's name: "
-                f"{' or '.join(repr(t) for t in twins)} (a block of your own that reads "
-                f"'{name}' declares it in its params)"
-            )
+        if name in names or not twins:
+            return ""
+        table = self if self.table is None else self.table
+        prefix = self.prefix if self.table is None else ""
+        theirs = [k for k in twins if _reads_a_dict(table.owners.get(k.removeprefix(prefix)))]
+        if len(theirs) > 1:
+            raise AmbiguousNameError(f"parameter '{name}' could be {' or '.join(sorted(theirs))}")
+        if theirs:
+            return theirs[0].rpartition(".")[0]
+        raise UnknownNameError(
+            f"unknown parameter '{name}'; parameters carry their block's name: "
+            f"{' or '.join(repr(t) for t in twins)} (a block of your own that reads "
+            f"'{name}' declares it in its params)"
+        )
+
+
+def _reads_a_dict(block: Any) -> bool:
+    """Whether a block is a third-party one, whose parameters may go without its name."""
+    return bool(getattr(type(block), "reads_a_dict", False))
 
 
 def _same_block(name: str, names: Iterable[str]) -> bool:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import control as ct
 
 from .actuators import Backlash, DeadZone
+from .annotations import as_annotated
 from .controllers import (
     AdaptiveWeights,
     FilteredError,
@@ -34,6 +35,7 @@ __all__ = ["EXAMPLES", "example_1", "example_2", "named_example", "paper_centres
 _INTERNAL = ("r", "zeta", "delta_hat", "W_norm")  # a controller of another kind may lack these
 
 
+@as_annotated
 def paper_centres(layout: Any, order: int) -> Any:
     """Return the centres that a layout name stands for, on [-10, 10]^n.
 
@@ -69,6 +71,7 @@ def paper_centres(layout: Any, order: int) -> Any:
     )
 
 
+@as_annotated
 def example_1(
     *,
     plant: Any = None,
@@ -134,6 +137,7 @@ def example_1(
     return _closed_loop(2, plant, actuator, controller, reference, sensor, name)
 
 
+@as_annotated
 def example_2(
     *,
     plant: Any = None,
@@ -201,6 +205,7 @@ EXAMPLES = {make.__name__: make for make in (example_1, example_2)}
 """The examples by name, which is also that of their diagrams."""
 
 
+@as_annotated
 def named_example(name: str) -> Callable[..., ct.InterconnectedSystem]:
     """Return the example that the command line and study files call ``"example-1"``.
 

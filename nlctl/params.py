@@ -15,11 +15,14 @@ from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 
+from .annotations import as_numbers, reporting
 from .errors import ParameterError, UnknownKeywordError
 from .names import unknown
 
 _T = TypeVar("_T")
 _KEY = "nlctl"
+_MADE_BY_CLASS = 1 << 9  # Py_TPFLAGS_HEAPTYPE: not of types such as int
+HIGHEST_ORDER = 100  # of plants and references: a block has a signal for each derivative
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -34,6 +37,7 @@ class Param:
     at_most: float | None
     ndim: int
     symbol: str | None
+    may_be_empty: bool = False
 
     def rules(self) -> Iterator[tuple[str, Callable[[float], bool]]]:
         """Yield each bound as ``("> 0", test)``."""
@@ -63,6 +67,7 @@ def param(
     at_least: float | None = None,
     at_most: float | None = None,
     symbol: str | None = None,
+    may_be_empty: bool = False,
 ) -> Any:
     """Declare a parameter of a block record.
 
@@ -79,11 +84,18 @@ def param(
         Bounds that the value may attain.
     symbol : str, optional
         What formulas call it, where that is not its name: ``"mu"`` for centres.
+    may_be_empty : bool, optional
+        Whether a vector may have no element.
 
     Returns
     -------
     dataclasses.Field
         To be assigned in the body of a class decorated with `record`.
+
+    Raises
+    ------
+    ParameterError
+        If the default is not a number, vector or matrix, or a bound is not a number.
 
     Examples
     --------
@@ -93,6 +105,14 @@ def param(
     >>> print(nlctl.parameters(Damper())["unit"]["d"])
     N s/m
     """
+    try:
+        ndim = np.ndim(default)
+    except ValueError as error:  # rows of different lengths
+        raise ParameterError(f"param needs numbers for default, got {default!r}") from error
+    for name, bound in zip(("above", "below", "at_least", "at_most"),
+                           (above, below, at_least, at_most), strict=True):  # fmt: skip
+        if bound is not None and (as_numbers(bound) is None or np.ndim(bound)):
+            raise ParameterError(f"param needs a number for {name}, got {bound!r}")
     declared = Param(
         unit=unit,
         meaning=meaning,
@@ -100,8 +120,9 @@ def param(
         below=below,
         at_least=at_least,
         at_most=at_most,
-        ndim=np.ndim(default),
+        ndim=ndim,
         symbol=symbol,
+        may_be_empty=may_be_empty,
     )
     return dataclasses.field(default=default, metadata={_KEY: declared})
 
@@ -143,6 +164,10 @@ def record(cls: type[_T]) -> type[_T]:
     """
     if not isinstance(cls, type):
         raise ParameterError(f"record needs a class, got {type(cls).__name__}")
+    if "__dataclass_fields__" in cls.__dict__ or not cls.__flags__ & _MADE_BY_CLASS:
+        raise ParameterError(
+            f"record needs a class of your own that is not one already, got {cls.__name__}"
+        )
     told = cls.__doc__ if cls.__dict__.get("__doc__") else ""
     if "__post_init__" not in cls.__dict__:
         cls.__post_init__ = check_params  # type: ignore[attr-defined]
@@ -158,7 +183,7 @@ def record(cls: type[_T]) -> type[_T]:
                 raise unknown("parameter", name, known, f"of {made.__name__}", UnknownKeywordError)
         init(self, *arguments, **given)
 
-    made.__init__ = by_name
+    made.__init__ = reporting(by_name, made.__name__)
     return made
 
 
@@ -236,15 +261,18 @@ def check_params(spec: Any) -> None:
     who = type(spec).__name__
     types = {f.name: f.type for f in dataclasses.fields(spec)}
     for name, rule in declared_params(spec).items():
-        value = _normalised(who, name, getattr(spec, name), rule.ndim, types[name])
+        value = _normalised(who, name, getattr(spec, name), rule, types[name])
         object.__setattr__(spec, name, value)  # the record is frozen for everybody else
         _check_bounds(who, name, value, rule)
     if hasattr(spec, "check"):
         spec.check()
 
 
-def _normalised(who: str, name: str, value: Any, ndim: int, kind: Any) -> Any:
+def _normalised(who: str, name: str, value: Any, rule: Param, kind: Any) -> Any:
     """Return `value` as bool, int, float or nested tuple of floats."""
+    ndim = rule.ndim
+    if rule.may_be_empty and isinstance(value, tuple | list | np.ndarray) and not len(value):
+        return ()
     if kind in (bool, "bool"):
         if not isinstance(value, bool | np.bool_):
             raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")
@@ -266,27 +294,20 @@ def _normalised(who: str, name: str, value: Any, ndim: int, kind: Any) -> Any:
     return _nested_tuple(array.tolist())
 
 
-def as_numbers(value: Any) -> np.ndarray | None:
-    """Return `value` as a float array, or None if it holds anything but real numbers."""
-    try:
-        array = np.asarray(value)
-    except ValueError:  # rows of different lengths
-        return None
-    return array.astype(float) if array.dtype.kind in "iuf" else None
-
-
-def integer(who: str, name: str, value: Any, at_least: int) -> int:
+def integer(who: str, name: str, value: Any, at_least: int, at_most: float = math.inf) -> int:
     """Return `value` as an int.
 
     Raises
     ------
     ParameterError
-        If it is not an integer, or below `at_least`.
+        If it is not an integer, below `at_least` or above `at_most`.
     """
     is_integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not (is_integer and value >= at_least):
         named = name if is_integer else f"an integer {name.removeprefix('an ')}"
         raise ParameterError(f"{who} needs {named} >= {at_least}, got {value!r}")
+    if value > at_most:
+        raise ParameterError(f"{who} needs {name} <= {at_most}, got {value!r}")
     return int(value)
 
 
@@ -389,3 +410,40 @@ def equation_arguments(spec: Any) -> Any:
             array.flags.writeable = False
             values[name] = array
     return _arguments_type(type(spec).__name__, tuple(values))(**values)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ParameterRow:
+    """One line of a parameter table."""
+
+    name: str
+    value: Any
+    unit: str
+    meaning: str
+    bounds: str
+
+    @property
+    def text(self) -> str:
+        """The value as short text; long vectors are summarised."""
+        array = np.asarray(self.value)
+        if array.size > 6:
+            return (
+                f"{' x '.join(map(str, array.shape))} values in [{array.min():g}, {array.max():g}]"
+            )
+        if isinstance(self.value, tuple):
+            return "(" + ", ".join(f"{v:g}" for v in array.ravel()) + ")"
+        return str(self.value) if isinstance(self.value, bool) else f"{self.value:g}"
+
+
+def record_rows(spec: Any, path: str = "") -> list[ParameterRow]:
+    """Return the parameter table of a record, with names that begin with `path`."""
+    return [
+        ParameterRow(
+            name=f"{path}{name}",
+            value=getattr(spec, name),
+            unit=p.unit,
+            meaning=p.meaning,
+            bounds=p.bounds,
+        )
+        for name, p in declared_params(spec).items()
+    ]

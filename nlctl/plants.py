@@ -18,7 +18,7 @@ from .arguments import a_function
 from .equations import equation
 from .errors import ParameterError
 from .names import unknown
-from .params import integer, param, record
+from .params import HIGHEST_ORDER, integer, param, record
 
 __all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "WingRock", "integrator_chain"]
 
@@ -104,7 +104,7 @@ class PureFeedback:
 
     def check(self) -> None:
         """Refuse an order below 1 and an initial value for a state that does not exist."""
-        order = integer("PureFeedback", "an order", self.order, at_least=1)
+        order = integer("PureFeedback", "an order", self.order, at_least=1, at_most=HIGHEST_ORDER)
         object.__setattr__(self, "order", order)
         a_function("PureFeedback", "f", self.f)
         a_function("PureFeedback", "d", self.d)

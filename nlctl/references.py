@@ -16,7 +16,7 @@ from .arguments import pairs
 from .equations import equation
 from .errors import ParameterError
 from .functions import noise_spectrum, noise_value
-from .params import integer, param, record
+from .params import HIGHEST_ORDER, integer, param, record
 from .wording import counted
 
 __all__ = ["BandLimitedNoise", "FilteredStep", "FunctionReference", "SumOfSines"]
@@ -29,7 +29,7 @@ def derivative_names(order: int) -> tuple[str, ...]:
 
 def _check_order(spec: Any) -> None:
     """A reference has an integer number of derivatives."""
-    order = integer(type(spec).__name__, "an order", spec.order, at_least=0)
+    order = integer(type(spec).__name__, "an order", spec.order, at_least=0, at_most=HIGHEST_ORDER)
     object.__setattr__(spec, "order", order)
 
 

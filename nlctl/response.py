@@ -1,4 +1,4 @@
-"""Simulating a diagram in python-control at a tolerance that suits adaptive loops."""
+"""Simulating a diagram in either engine, at a tolerance that suits adaptive loops."""
 
 from __future__ import annotations
 
@@ -11,19 +11,22 @@ from typing import TYPE_CHECKING, Any
 
 import control as ct
 
-from .arguments import number
+from .annotations import as_annotated
+from .arguments import number, tolerances
 from .blocks import sampling_of
 from .diagrams import leaves
 from .errors import ParameterError
 from .names import unknown
 from .params import checked_times
+from .reference.interpreted import SOLVE_IVP_METHODS, python_control_response
 from .responses.arguments import RunArguments, checked_params, unified, with_aliases
-from .responses.interpreted import SOLVE_IVP_METHODS, python_control_response
+from .responses.watched import watched_functions
 from .sliding.blocks import sliding_blocks
 from .upstream.control_internals import is_system
 
 if TYPE_CHECKING:
     from .native import Compiled, Tableau
+    from .reference.known import Known
 
 __all__ = ["EngineWarning", "input_output_response"]
 
@@ -51,6 +54,7 @@ class EngineWarning(UserWarning):
     """
 
 
+@as_annotated
 def input_output_response(
     system: ct.NonlinearIOSystem | Compiled,
     timepts: Any = None,
@@ -71,7 +75,10 @@ def input_output_response(
     solve_ivp_method: str | None = None,
     solve_ivp_kwargs: Mapping[str, Any] | None = None,
     max_steps: int | None = None,
+    max_step: float | None = None,
     step: float | None = None,
+    stop_when: Callable[..., Any] | None = None,
+    events: Any = None,
     progress: Callable[[float], object] | None = None,
     **aliases: Any,
 ) -> ct.TimeResponseData:
@@ -135,8 +142,18 @@ def input_output_response(
         Keywords of `scipy.integrate.solve_ivp`.  Machine code takes ``rtol`` and ``atol``.
     max_steps : int, optional
         Machine code: attempted steps after which a run is given up.
+    max_step : float, optional
+        Longest step of the integrator (s).
     step : float, optional
         Machine code: a fixed step in s; 0 for error control.
+    stop_when : callable, optional
+        ``stop_when(t, x, u, params)``, a number: of the time, all states, the diagram's inputs
+        and the overrides of the run.  Where it changes its sign the run ends; that instant is the
+        last of the response, behind the times that were reached before it.
+    events : callable, sequence of callables or mapping, optional
+        Further such functions, by name in a mapping: when they change their signs is in
+        ``response.events``.  ``direction`` and ``terminal`` of a function are as in
+        `scipy.integrate.solve_ivp`.
     progress : callable, optional
         Called with the time after every accepted step (machine code: every 2000 steps).
     **aliases : object
@@ -146,7 +163,8 @@ def input_output_response(
     -------
     control.TimeResponseData
         Outputs have shape (noutputs, k), or (k,) for one input and one output, states
-        (nstates, k).  From machine code with an attribute ``statistics``: status, time reached,
+        (nstates, k).  ``response.events`` is a table of what has happened: time, block, which,
+        direction.  From machine code with an attribute ``statistics``: status, time reached,
         steps.
 
     Raises
@@ -154,7 +172,9 @@ def input_output_response(
     DivergedError
         If the state becomes infinite or NaN.
     ChatteringError
-        If machine code switches over and over again at a jump; the message names block and values.
+        If a run switches over and over again at a jump; the message names the block.
+    ZenoError
+        If jumps follow each other ever faster.
     KeyboardInterrupt
         After Ctrl-C; machine code with ``ignore_errors`` returns what it has until then.
     CompileError, AlgebraicLoopError
@@ -181,8 +201,11 @@ def input_output_response(
     0.632121
     """
     checked_params(params)
-    for name, tolerance in (("rtol", rtol), ("atol", atol)):
-        number("input_output_response", name, tolerance, above=0)
+    tolerances("input_output_response", rtol, atol)
+    if max_step is not None:
+        number("input_output_response", "max_step", max_step, above=0)
+    if isinstance(solve_ivp_kwargs, Mapping) and "rtol" in solve_ivp_kwargs:
+        tolerances("solve_ivp_kwargs", solve_ivp_kwargs["rtol"], atol)
     if squeeze not in (None, True, False):
         raise ParameterError(f"squeeze needs True, False or None, got {squeeze!r}")
     named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
@@ -202,10 +225,12 @@ def input_output_response(
         form=form,
         solver={
             **{"method": method, "rtol": rtol, "atol": atol, "max_steps": max_steps, "step": step},
+            "max_step": max_step,
             **{"solve_ivp_method": solve_ivp_method, "solve_ivp_kwargs": solve_ivp_kwargs},
         },
+        watched=watched_functions(stop_when, events),
     )
-    return _computed(unified(run), engine or "auto")
+    return _computed(unified(run), "auto" if engine is None else engine)
 
 
 @functools.cache
@@ -222,9 +247,9 @@ def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
             if run.solver[name] is not None:
                 raise ParameterError(
                     f"{name}={run.solver[name]!r} has no meaning in python-control: "
-                    "engine='native' has it, solve_ivp_kwargs={'max_step': ...} bounds its steps"
+                    "engine='native' has it, max_step= bounds the steps of both engines"
                 )
-        return python_control_response(run)
+        return python_control_response(run, _known)
     from .native import AlgebraicLoopError, AuditError, Compiled, CompileError  # late: needs numba
 
     if not interpretable and not isinstance(run.system, Compiled):
@@ -238,7 +263,14 @@ def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
         if engine != "auto" or not interpretable or sliding_blocks(run.system) or is_ring:
             raise
         warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=3)
-    return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}))
+    return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}), _known)
+
+
+def _known(system: Any, params: Any, times: Any) -> Known:
+    """Return what is known of the conditions of a diagram that python-control is to run."""
+    from .native.known import known_conditions  # late: needs numba
+
+    return known_conditions(system, params, times)
 
 
 def _is_sampled(system: Any) -> bool:
@@ -288,5 +320,6 @@ def _native(run: RunArguments) -> ct.TimeResponseData:
         ignore_errors=run.ignore_errors,
         progress=run.progress,
         audit=run.audit,
+        watched=run.watched,
         **run.form,
     )

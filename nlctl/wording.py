@@ -45,3 +45,19 @@ def some_of(count: SupportsIndex, total: SupportsIndex, one: str, verb: str, ver
         Without what the verb takes.
     """
     return f"{count} of {counted(total, one)} {verb if 1 in (count, total) else verbs}"
+
+
+def numbered(what: str, count: int) -> list[str]:
+    """Return so many names: one as it is, several with numbers from 1 on.
+
+    Parameters
+    ----------
+    what : str
+    count : int
+
+    Examples
+    --------
+    >>> numbered("guard", 2)
+    ['guard 1', 'guard 2']
+    """
+    return [what] if count == 1 else [f"{what} {k + 1}" for k in range(count)]

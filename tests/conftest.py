@@ -2,6 +2,7 @@
 
 import os
 import signal
+import tempfile
 
 import pytest
 from hypothesis import settings
@@ -20,6 +21,10 @@ def pytest_configure(config):
     """
     if "NLCTL_CACHE_DIR" not in os.environ and getattr(config, "cache", None) is not None:
         os.environ["NLCTL_CACHE_DIR"] = str(config.cache.mkdir("machine-code"))
+    if "NLCTL_CONFIG_DIR" not in os.environ:  # what this user trusts is no test's business
+        folder = tempfile.TemporaryDirectory()
+        config.add_cleanup(folder.cleanup)
+        os.environ["NLCTL_CONFIG_DIR"] = folder.name
 
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from .memory import TOO_LITTLE, is_short_of_memory
+from .printing import error_line
 from .report import register_reports
 from .studies import FAILS, OPEN, register_studies
 
@@ -246,16 +247,16 @@ def main() -> None:
     try:
         app()
     except (UsageError, DivergedError, OSError) as error:
-        print(f"nlctl: {error}", file=sys.stderr)
+        error_line(f"nlctl: {error}")
         raise SystemExit(2) from None
     except KeyboardInterrupt:
-        print("nlctl: interrupted", file=sys.stderr)
+        error_line("nlctl: interrupted")
         raise SystemExit(130) from None
-    except MemoryError as error:
-        print(f"nlctl: this needs more memory than there is ({error})", file=sys.stderr)
-        raise SystemExit(2) from None
     except Exception as error:
+        if is_short_of_memory(error):
+            error_line(f"nlctl: {TOO_LITTLE} ({error or type(error).__name__})")
+            raise SystemExit(2) from None
         from .terminal import trace_of
 
-        print(trace_of(error), file=sys.stderr)
+        error_line(trace_of(error))
         raise SystemExit(3) from None

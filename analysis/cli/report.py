@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json as json_text
 import shlex
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -16,7 +14,19 @@ import typer
 
 from nlctl.wording import counted
 
-from .studies import EXIT_CODES, INCOMPLETE, INTERRUPTED, Json, Trust, exit_codes, run_folder
+from .memory import TO_BEGIN, check_memory
+from .printing import error_line, in_json, say
+from .studies import (
+    EXIT_CODES,
+    INCOMPLETE,
+    INTERRUPTED,
+    Json,
+    Trust,
+    check_run_path,
+    check_study_path,
+    exit_codes,
+    run_folder,
+)
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -81,7 +91,7 @@ def report(
                 study, out, jobs, pdf=pdf, interactive=interactive, force=force, trust=trust
             )
         )
-        print(made)
+        say(made)
         finish_report(page, pdf=pdf, open_=open_)
         if code:
             raise typer.Exit(code)
@@ -146,6 +156,11 @@ def _study(
     from .study_report import report_study
     from .sweep_progress import sweep_bar
 
+    check_memory(TO_BEGIN)
+    if study.suffix == ".toml":
+        check_study_path(study)
+    elif study.is_file():
+        check_run_path(study)
     kept = run_folder(study) if study.suffix == ".toml" else study
     check_report_options(out or kept, pdf=pdf, force=force)
     page, result = report_study(
@@ -160,7 +175,7 @@ def _study(
     if result.complete:
         return result.verdict, page, EXIT_CODES.get(result.answer, 0)
     if study.suffix == ".toml":
-        print("nlctl: incomplete; the same command resumes", file=sys.stderr)
+        error_line("nlctl: incomplete; the same command resumes")
     return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE
 
 
@@ -215,18 +230,21 @@ def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
         If the PDF cannot be made; the page exists all the same.
     """
     from analysis.report.browser import open_page, write_pdf
+    from analysis.studies.whole.page import recorded_print
 
-    print(page)
+    say(page)
     if pdf:
-        print(write_pdf(page, page.with_name("report.pdf")))
+        with recorded_print(page.parent):
+            say(write_pdf(page, page.with_name("report.pdf")))
     if open_ and not open_page(page):
-        print("no browser was found to show it")
+        say("no browser was found to show it")
 
 
 def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:
     """Print what differs, one thing a line; return whether nothing does.
 
-    Two runs are compared by their results where one of them has no report.
+    Two runs are compared by their results where one of them has no report.  The folder of a run
+    has to be whole.
 
     Raises
     ------
@@ -235,26 +253,53 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
     """
     from analysis.report.compare import compare_contents
     from analysis.studies import origin_differences, run_differences
+    from analysis.studies.differences import long_table_differences
 
     paths = (first, second)
+    for path in paths:
+        _check_run(path)
     without = [p for p in paths if p.is_dir() and not (p / "report.json").exists()]
     as_runs = bool(without) and all((p / "results.json").exists() for p in paths)
     if not as_runs:
         for path in (p for p in paths if p in without or not p.exists()):
             raise _no_report(path)
+    are_runs = all((path / "results.json").exists() for path in paths)
     found: list[Any] = (
-        run_differences(first, second) if as_runs else compare_contents(first, second, rtol=rtol)
+        run_differences(first, second)
+        if as_runs
+        else compare_contents(first, second, rtol=rtol, common=are_runs)
     )
+    if are_runs and not as_runs:
+        found += long_table_differences(first, second, rtol)
     if as_runs and (told := origin_differences(first, second)):
-        print(f"nlctl: the two runs were not computed from the same: {told}", file=sys.stderr)
+        error_line(f"nlctl: the two runs were not computed from the same: {told}")
     if as_json:
         told = [text if isinstance(text, str) else vars(text) for text in found]
-        print(json_text.dumps(told, indent=1, ensure_ascii=False))
+        print(in_json(told))
         return not found
     for difference in found:
-        print(difference)
-    print(counted(len(found), "difference") if found else "no difference")
+        say(difference)
+    say(counted(len(found), "difference") if found else "no difference")
     return not found
+
+
+def _check_run(path: Path) -> None:
+    """Refuse a run, or its page, of which something was lost or edited.
+
+    Raises
+    ------
+    UsageError
+        With what is wrong; nothing is raised for a report that is in no run's folder.
+    """
+    from analysis.studies import load_result
+    from analysis.studies.whole.page import check_page, is_run
+
+    folder = path if path.is_dir() else path.parent
+    has_page = (folder / "report.json").exists()
+    if (folder / "results.json").exists() or (is_run(folder) and has_page):
+        load_result(folder)  # of a damaged folder nothing is believed
+        if has_page:
+            check_page(folder)
 
 
 def _no_report(path: Path) -> UsageError:
@@ -283,11 +328,12 @@ def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     """
     from analysis.report.browser import open_page
     from analysis.report.gallery import write_gallery
+    from analysis.studies.whole.page import check_page
 
     from .terminal import check_writable
 
     check_writable(folder)
-    page = write_gallery(folder, force=force)
-    print(page)
+    page = write_gallery(folder, force=force, check=check_page)
+    say(page)
     if open_ and not open_page(page):
-        print("no browser was found to show it")
+        say("no browser was found to show it")

@@ -8,23 +8,26 @@ refuted, but not all are shown yet, 130 interrupted.
 from __future__ import annotations
 
 import errno
-import json as json_text
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
 
 from nlctl.wording import counted
+
+from .memory import TO_BEGIN, TOO_LITTLE, check_memory, is_short_of_memory
+from .printing import error_line, in_json, say
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
 EXIT_CODES = {
     "refuted": FAILS,
     "not shown yet": OPEN,
 }  # exit code by the answer to a study's claims
+T = TypeVar("T")
 CONNECT = "5s"  # how long a scheduler may take to answer
 
 StudyPath = Annotated[Path, typer.Argument(metavar="STUDY", help="The study file, .toml.")]
@@ -40,7 +43,7 @@ SetKeys = Annotated[
 Trust = Annotated[
     bool,
     typer.Option(
-        "--trust", help="Run code from outside of the study's folder and of installed packages."
+        "--trust", help="Run whatever code is named, and record that this user trusts it as it is."
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
@@ -52,6 +55,7 @@ def register_studies(app: typer.Typer) -> None:
     app.command("run")(run_command)
     app.command("validate")(validate)
     app.command("replay")(replay_command)
+    app.command("verify")(verify_command)
     app.command("schema")(schema)
 
 
@@ -85,12 +89,15 @@ def run_command(
     options += ["--force"] * force + ["--trust"] * trust
     folder = run_folder(study) if out is None else out
     with exit_codes(json), _told_how_to_go_on(study, options, folder, resume, json):
+        check_memory(TO_BEGIN)
         from analysis.studies import read_study
         from analysis.studies import run as run_study
 
         from .sweep_progress import sweep_bar
 
-        file = read_study(study, set_ or [], trust=trust)
+        check_memory()
+        check_study_path(study)
+        file = asking(lambda trust: read_study(study, set_ or [], trust=trust), trust)
         with _executor(executor, jobs) as pool:
             result = run_study(
                 file,
@@ -120,17 +127,21 @@ def validate(
     To know, it makes the loop and runs a few rows: the code that the file names is run.
     """
     with exit_codes(json):
+        check_memory(TO_BEGIN)
         from analysis.studies import plan, read_study
 
-        found = plan(read_study(study, set_ or [], trust=trust), jobs or None)
+        check_memory()
+        check_study_path(study)
+        file = asking(lambda trust: read_study(study, set_ or [], trust=trust), trust)
+        found = plan(file, jobs or None)
         if json:
             content = {"valid": True, **vars(found), "total": found.total}
-            print(json_text.dumps(content, indent=1))
+            print(in_json(content))
             return
-        print(f"{study} is a valid study.")
+        say(f"{study} is a valid study.")
         for key, count in found.runs.items():
-            print(f"  {key}: {'at most ' if key in found.at_most else ''}{counted(count, 'run')}")
-        print(
+            say(f"  {key}: {'at most ' if key in found.at_most else ''}{counted(count, 'run')}")
+        say(
             f"In all {counted(found.total, 'run')}, about {_duration(found.seconds)} on this "
             f"machine, and at most about {found.size / 1e6:.2g} MB on disk."
         )
@@ -151,6 +162,7 @@ def replay_command(
     The loop is made anew: the code that the study names is run.
     """
     with exit_codes(json):
+        check_memory(TO_BEGIN)
         from analysis.studies import replay as replay_row
         from analysis.studies import replay_figure
 
@@ -158,22 +170,103 @@ def replay_command(
 
         if plot is not None:
             check_figure(plot)
-        made = replay_row(folder, row, part, trust=trust)
+        check_run_path(folder)
+        check_memory()
+        made = asking(lambda trust: replay_row(folder, row, part, trust=trust), trust)
         if plot is not None:
             write_figure(plot, replay_figure(made))
         if json:
-            print(json_text.dumps(made.plain(), indent=1))
+            print(in_json(made.plain()))
         else:
-            print(made)
+            say(made)
         if made.differences:
             raise typer.Exit(FAILS)
+
+
+def verify_command(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
+    json: Json = False,
+) -> None:
+    """Say whether the folder of a run is whole: every file as the run has written it.
+
+    Nothing is run or imported.  Exit codes: 0 it is whole, 1 something is missing, edited or too
+    much, 2 it is not the folder of a run that has come to an end.
+    """
+    with exit_codes(json):
+        from analysis.studies import verify
+
+        check_run_path(folder)
+        found = verify(folder)
+        if json:
+            content = {key: getattr(found, key) for key in ("is_whole", "files", "rows")}
+            lists = {k: list(getattr(found, k)) for k in ("analyses", "done", "problems", "others")}
+            print(in_json(content | lists))
+        else:
+            say(found)
+            for name in found.others:
+                say(f"  '{name}' is not a part of the run")
+        if not found.is_whole:
+            raise typer.Exit(FAILS)
+
+
+def asking(action: Callable[[bool], T], trust: bool) -> T:
+    """Return what `action` returns; where it needs trust, and somebody is there, ask for it.
+
+    Raises
+    ------
+    StudyError
+        If nobody is there, or the answer is no.
+    """
+    from analysis.studies import StudyError
+
+    try:
+        return action(trust)
+    except StudyError as error:
+        others = [p for p in error.problems if not p.needs_trust]
+        if trust or others or not (sys.stdin.isatty() and sys.stderr.isatty()):
+            raise
+        error_line(f"nlctl: {error}")
+        if not typer.confirm("Run this code?", err=True):
+            raise
+    return action(True)
 
 
 def schema() -> None:
     """Print the JSON schema of study files, for editors."""
     from analysis.studies.file.own_kinds import model_of
 
-    print(json_text.dumps(model_of({}).model_json_schema(), indent=1))
+    print(in_json(model_of({}).model_json_schema()))
+
+
+def check_study_path(study: Path) -> None:
+    """Refuse a folder where a study file is wanted.
+
+    Raises
+    ------
+    UsageError
+        With what the folder is good for.
+    """
+    from analysis.studies.whole.page import is_run
+    from nlctl.errors import UsageError
+
+    if study.is_dir():
+        run = shlex.quote(str(study))
+        told = f": look at that run with 'nlctl report {run}'" if is_run(study) else ""
+        raise UsageError(f"'{study}' is a folder, and a study is a file (.toml){told}")
+
+
+def check_run_path(run: Path) -> None:
+    """Refuse a file where the folder of a run is wanted.
+
+    Raises
+    ------
+    UsageError
+        With the folder that it lies in.
+    """
+    from nlctl.errors import UsageError
+
+    if run.exists() and not run.is_dir():
+        raise UsageError(f"'{run}' is a file, and a run is a folder: name '{run.parent}'")
 
 
 def run_folder(study: Path) -> Path:
@@ -195,21 +288,21 @@ def _told_how_to_go_on(
         yield
         return
     except KeyboardInterrupt:
-        print("nlctl: interrupted", file=sys.stderr)
+        error_line("nlctl: interrupted")
         code = INTERRUPTED
     except typer.Exit as error:
         if error.exit_code not in (INCOMPLETE, INTERRUPTED):
             raise
         code = error.exit_code
-    except (OSError, ValueError) as error:
-        if not _is_full(error):
+    except Exception as error:
+        if not (_is_full(error) or is_short_of_memory(error)):
             raise
         _fail(error, json)
         code = INCOMPLETE
     verb, flag = ("continue", ["--resume"]) if resume or kept.exists() else ("begin", [])
     if not is_taken:
         command = shlex.join(["nlctl", "run", str(study), *flag, *options])
-        print(f"{verb} with: {command}", file=sys.stderr)
+        error_line(f"{verb} with: {command}")
     raise typer.Exit(code) from None
 
 
@@ -221,32 +314,40 @@ def exit_codes(json: bool) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        print("nlctl: interrupted", file=sys.stderr)
+        error_line("nlctl: interrupted")
         raise typer.Exit(INTERRUPTED) from None
-    except (UsageError, DivergedError, OSError) as error:
+    except (UsageError, DivergedError, OSError, MemoryError) as error:
         _fail(error, json)
         raise typer.Exit(INVALID) from None
     except (typer.Exit, typer.Abort):
         raise
     except Exception as error:
+        if is_short_of_memory(error):
+            _fail(error, json)
+            raise typer.Exit(INVALID) from None
         from .terminal import trace_of
 
-        print(trace_of(error), file=sys.stderr)
+        error_line(trace_of(error))
         if json:
-            print(json_text.dumps({"error": f"{type(error).__name__}: {error}"}))
+            print(in_json({"error": f"{type(error).__name__}: {error}"}))
         raise typer.Exit(INTERNAL) from None
 
 
 def _fail(error: Exception, json: bool) -> None:
     """Print one message: as JSON where that was asked for."""
+    told = (
+        f"{TOO_LITTLE} ({error or type(error).__name__})"
+        if is_short_of_memory(error)
+        else str(error)
+    )
     if not json:
-        print(f"nlctl: {error}", file=sys.stderr)
+        error_line(f"nlctl: {told}")
         return
-    content: dict[str, Any] = {"error": str(error)}
+    content: dict[str, Any] = {"error": told}
     problems = getattr(error, "problems", None)
     if problems is not None:
         content |= {"valid": False, "problems": [problem.plain() for problem in problems]}
-    print(json_text.dumps(content, indent=1))
+    print(in_json(content))
 
 
 def _is_full(error: BaseException | None) -> bool:
@@ -300,16 +401,16 @@ def _dask_client(address: str) -> Any:
 def _show(result: Any, json: bool) -> None:
     """Print the verdict, then every finding in its own words."""
     for note in result.notes:
-        print(f"nlctl: {note}", file=sys.stderr)
+        error_line(f"nlctl: {note}")
     if json:
-        print(json_text.dumps(result.plain(), indent=1, ensure_ascii=False, allow_nan=False))
+        print(in_json(result.plain()))
         return
-    print(f"{result.study.study.title}\n{result.verdict}")
+    say(f"{result.study.study.title}\n{result.verdict}")
     for finding in result.findings:
-        print(f"\n{finding.title}\n  {finding.sentence}")
+        say(f"\n{finding.title}\n  {finding.sentence}")
         if finding.claim:
-            print(f"  Claim: {finding.claim}: {finding.told}.")
-    print(f"\n{result.folder}")
+            say(f"  Claim: {finding.claim}: {finding.told}.")
+    say(f"\n{result.folder}")
 
 
 def _duration(seconds: float) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import shlex
-import sys
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .printing import error_line
 from .studies import run_folder
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ def report_study(
     from analysis.studies.page.loop import loop_of
     from analysis.studies.page.redrawn import loop_again, rows_again
     from analysis.studies.page.report import study_report
+    from analysis.studies.whole.page import recorded_page
 
     result = (
         _run(path, threads, watch, force, trust)
@@ -77,7 +79,13 @@ def report_study(
         data = Path(os.path.relpath(result.folder, out))
         made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})
     folder = result.folder if out is None else out
-    return write_report(made, folder, interactive=interactive, force=force), result
+    with recorded_page(folder) if _is_in_run(folder, result) else nullcontext():
+        return write_report(made, folder, interactive=interactive, force=force), result
+
+
+def _is_in_run(page: Path, result: Result) -> bool:
+    """Whether a page lies in the folder of its run, in whose record it is then kept."""
+    return page.resolve() == result.folder.resolve()
 
 
 def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trust: bool) -> Result:
@@ -91,4 +99,4 @@ def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trus
 
 def tell(words: str) -> None:
     """Print what a page will lack."""
-    print(f"nlctl: {words}", file=sys.stderr)
+    error_line(f"nlctl: {words}")

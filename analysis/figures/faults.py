@@ -6,6 +6,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from nlctl.annotations import as_annotated
+
 from ..robustness.stl.spec import violates
 from .axes import BLUE, GREY, ORANGE, WIDTH
 from .labels import number_axes, plain
@@ -16,6 +18,7 @@ __all__ = ["fault_margins", "fault_pairs"]
 REACH = 1.0  # margins beyond are drawn there
 
 
+@as_annotated
 def fault_margins(margin: pd.Series) -> Figure:
     """Least margin that each fault leaves, with its name at the left.
 
@@ -39,6 +42,7 @@ def fault_margins(margin: pd.Series) -> Figure:
     return figure
 
 
+@as_annotated
 def fault_pairs(margin: pd.DataFrame) -> Figure:
     """Least margin under each pair of faults; on the diagonal under one alone.
 

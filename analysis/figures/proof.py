@@ -9,6 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
+from nlctl.annotations import as_annotated
+
 from ..lyapunov.loop.signals import Margin
 from ..lyapunov.nussbaum.long_run import LongRun
 from .axes import (
@@ -37,6 +39,7 @@ __all__ = [
 ]
 
 
+@as_annotated
 def burst(run: LongRun) -> Figure:
     """A long run until its gain loses the sign: zeta and |e|, and the end of both, with r and u.
 
@@ -83,6 +86,7 @@ def burst(run: LongRun) -> Figure:
     return figure
 
 
+@as_annotated
 def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) -> Figure:
     """The paper in one picture: the output follows, and zeta drifts until N changes its sign.
 
@@ -136,6 +140,7 @@ def _drifting(ax: Axes, run: LongRun) -> None:
     ax.set(xlabel=TIME)
 
 
+@as_annotated
 def windowed_maximum(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi) -> np.ndarray:
     """Return the largest value of y in each whole window, at the middle of the windows.
 
@@ -159,6 +164,7 @@ def windowed_maximum(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi)
     return np.array([time[0] + (number[starts] + 0.5) * window, largest])[:, :-1]
 
 
+@as_annotated
 def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
     """The Nussbaum argument of long runs that do not burst, and where it is predicted to stop.
 
@@ -184,6 +190,7 @@ def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
     return figure
 
 
+@as_annotated
 def lyapunov_bound(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Figure:
     """V over time against what bounds it; a bound that is infinite is named in the legend.
 
@@ -210,6 +217,7 @@ def lyapunov_bound(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Figure:
     return figure
 
 
+@as_annotated
 def inequality_margins(margins: Sequence[Margin]) -> Figure:
     """Margin of each inequality over time, one panel each; a dot where it is least.
 
@@ -237,6 +245,7 @@ def inequality_margins(margins: Sequence[Margin]) -> Figure:
     return figure
 
 
+@as_annotated
 def equality_residuals(margins: Sequence[Margin]) -> Figure:
     """Distance between the sides of each equation over its size, and the tolerance.
 
@@ -282,6 +291,7 @@ def _least(t: np.ndarray, y: np.ndarray, count: int = 600) -> tuple[np.ndarray, 
     return t[at], y[at]
 
 
+@as_annotated
 def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
     """Numbers with their kind as bars on a logarithmic axis, what is proved in a colour of its own.
 

@@ -10,12 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
+from nlctl.annotations import as_annotated
+
 from .axes import BLUE, GREY, ORANGE, SHORT_LINE, legend_above
 from .labels import arms, number_axes
 
 __all__ = ["paired_differences", "screening", "set_apart", "shares", "violation_rates"]
 
 
+@as_annotated
 def screening(effects: pd.DataFrame) -> Figure:
     """Mean magnitude of the effects of each quantity with its interval, and their deviation.
 
@@ -39,6 +42,7 @@ def screening(effects: pd.DataFrame) -> Figure:
     return figure
 
 
+@as_annotated
 def shares(indices: pd.DataFrame) -> Figure:
     """Shares of the variance: of each quantity by itself, and with all its interactions.
 
@@ -61,6 +65,7 @@ def shares(indices: pd.DataFrame) -> Figure:
     return figure
 
 
+@as_annotated
 def set_apart(table: pd.DataFrame) -> Figure:
     """How far failing runs lie from passing ones in each quantity.
 
@@ -81,6 +86,7 @@ def set_apart(table: pd.DataFrame) -> Figure:
     return figure
 
 
+@as_annotated
 def violation_rates(ranking: pd.DataFrame) -> Figure:
     """Share of violations of each option with its interval.
 
@@ -101,6 +107,7 @@ def violation_rates(ranking: pd.DataFrame) -> Figure:
     return figure
 
 
+@as_annotated
 def paired_differences(table: pd.DataFrame, labels: Sequence[str], quantity: str) -> Figure:
     """Median paired differences with their intervals; what is infinite is drawn at the edge.
 

@@ -17,6 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
+from nlctl.annotations import as_annotated
+
 from ..robustness.stl.spec import violates
 from .axes import (
     BLUE,
@@ -50,7 +52,7 @@ CLIP = 2.0
 BANDS = ((0.0, 1.0, 0.2), (0.05, 0.95, 0.35), (0.25, 0.75, 0.6))  # quantiles, opacity
 LIMIT = "limit of the spec"
 Limit = tuple[float, float, float]
-NOTHING: Mapping[str, Any] = MappingProxyType({})
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
 STRETCHES = 240  # of time, in which the ends of a band are drawn as lines
 
 
@@ -60,6 +62,7 @@ def clipped_margins(values: object) -> np.ndarray:
     return np.maximum(np.where(np.isnan(y), -np.inf, y), -CLIP)
 
 
+@as_annotated
 def margins_figure(values: np.ndarray) -> Figure:
     """How many runs have which margin, and the share of runs with at most that margin.
 
@@ -102,6 +105,7 @@ def margins_figure(values: np.ndarray) -> Figure:
     return figure
 
 
+@as_annotated
 def running_estimate(
     curve: pd.DataFrame,
     limit: float | None = None,
@@ -146,14 +150,15 @@ def running_estimate(
     return figure
 
 
+@as_annotated
 def fans(
     time: np.ndarray,
     signals: Mapping[str, np.ndarray],
     nominal: Mapping[str, np.ndarray],
     worst: Mapping[str, np.ndarray],
     *,
-    limits: Mapping[str, Sequence[Limit]] = NOTHING,
-    units: Mapping[str, str] = NOTHING,
+    limits: Mapping[str, Sequence[Limit]] = _NOTHING,
+    units: Mapping[str, str] = _NOTHING,
     groups: Sequence[str] = (),
 ) -> Figure:
     """Bands that hold all, 90 % and 50 % of the runs, with the nominal and the worst run.
@@ -226,6 +231,7 @@ def _kinds(
         ax.plot(time[nodes], middle, style, color=colour, linewidth=1.3, label=plain(name))
 
 
+@as_annotated
 def most_frequent(groups: Sequence[str]) -> list[str]:
     """Return the kinds of runs that `fans` shows: at most as many as there are line styles.
 
@@ -257,6 +263,7 @@ def _one_legend(axes: Sequence[Axes]) -> None:
     legend_above(axes[0], shown)
 
 
+@as_annotated
 def quantile(samples: np.ndarray, part: float, missing: float) -> np.ndarray:
     """Return a quantile over the runs (axis 0), one of their values; NaN counts as `missing`.
 

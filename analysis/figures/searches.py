@@ -12,6 +12,8 @@ from matplotlib.colors import ListedColormap, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
+from nlctl.annotations import as_annotated
+
 from ..robustness.stl.spec import violates
 from .axes import BLUE, GREEN, GREY, ORANGE, PURPLE, SHORT_LINE, WIDTH, legend_above, stacked_axes
 from .labels import arms, number_axes, plain
@@ -24,6 +26,7 @@ MAP_INK = "#111111"  # on the map, which is light on dark pages as well
 COLOURS = ListedColormap(colormaps["PuOr"](np.linspace(0.15, 0.85, 256)))  # MAP_INK shows on all
 
 
+@as_annotated
 def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
     """Lowest margin found after each run of a search, in the colour of what chose the run.
 
@@ -57,6 +60,7 @@ def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
     return figure
 
 
+@as_annotated
 def deviations(table: pd.DataFrame) -> Figure:
     """How far the quantities of some rows deviate from nominal, in sides of the box.
 
@@ -85,6 +89,7 @@ def deviations(table: pd.DataFrame) -> Figure:
     return figure
 
 
+@as_annotated
 def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | None = None) -> Figure:
     """Share of violations with its interval against the size of the uncertainty.
 
@@ -117,6 +122,7 @@ def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | Non
     return figure
 
 
+@as_annotated
 def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
     """Lowest margin that was found at each size that was looked at, and the radius.
 
@@ -149,6 +155,7 @@ def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
     return figure
 
 
+@as_annotated
 def failure_map_figure(
     points: pd.DataFrame,
     triangles: np.ndarray,

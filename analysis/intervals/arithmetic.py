@@ -6,8 +6,9 @@ result encloses every value that the equation takes for numbers inside the balls
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -15,61 +16,29 @@ from flint import arb
 
 from nlctl.expressions.functions import FUNCTIONS
 
-from .paths import Undecided, branch
+from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table
+from .pairs import FUNCTIONS_OF_TWO, real_power
+from .paths import Undecided, decided
 
 __all__ = ["Ball", "NumPyFunctions", "as_ball", "common", "power"]
 
 
-def _function(name: str) -> Callable[[Any], Any]:
-    def method(self: Any) -> Any:
-        return self.apply(name)
-
-    method.__doc__ = f"NumPy calls this for np.{name}(x)."
-    return method
-
-
-JUMPS = ("floor", "ceil", "sign")
-_Comparison = Callable[[arb, arb], Any]
+_ANY = arb(0, "inf")
+_NOT_NEGATIVE = ("sqrt", "exp", "cosh")
+_ODD_AND_RISING = ("sinh", "tanh", "arctan", "arcsinh", "expm1", "log1p", "cbrt", "sign", "floor",
+                   "ceil", "trunc", "rint")  # fmt: skip  # or of the sign of what they are of
+_SINC_SLOPE = 1.3707  # above the largest slope of sin(pi x)/(pi x)
+_QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
 
 
-class NumPyFunctions:
-    """What balls and difference quotients share: the functions that NumPy looks for.
-
-    Those of one argument in the table `nlctl.expressions.functions` that have an enclosure, and
-    minimum and maximum.
-    """
-
-    __slots__ = ()
-    __hash__ = None  # type: ignore[assignment]  # equality may be undecided
-
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
-        if ufunc in (np.minimum, np.maximum):
-            name = "minimum" if ufunc is np.minimum else "maximum"
-            ufunc = np.frompyfunc(lambda a, b: _pairwise(name, a, b), 2, 1)
-        return getattr(ufunc, method)(*map(_objects, inputs), **kwargs)
-
-
-NumPyFunctions.__floor__ = _function("floor")  # type: ignore[attr-defined]  # NumPy looks for it
-NumPyFunctions.__ceil__ = _function("ceil")  # type: ignore[attr-defined]
-for _name, _row in FUNCTIONS.items():
-    if _row.enclosure is not None and _row.count == 1:
-        setattr(NumPyFunctions, _name, _function(_name))
-
-
-def _objects(x: Any) -> np.ndarray:
-    """Return an array of plain objects: NumPy's own numbers would ask the ball in turn."""
-    plain = x.item() if isinstance(x, np.generic) else x
-    array = np.asarray(plain, dtype=object)
-    if isinstance(x, np.ndarray) and x.dtype != object:
-        array[...] = np.reshape(np.array(x.tolist(), dtype=object), x.shape)
-    return array
-
-
-def _pairwise(name: str, a: Any, b: Any) -> Any:
-    """Ask the operand that knows both: a ball knows numbers, a difference quotient balls, too."""
-    if as_ball(a) is NotImplemented or not isinstance(b, NumPyFunctions):
-        return getattr(a, name)(b)
-    return getattr(b, name)(a)
+@contextmanager
+def quiet() -> Iterator[None]:
+    """While a user's function runs its balls have no text: it would be another one of floats."""
+    token = _QUIET.set(True)
+    try:
+        yield
+    finally:
+        _QUIET.reset(token)
 
 
 class Ball(NumPyFunctions):
@@ -81,6 +50,9 @@ class Ball(NumPyFunctions):
     gradient : tuple of flint.arb
         Derivatives with respect to the coordinates of a box; empty for a constant.  Where a
         function has a corner they enclose its generalised gradient (Clarke).
+    not_negative : bool
+        Whether no value is below 0, whatever the rounding of `value` says: the radius of a ball is
+        rounded up, and that of [0, 1] begins below 0, where a root has no value.
 
     Examples
     --------
@@ -94,14 +66,40 @@ class Ball(NumPyFunctions):
     (10.0, 6.0)
     """
 
-    __slots__ = ("gradient", "value")
+    __slots__ = ("gradient", "not_negative", "value")
+    rank = 0  # of the kinds of numbers that compute with each other
 
-    def __init__(self, value: arb, gradient: tuple[arb, ...] = ()) -> None:
+    def __init__(
+        self, value: arb, gradient: tuple[arb, ...] = (), not_negative: bool = False
+    ) -> None:
         self.value = value
         self.gradient = gradient
+        self.not_negative = not_negative or bool(value >= 0)
+
+    def known_not_negative(self, known: bool = True) -> Ball:
+        """Return the ball with what is known of its sign besides its ends.
+
+        Parameters
+        ----------
+        known : bool, optional
+            Whether no value is below 0.
+
+        Returns
+        -------
+        Ball
+            The same where nothing is new.
+        """
+        return Ball(self.value, self.gradient, True) if known and not self.not_negative else self
 
     def __repr__(self) -> str:
+        if _QUIET.get():
+            raise TypeError("asks for the text of its argument")
         return f"Ball({self.value}, {self.gradient})"
+
+    __str__ = __repr__
+
+    def __format__(self, form: str) -> str:
+        return repr(self)
 
     def chain(self, value: arb, slope: arb) -> Ball:
         """Return `value` with the derivatives of self times `slope`.
@@ -139,7 +137,8 @@ class Ball(NumPyFunctions):
         other = as_ball(other)
         if other is NotImplemented:
             return other
-        return self._joined(self.value + other.value, 1, other, 1)
+        found = self._joined(self.value + other.value, 1, other, 1)
+        return found.known_not_negative(self.not_negative and other.not_negative)
 
     __radd__ = __add__
 
@@ -160,7 +159,8 @@ class Ball(NumPyFunctions):
         other = as_ball(other)
         if other is NotImplemented:
             return other
-        return self._joined(self.value * other.value, other.value, other, self.value)
+        found = self._joined(self.value * other.value, other.value, other, self.value)
+        return found.known_not_negative(self.not_negative and other.not_negative)
 
     __rmul__ = __mul__
 
@@ -169,21 +169,26 @@ class Ball(NumPyFunctions):
         if other is NotImplemented:
             return other
         value = self.value / other.value
-        return self._joined(value, 1 / other.value, other, -value / other.value)
+        found = self._joined(value, 1 / other.value, other, -value / other.value)
+        return found.known_not_negative(self.not_negative and other.not_negative)
 
     def __rtruediv__(self, other: Any) -> Any:
         other = as_ball(other)
         return other if other is NotImplemented else other / self
 
-    def __pow__(self, n: Any) -> Ball:
-        if n != int(n):
-            return (self.apply("log") * n).apply("exp")
+    def __pow__(self, n: Any) -> Any:
+        if isinstance(n, Ball):
+            n = float(n.value) if n.value.is_exact() and not n.gradient else n
+        if isinstance(n, Ball) or n != int(n):
+            return self.pair("power", n)
         if n < 0:
             return 1 / self ** (-n)
-        return self.chain(power(self.value, int(n)), int(n) * power(self.value, max(int(n) - 1, 0)))
+        n = int(n)
+        found = self.chain(power(self.value, n), n * power(self.value, max(n - 1, 0)))
+        return found.known_not_negative(n % 2 == 0 or self.not_negative)
 
     def __abs__(self) -> Ball:
-        return self.maximum(-self)
+        return self.maximum(-self).known_not_negative()
 
     def minimum(self, other: Any) -> Ball:
         """Smaller one; where balls overlap, the derivative is one or the other.
@@ -198,7 +203,9 @@ class Ball(NumPyFunctions):
         Ball
             Encloses both where they overlap.
         """
-        return self._extreme(as_ball(other), arb.min)
+        other = as_ball(other)
+        both = self.not_negative and other.not_negative
+        return self._extreme(other, arb.min).known_not_negative(both)
 
     def maximum(self, other: Any) -> Ball:
         """Larger one; where balls overlap, the derivative is one or the other.
@@ -213,7 +220,9 @@ class Ball(NumPyFunctions):
         Ball
             Encloses both where they overlap.
         """
-        return self._extreme(as_ball(other), arb.max)
+        other = as_ball(other)
+        either = self.not_negative or other.not_negative
+        return self._extreme(other, arb.max).known_not_negative(either)
 
     def _extreme(self, other: Ball, choose: Callable[[arb, arb], arb]) -> Ball:
         a, b = self.value, other.value
@@ -233,30 +242,108 @@ class Ball(NumPyFunctions):
         Parameters
         ----------
         name : str
-            A function of the table that has an enclosure, such as ``sin``.
+            A function of the table that has an enclosure, such as ``sin``; or ``sinc``.
 
         Returns
         -------
         Ball
-            With the derivatives by the chain rule.
-
-        Raises
-        ------
-        Undecided
-            If the function may jump within the ball.
+            With the derivatives by the chain rule; where it jumps within the ball they have no
+            bound.
         """
+        if name == "sinc":
+            return self._sinc()
         row = FUNCTIONS[name]
         assert row.enclosure is not None
-        value = row.enclosure(self.value)
+        known = name in _NOT_NEGATIVE or (self.not_negative and name in _ODD_AND_RISING)
+        if name == "sqrt" and self.not_negative and self.value.is_finite():
+            value = self._root()
+        else:
+            value = row.enclosure(self.value)
         if name in JUMPS and not value.is_exact():
-            raise Undecided(f"{name}({self.value}) jumps")
+            low, high = (row.enclosure(end) for end in (self.value.lower(), self.value.upper()))
+            if self.value.is_finite() and low.is_exact() and high.is_exact():
+                value = low.union(high)
+            return self.chain(value, _ANY).known_not_negative(known)
         if not self.gradient:
-            return Ball(value)
-        return self.chain(value, as_ball(row.derivative[0](Ball(self.value))).value)
+            return Ball(value, (), known)
+        found = self.chain(value, as_ball(row.derivative[0](Ball(self.value))).value)
+        return found.known_not_negative(known)
 
-    def _compare(self, other: Any, yes: _Comparison, no: _Comparison) -> Any:
-        """Return yes(self, other), where `no` is its negation; see `branch`."""
+    def _root(self) -> arb:
+        """Return the root of what is not negative, of its ends."""
+        ends = (arb(end).max(arb(0)).sqrt() for end in (self.value.lower(), self.value.upper()))
+        low, high = ends
+        return low.union(high)
+
+    def _sinc(self) -> Ball:
+        """Return sin(pi x)/(pi x)."""
+        x = self.value
+        value = x.sinc_pi() if x.is_finite() else arb(0, 1) if not x.is_nan() else arb.nan()
+        slope, bound = arb.nan(), arb(0, _SINC_SLOPE)
+        if x.is_finite() and not x.contains(0):
+            slope = ((arb.pi() * x).cos() - x.sinc_pi()) / x
+        return self.chain(value, common(slope, bound))
+
+    def pair(self, name: str, other: Any) -> Any:
+        """Return phi of this ball and another one, for the NumPy function of that name.
+
+        Parameters
+        ----------
+        name : str
+            A function of `analysis.intervals.pairs`.
+        other : Ball or float
+            The second argument.
+
+        Returns
+        -------
+        Ball
+            Where the function may jump, with derivatives without bound.
+        """
         other = as_ball(other)
+        if other is NotImplemented:
+            return other
+        if name == "power":
+            found = real_power(self.value, other.value, from_zero=self.not_negative)
+        else:
+            found = FUNCTIONS_OF_TWO[name](self.value, other.value)
+        value, by_self, by_other = found
+        made = self._joined(value, by_self, other, by_other)
+        return made.known_not_negative(name in ("hypot", "power"))  # a real power has no sign
+
+    def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Ball:
+        """Return the linear interpolation of a table, constant beyond its ends.
+
+        Parameters
+        ----------
+        xp, fp : tuple of m floats
+            Increasing break points, and the values there.
+
+        Returns
+        -------
+        Ball
+            At break points the derivatives enclose those of both sides.
+        """
+        return self.chain(*enclosed_table(self.value, xp, fp))
+
+    @staticmethod
+    def lifted(number: Any) -> Any:
+        """Return a number as a ball.
+
+        Parameters
+        ----------
+        number : float or Ball
+            What is computed with.
+
+        Returns
+        -------
+        Ball
+            NotImplemented for what is not a number.
+        """
+        return as_ball(number)
+
+    def _compare(self, other: Any, holds: frozenset[int], what: str) -> Any:
+        """Return whether the order of self and other is one of those; see `decided`."""
+        given, other = other, as_ball(other)
         if other is NotImplemented:
             return other
         a, b = self.value, other.value
@@ -264,25 +351,29 @@ class Ball(NumPyFunctions):
             raise Undecided(
                 "a comparison with a ball that is not a number (a division by 0, perhaps)"
             )
-        return branch(bool(yes(a, b)), bool(no(a, b)), f"{yes.__name__}({a}, {b})")
+        if given is self:
+            return 0 in holds
+        possible = {k for k, no in ((-1, a >= b), (0, a != b), (1, a <= b)) if not no}
+        key = (self, given if given is other else b)
+        return decided(possible, holds, key, f"{what}({a}, {b})")
 
     def __lt__(self, other: Any) -> bool:
-        return self._compare(other, operator.lt, operator.ge)
+        return self._compare(other, frozenset({-1}), "lt")
 
     def __le__(self, other: Any) -> bool:
-        return self._compare(other, operator.le, operator.gt)
+        return self._compare(other, frozenset({-1, 0}), "le")
 
     def __gt__(self, other: Any) -> bool:
-        return self._compare(other, operator.gt, operator.le)
+        return self._compare(other, frozenset({1}), "gt")
 
     def __ge__(self, other: Any) -> bool:
-        return self._compare(other, operator.ge, operator.lt)
+        return self._compare(other, frozenset({0, 1}), "ge")
 
     def __eq__(self, other: object) -> bool:
-        return self._compare(other, operator.eq, operator.ne)
+        return self._compare(other, frozenset({0}), "eq")
 
     def __ne__(self, other: object) -> bool:
-        return self._compare(other, operator.ne, operator.eq)
+        return self._compare(other, frozenset({-1, 1}), "ne")
 
     def __bool__(self) -> bool:
         return self != 0
@@ -326,6 +417,8 @@ def as_ball(x: Any) -> Any:
         return x
     if isinstance(x, arb):
         return Ball(x)
+    if isinstance(x, np.ndarray) and x.dtype == object and not x.ndim:  # of np.where
+        return as_ball(x.item())
     if isinstance(x, int | float | np.integer | np.floating | np.bool_):
         return Ball(arb(float(x)))
     return NotImplemented

@@ -9,6 +9,7 @@ from typing import Literal
 import control as ct
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.wording import counted
@@ -18,6 +19,7 @@ __all__ = ["Box", "Cell", "visited_box"]
 Cell = tuple[tuple[float, float], ...]
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Box:
     """A product of intervals with named sides.
@@ -124,6 +126,7 @@ class Box:
         return ", ".join(sides) + ("" if self.how == "given" else f" ({self.how})")
 
 
+@as_annotated
 def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
     """Return the box that responses have visited, each side widened at both ends.
 

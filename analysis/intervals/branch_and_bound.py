@@ -15,17 +15,21 @@ import itertools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from flint import arb
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, integer, of_type
 from nlctl.errors import ParameterError
+from nlctl.wording import counted
 
+from .agreement import on_balls
 from .arithmetic import Ball, as_ball, common
 from .box import Box, Cell
 from .paths import Undecided, every_way
+from .type_questions import is_of_library
 
 __all__ = ["Ball", "Box", "Proof", "Range", "Undecided", "enclose", "prove", "upper"]
 
@@ -95,7 +99,35 @@ class Proof:
     value: float
     seconds: float
 
+    @property
+    def status(self) -> Literal["proved", "refuted", "undecided"]:
+        """What became of the claim."""
+        return {True: "proved", False: "refuted"}.get(self.holds, "undecided")  # type: ignore
 
+    @property
+    def missing(self) -> str:
+        """What is missing for a decision; nothing if there is one."""
+        if self.holds is not None:
+            return ""
+        what = counted(self.undecided, "box is", "boxes are")
+        return (
+            f"{what} undecided after {self.boxes}, one around {_point(self.where)}: raise "
+            "max_boxes, or leave the claim a margin there"
+        )
+
+    def __str__(self) -> str:
+        if self.holds is None:
+            return f"undecided: {self.missing}"
+        if self.holds:
+            return f"proved on {counted(self.boxes, 'box', 'boxes')}"
+        return f"refuted at {_point(self.where)}: {self.value:.6g}"
+
+
+def _point(where: dict[str, float] | None) -> str:
+    return ", ".join(f"{name} = {value:.6g}" for name, value in (where or {}).items())
+
+
+@as_annotated
 def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) -> Range:
     """Enclose the range of a function on a box, by branch and bound.
 
@@ -119,7 +151,8 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     Raises
     ------
     ParameterError
-        If it is not a function or not a box, `tol` is not positive, or `max_boxes` is below 1.
+        If it is not a function or not a box, `tol` is not positive, or `max_boxes` is below 1; if
+        the function asks what its arguments are, or makes of balls what it does not of floats.
 
     Examples
     --------
@@ -135,6 +168,7 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     if not tol > 0:  # infinite: the first box will do
         raise ParameterError(f"enclose needs tol > 0, got {tol}")
     integer("enclose", "max_boxes", max_boxes, at_least=1)
+    function = _also_of_floats("enclose", function)
     start = time.perf_counter()
     high, greatest, n, lost = _supremum(function, box, tol, max_boxes)
     low, least, m, missed = _supremum(lambda x: -as_ball(function(x)), box, tol, max_boxes)
@@ -149,6 +183,7 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     )
 
 
+@as_annotated
 def prove(
     function: _Function,
     box: Box,
@@ -182,7 +217,8 @@ def prove(
     ------
     ParameterError
         If it is not a function or not a box, the claim is not low <= high, or `max_boxes` is
-        below 1.
+        below 1; if the function asks what its arguments are, or makes of balls what it does not
+        of floats.
 
     Examples
     --------
@@ -199,6 +235,7 @@ def prove(
     integer("prove", "max_boxes", max_boxes, at_least=1)
     if not low <= high:  # refuses NaN, too
         raise ParameterError(f"prove needs low <= high, got {low} and {high}")
+    function = _also_of_floats("prove", function)
     start, queue, boxes = time.perf_counter(), [box.cell], 0
     undecided, where, value, holds = 0, None, np.nan, True
     while queue and boxes < max_boxes:
@@ -222,6 +259,16 @@ def prove(
     seconds = time.perf_counter() - start
     return Proof(
         holds=holds, boxes=boxes, undecided=undecided, where=where, value=value, seconds=seconds
+    )
+
+
+def _also_of_floats(who: str, function: _Function) -> _Function:
+    """Return a user's function, to be compared with itself on floats."""
+    if is_of_library(function):  # what it calls was compared on its own
+        return function
+    return on_balls(
+        function,
+        lambda why: ParameterError(f"{who} needs a function of numbers, of which it holds: {why}"),
     )
 
 
@@ -291,14 +338,14 @@ def _bounds(function: _Function, cell: Cell) -> tuple[arb, arb, tuple[arb, ...] 
     The gradient is None where the function, having branches there, need not be continuous.
     """
     wide = [_interval(a, b) for a, b in cell]
-    middle = _centre(cell)
+    middle, signs = _centre(cell), [a >= 0 for a, _ in cell]
     points = [arb(m) if np.isfinite(m) else w for m, w in zip(middle, wide, strict=True)]
-    centre = _every_branch(function, points)
+    centre = _every_branch(function, points, signs)
     unit = [tuple(arb(int(i == j)) for i in range(len(cell))) for j in range(len(cell))]
     try:
-        value = as_ball(function(tuple(map(Ball, wide, unit))))
+        value = as_ball(function(tuple(map(Ball, wide, unit, signs))))
     except Undecided:
-        return _every_branch(function, wide), centre, None
+        return _every_branch(function, wide, signs), centre, None
     gradient = value.gradient or (arb(0),) * len(cell)
     mean = centre
     for slope, w, point in zip(gradient, wide, points, strict=True):
@@ -306,9 +353,9 @@ def _bounds(function: _Function, cell: Cell) -> tuple[arb, arb, tuple[arb, ...] 
     return common(value.value, mean), centre, gradient
 
 
-def _every_branch(function: _Function, coordinates: Sequence[arb]) -> arb:
+def _every_branch(function: _Function, coordinates: Sequence[arb], signs: Sequence[bool]) -> arb:
     """Return the hull over every way through the function; NaN if there is no end of them."""
-    balls, hull = tuple(map(Ball, coordinates)), None
+    balls, hull = tuple(Ball(x, (), s) for x, s in zip(coordinates, signs, strict=True)), None
     try:
         for result in every_way(lambda: function(balls)):
             value = as_ball(result).value

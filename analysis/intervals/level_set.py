@@ -2,47 +2,65 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from flint import arb
 
+from nlctl.annotations import as_annotated
+from nlctl.arguments import a_function, of_type
 from nlctl.errors import ParameterError
+from nlctl.wording import counted
 
+from .agreement import on_balls
 from .arithmetic import Ball, as_ball
 from .box import Box
 from .branch_and_bound import Proof, prove
+from .paths import Undecided
+from .rates import Rate, as_rate
 
 __all__ = ["prove_decrease"]
 
 STRICT = 1e-9  # V' < 0 is proved as V' <= -1e-9
+_SAME = 1e-9  # relative: between a gradient that is given and the derivatives of V
+_FACE = 20_000  # boxes on a face of the box
 Scalar = Callable[[tuple[Any, ...]], Any]
 Vector = Callable[[tuple[Any, ...]], Sequence[Any]]
 
 
+@as_annotated
 def prove_decrease(
     V: Scalar,
-    gradient: Vector,
     rhs: Vector,
     box: Box,
     *,
     level: float,
     floor: float,
+    gradient: Vector | None = None,
     max_boxes: int = 100_000,
 ) -> Proof:
-    """Prove or refute V' < 0 where floor <= V <= level, V' being the gradient times the rhs.
+    """Prove or refute V' < 0 where floor <= V <= level, V' being the rate of V along the rhs.
 
+    V' is made of exact derivatives of V itself: a gradient need not be given.  Before it is looked
+    at, V > level is proved on every face of the box, so that no trajectory of the level set leaves
+    it.
     The origin, where V' = 0, must be cut out by `floor`; near it the linearisation decides.
 
     Parameters
     ----------
-    V, gradient, rhs : callable
-        Of the tuple (x1, ..., xn): the function, its gradient, and x'.
+    V, rhs : callable
+        Of the tuple (x1, ..., xn): the function, and x'.  V has to be continuous: write cases as
+        np.minimum, np.maximum or abs.
     box : Box
-        Must hold the level set.
+        Must hold the level set, or the component of it that is meant.  Sides that V does not
+        depend on, with the rate 0, are parameters and disturbances: anything between their ends.
     level, floor : float
         The values of V between which V' < 0 is claimed.
+    gradient : callable, optional
+        Of the same tuple: what is held to be the gradient of V.  It is compared with the
+        derivatives of V on every box, and nothing is proved if it is another function.
     max_boxes : int, optional
         Limit of the branch and bound.
 
@@ -54,8 +72,9 @@ def prove_decrease(
     Raises
     ------
     ParameterError
-        If `gradient` is not that of V at the centre of the box's upper quarter, or not
-        0 < floor < level.
+        If `gradient` is not that of V somewhere in the box; if the box does not hold the level
+        set; if V compares, and so may jump; if a function asks what its arguments are, or makes of
+        balls what it does not of floats; if not 0 < floor < level.
 
     Examples
     --------
@@ -64,35 +83,116 @@ def prove_decrease(
     >>> from analysis.lyapunov import Box, prove_decrease
     >>> proof = prove_decrease(
     ...     lambda x: x[0] ** 2 + x[1] ** 2,
-    ...     lambda x: (2 * x[0], 2 * x[1]),
-    ...     lambda x: (-x[0] + x[1], -x[0] - x[1]),
-    ...     Box(names=("x1", "x2"), low=(-1.0, -1.0), high=(1.0, 1.0)), level=0.9, floor=0.1,
+    ...     rhs=lambda x: (-x[0] + x[1], -x[0] - x[1]),
+    ...     box=Box(names=("x1", "x2"), low=(-1.0, -1.0), high=(1.0, 1.0)), level=0.9, floor=0.1,
     ... )
-    >>> proof.holds
-    True
+    >>> print(proof.status)
+    proved
     """
-    if not 0 < floor < level:
+    of_type("prove_decrease", "box", box, Box, "Box.of(x1=(-1, 1), x2=(-1, 1))")
+    for name, function in (("V", V), ("rhs", rhs), ("gradient", gradient or rhs)):
+        a_function("prove_decrease", name, function)
+    if not 0 < floor < level < np.inf:
         raise ParameterError(f"prove_decrease needs 0 < floor < level, got {floor:g} and {level:g}")
-    _check_gradient(V, gradient, box)
-    high, low = float(level), float(floor)
+    high, low, given = float(level), float(floor), gradient and _compared("gradient", gradient)
+    V, rhs = _compared("V", V), _compared("rhs", rhs)
+    _check_continuous(V, box)
+    fixed = _parameters(V, rhs, box)
+    open_face = _check_faces(V, box, high, [i for i in range(len(fixed)) if not fixed[i]])
+    if open_face is not None:
+        return open_face
 
     def least(x: tuple[Any, ...]) -> Any:
-        V_x = V(x)
-        slope = sum(g * f for g, f in zip(gradient(x), rhs(x), strict=True))
-        return np.minimum(slope + STRICT, np.minimum(high - V_x, V_x - low))
+        rates = rhs(x)
+        if len(rates) != len(box.names):
+            raise ParameterError(f"rhs gives {_of_states(len(rates), 'rate', box)}")
+        if given is not None:
+            _check_gradient(V, given, x, box)
+        V_x = as_rate(V(tuple(map(Rate, map(as_ball, x), map(as_ball, rates)))))
+        return np.minimum(V_x.rate + STRICT, np.minimum(high - V_x.here, V_x.here - low))
 
     # Positive where a point inside the level set has V' > -STRICT, and nowhere else.
     return prove(least, box, high=0.0, max_boxes=max_boxes)
 
 
-def _check_gradient(V: Scalar, gradient: Vector, box: Box) -> None:
+def _compared(name: str, function: Any) -> Any:
+    """Return a function that is compared with itself on floats."""
+    return on_balls(
+        function, lambda why: ParameterError(f"prove_decrease needs {name} of numbers: {why}")
+    )
+
+
+def _of_states(count: int, what: str, box: Box) -> str:
+    return f"{counted(count, what)} for {counted(len(box.names), 'state')}"
+
+
+def _wide(box: Box) -> tuple[Ball, ...]:
+    return tuple(Ball(arb(a).union(arb(b))) for a, b in box.cell)
+
+
+def _check_continuous(V: Scalar, box: Box) -> None:
+    """Refuse V that compares: its pieces need not fit."""
+    try:
+        V(tuple(Rate(x, Ball(arb(0))) for x in _wide(box)))
+    except Undecided as error:
+        raise ParameterError(
+            f"prove_decrease needs a V that is continuous, and cannot see it of cases ({error}): "
+            "write them as np.minimum, np.maximum or abs"
+        ) from None
+
+
+def _parameters(V: Scalar, rhs: Vector, box: Box) -> list[bool]:
+    """Return which sides are parameters: V does not depend on them, and their rates are 0."""
+    n, wide = len(box.names), _wide(box)
+    unit = [tuple(arb(int(i == j)) for i in range(n)) for j in range(n)]
+    inner = tuple(Ball(x.value, row) for x, row in zip(wide, unit, strict=True))
+    slopes = as_ball(V(inner)).gradient or (arb(0),) * n
+    try:
+        rates = [as_ball(rate).value for rate in rhs(wide)]
+    except Undecided:
+        return [False] * n
+    return [bool(s.is_zero() and r.is_zero()) for s, r in zip(slopes, rates, strict=False)]
+
+
+def _check_faces(V: Scalar, box: Box, level: float, sides: Sequence[int]) -> Proof | None:
+    """Prove V > level on faces of a box; return the proof of one that stays open."""
+    if not np.all(np.isfinite(box.cell)):
+        raise ParameterError(f"prove_decrease needs a finite box, got {box}")
+    for i in sides:
+        name = box.names[i]
+        for end in box.cell[i]:
+            ends = (box.low, box.high)
+            low, high = (tuple(end if j == i else a for j, a in enumerate(s)) for s in ends)
+            face = dataclasses.replace(box, low=low, high=high)
+            found = prove(V, face, low=float(np.nextafter(level, np.inf)), max_boxes=_FACE)
+            if found.holds is False:
+                at = ", ".join(f"{k} = {v:.6g}" for k, v in (found.where or {}).items())
+                raise ParameterError(
+                    f"the box does not hold the level set: V = {found.value:.6g} <= {level:g} at "
+                    f"{at}, on its face {name} = {end:g}: take a larger box, or a lower level"
+                )
+            if found.holds is None:
+                return found
+    return None
+
+
+def _check_gradient(V: Scalar, gradient: Vector, x: tuple[Any, ...], box: Box) -> None:
+    """Compare what is given with the derivatives of V: on a box, and at a point without width."""
     n = len(box.names)
-    point = [arb(0.25 * a + 0.75 * b) for a, b in box.cell]
-    unit = np.eye(n, dtype=int)
-    x = tuple(Ball(p, tuple(arb(int(e)) for e in row)) for p, row in zip(point, unit, strict=True))
-    told = [as_ball(g).value for g in gradient(tuple(map(Ball, point)))]
-    for name, true, given in zip(box.names, as_ball(V(x)).gradient, told, strict=True):
-        if not abs(true - given) < 1e-9 * (1 + abs(true)):
-            raise ParameterError(
-                f"gradient gives dV/d{name} = {given} at {point}, the derivative of V is {true}"
-            )
+    unit = [tuple(arb(int(i == j)) for i in range(n)) for j in range(n)]
+    values = [as_ball(one).value for one in x]
+    inner = tuple(map(Ball, values, unit))
+    true = as_ball(V(inner)).gradient or (arb(0),) * n
+    given = [as_ball(g).value for g in gradient(tuple(map(Ball, values)))]
+    if len(given) != n:
+        raise ParameterError(f"gradient gives {_of_states(len(given), 'derivative', box)}")
+    for name, one, other in zip(box.names, true, given, strict=True):
+        if one.is_finite() and other.is_finite():
+            room = _SAME * (1 + float(abs(one).upper()))
+            if not (one + arb(0, room)).overlaps(other):
+                at = ", ".join(
+                    f"{k} = {float(v.mid()):.6g}" for k, v in zip(box.names, values, strict=True)
+                )
+                raise ParameterError(
+                    f"gradient gives dV/d{name} = {other} around {at}, the derivative of V is {one}"
+                )

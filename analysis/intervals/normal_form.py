@@ -17,13 +17,15 @@ from flint import arb, fmpq
 
 from nlctl.expressions.functions import FUNCTIONS
 
-from .arithmetic import Ball, NumPyFunctions, as_ball
+from .arithmetic import Ball, as_ball
+from .numpy_functions import NumPyFunctions
 from .paths import Undecided
 
 __all__ = ["Atom", "Sum", "exact", "indeterminate"]
 
 LARGEST_POWER = 12  # powers up to which a sum is multiplied out
-EVERYWHERE = ("sin", "cos", "tanh", "exp", "arctan", "arcsinh", "absolute", "minimum", "maximum")
+EVERYWHERE = ("sin", "cos", "tanh", "exp", "arctan", "arcsinh", "absolute", "minimum", "maximum",
+              "hypot", "logaddexp", "sinc", "table")  # fmt: skip  # continuous, for all numbers
 
 
 @dataclass(frozen=True)
@@ -36,10 +38,13 @@ class Atom:
         Of the symbol, or of the function.
     arguments : tuple of frozenset
         Monomials of the sums that it is a function of; empty for a symbol.
+    data : tuple
+        Break points and values of a table.
     """
 
     name: str
     arguments: tuple[Monomials, ...] = ()
+    data: tuple[tuple[float, ...], ...] = ()
 
     @property
     def names(self) -> set[str]:
@@ -56,7 +61,9 @@ class Atom:
             return 1 / given[0]
         if self.name == "absolute":
             return abs(given[0])
-        if self.name in ("minimum", "maximum"):
+        if self.name == "table":
+            return given[0].table(*self.data)
+        if len(given) > 1:
             return getattr(given[0], self.name)(given[1])
         return given[0].apply(self.name)
 
@@ -104,6 +111,7 @@ class Sum(NumPyFunctions):
     """
 
     __slots__ = ("partial", "terms")
+    rank = 2
 
     def __init__(
         self, terms: Mapping[Product, Fraction], partial: frozenset[Atom] = frozenset()
@@ -198,8 +206,8 @@ class Sum(NumPyFunctions):
         return as_sum(other) / self
 
     def __pow__(self, n: Any) -> Sum:
-        if n != int(n):
-            return (self.apply("log") * n).apply("exp")
+        if isinstance(n, NumPyFunctions) or n != int(n):
+            return self.pair("power", n)
         if n < 0:
             return 1 / self ** (-n)
         if n > LARGEST_POWER:
@@ -222,11 +230,24 @@ class Sum(NumPyFunctions):
 
     def apply(self, name: str) -> Sum:
         """Return a function of the table that has an enclosure, as an atom."""
-        assert FUNCTIONS[name].enclosure is not None
+        assert name == "sinc" or FUNCTIONS[name].enclosure is not None
         return self._function(name)
 
-    def _function(self, name: str, *others: Sum) -> Sum:
-        atom = Atom(name, tuple(argument.key() for argument in (self, *others)))
+    def pair(self, name: str, other: Any) -> Sum:
+        """Return a function of two arguments, as an atom."""
+        return self._function(name, as_sum(other))
+
+    def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Sum:
+        """Return the linear interpolation of a table, as an atom."""
+        return self._function("table", data=(xp, fp))
+
+    @staticmethod
+    def lifted(number: Any) -> Any:
+        """Return a number as a sum."""
+        return as_sum(number)
+
+    def _function(self, name: str, *others: Sum, data: tuple[Any, ...] = ()) -> Sum:
+        atom = Atom(name, tuple(argument.key() for argument in (self, *others)), data)
         own = frozenset([] if name in EVERYWHERE else [atom])
         partial = own.union(self.partial, *(argument.partial for argument in others))
         return Sum({frozenset([(atom, 1)]): Fraction(1)}, partial)

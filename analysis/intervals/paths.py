@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from nlctl.errors import DiagramError, UsageError
+from flint import arb
 
-__all__ = ["Decisions", "Undecided", "branch", "every_way", "on_balls", "take"]
+__all__ = ["Decisions", "Undecided", "decided", "decided_so_far", "every_way", "take", "undecided"]
 
 BRANCHES = 64  # ways through an equation on one box, beyond which the box is split first
 
@@ -36,6 +36,10 @@ class Decisions:
 
     Attributes
     ----------
+    used : int
+        Comparisons that were answered by decisions, this one or an earlier one.
+    orders : list
+        What answers said of two quantities.
     taken : tuple of bool
         Answers so far; those that were not given beforehand are True.
     given : tuple of bool
@@ -44,12 +48,30 @@ class Decisions:
 
     given: tuple[bool, ...] = ()
     taken: tuple[bool, ...] = ()
+    used: int = 0
+    orders: list[tuple[tuple[Any, Any], set[int]]] = field(default_factory=list, repr=False)
+
+    def known(self, key: tuple[Any, Any]) -> set[int]:
+        """Return the orders of two quantities that earlier answers leave."""
+        for (a, b), orders in self.orders:
+            if a is key[0] and (b is key[1] or _same_number(b, key[1])):
+                return orders
+        return {-1, 0, 1}
+
+    def restrict(self, key: tuple[Any, Any], orders: set[int]) -> None:
+        """Remember what an answer says of the order of two quantities."""
+        self.orders.insert(0, (key, orders))
 
     def next(self) -> bool:
         """Return the next answer and remember it."""
         i = len(self.taken)
         self.taken += (self.given[i] if i < len(self.given) else True,)
         return self.taken[-1]
+
+
+def _same_number(a: Any, b: Any) -> bool:
+    """Whether both are numbers without width, and equal."""
+    return isinstance(a, arb) and isinstance(b, arb) and a.is_exact() and bool(a == b)
 
 
 _DECISIONS: ContextVar[Decisions | None] = ContextVar("decisions", default=None)
@@ -65,14 +87,49 @@ def take(decisions: Decisions) -> Iterator[Decisions]:
         _DECISIONS.reset(token)
 
 
-def branch(yes: bool, no: bool, what: str) -> bool:
-    """Return the outcome of a comparison that is certain, or see `Undecided`."""
-    if yes or no:
-        return yes
+@contextmanager
+def undecided() -> Iterator[None]:
+    """Answer nothing: a comparison that balls cannot decide raises, whoever follows branches."""
+    token = _DECISIONS.set(None)
+    try:
+        yield
+    finally:
+        _DECISIONS.reset(token)
+
+
+def decided(possible: set[int], holds: frozenset[int], key: tuple[Any, Any], what: str) -> bool:
+    """Return whether the order of two quantities is one of `holds`; or see `Undecided`.
+
+    Parameters
+    ----------
+    possible, holds : set of {-1, 0, 1}
+        Orders that are possible, below, equal and above, and those that are asked for.
+    key : tuple
+        The quantities: what was answered of them before restricts what is possible.
+    what : str
+        For the message.
+    """
     decisions = _DECISIONS.get()
+    if decisions is not None:
+        known = decisions.known(key)
+        decisions.used += not possible <= known
+        possible = possible & known
+    if possible <= holds:
+        return True
+    if not possible & holds:
+        return False
     if decisions is None:
         raise Undecided(f"{what} is true for some points of the box and false for others")
-    return decisions.next()
+    decisions.used += 1
+    yes = decisions.next()
+    decisions.restrict(key, possible & holds if yes else possible - holds)
+    return yes
+
+
+def decided_so_far() -> int | None:
+    """Return how many comparisons were answered by decisions so far; None without any."""
+    decisions = _DECISIONS.get()
+    return None if decisions is None else decisions.used
 
 
 def every_way(call: Callable[[], Any]) -> Iterator[Any]:
@@ -95,33 +152,3 @@ def every_way(call: Callable[[], Any]) -> Iterator[Any]:
         scripts += [taken[:i] + (False,) for i in range(len(given), len(taken))]
         if count + len(scripts) > BRANCHES:
             raise Undecided(f"more than {BRANCHES} ways through an equation")
-
-
-def on_balls(
-    function: Callable[..., Any], refusal: Callable[[str], UsageError]
-) -> Callable[..., Any]:
-    """Return a function of a user's for balls: where it fails on them, `refusal` says so.
-
-    Parameters
-    ----------
-    function : callable
-    refusal : callable
-        Takes what has gone wrong, and returns the error to be raised.
-
-    Raises
-    ------
-    Undecided
-        When the function that is returned compares balls that decide nothing.
-    UsageError
-        The refusal, when it fails otherwise.
-    """
-
-    def called(*arguments: Any) -> Any:
-        try:
-            return function(*arguments)
-        except (Undecided, DiagramError):
-            raise
-        except Exception as error:  # a user's function may raise whatever it likes
-            raise refusal(f"{type(error).__name__}: {error}") from error
-
-    return called

@@ -13,7 +13,9 @@ from flint import arb
 
 from nlctl.expressions.functions import FUNCTIONS
 
-from .arithmetic import Ball, NumPyFunctions, as_ball, common
+from .arithmetic import Ball, as_ball, common
+from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table
+from .pairs import FUNCTIONS_OF_TWO
 from .paths import Undecided
 
 __all__ = ["Slope", "slope_in"]
@@ -23,6 +25,7 @@ class Slope(NumPyFunctions):
     """A quantity q of an equation: q(v), q(0) and (q(v) - q(0)) / v, each a `Ball`."""
 
     __slots__ = ("base", "here", "quotient")
+    rank = 1
 
     def __init__(self, here: Ball, base: Ball, quotient: Ball) -> None:
         self.here = here
@@ -63,7 +66,10 @@ class Slope(NumPyFunctions):
         elif self.is_constant:
             quotient = self.base * other.quotient
         else:
-            quotient = self.here * other.quotient + other.base * self.quotient
+            quotient = _both(
+                self.here * other.quotient + other.base * self.quotient,
+                other.here * self.quotient + self.base * other.quotient,
+            )
         return Slope(self.here * other.here, self.base * other.base, quotient)
 
     __rmul__ = __mul__
@@ -80,9 +86,9 @@ class Slope(NumPyFunctions):
         other = _as_slope(other)
         return other if other is NotImplemented else other / self
 
-    def __pow__(self, n: Any) -> Slope:
-        if n != int(n):
-            return (self.apply("log") * n).apply("exp")
+    def __pow__(self, n: Any) -> Any:
+        if isinstance(n, NumPyFunctions) or n != int(n):
+            return self.pair("power", n)
         if n < 0:
             return 1 / self**-n
         result = _as_slope(1)
@@ -101,8 +107,39 @@ class Slope(NumPyFunctions):
         """Larger one, where that is decided."""
         return self if self >= other else other
 
+    def pair(self, name: str, other: Any) -> Any:
+        """Return phi of this and another quantity for the NumPy function of that name.
+
+        By the mean value theorem: the derivatives are those between v and 0.
+        """
+        other = _as_slope(other)
+        if other is NotImplemented:
+            return other
+        here, base = self.here.pair(name, other.here), self.base.pair(name, other.base)
+        between = [a.here.value.union(a.base.value) for a in (self, other)]
+        _, by_self, by_other = FUNCTIONS_OF_TWO[name](*between)
+        quotient = Ball(arb(0))
+        for one, slope in ((self, by_self), (other, by_other)):
+            if not one.is_constant:
+                quotient = quotient + one.quotient * _unknown_slope(slope, one.quotient)
+        return Slope(here, base, quotient)
+
+    def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Slope:
+        """Return the linear interpolation of a table."""
+        here, base = self.here.table(xp, fp), self.base.table(xp, fp)
+        _, slope = enclosed_table(self.here.value.union(self.base.value), xp, fp)
+        return Slope(here, base, self.quotient * _unknown_slope(slope, self.quotient))
+
+    @staticmethod
+    def lifted(number: Any) -> Any:
+        """Return a number as a quantity that does not depend on v."""
+        return _as_slope(number)
+
     def apply(self, name: str) -> Slope:
         """Return phi of the quantity for the NumPy function of that name."""
+        if self.is_constant:
+            base = self.base.apply(name)
+            return Slope(base, base, Ball(arb(0)))
         here, base = self.here.apply(name), self.base.apply(name)
         secant = _secant(name, self.here, self.base, here, base)
         return Slope(here, base, secant * self.quotient)
@@ -151,6 +188,8 @@ def _secant(name: str, a: Ball, b: Ball, at_a: Ball, at_b: Ball) -> Ball:
     respect to a and b lie in phi''(hull) / 2.  Where a - b has no zero the quotient itself is
     an enclosure as well.
     """
+    if name in JUMPS or name == "sinc":
+        return _secant_of_jump(name, a, b, at_a, at_b)
     mean = as_ball(FUNCTIONS[name].derivative[0](Ball(a.value.union(b.value), (arb(1),))))
     half = (mean.gradient[0] if mean.gradient else arb(0)) / 2
     enclosure = (a + b).chain(mean.value, half)
@@ -158,8 +197,30 @@ def _secant(name: str, a: Ball, b: Ball, at_a: Ball, at_b: Ball) -> Ball:
     if distance.value.contains(0):
         return enclosure
     quotient = (at_a - at_b) / distance
-    pairs = zip(enclosure.gradient, quotient.gradient, strict=True)
-    return Ball(common(enclosure.value, quotient.value), tuple(common(g, h) for g, h in pairs))
+    return _both(enclosure, quotient)
+
+
+def _both(one: Ball, other: Ball) -> Ball:
+    """Return what two enclosures of one quantity have in common."""
+    pairs = zip(one.gradient, other.gradient, strict=False)
+    gradient = tuple(common(g, h) for g, h in pairs) or one.gradient or other.gradient
+    return Ball(common(one.value, other.value), gradient)
+
+
+def _secant_of_jump(name: str, a: Ball, b: Ball, at_a: Ball, at_b: Ball) -> Ball:
+    """Return (phi(a) - phi(b)) / (a - b) without a second derivative, or where phi may jump."""
+    over = Ball(a.value.union(b.value), (arb(1),)).apply(name)
+    mean, distance = over.gradient[0], a - b
+    if not distance.value.contains(0):
+        mean = common(mean, ((at_a - at_b) / distance).value)
+    return _unknown_slope(mean, distance)
+
+
+def _unknown_slope(value: arb, like: Ball) -> Ball:
+    """Return a factor whose own derivatives are not known."""
+    if value.is_exact():
+        return Ball(value)
+    return Ball(value, (arb(0, "inf"),) * len(like.gradient))
 
 
 def slope_in(function: Any, v: Any) -> Ball:

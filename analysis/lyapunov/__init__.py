@@ -3,11 +3,13 @@
 from ..intervals.box import Box, visited_box
 from ..intervals.branch_and_bound import Proof, Range, enclose, prove
 from ..intervals.level_set import prove_decrease
+from .bounds.clipped import clipped_split
 from .bounds.constants import constants, disturbance, kappa
-from .bounds.decomposition import Decomposition, DecompositionError, clipped_split, decompose
+from .bounds.decomposition import Decomposition, DecompositionError, decompose
 from .bounds.premises import Premises, literal, premises
 from .bounds.provenance import Constant, Constants
 from .bounds.sector import Sector, sector
+from .bounds.starts import Starts
 from .bounds.weights import approximation_error, minimax_weights, tightest_weights
 from .certificate.certify import certify
 from .certificate.gains import GainDesign, design
@@ -23,12 +25,14 @@ from .loop.integral import NussbaumIntegral, sharpest
 from .loop.roles import Parts, read_parts
 from .loop.signals import Margin, Signals, signals_of
 from .model_reference.model_certificate import ModelReferenceCertificate
+from .nussbaum.aftermath import Aftermath, aftermath
 from .nussbaum.energy import Drift, drift, drift_margin, safe_horizon
 from .nussbaum.property import nussbaum_property
 from .nussbaum.slow_drift import SlowDrift, burst_peak, slow_drift
 from .tighten import Tightened, tighten
 
 __all__ = [
+    "Aftermath",
     "Box",
     "Certificate",
     "Conservatism",
@@ -53,7 +57,9 @@ __all__ = [
     "Signals",
     "SlidingModeCertificate",
     "SlowDrift",
+    "Starts",
     "Tightened",
+    "aftermath",
     "approximation_error",
     "burst_peak",
     "certify",

@@ -1,23 +1,16 @@
-"""What the paper concludes by Lemma 1, what of it is true, and whether the compact set closes."""
+"""What the paper concludes by Lemma 1, and what of it is true."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import control as ct
 import numpy as np
-from flint import arb
 
-from nlctl.diagrams import leaves
 from nlctl.errors import ParameterError
-from nlctl.params import equation_arguments
-from nlctl.plants import coordinate_names
-from nlctl.references import SumOfSines
 from nlctl.wording import counted
 
-from .bounds.error_bounds import error_bounds, reference_bounds
 from .bounds.premises import Premises, premises
 from .bounds.provenance import Constants
+from .closure import closure
 from .inequalities import terms
 from .lines import Line
 from .loop.simulation import MemberRun
@@ -25,7 +18,7 @@ from .nussbaum.energy import drift, drift_margin, safe_horizon
 from .nussbaum.property import antiderivative, lobe_around, nussbaum_property
 from .nussbaum.slow_drift import SlowDrift, slow_drift
 
-__all__ = ["closure", "conclusions", "slow_drift_of"]
+__all__ = ["conclusions", "slow_drift_of"]
 
 SAFE = "zeta cannot cross its lobe before T"
 _WINDOW = 4 * np.pi  # s; period of the paper's reference
@@ -71,7 +64,7 @@ def conclusions(loop: ct.InterconnectedSystem, run: MemberRun, found: Constants)
     lines = [_property(given), _lemma(), *_bounded(run, given)]
     if np.isfinite(run.signals["zeta"]).all():
         lines += [*_remains(run, given, found), _slow_drift_line(run)]
-    return [*lines, closure(loop, run, found, given)]
+    return [*lines, closure(loop, run, found)]
 
 
 def _property(given: Premises) -> Line:
@@ -203,42 +196,4 @@ def _slow_drift_line(run: MemberRun) -> Line:
         time=found.time,
         evidence=f"{found.verdict}: {100 * found.share:.3g} % of the budget spent, "
         f"{found.recent.mean():.3g} per s" + ("" if calm else soon),
-    )
-
-
-def closure(
-    loop: ct.InterconnectedSystem, run: MemberRun, found: Constants, given: Premises
-) -> Line:
-    """Return the line that tells whether |r| <= C_0 keeps the state in the box."""
-    statement, key = "|r| <= C_0 keeps x in the box that C_0 was computed on", "closure"
-    path = run.parts.paths["reference"]
-    spec: Any = next(
-        getattr(x.system, "current_spec", None) for x in leaves(loop) if x.path == path
-    )
-    s, names = run.signals, coordinate_names(len(given.lambdas) + 1)
-    C_0 = given.C_0(float(terms(s, given).V[0]), float(np.max(s["I"])))
-    if not isinstance(spec, SumOfSines) or not np.isfinite(C_0):
-        why = "C_0 is infinite" if not np.isfinite(C_0) else "no bound of the reference is known"
-        return Line(key=key, statement=statement, status="undecided", evidence=why)
-    yd = spec.output(float(s.t[0]), (), (), equation_arguments(spec))
-    e0 = [arb(float(s[x][0])) - arb(float(y), 1e-12) for x, y in zip(names, yd, strict=False)]
-    try:
-        errors = error_bounds(given.lambdas, e0, arb(C_0))
-    except ParameterError as error:
-        return Line(key=key, statement=statement, status="undecided", evidence=str(error))
-    reach = [float(e.upper()) + y for e, y in zip(errors, reference_bounds(spec), strict=False)]
-    sides = [found.box[x] for x in names]
-    room = min(min(high, -low) - a for (low, high), a in zip(sides, reach, strict=True))
-    told = ", ".join(f"|{x}| <= {a:.4g}" for x, a in zip(names, reach, strict=True))
-    return Line(
-        key=key,
-        statement=statement,
-        status="computed" if room >= 0 else "violated",
-        least=room,
-        evidence=f"C_0 = {C_0:.5g} gives {told}",
-        follows=""
-        if room >= 0
-        else "that x stays in Omega, which (19) needs, is supposed and not "
-        "shown: (36) holds only as far as the runs were seen in the box.",
-        reading="paper",
     )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.functions import smooth_sign
 
 from ..metrics import over, peak
@@ -18,7 +19,7 @@ from .bounds.provenance import Constants
 from .bounds.weights import Network, tightest_weights
 from .examination import Examination, examine
 from .inequalities import terms
-from .loop.signals import Signals
+from .loop.signals import Signals, peak_by_rates
 from .nussbaum.property import root
 
 if TYPE_CHECKING:
@@ -152,10 +153,14 @@ class Conservatism:
             f"comparison on [{c.start:g}, {c.end:g}] s: |r| <= {c.bound:.5g}, {c.ratio:.4g} times"
             for c in self.comparisons
         ]
-        lines.append(f"|e_1| <= {self.e_1:.5g} in the end, for {self.tail_max_e_1:.5g}")
+        lines.append(
+            f"second half: max |r| / lambda = {self.e_1:.5g}, a bound of limsup |e_1| if r goes on "
+            f"like that, and max |e_1| = {self.tail_max_e_1:.5g}"
+        )
         return "\n".join(lines)
 
 
+@as_annotated
 def conservatism(
     loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **settings: Any
 ) -> Conservatism:
@@ -204,7 +209,7 @@ def conservatism(
     starts = [a for a in (s.t[0] + 1.0, half) if a < ends]
     return Conservatism(
         C_0=C_0,
-        max_r=peak(s.t, s["r"]),
+        max_r=peak_by_rates(s.t, x.r, x.r_rate),
         ultimate=given.C_0(0.0, Q),
         tail_max_r=peak(late, r),
         shares=_shares(given, float(x.r[0]), Q),
@@ -272,6 +277,7 @@ def _fitted(s: Signals, given: Premises, Q: float) -> float:
     return _bound_with(given, float(np.max(np.abs(target - psi @ W))), W, Q)
 
 
+@as_annotated
 def comparison(signals: Signals, given: Premises, start: float, end: float) -> DirectBound:
     """Bound |r| on an interval by comparison, from the signals along a run.
 

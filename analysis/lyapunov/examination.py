@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native
+from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, one_of
 
 from ..intervals.box import Box, visited_box
@@ -83,6 +84,7 @@ class Examination:
     constants: Constants
 
 
+@as_annotated
 def examine(
     loop: ct.InterconnectedSystem,
     run: Any = 20.0,

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.functions import smooth_sign
 from nlctl.plants import coordinate_names
 
@@ -116,6 +117,7 @@ def terms(signals: Signals, given: Premises) -> Terms:
     )
 
 
+@as_annotated
 def inequalities(signals: Signals, given: Premises) -> tuple[Margin, ...]:
     """Evaluate every numbered step of the proof along a response.
 

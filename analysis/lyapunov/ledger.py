@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import UnknownKeywordError
 from nlctl.host.notebook import table_html
 from nlctl.names import unknown
@@ -18,11 +19,14 @@ from nlctl.wording import counted
 
 from ..json_values import as_json
 from ..loop_record import loop_facts
-from ..metrics import peak
+from .bounds.premises import premises
 from .bounds.provenance import Constants
 from .conclusions import conclusions, slow_drift_of
 from .examination import U_MAX, Examination, examine
+from .inequalities import terms
 from .lines import Line, assumption_lines, decay_line, inequality_lines, run_line
+from .loop.signals import peak_by_rates
+from .loop.simulation import MemberRun
 from .nussbaum.slow_drift import SlowDrift
 
 if TYPE_CHECKING:
@@ -161,6 +165,7 @@ class Ledger:
         return "\n".join(rows)
 
 
+@as_annotated
 def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **settings: Any) -> Ledger:
     """Check the proof's assumptions and inequalities for a loop, line by line.
 
@@ -193,7 +198,7 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
     >>> found = examine(nlctl.paper.example_1(controller=controller), 0.2)
     >>> book = ledger(found)
     >>> status = {line.key: line.status for line in book.lines}
-    >>> status["A2"], status["(31)"], status["(31) literal"]
+    >>> status["A2"], status["(31)"], status["Lemma 1"]
     ('proved', 'checked', 'violated')
     >>> found.constants["d*"] < 5.3  # of q cos(w t) and 0.1 |x|^2 sin t
     True
@@ -223,7 +228,7 @@ def _assembled(study: Examination) -> Ledger:
             own = dataclasses.replace(line, member=number, replay=run.member.options)
             merged[line.key] = own.worse_of(merged.get(line.key))
         Q = float(np.maximum(Q, np.max(run.signals["I"])))
-        max_r = float(np.maximum(max_r, peak(run.signals.t, run.signals["r"])))
+        max_r = float(np.maximum(max_r, _largest_r(run, found)))
         horizon, count = max(horizon, float(run.signals.t[-1])), count + 1
     lines = tuple(dataclasses.replace(line, runs=count) for line in merged.values())
     return Ledger(
@@ -237,3 +242,8 @@ def _assembled(study: Examination) -> Ledger:
         max_r=max_r,
         slow_drift=slow_drift_of(study.runs.first),
     )
+
+
+def _largest_r(run: MemberRun, found: Constants) -> float:
+    x = terms(run.signals, premises(found, run.gains))
+    return peak_by_rates(run.signals.t, x.r, x.r_rate)

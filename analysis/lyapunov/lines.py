@@ -13,7 +13,7 @@ from nlctl.wording import counted
 from .assumptions import assumptions
 from .bounds.constants import kappa
 from .bounds.final_bound import alpha_1
-from .bounds.premises import literal, premises
+from .bounds.premises import Premises, forcing_bound, literal, premises
 from .bounds.provenance import Constants, Provenance
 from .inequalities import inequalities
 from .loop.declared_terms import update_is_declared
@@ -50,7 +50,7 @@ FOLLOWS = {
     "(31)": "V need not decay: (32), (34), (36) do not follow.",
 }
 NEXT = "the steps that build on it do not follow along this run."
-LITERAL = "(18)", "(20)", "(22)", "(30)", "(31)", "(32)", "(36)"
+LITERAL = "A2", "(10)", "(18)", "(20)", "(22)", "(30)", "(31)", "(32)", "(36)"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,26 +217,33 @@ def inequality_lines(run: MemberRun, found: Constants) -> list[Line]:
         for margin in margins
     ]
     lines = [_beyond_samples(line) for line in lines]
+    return [*lines, *_literal_lines(run, found, given)]
+
+
+def _literal_lines(run: MemberRun, found: Constants, given: Premises) -> list[Line]:
+    """Return the lines that q cos(w t) enters, with it in g as the paper has it."""
     printed = literal(given, found, run.parts.plant)
     if printed is None:
-        return lines
-    for margin in inequalities(run.signals, printed):
-        if margin.equation in LITERAL:
-            samples = counted(margin.t.size, "sample")
-            broken = f"{100 * margin.share_violated:.3g} % of {samples} violate it"
-            line = _line(margin, run.signals, "checked", broken)
-            why = (
-                "q cos(w t) is not a function of x; counted to d instead, the corrected line holds."
+        return []
+    premised = [*assumptions(run.signals, printed, found.box, np.inf)]
+    lines = []
+    for margin in (*premised, *inequalities(run.signals, printed)):
+        if margin.equation not in LITERAL:
+            continue
+        samples = counted(margin.t.size, "sample")
+        told = f"{100 * margin.share_violated:.3g} % of {samples} violate it"
+        if margin.equation == "(10)":
+            told += f"; no network of x has an eps* below {forcing_bound(found.parts.plant):.4g}"
+        line = _line(margin, run.signals, "checked", told)
+        premise = f"d* = {printed.d:.4g}, eps* = {printed.eps:.4g}"
+        lines.append(
+            dataclasses.replace(
+                line,
+                key=f"{line.key} literal",
+                statement=f"{line.statement}, q cos(w t) in g, {premise}",
+                reading="paper",
             )
-            lines.append(
-                dataclasses.replace(
-                    line,
-                    key=f"{line.key} literal",
-                    statement=f"{line.statement}, q cos(w t) in g, d* = {printed.d:.4g}",
-                    follows=why if line.status == "violated" else "",
-                    reading="paper",
-                )
-            )
+        )
     return lines
 
 

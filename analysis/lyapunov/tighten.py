@@ -11,6 +11,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from nlctl import native
+from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number
 from nlctl.errors import DivergedError, ParameterError
 from nlctl.names import unknown
@@ -128,6 +129,7 @@ class _Search:
     max_steps: int
 
 
+@as_annotated
 def tighten(
     loop: ct.InterconnectedSystem,
     *,

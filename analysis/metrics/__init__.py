@@ -1,5 +1,6 @@
 """Numbers of a response: one function, one number, with unit and meaning."""
 
+from .breaks import breaks_of, with_breaks
 from .extremes import final, highest, lowest, peak, spread, ultimate_bound, vertex
 from .functionals import in_machine_code
 from .integrals import (
@@ -16,6 +17,7 @@ from .travel import reversals, settling_time, time_within, total_variation
 __all__ = [
     "Metric",
     "absolute_integral",
+    "breaks_of",
     "consecutive_differences",
     "final",
     "highest",
@@ -35,4 +37,5 @@ __all__ = [
     "tracking_metrics",
     "ultimate_bound",
     "vertex",
+    "with_breaks",
 ]

@@ -1,13 +1,15 @@
-"""Largest and smallest values of a signal, between samples by a parabola.
+"""Largest and smallest values of a signal, between samples by a curve where they support one.
 
-A signal with NaN has the number NaN, or one that is not a finite number.
+`curves` says where that is, and what `breaks` are: the times (s) of kinks and jumps, such as those
+of the events of a run.  A signal with NaN has the number NaN, or one that is not a finite number.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from nlctl.equations import equation
+from .curves import limits_at_breaks, turning_points
+from .samples import of_samples
 
 __all__ = [
     "final",
@@ -20,8 +22,8 @@ __all__ = [
 ]
 
 
-@equation
-def vertex(h_before, h_after, before, here, after):
+@of_samples
+def vertex(h_before: float, h_after: float, before: float, here: float, after: float):
     """Return where the parabola through three samples has its vertex, and its value there.
 
     Parameters
@@ -51,11 +53,13 @@ def vertex(h_before, h_after, before, here, after):
     return offset, here + slope * offset / 2
 
 
-@equation
-def highest(t, y):
-    """Largest value of y, between samples by the parabola through the largest and its neighbours.
+@of_samples
+def highest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
+    """Largest value of y, between samples by a curve where y is smooth there.
 
-    Its error is of third order in the sampling interval for smooth y (fourth on uniform samples).
+    The curve goes through up to nine samples around each of the largest ones; where these show that
+    y is not smooth, such as behind a saturation, and of fewer than four, the sample counts.  The
+    error is of eighth order in the sampling interval for smooth y, of second order otherwise.
 
     Parameters
     ----------
@@ -63,6 +67,8 @@ def highest(t, y):
         Sample times (s), increasing.
     y : ndarray, shape (n,)
         Samples.
+    breaks : ndarray, shape (m,), optional
+        Increasing times (s) at which y may jump or bend.  The limits there count as values.
 
     Returns
     -------
@@ -71,26 +77,30 @@ def highest(t, y):
 
     Examples
     --------
-    The parabola between samples is found exactly:
+    A parabola's vertex is found exactly, a clipped one has the limit as its largest value:
 
     >>> import numpy as np
     >>> from analysis.metrics import highest
-    >>> t = np.array([-1.0, 0.0, 1.0])
-    >>> highest(t, 1 - (t - 0.25) ** 2)
-    1.0
+    >>> t = np.linspace(-1.0, 1.0, 9)
+    >>> y = 1 - (t - 0.1) ** 2
+    >>> round(highest(t, y), 9), highest(t, np.minimum(y, 0.9))
+    (1.0, 0.9)
     """
-    if not np.all(np.isfinite(y)):
-        top = np.max(y)  # NaN and inf stay what they are, -inf is no calm maximum of the rest
+    top = np.max(y)
+    if not np.all(np.isfinite(y)):  # NaN and inf stay, -inf is no calm maximum of the rest
         return np.nan if np.isfinite(top) else float(top)
-    i = int(np.argmax(y))
-    if i == 0 or i == y.size - 1 or y[i - 1] + y[i + 1] == 2 * y[i]:
-        return float(y[i])
-    top = vertex(t[i] - t[i - 1], t[i + 1] - t[i], y[i - 1], y[i], y[i + 1])[1]
-    return float(top) if top > y[i] else float(y[i])  # rounding may have lost a flat parabola
+    breaks = t[:0] if breaks is None else np.asarray(breaks)
+    _, _, values = turning_points(t, y, breaks)
+    if values.size:
+        top = max(top, np.max(values))
+    _, values = limits_at_breaks(t, y, breaks)
+    if values.size:
+        top = max(top, np.max(values))
+    return float(top)
 
 
-@equation
-def lowest(t, y):
+@of_samples
+def lowest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     """Smallest value of y, see `highest`.
 
     Parameters
@@ -99,6 +109,8 @@ def lowest(t, y):
         Sample times (s), increasing.
     y : ndarray, shape (n,)
         Samples.
+    breaks : ndarray, shape (m,), optional
+        Increasing times (s) at which y may jump or bend.  The limits there count as values.
 
     Returns
     -------
@@ -109,15 +121,15 @@ def lowest(t, y):
     --------
     >>> import numpy as np
     >>> from analysis.metrics import lowest
-    >>> t = np.array([-1.0, 0.0, 1.0])
-    >>> lowest(t, (t - 0.25) ** 2 - 1)
+    >>> t = np.linspace(-1.0, 1.0, 9)
+    >>> round(lowest(t, (t - 0.1) ** 2 - 1), 9)
     -1.0
     """
-    return -highest(t, -y)
+    return -highest(t, -y, breaks)
 
 
-@equation
-def spread(t, y):
+@of_samples
+def spread(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     """Range of y, `highest` less `lowest`.
 
     Parameters
@@ -126,6 +138,8 @@ def spread(t, y):
         Sample times (s), increasing.
     y : ndarray, shape (n,)
         Samples.
+    breaks : ndarray, shape (m,), optional
+        Increasing times (s) at which y may jump or bend.  The limits there count as values.
 
     Returns
     -------
@@ -140,11 +154,11 @@ def spread(t, y):
     >>> round(spread(t, 3 * np.sin(t)), 6)
     6.0
     """
-    return highest(t, y) + highest(t, -y)
+    return highest(t, y, breaks) + highest(t, -y, breaks)
 
 
-@equation
-def peak(t, y):
+@of_samples
+def peak(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     """Largest magnitude max |y|, see `highest`.
 
     Parameters
@@ -153,6 +167,8 @@ def peak(t, y):
         Sample times (s), increasing.
     y : ndarray, shape (n,)
         Samples.
+    breaks : ndarray, shape (m,), optional
+        Increasing times (s) at which y may jump or bend.  The limits there count as values.
 
     Returns
     -------
@@ -166,11 +182,13 @@ def peak(t, y):
     >>> peak(np.array([0.0, 1.0, 2.0]), np.array([-3.0, 1.0, 1.0]))
     3.0
     """
-    return float(np.maximum(highest(t, y), highest(t, -y)))
+    return float(np.maximum(highest(t, y, breaks), highest(t, -y, breaks)))
 
 
-@equation
-def ultimate_bound(t, y, share=0.25):
+@of_samples
+def ultimate_bound(
+    t: np.ndarray, y: np.ndarray, share: float = 0.25, breaks: np.ndarray | None = None
+):
     """Largest magnitude in the last `share` of the time: what is left when transients are over.
 
     A number of this response, not a bound for all time.
@@ -183,6 +201,8 @@ def ultimate_bound(t, y, share=0.25):
         Samples.
     share : float, optional
         Part of the time that counts as late, in (0, 1].
+    breaks : ndarray, shape (m,), optional
+        Increasing times (s) at which y may jump or bend.  The limits there count as values.
 
     Returns
     -------
@@ -198,11 +218,11 @@ def ultimate_bound(t, y, share=0.25):
     0.049787 0.049787
     """
     late = t >= t[-1] - share * (t[-1] - t[0])
-    return peak(t[late], y[late])
+    return peak(t[late], y[late], breaks)
 
 
-@equation
-def final(t, y):
+@of_samples
+def final(t: np.ndarray, y: np.ndarray):
     """Value at the last sample.
 
     Parameters

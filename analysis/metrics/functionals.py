@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 from collections.abc import Callable
 from typing import Any
 
@@ -48,4 +49,4 @@ def in_machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @functools.cache
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    return kept(nogil=True, error_model="numpy")(function)
+    return kept(nogil=True, error_model="numpy")(inspect.unwrap(function))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nlctl.equations import equation
+from .samples import of_samples
 
 __all__ = [
     "absolute_integral",
@@ -16,8 +16,8 @@ __all__ = [
 ]
 
 
-@equation
-def consecutive_differences(y):
+@of_samples
+def consecutive_differences(y: np.ndarray):
     """Return y_{i+1} - y_i, as `numpy.diff` does, which takes seconds to compile.
 
     Parameters
@@ -40,8 +40,8 @@ def consecutive_differences(y):
     return y[1:] - y[:-1]
 
 
-@equation
-def integral(t, y):
+@of_samples
+def integral(t: np.ndarray, y: np.ndarray):
     """Integral of y by the composite Simpson rule on any samples, exact for parabolas.
 
     Of an odd number of intervals the last takes the parabola through the last three samples, as
@@ -83,8 +83,8 @@ def integral(t, y):
     return float(total)
 
 
-@equation
-def rms(t, y):
+@of_samples
+def rms(t: np.ndarray, y: np.ndarray):
     """Root mean square over time.
 
     Parameters
@@ -110,8 +110,8 @@ def rms(t, y):
     return float(np.sqrt(integral(t, y * y) / (t[-1] - t[0])))
 
 
-@equation
-def absolute_integral(t, y):
+@of_samples
+def absolute_integral(t: np.ndarray, y: np.ndarray):
     """Integral of |y| (IAE of an error); of second order where y changes sign.
 
     Parameters
@@ -137,8 +137,8 @@ def absolute_integral(t, y):
     return integral(t, np.abs(y))
 
 
-@equation
-def square_integral(t, y):
+@of_samples
+def square_integral(t: np.ndarray, y: np.ndarray):
     """Integral of y^2: ISE of an error, energy of an input.
 
     Parameters
@@ -164,8 +164,8 @@ def square_integral(t, y):
     return integral(t, y * y)
 
 
-@equation
-def time_weighted_integral(t, y):
+@of_samples
+def time_weighted_integral(t: np.ndarray, y: np.ndarray):
     """Integral of (t - t_0) |y| (ITAE of an error), time counted from the first sample t_0.
 
     Parameters

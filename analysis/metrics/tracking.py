@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, number, text
 from nlctl.errors import ParameterError
 
@@ -16,6 +17,7 @@ from . import extremes, integrals, travel
 __all__ = ["Metric", "over", "tracking_metrics"]
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Metric:
     """A named number of one signal.
@@ -70,6 +72,7 @@ class Metric:
         return (self.signal,)
 
 
+@as_annotated
 def over(t: np.ndarray, y: np.ndarray, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the samples with start <= t <= end.
 
@@ -107,6 +110,7 @@ def over(t: np.ndarray, y: np.ndarray, start: float, end: float) -> tuple[np.nda
     return t[inside], y[inside]
 
 
+@as_annotated
 def tracking_metrics(
     *,
     start: float,

@@ -1,12 +1,16 @@
-"""How far, how often and for how long a signal moves, by straight lines between samples."""
+"""How far, how often and for how long a signal moves, by straight lines between samples.
+
+With `breaks`, the times (s) of kinks and jumps, it moves as `curves.path` does: on curves between
+them, and at once where it jumps.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from nlctl.equations import equation
-
+from .curves import path
 from .integrals import consecutive_differences
+from .samples import of_samples
 
 __all__ = [
     "reversals",
@@ -16,8 +20,8 @@ __all__ = [
 ]
 
 
-@equation
-def total_variation(t, y):
+@of_samples
+def total_variation(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     """Sum of |y_{i+1} - y_i|, the way that y travels; between samples it is a lower bound.
 
     Parameters
@@ -26,6 +30,8 @@ def total_variation(t, y):
         Sample times (s), increasing.
     y : ndarray, shape (n,)
         Samples.
+    breaks : ndarray, shape (m,), optional
+        Increasing times (s) at which y may jump or bend.
 
     Returns
     -------
@@ -39,11 +45,13 @@ def total_variation(t, y):
     >>> total_variation(np.arange(4.0), np.array([0.0, 2.0, 1.0, 1.0]))
     3.0
     """
+    if breaks is not None and np.all(np.isfinite(y)):
+        t, y = path(t, y, np.asarray(breaks))
     return float(np.sum(np.abs(consecutive_differences(y))))
 
 
-@equation
-def settling_time(t, y, band):
+@of_samples
+def settling_time(t: np.ndarray, y: np.ndarray, band: float, breaks: np.ndarray | None = None):
     """Time after the first sample from which on |y| <= band, by a line between samples.
 
     Infinite where the last sample lies outside: the response has not settled.
@@ -56,6 +64,8 @@ def settling_time(t, y, band):
         Samples.
     band : float
         Largest |y| that counts as settled, in the unit of y.
+    breaks : ndarray, shape (m,), optional
+        Increasing times (s) at which y may jump or bend.
 
     Returns
     -------
@@ -73,6 +83,8 @@ def settling_time(t, y, band):
     """
     if not np.all(np.isfinite(y)):
         return np.nan
+    if breaks is not None:
+        t, y = path(t, y, np.asarray(breaks))
     outside = np.nonzero(np.abs(y) > band)[0]
     if outside.size == 0:
         return 0.0
@@ -83,8 +95,10 @@ def settling_time(t, y, band):
     return float(t[i] - t[0] + (t[i + 1] - t[i]) * (edge - y[i]) / (y[i + 1] - y[i]))
 
 
-@equation
-def time_within(t, y, lower, upper):
+@of_samples
+def time_within(
+    t: np.ndarray, y: np.ndarray, lower: float, upper: float, breaks: np.ndarray | None = None
+):
     """Time (s) that y spends in [lower, upper], by lines between samples.
 
     With the break points of a dead zone it is the time in which its input has no effect; the same
@@ -98,6 +112,8 @@ def time_within(t, y, lower, upper):
         Samples.
     lower, upper : float
         The interval, in the unit of y.
+    breaks : ndarray, shape (m,), optional
+        Increasing times (s) at which y may jump or bend.
 
     Returns
     -------
@@ -113,6 +129,8 @@ def time_within(t, y, lower, upper):
     """
     if not np.all(np.isfinite(y)):
         return np.nan
+    if breaks is not None:
+        t, y = path(t, y, np.asarray(breaks))
     low, high = np.minimum(y[:-1], y[1:]), np.maximum(y[:-1], y[1:])
     inside = np.minimum(high, upper) - np.maximum(low, lower)  # negative: none of the interval
     span = high - low
@@ -121,8 +139,8 @@ def time_within(t, y, lower, upper):
     return float(np.sum(consecutive_differences(t) * share))
 
 
-@equation
-def reversals(t, y, above=0.0):
+@of_samples
+def reversals(t: np.ndarray, y: np.ndarray, above: float = 0.0, breaks: np.ndarray | None = None):
     """How often y reverses: the turns between swings of more than `above`.
 
     Parameters
@@ -133,6 +151,8 @@ def reversals(t, y, above=0.0):
         Samples.
     above : float, optional
         Swings up to this size (in the unit of y) do not count.
+    breaks : ndarray, shape (m,), optional
+        Increasing times (s) at which y may jump or bend.
 
     Returns
     -------
@@ -151,6 +171,8 @@ def reversals(t, y, above=0.0):
     """
     if not np.all(np.isfinite(y)):
         return np.nan
+    if breaks is not None:
+        t, y = path(t, y, np.asarray(breaks))
     steps = consecutive_differences(y)
     moving = np.nonzero(steps)[0]
     up = steps[moving] > 0

@@ -1,6 +1,6 @@
 """What is only about Lv et al. (2017): its reproduction, loops, controllers, page."""
 
-from .cases import CASES, HORIZON, METRICS, TAIL, Case
+from .cases import BOUND, CASES, HORIZON, METRICS, TAIL, Case
 from .controllers import compared_controllers
 from .numerics import numerics
 from .reproduction import (
@@ -17,6 +17,7 @@ from .reproduction import (
 )
 
 __all__ = [
+    "BOUND",
     "CASES",
     "HORIZON",
     "METRICS",

@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nlctl import actuators, paper
+from nlctl.annotations import as_annotated
 
 from ..metrics import Metric, final, highest, lowest, peak, rms
 
 HORIZON = 20.0
 TAIL = HORIZON / 2
+BOUND = 0.15  # of |e₁| from TAIL on: a sixth of the reference; the paper names none
 
 METRICS = (
     Metric(
@@ -51,6 +53,7 @@ METRICS = (
 )
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Case:
     """One closed loop of the paper, or of a choice that the paper leaves open.

@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 
 from nlctl import paper
+from nlctl.annotations import as_annotated
 from nlctl.controllers import (
     PID,
     AdaptiveWeights,
@@ -88,6 +89,7 @@ GAINS = {
 }
 
 
+@as_annotated
 def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
     """Return every controller of an example by label, the paper's first.
 

@@ -28,6 +28,7 @@ from ..lyapunov.nussbaum.energy import signal
 from ..lyapunov.nussbaum.long_run import LOOKS, LongRun, long_run
 from ..lyapunov.nussbaum.slow_drift import SlowDrift
 from ..metrics import peak
+from .burst import Burst, through_the_burst
 from .controllers import compared_controllers
 from .reference_run import continued, read_record
 
@@ -35,6 +36,7 @@ __all__ = [
     "FAR_HORIZONS",
     "LOOK",
     "Evidence",
+    "FarRuns",
     "compile_evidence_ahead",
     "evidence",
     "far_runs_in_background",
@@ -136,8 +138,24 @@ def known_sign(loop: ct.InterconnectedSystem) -> ct.InterconnectedSystem:
     return paper.EXAMPLES[name](controller=compared_controllers(name)["certified"])
 
 
+@dataclass(frozen=True, kw_only=True)
+class FarRuns:
+    """What became of the loops far beyond 20 s.
+
+    Attributes
+    ----------
+    runs : mapping
+        By key of `FAR_HORIZONS`.
+    burst : Burst or None
+        Example 2 beyond its run, if it bursts.
+    """
+
+    runs: Mapping[str, LongRun] = field(default_factory=dict)
+    burst: Burst | None = None
+
+
 @contextmanager
-def far_runs_in_background(*, whole: bool = False) -> Iterator[Future[dict[str, LongRun]]]:
+def far_runs_in_background(*, whole: bool = False) -> Iterator[Future[FarRuns]]:
     """Run `FAR_HORIZONS` in a thread while the body continues; an early exit ends the runs.
 
     Example 2 is run as far as its burst is predicted from, and continues the record of
@@ -151,7 +169,7 @@ def far_runs_in_background(*, whole: bool = False) -> Iterator[Future[dict[str, 
             stop.set()
 
 
-def _far_runs(stop: Event, whole: bool) -> dict[str, LongRun]:
+def _far_runs(stop: Event, whole: bool) -> FarRuns:
     loops = {
         "2": paper.example_2(),
         "1": paper.example_1(),
@@ -171,4 +189,4 @@ def _far_runs(stop: Event, whole: bool) -> dict[str, LongRun]:
     runs = {key: run.result() for key, run in waiting.items()}
     if not whole:
         runs["2"] = continued(runs["2"], read_record(runs["2"]))
-    return runs
+    return FarRuns(runs=runs, burst=through_the_burst(runs["2"]))

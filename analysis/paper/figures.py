@@ -16,18 +16,21 @@ from ..figures.axes import (
     GREY,
     STYLES,
     TIME,
+    WIDTH,
     draw_lines,
     legend_above,
     set_style,
     stacked_axes,
 )
 from . import TAIL, CaseRun
+from .burst import Burst
 
 __all__ = [
     "SAMPLED_CONTROLLERS",
     "actuator_errors",
     "actuator_path",
     "adaptation",
+    "after_burst",
     "control_input",
     "error_comparison",
     "nussbaum_gain",
@@ -120,6 +123,31 @@ def adaptation(run: CaseRun) -> Figure:
     """Norm of the network's weights, and the estimate delta_hat."""
     curves = {"$\\|\\hat W\\|$": run.signals["W_norm"], "$\\hat\\delta$": run.signals["delta_hat"]}
     return _one(run.time, curves, ", ".join(curves))
+
+
+def after_burst(burst: Burst) -> Figure:
+    """Example 2 through its burst: r and u over zeta, and the error afterwards."""
+    figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
+    through, late = figure.subplots(1, 2, width_ratios=(1.25, 1))
+    zeta = burst.signals["zeta"]
+    for ax in (through, late):
+        set_style(ax)
+    for (name, label), (colour, style) in zip(
+        (("r", "$|r|$"), ("u", "$|u|$")), STYLES, strict=False
+    ):
+        y = np.abs(burst.signals[name])
+        through.semilogy(
+            zeta, np.where(y > 0, y, np.nan), style, color=colour, linewidth=1.4, label=label
+        )
+    for end in (burst.bounds.wrong.low, burst.bounds.wrong.high):
+        through.axvline(end, color=GREY, linewidth=1.0, linestyle="--")
+    through.set(xlabel="$\\zeta$", ylim=(1e-2, None))
+    legend_above(through)
+    for (K, e), (colour, style) in zip(burst.late.items(), STYLES, strict=False):
+        late.plot(burst.late_time, e, style, color=colour, linewidth=1.2, label=f"$N = -{K:g}$")
+    legend_above(late)
+    late.set(xlabel="time after the burst (s)", ylabel="$e_1$")
+    return figure
 
 
 def error_comparison(runs: Sequence[CaseRun], labels: Sequence[str]) -> Figure:

@@ -21,6 +21,7 @@ RECORD = Path(__file__).with_name("example-2-burst.csv")
 TOLERANCES = (1e-6, 1e-7)  # relative; the record is of the second
 AGREE = 5.0  # s; bursts at two tolerances differ by less
 _WINDOW = 4 * np.pi  # s; period of the paper's reference: one row in each, where |e| is largest
+_ABOUT = ("loop", "horizon", "rtol", "lost", "again", "last")  # what a record says of its run
 LAST, _STEP, PER_DECADE = 100.0, 0.5, 60  # s, s; the last seconds by time left until the end
 
 
@@ -66,7 +67,9 @@ def agreed(run: LongRun, other: LongRun) -> LongRun:
 
 def write_record(run: LongRun, path: Path = RECORD) -> None:
     """Write a run as CSV; the first line says what it is, in JSON."""
-    about = {name: getattr(run, name) for name in ("loop", "horizon", "rtol", "lost", "again")}
+    about = {
+        name: getattr(run, name) for name in ("loop", "horizon", "rtol", "lost", "again", "last")
+    }
     rows = np.column_stack([run.time, *(run.signals[name] for name in LONG_RUN_SIGNALS)])
     names = ",".join(["time", *LONG_RUN_SIGNALS])
     formats = ["%.6f", *["%.7g"] * len(LONG_RUN_SIGNALS)]
@@ -81,6 +84,7 @@ def read_record(beginning: LongRun, path: Path = RECORD) -> LongRun:
         time, *rows = np.loadtxt(file, delimiter=",").T
     signals = dict(zip(LONG_RUN_SIGNALS, rows, strict=True))
     about["again"] = about["again"] and tuple(about["again"])
+    about["last"] = tuple(about.get("last", ()))
     return replace(beginning, time=time, signals=signals, **about)
 
 

@@ -8,7 +8,7 @@ In a notebook::
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
@@ -17,7 +17,6 @@ from typing import Any
 
 from nlctl import paper
 
-from ..lyapunov.nussbaum.long_run import LongRun
 from ..report.document import Report, Section
 from ..report.svg import Drawn, draw_ahead
 from ..robustness import prepare
@@ -111,7 +110,7 @@ def reproduction(watch: ProgressWatch = _unwatched) -> list[Section]:
 
 def proof(
     horizon: float = HORIZON,
-    far: Mapping[str, LongRun] | None = None,
+    far: proofs.FarRuns | None = None,
     watch: ProgressWatch = _unwatched,
 ) -> list[Section]:
     """Check the proof for both examples, and return the report's second part.
@@ -120,12 +119,13 @@ def proof(
     ----------
     horizon : float, optional
         Length of the runs along which it is checked (s).
-    far : mapping of str to LongRun, optional
+    far : FarRuns, optional
         Runs far beyond that, see `evidence.far_runs_in_background`.
     watch : callable, optional
         See `ProgressWatch`.
     """
-    return lyapunov_sections(_proved(horizon, watch), far)
+    far = far or proofs.FarRuns()
+    return lyapunov_sections(_proved(horizon, watch), far.runs, far.burst)
 
 
 def robustness(
@@ -204,15 +204,15 @@ def compose(
         with watch("running far beyond 20 s, and the studies", 2) as advance:
             far_away = long_runs.result()
             advance(1)
-            sections = paper_sections(runs, proofs=found, far=far_away)
+            shown: Any = {"proofs": found, "far": far_away.runs, "burst": far_away.burst}
+            sections = paper_sections(runs, **shown)
             drawn = draw_ahead(sections, until=waiting[-1].done)
             *_, record, numbers = (task.result() for task in (*ahead, *waiting))
             advance(1)
     folders = [folder / name for name in studies]
     made = paper_report(
         runs,
-        proofs=found,
-        far=far_away,
+        **shown,
         sections=sections,
         studies=robustness(folders, threads=threads, tell=tell) if folders else (),
         numerics=numbers,
@@ -245,13 +245,13 @@ def _proved(horizon: float, watch: ProgressWatch) -> dict[int, proofs.Evidence]:
 
 
 @contextmanager
-def _far_away(far: bool, whole: bool) -> Iterator[Future[dict[str, LongRun]]]:
+def _far_away(far: bool, whole: bool) -> Iterator[Future[proofs.FarRuns]]:
     """Run the loops far beyond 20 s while the body continues, or nothing."""
     if far:
         with proofs.far_runs_in_background(whole=whole) as long_runs:
             yield long_runs
     else:
-        yield _Here().submit(dict)
+        yield _Here().submit(proofs.FarRuns)
 
 
 def _runs(

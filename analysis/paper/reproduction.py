@@ -11,6 +11,8 @@ from importlib.resources import files
 import numpy as np
 
 from nlctl import native
+from nlctl.annotations import as_annotated
+from nlctl.arguments import number
 from nlctl.native import compile  # noqa: A004 (what it does)
 from nlctl.response import input_output_response
 
@@ -90,6 +92,7 @@ class Check:
         return self.error <= self.expectation.tolerance
 
 
+@as_annotated
 def sample_times(horizon: float = HORIZON) -> np.ndarray:
     """Return output times (s): 0.2 ms apart in the first half second, then 5 ms.
 
@@ -104,13 +107,20 @@ def sample_times(horizon: float = HORIZON) -> np.ndarray:
     -------
     ndarray of shape (m,)
         From 0 to the horizon (s).
+
+    Raises
+    ------
+    ParameterError
+        If the horizon does not lie beyond the first half second.
     """
+    horizon = number("sample_times", "horizon", horizon, above=0.5, at_most=1e6)
     early = np.linspace(0, 0.5, 2501)
     return np.concatenate(
         [early, np.linspace(0.5, horizon, round((horizon - 0.5) / 0.005) + 1)[1:]]
     )
 
 
+@as_annotated
 def run_case(case: Case) -> CaseRun:
     """Simulate a case over the paper's horizon, its diagram compiled to machine code.
 
@@ -137,6 +147,7 @@ def run_case(case: Case) -> CaseRun:
     return measured(case, response.time, dict(zip(diagram.output_labels, response.y, strict=True)))
 
 
+@as_annotated
 def measured(case: Case, time: np.ndarray, signals: Mapping[str, np.ndarray]) -> CaseRun:
     """Return a run with its metrics, whatever simulated it.
 
@@ -158,6 +169,7 @@ def measured(case: Case, time: np.ndarray, signals: Mapping[str, np.ndarray]) ->
     return CaseRun(case=case, time=time, signals=signals, metrics=metrics)
 
 
+@as_annotated
 def run_all(
     cases: Iterable[Case], *, done: Callable[[Case], object] | None = None
 ) -> dict[str, CaseRun]:
@@ -185,6 +197,7 @@ def run_all(
     return results
 
 
+@as_annotated
 def compile_cases_ahead(cases: Iterable[Case]) -> None:
     """Compile the diagrams of cases, which otherwise happens when they are run.
 
@@ -197,6 +210,7 @@ def compile_cases_ahead(cases: Iterable[Case]) -> None:
         native.compile_ahead(compile(case.diagram))
 
 
+@as_annotated
 def checks(runs: Mapping[str, CaseRun]) -> list[Check]:
     """Compare runs with the figures to reach; cases that were not run are left out.
 

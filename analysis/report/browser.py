@@ -11,6 +11,7 @@ import tempfile
 import webbrowser
 from pathlib import Path
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
@@ -44,6 +45,7 @@ def find_browser() -> str:
     )
 
 
+@as_annotated
 def write_pdf(page: str | os.PathLike[str], path: str | os.PathLike[str]) -> Path:
     """Print a page to PDF through an installed Chromium.
 

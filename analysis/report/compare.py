@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError, UsageError
 
 from .outline import sort_key
@@ -35,8 +36,13 @@ class Difference:
         return f"{self.where}: {self.first} -> {self.second}"
 
 
+@as_annotated
 def compare_contents(
-    first: str | os.PathLike[str], second: str | os.PathLike[str], rtol: float = 0.0
+    first: str | os.PathLike[str],
+    second: str | os.PathLike[str],
+    rtol: float = 0.0,
+    *,
+    common: bool = False,
 ) -> list[Difference]:
     """Compare what two reports claim, measure and list.
 
@@ -49,6 +55,9 @@ def compare_contents(
         Files ``report.json``, or the folders that hold them.
     rtol : float, optional
         Numbers closer than this, relative to the larger, count as equal.
+    common : bool, optional
+        Whether only sections count that both have, as of two runs of which one page was made of
+        its data alone.
 
     Returns
     -------
@@ -81,7 +90,9 @@ def compare_contents(
     """
     if not 0 <= rtol < math.inf:
         raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
-    one, two = (_flat(read_report(path)) for path in (first, second))
+    reports = [read_report(path) for path in (first, second)]
+    both = set(reports[0]["sections"]) & set(reports[1]["sections"])
+    one, two = (_flat(report, both if common else set(report["sections"])) for report in reports)
     return [
         Difference(where=where, first=one.get(where, ABSENT), second=two.get(where, ABSENT))
         for where in dict.fromkeys([*one, *two])
@@ -111,7 +122,7 @@ def read_report(path: str | os.PathLike[str]) -> Mapping[str, Any]:
     return content
 
 
-def _flat(report: Mapping[str, Any]) -> dict[str, Any]:
+def _flat(report: Mapping[str, Any], sections: set[str]) -> dict[str, Any]:
     """Return all that is compared, by the name of the place where it stands."""
     found = {"title": report["title"], "verdict": report["verdict"]}
     claims = report["claims"]
@@ -119,6 +130,8 @@ def _flat(report: Mapping[str, Any]) -> dict[str, Any]:
         found |= {f"claim '{name}', {k}": v for k, v in claim.items() if k != "text"}
     found |= _leaves("numbers", report["numbers"])
     for key, section in report["sections"].items():
+        if key not in sections:
+            continue
         tables = [item for item in section["items"] if item["kind"] == "table"]
         for number, table in enumerate(tables, 1):
             found |= _cells(f"section '{key}', table {number}", table)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure as MatplotlibFigure
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.params import checked_times
@@ -35,6 +36,7 @@ __all__ = [
 ]
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Paragraph:
     """A paragraph of plain text, and what is to be typed below it, such as a command.
@@ -48,6 +50,7 @@ class Paragraph:
     code: str = ""
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Equation:
     """A formula in LaTeX, with the paper's number where it has one.
@@ -67,6 +70,7 @@ class Equation:
     number: str = ""
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Table:
     """A table: column titles, rows of text or numbers, and a caption.
@@ -95,6 +99,7 @@ class Table:
     folded: bool = False
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Figure:
     """A matplotlib figure with its caption and a description for those who cannot see it.
@@ -178,6 +183,7 @@ class History:
 Item = Paragraph | Equation | Table | Figure | History
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Section:
     """A headed part of a report; `key` is its anchor.
@@ -200,6 +206,7 @@ class Section:
     folded: bool = False
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Claim:
     """One line of the verdict: what was asked, what was found, the limit, where the evidence is.
@@ -243,6 +250,7 @@ class Claim:
     by: str = ""
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Report:
     """A whole report.

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 
 from .compare import read_report
@@ -34,10 +36,17 @@ class Entry:
         return quote(f"{self.folder}/index.html", errors="surrogateescape")
 
 
-def entries(folder: str | os.PathLike[str]) -> list[Entry]:
+def _unchecked(folder: Path) -> None:
+    """Believe a report as it stands."""
+
+
+def entries(
+    folder: str | os.PathLike[str], check: Callable[[Path], object] = _unchecked
+) -> list[Entry]:
     """Return the reports below a folder, by the names of their folders.
 
-    A ``report.json`` that cannot be read, or has no page beside it, is listed as such.
+    A ``report.json`` that cannot be read, has no page beside it, or that `check` refuses is listed
+    as such.
 
     Raises
     ------
@@ -48,17 +57,20 @@ def entries(folder: str | os.PathLike[str]) -> list[Entry]:
     files = sorted(p for p in folder.rglob("report.json") if p.parent != folder)
     if not files:
         raise UsageError(f"no report (a folder with report.json) below '{folder}'")
-    return [_entry(path.parent, path.parent.relative_to(folder).as_posix()) for path in files]
+    return [
+        _entry(path.parent, path.parent.relative_to(folder).as_posix(), check) for path in files
+    ]
 
 
-def _entry(folder: Path, name: str) -> Entry:
+def _entry(folder: Path, name: str, check: Callable[[Path], object]) -> Entry:
     try:
+        check(folder)
         report = read_report(folder)
         light, told = summary([Claim(**claim) for claim in report["claims"]])
         if not (folder / "index.html").is_file():
             raise UsageError("a page is missing")
     except (UsageError, OSError, TypeError):
-        reason = "report.json is damaged, or there is no index.html beside it."
+        reason = "The report is damaged, was edited, or its page is missing."
         return Entry(folder=name, title=name, verdict=reason, light="fail", told="Cannot be read.")
     return Entry(
         folder=name,
@@ -70,7 +82,13 @@ def _entry(folder: Path, name: str) -> Entry:
     )
 
 
-def write_gallery(folder: str | os.PathLike[str], *, force: bool = False) -> Path:
+@as_annotated
+def write_gallery(
+    folder: str | os.PathLike[str],
+    *,
+    force: bool = False,
+    check: Callable[[Path], object] = _unchecked,
+) -> Path:
     """Write FOLDER/index.html: every report below it with its verdict and a link.
 
     Parameters
@@ -79,6 +97,8 @@ def write_gallery(folder: str | os.PathLike[str], *, force: bool = False) -> Pat
         Where reports lie, at any depth.
     force : bool, optional
         Whether an ``index.html`` is replaced that is not a gallery.
+    check : callable, optional
+        Takes the folder of a report, and raises UsageError where it is not to be believed.
 
     Returns
     -------
@@ -96,7 +116,7 @@ def write_gallery(folder: str | os.PathLike[str], *, force: bool = False) -> Pat
     --------
     See `write_report`.
     """
-    found = entries(folder)
+    found = entries(folder, check)
     if not force:
         check_gallery_folder(folder)
     page = fill("gallery.html", entries=found)

@@ -44,7 +44,7 @@ _SHORT = 24  # characters of a text that stays on one line
 
 # Statuses by the look of their badge.  What is proved never looks like what is sampled.
 LIGHTS = {
-    "pass": ("pass", "passes", "hold", "holds", "ok", "reached", "confirmed"),
+    "pass": ("pass", "passes", "hold", "holds", "ok", "reached", "confirmed", "held"),
     "proved": ("proved", "computed"),
     "checked": ("checked", "sampled", "shown"),
     "caution": ("undecided", "open", "inconclusive", "not confirmed", "not shown yet"),

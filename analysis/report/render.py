@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 
 from ..json_values import as_json
@@ -39,6 +40,7 @@ _TITLES = {
 }
 
 
+@as_annotated
 def render_html(
     report: Report,
     *,
@@ -119,6 +121,7 @@ def _pairs(caption: str, columns: tuple[str, str], values: Mapping[str, str]) ->
     return Table(caption=caption, columns=columns, rows=list(values.items()))
 
 
+@as_annotated
 def render_json(report: Report) -> str:
     """Return every number and table of the report as JSON.
 
@@ -175,6 +178,7 @@ def _plain(item: Item) -> dict[str, Any]:
     return {"kind": kind(item)} | {k: v for k, v in vars(item).items() if k not in DRAWN}
 
 
+@as_annotated
 def write_report(
     report: Report,
     folder: str | os.PathLike[str],
@@ -259,6 +263,7 @@ class Framed:
         )
 
 
+@as_annotated
 def framed(report: Report) -> Framed:
     """Return a report as a notebook shows it: the whole page, in a frame.
 
@@ -284,6 +289,7 @@ def framed(report: Report) -> Framed:
     return Framed(title=plain_text(report.title), page=render_html(report))
 
 
+@as_annotated
 def file_hashes(paths: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     """Return name and SHA-256 of data files, for `Report.files`.
 

@@ -1,12 +1,13 @@
 """Study files: what is uncertain, what is asked, and everything connected to answer it."""
 
+from .differences import origin_differences, run_differences
 from .file.errors import Problem, StudyError
 from .file.parse import StudyFile, read_study
 from .file.schema import Study
 from .file.shipped import shipped
 from .file.written import from_toml, to_toml
 from .finding import Finding
-from .folder import load_result, origin_differences, run_differences
+from .folder import load_result
 from .kind import Asked, Ground, Kind, Setup, Varied, made
 from .kinds import KINDS
 from .plan import Plan, plan
@@ -14,6 +15,7 @@ from .replay import Replay, replay, replay_figure
 from .result import Result
 from .run import run
 from .sealed import RunFolderError
+from .whole.wholeness import Wholeness, verify
 
 __all__ = [
     "KINDS",
@@ -31,6 +33,7 @@ __all__ = [
     "StudyError",
     "StudyFile",
     "Varied",
+    "Wholeness",
     "from_toml",
     "load_result",
     "made",
@@ -43,4 +46,5 @@ __all__ = [
     "run_differences",
     "shipped",
     "to_toml",
+    "verify",
 ]

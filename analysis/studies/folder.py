@@ -6,15 +6,17 @@ rows/                the main table, see `analysis.robustness.runs.store`
 KEY/finding.json     what one analysis found, its tables beside it in Parquet
 KEY/rows/            the rows that it ran itself, where their number is known in advance
 results.json         everything but the tables, for other programs
+contents.json        which files there are, with a key of each and of the page, see `whole`;
+                     written last
 
-Every file but study.toml carries a key of its content, and every part the key of its origin: what
-was edited or belongs to another loop is refused, not shown.
+Every file of JSON carries a key of its content, and every part the key of its origin: what is
+missing, was edited or belongs to another loop is refused, not shown.
 """
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,37 +24,52 @@ from typing import Any
 import pandas as pd
 
 from analysis.robustness import Design, Space
-from analysis.robustness.runs.identity import differences_of
-from analysis.robustness.runs.store import opened
+from analysis.robustness.runs.store import opened, read_parquet
 from analysis.robustness.runs.sweep import Sweep, load
+from nlctl.annotations import as_annotated
 from nlctl.host.files import replace_file
+from nlctl.wording import counted
 
 from .build import labels, main_design
-from .file.own_kinds import own_kinds, stand_ins
+from .code.record import study_digest
+from .code.rule import Grant
+from .file.own_kinds import STAND_IN, own_kinds, stand_ins
 from .file.resolve import uncertain
 from .file.schema import Study, keyed
-from .file.toml import read_toml
+from .file.toml import read_toml, study_text
 from .file.written import from_toml
 from .finding import Finding
 from .kind import Kind
-from .origin import loop_differences, plain_study, version_differences
+from .origin import plain_study
 from .result import Result
-from .sealed import ANEW, RunFolderError, file_digest, origin_key, read_json, write_json
+from .sealed import (
+    ANEW,
+    RunFolderError,
+    as_json,
+    as_written,
+    digest_of,
+    file_bytes,
+    file_digest,
+    origin_key,
+    write_json,
+)
+from .whole.contents import CONTENTS, check_whole
+from .whole.shapes import FindingFile, ResultsFile, RunFile, shaped
 
 __all__ = [
     "METRIC_COLUMNS",
+    "checked",
     "load_finding",
     "load_result",
     "load_rows",
     "load_run",
     "load_study",
-    "origin_differences",
+    "received",
     "remove_run",
-    "run_differences",
     "save_finding",
 ]
 
-_OWN = ("study.toml", "run.json", "results.json", "rows", ".lock", ".owner")
+_OWN = ("study.toml", "run.json", "results.json", CONTENTS, "rows", ".lock", ".owner")
 _OWN += ("index.html", "report.json", "report.pdf")
 METRIC_COLUMNS = ("key", "signal", "unit", "meaning")
 
@@ -84,8 +101,10 @@ def load_finding(folder: Path, key: str, origin: str) -> Finding | None:
     if not path.exists():
         return None
     remedy = f"delete '{path}' and continue with --resume"
-    content = read_json(path, remedy)
-    if content.pop("origin", None) != origin:
+    content = shaped(path, FindingFile, remedy)
+    if content["key"] != key:
+        raise RunFolderError(f"'{path}' is of another analysis, '{content['key']}': {remedy}")
+    if content.pop("origin") != origin:
         raise RunFolderError(
             f"'{path.parent}' was computed from another loop than the rest of the run: {remedy}"
         )
@@ -95,7 +114,7 @@ def load_finding(folder: Path, key: str, origin: str) -> Finding | None:
         try:
             if file_digest(file) != kept:
                 raise RunFolderError(f"'{file}' is not as it was written: {remedy}")
-            tables[name] = pd.read_parquet(file)
+            tables[name] = read_parquet(file)
         except (OSError, ValueError) as error:
             if isinstance(error, RunFolderError):
                 raise
@@ -111,7 +130,7 @@ def load_run(folder: Path) -> dict[str, Any]:
     RunFolderError
         If the folder holds no run, or the file is damaged.
     """
-    return read_json(folder / "run.json")
+    return shaped(folder / "run.json", RunFile)
 
 
 def remove_run(folder: Path, *, force: bool = False) -> None:
@@ -150,7 +169,7 @@ def load_study(folder: Path, own: Mapping[str, Kind] | None = None) -> Study:
     """
     path = folder / "study.toml"
     try:
-        text = path.read_text(encoding="utf-8")
+        text = study_text(file_bytes(path))
         known = dict(own or {})
         study = from_toml(text, known | stand_ins(read_toml(text), known))
     except FileNotFoundError:
@@ -183,6 +202,39 @@ def load_rows(folder: Path, origin: str, design: Design | None = None) -> Sweep 
     return load(here, design)
 
 
+def checked(folder: Path) -> None:
+    """Refuse a folder that is not whole, before anything of it is believed.
+
+    Raises
+    ------
+    RunFolderError
+        With what is wrong, in the words of whoever reads the part that is.
+    """
+    try:
+        check_whole(folder)
+    except RunFolderError:
+        read_through(folder)
+        raise
+
+
+def read_through(folder: Path) -> None:
+    """Read every part and every table, for what their readers say of them; nothing is imported.
+
+    Raises
+    ------
+    UsageError
+        If a part is damaged, or parts do not go together.
+    """
+    result = _result_in(folder, {}, ())
+    with as_written(f"'{folder}'"):
+        if result.rows is not None:
+            len(result.rows.table)
+        for finding in result.findings:
+            if (own := load_rows(folder / finding.key, origin_key(result.origin))) is not None:
+                len(own.table)
+
+
+@as_annotated
 def load_result(folder: Path, *, trust: bool = False) -> Result:
     """Return what is in the folder of a run, finished or not.
 
@@ -210,24 +262,48 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
     --------
     See `run`.
     """
-    own, gone = _own_kinds(folder, trust)
+    checked(folder)
+    return _result_in(folder, *_own_kinds(folder, trust))
+
+
+def _result_in(folder: Path, own: Mapping[str, Kind], gone: Sequence[str]) -> Result:
+    """Return what is in a folder that is whole, or say why its parts do not go together.
+
+    Raises
+    ------
+    UsageError
+        If a part is damaged, or parts do not go together.
+    """
     study, run = load_study(folder, own), load_run(folder)
-    content = read_json(folder / "results.json", "continue with --resume, which makes it anew")
+    content = shaped(folder / "results.json", ResultsFile, "continue with --resume")
     origin = origin_key(run["origin"])
-    try:
-        quantities = pd.DataFrame(content["quantities"]).set_index("name")
-        requirements = pd.DataFrame(content["requirements"]).set_index("key")
-        metrics = pd.DataFrame(content["metrics"], columns=METRIC_COLUMNS).set_index("key")
-        keys = [finding["key"] for finding in content["findings"]]
-    except KeyError as error:
-        raise RunFolderError(f"'{folder}' holds no results of a study: {error}") from error
-    if content["origin"] != origin:
+    if content.pop("origin") != origin:
         raise RunFolderError(f"the results in '{folder}' are those of another run: {ANEW}")
-    findings = [load_finding(folder, key, origin) for key in keys]
-    rows = None
+    with as_written(f"'{folder}'"):
+        result = _put_together(folder, study, content, run["origin"])
+        _check_contradictions(result, content)
+    return replace(result, notes=(*content["notes"], *gone))
+
+
+def _put_together(
+    folder: Path, study: Study, content: Mapping[str, Any], origin: Mapping[str, Any]
+) -> Result:
+    """Return the result that the files of a folder make."""
+    quantities = pd.DataFrame(content["quantities"]).set_index("name")
+    requirements = pd.DataFrame(content["requirements"]).set_index("key")
+    metrics = pd.DataFrame(content["metrics"], columns=METRIC_COLUMNS).set_index("key")
+    key, rows, findings = origin_key(origin), None, []
     if study.runs is not None:
         design = main_design(study.runs, _space(study, quantities), study.study.seed)
-        rows = load_rows(folder, origin, design)
+        rows = load_rows(folder, key, design)
+    for asked in content["findings"]:
+        finding = load_finding(folder, asked["key"], key)
+        if finding is None:
+            raise RunFolderError(
+                f"'{folder / asked['key']}' is missing, which '{folder / 'results.json'}' names: "
+                "continue with --resume"
+            )
+        findings.append(finding)
     return Result(
         folder=folder,
         study=study,
@@ -235,11 +311,67 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
         requirements=requirements,
         metrics=metrics,
         rows=rows,
-        findings=tuple(finding for finding in findings if finding is not None),
+        findings=tuple(findings),
         complete=content["complete"],
-        notes=(*content["notes"], *gone),
-        origin=run["origin"],
+        notes=tuple(content["notes"]),
+        origin=origin,
     )
+
+
+def _check_contradictions(result: Result, content: Mapping[str, Any]) -> None:
+    """Refuse parts that are each as they were written, and do not go together.
+
+    Raises
+    ------
+    RunFolderError
+        With what contradicts what.
+    """
+    folder, rows = result.folder, result.rows
+    expected, done = list(keyed(result.study)), [finding.key for finding in result.findings]
+    if expected[: len(done)] != done or (result.complete and done != expected):
+        raise RunFolderError(
+            f"'{folder}' has the analyses {', '.join(done) or 'none'}, and its study asks for "
+            f"{', '.join(expected) or 'none'}: continue with --resume"
+        )
+    if result.complete and result.study.runs is not None:
+        stops = [a for a in result.study.analysis if a.definition.needs_rows]
+        early = len(stops) == 1 and stops[0].definition.stop is not None
+        if rows is None or not (rows.complete or early):
+            there = 0 if rows is None else rows.done
+            raise RunFolderError(
+                f"'{folder / 'rows'}' has {counted(there, 'row')}, less than its study asks for: "
+                "continue with --resume"
+            )
+    for finding in result.findings:
+        asked = result.asked[finding.key]
+        told = asked.claim if asked.definition.name != STAND_IN else finding.claim
+        same = finding.claim == told or not (told or finding.is_answered)
+        if finding.kind != asked.kind or not same or bool(finding.claim) != bool(finding.answer):
+            raise RunFolderError(
+                f"'{folder / finding.key}' does not answer what its study asks ({asked.kind}"
+                f"{': ' * bool(told)}{told}): delete it and continue with --resume"
+            )
+    if digest_of(as_json(result.plain())) != digest_of(as_json(content)):
+        raise RunFolderError(
+            f"'{folder / 'results.json'}' does not say what the parts of the run say: continue "
+            "with --resume, which makes it anew"
+        )
+
+
+def received(folder: Path, *, trust: bool = False) -> Grant:
+    """Return what code of a run folder may run: what this user has run or trusted, and nlctl's own.
+
+    The folder says where the code was, and nothing of who trusts it.
+
+    Raises
+    ------
+    RunFolderError
+        If the folder holds no run, or it is damaged.
+    """
+    home = folder / load_run(folder)["study_folder"]
+    load_study(folder)
+    data = read_toml(study_text(file_bytes(folder / "study.toml")))
+    return Grant(reach="all" if trust else "nlctl", folder=home, study=study_digest(data))
 
 
 def _own_kinds(folder: Path, trust: bool) -> tuple[dict[str, Kind], list[str]]:
@@ -250,8 +382,7 @@ def _own_kinds(folder: Path, trust: bool) -> tuple[dict[str, Kind], list[str]]:
     RunFolderError
         If the folder holds no run, or its study is damaged.
     """
-    home = folder / load_run(folder)["study_folder"]
-    found, problems = own_kinds(plain_study(load_study(folder)), home, trust=trust)
+    found, problems = own_kinds(plain_study(load_study(folder)), received(folder, trust=trust))
     return found, [f"what it found is told without its figures: {p}" for p in problems]
 
 
@@ -274,88 +405,3 @@ def _space(study: Study, quantities: pd.DataFrame) -> Space:
         ),
         choices=tuple(labels(name, choices) for name, choices in study.choices.items()),
     )
-
-
-def origin_differences(first: Path, second: Path) -> str:
-    """Return in words what two runs were computed from that differs; nothing if nothing does.
-
-    Parameters
-    ----------
-    first, second : pathlib.Path
-        Run folders.
-
-    Returns
-    -------
-    str
-        Sentences, or nothing.
-
-    Raises
-    ------
-    RunFolderError
-        If a folder holds no run.
-
-    Examples
-    --------
-    See `run_differences`.
-    """
-    one, other = (load_run(folder)["origin"] for folder in (first, second))
-    told = [loop_differences(one, other), version_differences(one, other)]
-    return "; ".join(filter(None, told))
-
-
-def run_differences(first: Path, second: Path) -> list[str]:
-    """Return what differs between what two runs have found, one text for each number.
-
-    Parameters
-    ----------
-    first, second : pathlib.Path
-        Run folders.
-
-    Returns
-    -------
-    list of str
-        Empty if nothing differs.
-
-    Raises
-    ------
-    RunFolderError
-        If a folder holds no results, or what does not belong together.
-
-    Examples
-    --------
-    What two runs have found that differs, and why it may:
-
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from analysis.studies import origin_differences, read_study, run, run_differences
-    >>> text = '''
-    ... loop = "nlctl:block"
-    ... options = { spec = { block = "Lag" }, name = "lag" }
-    ... study = { title = "A lag", seed = 1 }
-    ... space."lag.T" = { bounds = [0.05, 0.4] }
-    ... inputs.u = 1.0
-    ... spec.rises = "always from 1 s on v >= 0.9"
-    ... time = { end = 1.2, step = 0.1 }
-    ... runs.size = 20
-    ... analysis = [{ kind = "probability" }]
-    ... '''
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     one, other = Path(folder, "one"), Path(folder, "other")
-    ...     _ = Path(folder, "lag.toml").write_text(text, encoding="utf-8")
-    ...     _ = run(read_study(Path(folder, "lag.toml")), one)
-    ...     _ = run(read_study(Path(folder, "lag.toml"), ["inputs.u=0.8"]), other)
-    ...     found, reason = run_differences(one, other), origin_differences(one, other)
-    >>> reason
-    '[inputs] of the study'
-    >>> print(found[1])
-    findings.probability.numbers.violations was 0, now 20
-    """
-    found = []
-    for folder in (first, second):
-        load_result(folder)
-        content = read_json(folder / "results.json")
-        del content["origin"]
-        for name, key in (("findings", "key"), ("quantities", "name"), ("requirements", "key")):
-            content[name] = {part.pop(key): part for part in content[name]}
-        found.append(content)
-    return differences_of(*found)

@@ -27,6 +27,7 @@ from pydantic import Field, create_model
 from analysis.robustness import Design, Experiment, Prepared, Space
 from analysis.robustness.runs.progress import Progress
 from analysis.robustness.runs.sweep import Sweep
+from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError, UsageError
 
 from .file.field_types import Names, Strict
@@ -416,6 +417,7 @@ def column(rows: Sweep, name: str) -> np.ndarray:
     return rows.columns(name)[name].to_numpy()
 
 
+@as_annotated
 def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
     """Return a finding, whose key and title `answer` fills in.
 

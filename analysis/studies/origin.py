@@ -17,6 +17,7 @@ from analysis.loop_record import (
     loop_facts,
     loop_values,
     short_key,
+    unseen_parts,
     values_differ,
 )
 from analysis.robustness import Prepared, diagrams
@@ -32,6 +33,7 @@ __all__ = [
     "loop_differences",
     "origin_of",
     "plain_study",
+    "unseen_notes",
     "version_differences",
 ]
 
@@ -53,6 +55,7 @@ def origin_of(file: StudyFile, prepared: Prepared) -> dict[str, Any]:
     end = float(file.experiment.timepts[-1])
     facts = experiment_facts(prepared)
     values = {labels_text(labels): loop_values(p.system, end) for labels, p in prepared.loops}
+    every = [p.system for _, p in prepared.loops]
     setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
     for key, asked in keyed(file.study).items():
         if asked.definition.experiment is not None:
@@ -61,10 +64,24 @@ def origin_of(file: StudyFile, prepared: Prepared) -> dict[str, Any]:
                 name = _compared_name(key, labels)
                 facts["diagrams"][name] = loop_facts(diagram)
                 values[name] = loop_values(diagram, end)
+                every.append(diagram)
     own_kinds = {a.kind: short_key(a.definition.run) for a in file.study.analysis if ":" in a.kind}
     facts |= {"kinds": own_kinds} if own_kinds else {}
+    unseen = dict[str, list[str]]()
+    for diagram in every:
+        unseen |= unseen_parts(diagram)
+    facts |= {"unseen": unseen} if unseen else {}
     content = {**facts, "study": plain_study(file.study), "values": values}
     return from_json(as_json(content))  # as it is read from a file
+
+
+def unseen_notes(origin: Mapping[str, Any]) -> list[str]:
+    """Return what the keys of a run do not see, one sentence for each block."""
+    return [
+        f"What '{block}' computes depends on what no key can see, so that a change of it would "
+        f"not be noticed: {'; '.join(told)}."
+        for block, told in origin.get("unseen", {}).items()
+    ]
 
 
 def _compared_name(key: str, labels: Mapping[str, str]) -> str:

@@ -9,6 +9,7 @@ import pandas as pd
 
 from analysis.robustness import Prepared, evaluate, independent, prepare
 from analysis.robustness.runs.experiment import columns_of
+from nlctl.annotations import as_annotated
 
 from .build import main_design
 from .file.parse import StudyFile
@@ -54,6 +55,7 @@ class Plan:
         return sum(self.runs.values())
 
 
+@as_annotated
 def plan(file: StudyFile, threads: int | None = None) -> Plan:
     """Count the runs of a study, and time a few of them.
 

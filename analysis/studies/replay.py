@@ -15,6 +15,7 @@ from analysis.figures.axes import BLUE, ORANGE, TIME, stacked_axes
 from analysis.robustness import Experiment, Prepared, evaluate, prepare
 from analysis.robustness.runs.experiment import by_diagram, simulate_rows
 from analysis.robustness.stl.formula import Band, parts_of
+from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
@@ -90,6 +91,7 @@ class Replay:
         )
 
 
+@as_annotated
 def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Replay:
     """Run one row of a run folder again.
 
@@ -202,6 +204,7 @@ def _signals(prepared: Prepared, row: pd.DataFrame) -> tuple[np.ndarray, dict[st
     return found.time, {name: samples[0] for name, samples in found.signals.items()}
 
 
+@as_annotated
 def replay_figure(made: Replay) -> Figure:
     """Draw the signals that requirements look at, with their bounds, above the other outputs.
 

@@ -16,24 +16,30 @@ from analysis.robustness import Design, Prepared, evaluate, nominal, prepare
 from analysis.robustness.runs.progress import Progress
 from analysis.robustness.runs.store import StoreError, locked
 from analysis.robustness.runs.sweep import Sweep, load, sweep
+from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
 from .build import main_design
+from .code.record import study_digest
+from .code.rule import remember_code
 from .file.parse import StudyFile, read_study
 from .file.schema import Study, keyed
+from .file.toml import read_toml
 from .file.written import to_toml
 from .finding import Finding
-from .folder import METRIC_COLUMNS, load_finding, load_run, load_study, save_finding
+from .folder import METRIC_COLUMNS, checked, load_finding, load_run, load_study, save_finding
 from .kind import Ground, answer, unanswered
 from .origin import (
     compared_differences,
     loop_differences,
     origin_of,
+    unseen_notes,
     version_differences,
 )
 from .result import Result
 from .sealed import RunFolderError, origin_key, write_json
+from .whole.contents import seal, unseal
 
 __all__ = ["Reopened", "Watch", "reopened", "rerun_file", "run"]
 
@@ -66,6 +72,7 @@ class _Way:
         return origin_key(self.origin)
 
 
+@as_annotated
 def run(
     file: StudyFile,
     folder: Path,
@@ -147,16 +154,19 @@ def run(
         _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)
         origin = _stamped(file, prepared, folder)
+        remember_code(file.study, study_digest(read_toml(to_toml(file.study))), file.folder)
         way = _Way(executor=executor, threads=threads, watch=watch, origin=origin)
+        before = unseal(folder)
         result = replace(_through(file, prepared, folder, way), origin=origin)
         write_json(folder / "results.json", result.plain() | {"origin": way.key})
+        seal(result, before)
     return result
 
 
 def _through(file: StudyFile, prepared: Prepared, folder: Path, way: _Way) -> Result:
     """Run the main table, then every analysis that is not done yet."""
     study = file.study
-    rows, notes, findings = None, [], []
+    rows, notes, findings = None, unseen_notes(way.origin), []
     complete, interrupted = True, False
     if study.runs is not None:
         rows = _main_rows(study, prepared, folder, way)
@@ -305,7 +315,7 @@ def _stamped(file: StudyFile, prepared: Prepared, folder: Path) -> dict[str, Any
             )
         return before
     place = os.path.relpath(file.folder.resolve(), folder.resolve())
-    content = {"format": 2, "study_folder": Path(place).as_posix(), "origin": origin}
+    content = {"study_folder": Path(place).as_posix(), "origin": origin}
     write_json(folder / "run.json", content)
     return origin
 
@@ -328,9 +338,10 @@ def rerun_file(folder: Path, *, trust: bool = False) -> StudyFile:
     StudyError
         If the loop has changed so that the study no longer fits.
     """
+    checked(folder)
     place = load_run(folder)["study_folder"]
     load_study(folder)
-    return read_study(folder / "study.toml", folder=folder / place, trust=trust)
+    return read_study(folder / "study.toml", folder=folder / place, trust=trust, received=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +16,22 @@ from nlctl.host.files import replace_file
 
 __all__ = [
     "ANEW",
+    "RUN_FORMAT",
     "RunFolderError",
     "as_json",
+    "as_written",
     "digest_of",
+    "file_bytes",
     "file_digest",
     "origin_key",
     "read_json",
     "write_json",
 ]
 
+RUN_FORMAT = 4
+"""Of all files of a run folder; others are refused."""
 SEAL = "sha256"
+LARGEST = 200_000_000  # bytes of a file of JSON
 ANEW = "restore it, or run the study in another folder with --out"
 
 
@@ -36,13 +44,13 @@ class RunFolderError(UsageError):
     >>> from analysis.studies import load_result
     >>> load_result(Path("arm"))
     Traceback (most recent call last):
-    analysis.studies.sealed.RunFolderError: 'arm' holds no run of a study, or one that ...
+    analysis.studies.sealed.RunFolderError: 'arm' holds no run of a study
     """
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write a file of JSON in one step, with a key of its content in it."""
-    plain = as_json(content)
+    """Write a file of JSON in one step, with its format and a key of its content in it."""
+    plain = as_json({"format": RUN_FORMAT, **content})
     sealed = plain | {SEAL: digest_of(plain)}
     text = json.dumps(sealed, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     replace_file(path, lambda file: file.write(text.encode()))
@@ -63,7 +71,7 @@ def read_json(path: Path, remedy: str = ANEW) -> Any:
         If it is missing, damaged or edited.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(file_bytes(path))
     except FileNotFoundError:
         raise RunFolderError(
             f"'{path.parent}' holds no run of a study, or one that has not come so far: there is "
@@ -72,9 +80,51 @@ def read_json(path: Path, remedy: str = ANEW) -> Any:
     except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not JSON"
         raise RunFolderError(f"'{path}' is damaged ({reason}): {remedy}") from error
-    if not isinstance(content, dict) or content.pop(SEAL, None) != digest_of(content):
+    if not isinstance(content, dict):
         raise RunFolderError(f"'{path}' is not as it was written: {remedy}")
+    if content.get("format") != RUN_FORMAT:
+        known = str(content.get("format", "none"))[:20]
+        raise RunFolderError(
+            f"'{path}' has the format {known!a}, and this nlctl reads {RUN_FORMAT}: read "
+            "it with the nlctl that wrote it, or run the study again in another folder with --out"
+        )
+    if content.pop(SEAL, None) != digest_of(content):
+        raise RunFolderError(f"'{path}' is not as it was written: {remedy}")
+    del content["format"]
     return from_json(content)
+
+
+def file_bytes(path: Path) -> bytes:
+    """Return what is in a file of a run folder.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, is not a file, or is larger than any of a run.
+    """
+    if path.exists() and not path.is_file():  # a pipe would never end
+        raise OSError(errno.EINVAL, "it is not a file")
+    if path.stat().st_size > LARGEST:
+        raise OSError(errno.EFBIG, "it is larger than any file of a run")
+    return path.read_bytes()
+
+
+@contextmanager
+def as_written(what: str, remedy: str = ANEW) -> Iterator[None]:
+    """Refuse content that fits together and that no run writes: of other versions, or made up.
+
+    Raises
+    ------
+    RunFolderError
+        Where the body stumbles over it.
+    """
+    try:
+        yield
+    except UsageError:
+        raise
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        reason = f"{type(error).__name__}: {error}".partition("\n")[0][:200]
+        raise RunFolderError(f"{what} holds what no run writes ({reason}): {remedy}") from error
 
 
 def digest_of(content: Any) -> str:
@@ -91,6 +141,8 @@ def file_digest(path: Path) -> str:
     OSError
         If it cannot be read.
     """
+    if not path.is_file():
+        raise FileNotFoundError(errno.ENOENT, "there is no such file", str(path))
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -29,7 +29,7 @@ def rhs(x):
 
 
 box = Box.of(x1=(-3, 3), x2=(-3, 3))
-proof = prove_decrease(V, gradient, rhs, box, level=2.25, floor=0.05)
+proof = prove_decrease(V, rhs, box, level=2.25, floor=0.05)
 
 x1, x2 = np.meshgrid(np.linspace(-3, 3, 301), np.linspace(-3, 3, 301))
 rate = sum(a * b for a, b in zip(gradient((x1, x2)), rhs((x1, x2)), strict=True))
@@ -39,4 +39,4 @@ axes.contour(x1, x2, V((x1, x2)), levels=[2.25])
 axes.set(xlabel="x1", ylabel="x2", title="V = 2.25 within V' < 0 (shaded)")
 
 assert proof.holds
-assert not prove_decrease(V, gradient, rhs, box, level=2.4, floor=0.05).holds  # too large
+assert not prove_decrease(V, rhs, box, level=2.4, floor=0.05).holds  # too large

@@ -10,6 +10,7 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
 from ..params import as_numbers, param, record
+from .memories import RELAXATION
 
 __all__ = ["Backlash"]
 
@@ -51,12 +52,11 @@ class Backlash:
     phi(u) is read as v(t-); any other reading is ill-posed in a closed loop.  The output lies in
     the gap from the first instant, whatever memory it starts from.
 
-    In python-control, which has no accepted-step hook, the memory is a state that relaxes onto
-    the play, memory' = rate (v - memory), and v is the memory clipped into the gap.  On the sides
-    of the gap v is then exact, whatever the rate; where it holds, it misses the turning value by
-    O(slope |u''| / rate^2).  In Example 2 over 20 s the states are off by at most 1.5e-2, 1.8e-4
-    and 1.8e-6 at rates of 100, 1000 and 10,000 1/s.  The price is a stiff state: simulate with
-    ``method="LSODA"`` and rtol <= 1e-8 (the default of `nlctl.input_output_response`).
+    Both engines of `nlctl.input_output_response` have this play: they locate where it reverses.
+    Plain `control.input_output_response` has no hook for accepted steps.  There the memory relaxes
+    onto the play, memory' = 1000/s (v - memory), and v is the memory clipped into the gap: exact on
+    the sides of the gap, off by O(slope |u''| / rate^2) where it holds.  In Example 2 over 20 s the
+    states are off by at most 1.8e-4.  The price is a stiff state: simulate with LSODA there.
 
     Parameters
     ----------
@@ -79,7 +79,6 @@ class Backlash:
     m_l: float = param(1.2, unit="1", meaning="slope of the left (falling) side", above=0)
     c_r: float = param(0.5, unit="1", meaning="right end of the gap, in u")
     c_l: float = param(-0.6, unit="1", meaning="left end of the gap, in u")
-    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memory", above=0)
     v0: float = 0.0
 
     inputs = ("u",)
@@ -111,7 +110,7 @@ class Backlash:
         """Relaxation of the memory onto the play."""
         (memory,) = x
         (u1,) = u
-        return (p.rate * (play(u1, memory, p) - memory),)
+        return (RELAXATION * (play(u1, memory, p) - memory),)
 
     @staticmethod
     @equation

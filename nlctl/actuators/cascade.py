@@ -7,12 +7,14 @@ from typing import Any
 
 import control as ct
 
+from ..annotations import as_annotated
 from ..diagrams import as_system, interconnect
 from ..errors import DiagramError
 
 __all__ = ["cascade"]
 
 
+@as_annotated
 def cascade(stages: Mapping[str, Any], *, name: str = "actuator") -> ct.InterconnectedSystem:
     """Join actuators in series: the output v of each is the input u of the next.
 

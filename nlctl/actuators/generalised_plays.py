@@ -8,7 +8,7 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
-from .memories import checked_start, memory_names, started
+from .memories import RELAXATION, checked_start, memory_names, started
 from .prandtl_ishlinskii import check_pairs, check_thresholds
 from .static import BOUNDED_OUTPUT
 
@@ -55,8 +55,8 @@ class GeneralisedPrandtlIshlinskii:
     With equal envelopes it is a `PrandtlIshlinskii` operator behind the characteristic gamma, and
     the inverse of that operator, followed by that of gamma, is its inverse.
 
-    It does not obey (2): |v| is bounded for all u.  In python-control the memories relax onto the
-    plays, as with `nlctl.Backlash`.
+    It does not obey (2): |v| is bounded for all u.  In plain `control.input_output_response` the
+    memories relax onto the plays, as with `nlctl.Backlash`.
 
     Parameters
     ----------
@@ -87,7 +87,6 @@ class GeneralisedPrandtlIshlinskii:
     r: tuple[float, ...] = param(
         (0.0, 0.2, 0.4, 0.6), unit="1", meaning="thresholds, increasing", at_least=0
     )
-    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memories", above=0)
     v0: float | tuple[float, ...] = 0.0
 
     inputs = ("u",)
@@ -125,7 +124,7 @@ class GeneralisedPrandtlIshlinskii:
     @equation
     def update(t, x, u, p):
         """Relaxation of the memories onto the plays."""
-        return p.rate * (generalised_plays(u[0], x, p) - x)
+        return RELAXATION * (generalised_plays(u[0], x, p) - x)
 
     @staticmethod
     @equation

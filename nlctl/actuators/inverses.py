@@ -13,7 +13,7 @@ import numpy as np
 from ..equations import equation
 from ..params import param, record
 from .backlash import check_gap
-from .memories import checked_start, memory_names, started
+from .memories import RELAXATION, checked_start, memory_names, started
 from .prandtl_ishlinskii import (
     check_thresholds,
     check_weights,
@@ -109,8 +109,7 @@ class BacklashInverse:
     it has the output u.  The inverse crosses the gap in a jump where u reverses: that is why it
     needs u', and no inverse from u alone does it.
 
-    It obeys (2) with k between 1 / m_r and 1 / m_l and eps_u between c_l and c_r.  In
-    python-control the memory of the side relaxes as that of `Relay`; it counts at u' = 0 only.
+    It obeys (2) with k between 1 / m_r and 1 / m_l and eps_u between c_l and c_r.
 
     Parameters
     ----------
@@ -130,7 +129,6 @@ class BacklashInverse:
     m_l: float = param(1.2, unit="1", meaning="slope of the left (falling) side", above=0)
     c_r: float = param(0.5, unit="1", meaning="right end of the gap")
     c_l: float = param(-0.6, unit="1", meaning="left end of the gap")
-    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memory", above=0)
     v0: float = 1.0
 
     inputs = ("u", "u1")
@@ -155,7 +153,7 @@ class BacklashInverse:
     def update(t, x, u, p):
         """Relaxation of the memory onto the side."""
         (side,) = x
-        return (p.rate * (moving_side(u[1], side) - side),)
+        return (RELAXATION * (moving_side(u[1], side) - side),)
 
     @staticmethod
     @equation
@@ -196,8 +194,7 @@ class PrandtlIshlinskiiInverse:
     operator.  Operator and inverse, one behind the other in either order, are the identity, if the
     memories v0 fit each other as after some input: |v0[i] - v0[i-1]| <= r_i - r_(i-1).
 
-    It obeys (2) with the gain k = 1 / (w_0 + sum w_i) and |eps_u| <= sum |W_i| R_i.  In
-    python-control its memories relax as those of `PrandtlIshlinskii`.
+    It obeys (2) with the gain k = 1 / (w_0 + sum w_i) and |eps_u| <= sum |W_i| R_i.
 
     Parameters
     ----------
@@ -219,7 +216,6 @@ class PrandtlIshlinskiiInverse:
     r: tuple[float, ...] = param(
         (0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds of the operator, increasing", above=0
     )
-    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memories", above=0)
     v0: float | tuple[float, ...] = 0.0
 
     inputs = ("u",)
@@ -266,7 +262,7 @@ class PrandtlIshlinskiiInverse:
     @equation
     def update(t, x, u, p):
         """Relaxation of the memories onto the plays."""
-        return p.rate * (unit_play(u[0], x, p.R) - x)
+        return RELAXATION * (unit_play(u[0], x, p.R) - x)
 
     @staticmethod
     @equation

@@ -12,7 +12,7 @@ from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
 from ..wording import counted
-from .memories import checked_start, memory_names, started
+from .memories import RELAXATION, checked_start, memory_names, started
 from .static import BOUNDED_OUTPUT
 
 __all__ = ["OneSidedDeadZones", "PrandtlIshlinskii", "Stop"]
@@ -53,8 +53,8 @@ class Stop:
     (Brokate, Sprekels, Hysteresis and Phase Transitions, 1996, section 2.3).  v follows the
     changes of u until |v| = r, and stays there until u reverses.
 
-    It does not obey (2): |v| <= r for all u.  In python-control the memory relaxes onto the play,
-    as with `nlctl.Backlash`.
+    It does not obey (2): |v| <= r for all u.  In plain `control.input_output_response` the memory
+    relaxes onto the play, as with `nlctl.Backlash`.
 
     Parameters
     ----------
@@ -72,7 +72,6 @@ class Stop:
     """
 
     r: float = param(1.0, unit="1", meaning="largest |v|, half gap of the play", above=0)
-    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memory", above=0)
     v0: float = 0.0
 
     inputs = ("u",)
@@ -96,7 +95,7 @@ class Stop:
     def update(t, x, u, p):
         """Relaxation of the memory onto the play."""
         (memory,) = x
-        return (p.rate * (unit_play(u[0], memory, p.r) - memory),)
+        return (RELAXATION * (unit_play(u[0], memory, p.r) - memory),)
 
     @staticmethod
     @equation
@@ -158,8 +157,8 @@ class PrandtlIshlinskii:
     Each play has its memory, the state ``memory[i]``.
 
     It obeys (2) with the gain k = w_0 + sum w_i and |eps_u| <= sum |w_i| r_i, since
-    |H_i - u| <= r_i.  In python-control the memories relax onto the plays, as with
-    `nlctl.Backlash`.
+    |H_i - u| <= r_i.  In plain `control.input_output_response` the memories relax onto the plays,
+    as with `nlctl.Backlash`.
 
     Parameters
     ----------
@@ -181,7 +180,6 @@ class PrandtlIshlinskii:
     r: tuple[float, ...] = param(
         (0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds, increasing", above=0
     )
-    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memories", above=0)
     v0: float | tuple[float, ...] = 0.0
 
     inputs = ("u",)
@@ -217,7 +215,7 @@ class PrandtlIshlinskii:
     @equation
     def update(t, x, u, p):
         """Relaxation of the memories onto the plays."""
-        return p.rate * (unit_play(u[0], x, p.r) - x)
+        return RELAXATION * (unit_play(u[0], x, p.r) - x)
 
     @staticmethod
     @equation

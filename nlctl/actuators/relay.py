@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..annotations import as_annotated
 from ..arguments import number, vector
 from ..equations import equation
 from ..errors import ParameterError
 from ..params import param, record
-from .memories import checked_start, memory_names, started
+from .memories import RELAXATION, checked_start, memory_names, started
 from .static import BOUNDED_OUTPUT
 
 __all__ = ["Preisach", "Relay", "relay_grid"]
@@ -66,9 +67,9 @@ class Relay:
     function is 4 height / (pi A) (sqrt(1 - (h / A)^2) - i h / A) (Gelb, Vander Velde,
     Multiple-Input Describing Functions, 1968, appendix B).
 
-    It does not obey (2): |v| = height for all u.  In python-control the memory relaxes onto the
-    side with the rate given, and its sign counts: the output switches ln(2) / rate after the input
-    has met a threshold, and a swing back that comes sooner is missed.
+    It does not obey (2): |v| = height for all u.  In plain `control.input_output_response` the
+    memory relaxes onto the side with 1000/s, and its sign counts: the output switches 0.7 ms after
+    the input has met a threshold, and a swing back that comes sooner is missed.
 
     Parameters
     ----------
@@ -86,7 +87,6 @@ class Relay:
     on: float = param(1.0, unit="1", meaning="input from which the relay is on")
     off: float = param(-1.0, unit="1", meaning="input up to which the relay is off")
     height: float = param(1.0, unit="1", meaning="output |v|", above=0)
-    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memory", above=0)
     v0: float = -1.0
 
     inputs = ("u",)
@@ -113,7 +113,7 @@ class Relay:
     def update(t, x, u, p):
         """Relaxation of the memory onto the side."""
         (side,) = x
-        return (p.rate * (relay_side(u[0], side, p.on, p.off) - side),)
+        return (RELAXATION * (relay_side(u[0], side, p.on, p.off) - side),)
 
     @staticmethod
     @equation
@@ -136,6 +136,7 @@ class Relay:
         return u[0] - p.on, u[0] - p.off
 
 
+@as_annotated
 def relay_grid(levels: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the thresholds (alpha, beta) of all relays on a grid of levels, alpha > beta.
 
@@ -181,8 +182,8 @@ class Preisach:
     with weights w_k >= 0 (Mayergoyz, Mathematical Models of Hysteresis, 1991, section 1.1).
     `nlctl.relay_grid` makes the thresholds of a grid in the half-plane alpha > beta.
 
-    It does not obey (2): |v| <= sum w_k for all u.  In python-control each memory relaxes as that
-    of `nlctl.Relay`.
+    It does not obey (2): |v| <= sum w_k for all u.  In plain `control.input_output_response` each
+    memory relaxes as that of `nlctl.Relay`.
 
     Parameters
     ----------
@@ -203,7 +204,6 @@ class Preisach:
     alpha: tuple[float, ...] = param(_GRID[0], unit="1", meaning="inputs from which relays are on")
     beta: tuple[float, ...] = param(_GRID[1], unit="1", meaning="inputs up to which relays are off")
     w: tuple[float, ...] = param((0.1,) * 10, unit="1", meaning="weights", at_least=0)
-    rate: float = param(1e3, unit="1/s", meaning="relaxation rate of the memories", above=0)
     v0: float | tuple[float, ...] = -1.0
 
     inputs = ("u",)
@@ -244,7 +244,7 @@ class Preisach:
     @equation
     def update(t, x, u, p):
         """Relaxation of the memories onto the sides."""
-        return p.rate * (relay_side(u[0], x, p.alpha, p.beta) - x)
+        return RELAXATION * (relay_side(u[0], x, p.alpha, p.beta) - x)
 
     @staticmethod
     @equation

@@ -6,6 +6,7 @@ from typing import Any
 
 import control as ct
 
+from ..annotations import as_annotated
 from ..arguments import of_type
 from ..equations import equation
 from ..params import param, record
@@ -46,6 +47,7 @@ class FixedGainLaw:
         return (-p.kappa * control_base(u, p),)
 
 
+@as_annotated
 def replaced(controller: ct.InterconnectedSystem, **pieces: Any) -> ct.InterconnectedSystem:
     """Return a controller like this one, with other pieces in some places.
 
@@ -79,6 +81,7 @@ def replaced(controller: ct.InterconnectedSystem, **pieces: Any) -> ct.Interconn
     return adaptive_neural(order, **(own | pieces), name=controller.name)
 
 
+@as_annotated
 def ablations(
     controller: ct.InterconnectedSystem, kappa: float = FixedGainLaw.kappa
 ) -> dict[str, ct.InterconnectedSystem]:

@@ -6,10 +6,11 @@ from typing import Any
 
 import control as ct
 
+from ..annotations import as_annotated
 from ..diagrams import as_system, interconnect
 from ..equations import equation
 from ..errors import ParameterError
-from ..params import integer, record
+from ..params import HIGHEST_ORDER, integer, record
 from ..plants import coordinate_names
 from ..references import derivative_names
 from ..wording import counted
@@ -55,6 +56,7 @@ class Zero:
         return output
 
 
+@as_annotated
 def adaptive_neural(
     order: int = 2,
     *,
@@ -94,7 +96,7 @@ def adaptive_neural(
     Raises
     ------
     ParameterError
-        If `order` is below 2 or does not fit to the filter or the basis.
+        If `order` is below 1 or does not fit to the filter or the basis.
     DiagramError
         If a replaced piece lacks a signal.
 
@@ -105,7 +107,7 @@ def adaptive_neural(
     >>> controller.input_labels
     ['x1', 'x2', 'yd', 'yd1', 'yd2']
     """
-    order = integer("adaptive_neural", "an order", order, at_least=2)
+    order = integer("adaptive_neural", "an order", order, at_least=1, at_most=HIGHEST_ORDER)
     if filtered_error is None:
         lambdas = FilteredError.lambdas if order == 2 else binomial_lambdas(order)
         filtered_error = FilteredError(lambdas=lambdas)

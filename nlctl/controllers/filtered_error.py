@@ -29,7 +29,7 @@ def binomial_lambdas(order: int) -> tuple[float, ...]:
     tuple of float
         n - 1 numbers.
     """
-    return tuple(float(c) for c in np.poly(-np.ones(order - 1))[1:])
+    return tuple(float(c) for c in np.atleast_1d(np.poly(-np.ones(order - 1)))[1:])
 
 
 def is_hurwitz(coefficients: Sequence[float]) -> bool:
@@ -70,7 +70,8 @@ class FilteredError:
         r   = lambda_{n-1} e_1 + ... + lambda_1 e_{n-1} + e_n
         Y_d = -yd^(n) + lambda_{n-1} e_2 + ... + lambda_1 e_n
 
-    The polynomial s^(n-1) + lambda_1 s^(n-2) + ... + lambda_{n-1} must be Hurwitz.
+    The polynomial s^(n-1) + lambda_1 s^(n-2) + ... + lambda_{n-1} must be Hurwitz.  Of a plant of
+    order 1 there are no lambdas, and r = e_1.
 
     Examples
     --------
@@ -82,7 +83,10 @@ class FilteredError:
     """
 
     lambdas: tuple[float, ...] = param(
-        (1.5,), unit="s^-i", meaning="lambda_1, ..., lambda_{n-1}; the order is their number + 1"
+        (1.5,),
+        unit="s^-i",
+        meaning="lambda_1, ..., lambda_{n-1}; the order is their number + 1",
+        may_be_empty=True,
     )
 
     states = ()

@@ -9,6 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..annotations import as_annotated
 from ..arguments import integer, number, tuple_of
 from ..diagrams import as_system
 from ..equations import equation
@@ -40,6 +41,7 @@ def _checked(who: str, count: int, inputs: int, low: float, high: float) -> int:
     return integer(who, "count", count, at_least=1)
 
 
+@as_annotated
 def diagonal_centres(count: int, inputs: int, low: float = -10, high: float = 10) -> Matrix:
     """Return `count` centres evenly spaced on the diagonal of [low, high]^inputs.
 
@@ -73,6 +75,7 @@ def diagonal_centres(count: int, inputs: int, low: float = -10, high: float = 10
     return _rows(np.tile(np.linspace(low, high, count)[:, None], (1, inputs)))
 
 
+@as_annotated
 def grid_centres(counts: Sequence[int], low: float = -10, high: float = 10) -> Matrix:
     """Return a full grid on [low, high]^n with ``counts[i]`` points along axis i.
 
@@ -106,6 +109,7 @@ def grid_centres(counts: Sequence[int], low: float = -10, high: float = 10) -> M
     return _rows(np.array(list(itertools.product(*axes))))
 
 
+@as_annotated
 def latin_hypercube_centres(
     count: int, inputs: int, low: float = -10, high: float = 10, *, seed: int
 ) -> Matrix:

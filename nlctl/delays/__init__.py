@@ -2,7 +2,7 @@
 
 `transport` is the block, `variation` how its delay varies in time, as polynomials by `pieces`, and
 `lines` finds those of a diagram.  What runs keep of the signals is in `nlctl.native.histories` and
-`nlctl.responses.delayed`.
+`nlctl.reference.past`.
 """
 
 from .transport import TransportDelay

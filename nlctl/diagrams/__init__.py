@@ -4,6 +4,7 @@ from .connecting import as_system, interconnect, reconnected
 from .parameters import (
     all_parameter_rows,
     check_read,
+    overridden,
     override,
     parameter_names,
     parameters,
@@ -19,10 +20,13 @@ from .places import (
     places,
     state_names,
 )
+from .third_party import Apart, apart
 
 __all__ = [
+    "Apart",
     "Place",
     "all_parameter_rows",
+    "apart",
     "as_system",
     "check_read",
     "continuous_blocks",
@@ -31,6 +35,7 @@ __all__ = [
     "known_system",
     "leaves",
     "not_a_system",
+    "overridden",
     "override",
     "parameter_names",
     "parameters",

@@ -8,11 +8,13 @@ from typing import Any
 
 import control as ct
 
-from ..blocks import block, within
+from ..annotations import as_annotated
+from ..blocks import Block, block, within
 from ..errors import DiagramError
 from ..names import Parameters, unknown
 from ..upstream.control_internals import StandIn, is_system
 from .places import leaves
+from .third_party import with_own_values
 
 
 def as_system(thing: Any, name: str) -> ct.InputOutputSystem:
@@ -48,6 +50,7 @@ def _check_not_compiled(thing: Any, name: str) -> None:
         )
 
 
+@as_annotated
 def interconnect(
     blocks: Mapping[str, Any] | Sequence[ct.InputOutputSystem],
     *,
@@ -59,8 +62,9 @@ def interconnect(
 
     An input is fed by the output of the same name.  The result is an ordinary
     `control.InterconnectedSystem`; what is added are checks (a misspelt signal is an error, not
-    a warning) and, when the diagram is nested in another one, its name in front of the names of
-    its parameters.
+    a warning), parameters of third-party blocks that go by their block's name as those of nlctl's
+    do (python-control has one value for all blocks whose parameters have one name), and, when the
+    diagram is nested in another one, its name in front of the names of its parameters.
 
     Parameters
     ----------
@@ -111,6 +115,7 @@ def interconnect(
     sources = _signal_sources(systems)
     _check_inputs(systems, sources, inputs)
     _check_orders(systems, sources)
+    systems = [with_own_values(system) for system in systems]
     outputs = list(sources) if outputs is None else list(outputs)
     for signal in outputs:
         if signal not in sources:
@@ -213,7 +218,8 @@ def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str,
     """A controller that is made for plants of one order must not drive one of a higher order."""
     for system in systems:
         for leaf in leaves(system):
-            order = getattr(getattr(within(leaf.system), "spec", None), "plant_order", None)
+            made = within(leaf.system)
+            order = getattr(made.spec, "plant_order", None) if isinstance(made, Block) else None
             if not isinstance(order, int):
                 continue
             above = f"x{order + 1}"

@@ -7,22 +7,23 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import control as ct
+import numpy as np
 
-from ..blocks import Block, ParameterRow, parameter_rows, record_rows, sampling_of, within
-from ..names import Parameters, base_name, unknown
-from ..params import declared_params
-from ..upstream.control_internals import set_parameters
+from ..annotations import as_annotated
+from ..blocks import Block, parameter_rows, sampling_of, within
+from ..names import Parameters
+from ..params import ParameterRow, declared_params, record_rows
+from ..upstream.control_internals import StandIn, current_parameters, set_parameters
+from .addresses import divided
 from .places import known_system, leaves
+from .third_party import apart, declared_keys, is_third_party, set_key
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 def check_read(system: Any, params: Mapping[str, Any] | None) -> None:
-    """Refuse parameters without a block's name that nothing in a diagram of nlctl's can read.
-
-    A third-party function reads what it likes; blocks of nlctl and linear systems do not.  Where
-    none is nlctl's, python-control's own rule holds: what nothing reads is ignored.
+    """Refuse parameters that nothing in a diagram reads.
 
     Parameters
     ----------
@@ -33,41 +34,72 @@ def check_read(system: Any, params: Mapping[str, Any] | None) -> None:
 
     Raises
     ------
-    UnknownNameError
+    UnknownNameError, AmbiguousNameError
         The nearest name is given.
     """
-    bare = [key for key in params or {} if isinstance(key, str) and "." not in key]
-    bare = [key for key in bare if base_name(key) not in system.params]
-    if not bare:
-        return
-    parts = [within(leaf.system) for leaf in leaves(system)]
-    others = [part for part in parts if not isinstance(part, Block)]
-    linear = ct.StateSpace, ct.TransferFunction
-    if len(others) < len(parts) and all(isinstance(part, linear) for part in others):
-        raise unknown("parameter", bare[0], parameter_names(system))
+    divided(system, params)
 
 
-def override(system: Any, params: Mapping[str, Any] | None) -> None:
+def override(system: Any, params: Mapping[str, Any] | None) -> dict[str, Any]:
     """Let a system's equations have a user's overrides from now on; None for its own values.
 
     Parameters
     ----------
     system : control.InputOutputSystem
-        A diagram or a block.
+        A diagram or a block; of a run the one that is its own, see `apart`.
     params : mapping or None
         Overrides by name.
+
+    Returns
+    -------
+    dict
+        What python-control is given of them.
 
     Raises
     ------
     UnknownNameError, AmbiguousNameError, ParameterError
         If a name or a value is refused.
     """
-    check_read(system, params)
-    set_parameters(system, params)
+    found = divided(system, params)
+    blocks = [within(leaf.system) for leaf in leaves(system)]
+    for made in blocks:
+        if "nlctl_overrides" in vars(made):
+            made.nlctl_overrides = found.alone.get(id(made), {})
+    set_parameters(system, found.given)
+    for made in blocks:
+        if "nlctl_overrides" not in vars(made):  # not a run's own
+            for name, value in found.alone.get(id(made), {}).items():
+                set_key(current_parameters(made), name, value)
+    return found.given
+
+
+def overridden(system: Any, params: Mapping[str, Any] | None = None) -> Any:
+    """Return a copy of a system whose equations have a user's overrides; the system stays as it is.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram or a block.
+    params : mapping, optional
+        Overrides by name.
+
+    Returns
+    -------
+    control.InputOutputSystem
+        Its functions, matrices and records are those of the system.
+
+    Raises
+    ------
+    UnknownNameError, AmbiguousNameError, ParameterError
+        If a name or a value is refused.
+    """
+    own = apart(system.system if isinstance(system, StandIn) else system).system
+    override(own, params)
+    return own
 
 
 def parameter_names(system: ct.InputOutputSystem) -> list[str]:
-    """Return the qualified names of all parameters of nlctl blocks in `system`.
+    """Return the qualified names of all parameters in `system`.
 
     Parameters
     ----------
@@ -96,14 +128,27 @@ def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
         In the order of the blocks, those of sampling behind them.
     """
     if isinstance(system, ct.NonlinearIOSystem):
+        system = apart(system).system
         set_parameters(system, None)
     rows: list[ParameterRow] = []
     for leaf in leaves(system):
         if isinstance(within(leaf.system), Block):
             rows += parameter_rows(within(leaf.system), f"{leaf.parameter_path}.")
+        elif is_third_party(within(leaf.system)):
+            rows += _third_party_rows(within(leaf.system), leaf.parameter_path)
     for path, owner in samplings(system):
         rows += parameter_rows(owner, f"{path}.")
     return rows
+
+
+def _third_party_rows(made: Any, path: str) -> list[ParameterRow]:
+    """Return the numbers that a third-party block declares; nobody says what they mean."""
+    values = current_parameters(made)
+    return [
+        ParameterRow(name=f"{path}.{key}", value=values[key], unit="", meaning="", bounds="")
+        for key in declared_keys(made)
+        if isinstance(key, str) and np.asarray(values[key]).dtype.kind in "fib"
+    ]
 
 
 def samplings(system: Any) -> list[tuple[Any, Any]]:
@@ -126,6 +171,7 @@ def samplings(system: Any) -> list[tuple[Any, Any]]:
     return [(paths.get(key, made.name), made) for key, made in found.items()]
 
 
+@as_annotated
 def parameters(system: Any) -> pd.DataFrame:
     """Return all parameters of a diagram, block or record as a table.
 

@@ -9,10 +9,12 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..annotations import as_annotated
 from ..blocks import Block, default_state, within
 from ..errors import DiagramError, ParameterError
 from ..names import Parameters, find_name
 from ..params import as_numbers
+from ..upstream.control_internals import StandIn
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -171,7 +173,7 @@ def known_system(who: str, system: Any) -> Any:
     ParameterError
         If it is neither.
     """
-    inner = getattr(system, "system", system)
+    inner = system.system if isinstance(system, StandIn) else system
     if not isinstance(inner, ct.InputOutputSystem):
         raise ParameterError(not_a_system(who, system))
     return inner
@@ -198,6 +200,7 @@ def not_a_system(who: str, thing: Any) -> str:
     )
 
 
+@as_annotated
 def state_names(system: ct.InputOutputSystem) -> list[str]:
     """Return the qualified names of all states, ``"controller.law.zeta"``, in vector order.
 
@@ -221,6 +224,7 @@ def state_names(system: ct.InputOutputSystem) -> list[str]:
     return [f"{leaf.path}.{s}" for leaf in leaves(system) for s in leaf.system.state_labels]
 
 
+@as_annotated
 def initial_state(
     system: ct.InputOutputSystem, values: Mapping[str, float] | None = None
 ) -> np.ndarray:

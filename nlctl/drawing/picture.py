@@ -17,6 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Polygon, Rectangle
 
+from ..annotations import as_annotated
+from ..blocks import Block
 from ..wording import counted
 from .figure import Drawing
 from .records import (
@@ -123,7 +125,7 @@ def _kind(system: Any) -> str:
     """What a block is, in a word; a static sum or gain as its formula."""
     if isinstance(system, ct.InterconnectedSystem):
         return counted(len(system.syslist), "block")
-    if hasattr(system, "spec"):
+    if isinstance(system, Block):
         return type(system.spec).__name__
     if not isinstance(system, ct.StateSpace):
         return ""
@@ -188,6 +190,7 @@ def lay_out(diagram: ct.InterconnectedSystem) -> Layout:
     return arrange(nodes, wires, _WIDTH - 2 * MARGIN)
 
 
+@as_annotated
 def draw(
     diagram: ct.InterconnectedSystem, *, title: str | None = None, expand: bool = False
 ) -> Drawing:

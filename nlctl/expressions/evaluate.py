@@ -8,7 +8,7 @@ import numpy as np
 
 from .graph import Expr, Untraceable, needed, numpy_function
 
-__all__ = ["evaluate_expressions"]
+__all__ = ["evaluate_expressions", "value_of"]
 
 
 def evaluate_expressions(
@@ -42,15 +42,22 @@ def evaluate_expressions(
     results = list(results)
     with np.errstate(all="ignore"):  # infinity and NaN travel, as they do in machine code
         for node in needed(results):
-            parts = [values[arg] for arg in node.args]
-            if node.op == "solve" and searches and node.data[0] in searches:
-                values[node] = searches[node.data[0]](_joined(parts, node.data[1]))
-            else:
-                values[node] = _value(node, parts, arrays)
+            values[node] = value_of(node, [values[arg] for arg in node.args], arrays, searches)
     return [values[expr] for expr in results]
 
 
-def _value(node: Expr, parts: list[np.ndarray], arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+def value_of(
+    node: Expr,
+    parts: list[np.ndarray],
+    arrays: Mapping[str, np.ndarray],
+    searches: Mapping[str, Callable[[np.ndarray], np.ndarray]] | None = None,
+) -> np.ndarray:
+    """Return the value of one expression from those of its parts.
+
+    As `evaluate_expressions`; among `searches` there may be opaque functions as well.
+    """
+    if node.op in ("call", "solve") and searches and node.data[0] in searches:
+        return searches[node.data[0]](_joined(parts, node.data[1]))
     if node.op == "const":
         return np.asarray(node.data)
     if node.op == "table":

@@ -74,6 +74,26 @@ def _cube_root(x: Any) -> Any:
     return low.union(high)
 
 
+def _by_ends(x: Any, rounded: Callable[[Any], Any]) -> Any:
+    if not x.is_finite():
+        return x if x.is_nan() else type(x)(0, "inf")
+    low, high = rounded(x.lower()), rounded(x.upper())  # it rises
+    return low if low.is_exact() and high.is_exact() and low == high else low.union(high)
+
+
+def _truncated(x: Any) -> Any:
+    return _by_ends(x, lambda e: e.floor() if e >= 0 else e.ceil())
+
+
+def _rounded(x: Any) -> Any:
+    def even(e: Any) -> Any:  # of two integers equally far
+        below = e.floor()
+        odd = (below / 2).floor() * 2 != below
+        return below + int(e - below > 0.5 or (e - below == 0.5 and odd))
+
+    return _by_ends(x, even)
+
+
 def _hyperbolic_tangent(x: Any) -> Any:
     # flint has no number for an argument without bounds, where it lies between -1 and 1
     return x.tanh() if x.is_finite() or x.is_nan() else type(x)(0, 1)
@@ -146,8 +166,10 @@ _ROWS = (
          lambda x: 1.0 / ((1.0 - x) * (1.0 + x)), ball=lambda x: x.atanh(), math="atanh"),
     _row("ceil", "llvm.ceil", r"\left\lceil {0} \right\rceil", _zero,
          ball=lambda x: x.ceil(), math="-", series="unknown"),
-    _row("trunc", "llvm.trunc", r"\operatorname{{trunc}} {0}", _zero, math="-", series="unknown"),
-    _row("rint", "llvm.rint", r"\operatorname{{round}} {0}", _zero, math="-", series="unknown"),
+    _row("trunc", "llvm.trunc", r"\operatorname{{trunc}} {0}", _zero,
+         ball=_truncated, math="-", series="unknown"),
+    _row("rint", "llvm.rint", r"\operatorname{{round}} {0}", _zero, ball=_rounded, math="-",
+         series="unknown"),
     _row("cbrt", "cbrt", r"\sqrt[3]{{{0}}}", lambda x: 1.0 / (3.0 * np.cbrt(x) ** 2),
          ball=_cube_root),
     _row("arctan2", "atan2", r"\operatorname{{atan2}}\left({0}, {1}\right)",

@@ -232,6 +232,8 @@ class _Object:
     def __getattr__(self, name: str) -> Any:
         real, stage = self.__dict__["_real"], self.__dict__["_stage"]
         found = inspect.getattr_static(type(real), name, None)
+        if name in getattr(real, "__dict__", {}) and not isinstance(found, property):
+            return stage.instead(getattr(real, name))  # its own is what Python finds first
         if isinstance(found, property | functools.cached_property) and not _is_of_a_library(real):
             getter = found.fget if isinstance(found, property) else found.func
             return stage.copied(getter)(self)

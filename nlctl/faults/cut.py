@@ -11,6 +11,7 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
+from ..annotations import as_annotated
 from ..blocks import block, memory_states
 from ..diagrams import known_system, places, reconnected
 from ..errors import DiagramError, ParameterError, UnknownNameError
@@ -51,6 +52,7 @@ class _Cut:
     watched: Spot | None
 
 
+@as_annotated
 def with_faults(diagram: Any, *faults: Fault) -> ct.InterconnectedSystem:
     """Return a diagram with faults on its signals; the one that was given stays as it is.
 

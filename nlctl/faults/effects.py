@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..actuators.memories import RELAXATION
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import noise_spectrum, noise_value
@@ -210,13 +211,11 @@ class Late(_Effect):
 class LockInPlace(_Effect):
     """Stuck at the value that the signal had at the onset.
 
-    In machine code that value is remembered at the onset, exactly.  In python-control, which has
-    no hook for accepted steps, ``held`` follows the signal with the rate 20 ``rate`` and freezes
-    when ``caught``, which begins to rise at the onset, has passed 1/2: 0.7 / rate later.
-    The value is then off by about 0.7 |signal'| / rate.
+    `nlctl.input_output_response` remembers that value at the onset, exactly.  In plain
+    `control.input_output_response`, which has no hook for accepted steps, ``held`` follows the
+    signal with 20,000/s and freezes when ``caught``, which rises with 1000/s from the onset on, has
+    passed 1/2: 0.7 ms later.  The value is then off by about 0.7 ms of the signal's rate.
     """
-
-    rate: float = param(1e3, unit="1/s", meaning="relaxation rate in python-control", above=0)
 
     states = ("held", "caught")
     memory = states
@@ -227,8 +226,8 @@ class LockInPlace(_Effect):
         """Relaxation: the held value follows until it is caught."""
         begun = 1.0 if age(t, u, p) >= 0 else 0.0
         if x[1] > 0.5:
-            return 0.0, p.rate * (begun - x[1])
-        return SHARPER * p.rate * (u[0] - x[0]), p.rate * (begun - x[1])
+            return 0.0, RELAXATION * (begun - x[1])
+        return SHARPER * RELAXATION * (u[0] - x[0]), RELAXATION * (begun - x[1])
 
     @staticmethod
     @equation
@@ -261,10 +260,10 @@ class Latch:
     The condition is watched > level; |watched| > level with `is_magnitude`, < with `is_below`.
     ``on`` is 1 from then on, and ``since`` the time at which it began (s).
 
-    In machine code it is met exactly where the signal passes the level, also by a peak within one
-    step.  In python-control
-    ``on`` rises with a rate, and counts when it has passed 1/2: a condition that is met for less
-    than 0.7 / rate is not remembered, and what begins with it begins 0.7 / rate late.
+    It is met exactly where the signal passes the level, also by a peak within one step.  In plain
+    `control.input_output_response` ``on`` rises with 1000/s, and counts when it has passed 1/2: a
+    condition that is met for less than 0.7 ms is not remembered, and what begins with it is late
+    by 0.7 ms.
 
     Parameters
     ----------
@@ -272,7 +271,6 @@ class Latch:
     """
 
     level: float = param(1.0, unit="1", meaning="level, in the unit of the watched signal")
-    rate: float = param(1e3, unit="1/s", meaning="relaxation rate in python-control", above=0)
     is_magnitude: bool = False
     is_below: bool = False
 
@@ -298,9 +296,9 @@ class Latch:
         """Relaxation: `on` rises while the condition is met, until then `since` follows t."""
         on, since = x
         if on > 0.5:
-            return p.rate * (1.0 - on), 0.0
+            return RELAXATION * (1.0 - on), 0.0
         met = 1.0 if excess(u, p) > 0 else 0.0
-        return p.rate * (met - on), SHARPER * p.rate * (t - since)
+        return RELAXATION * (met - on), SHARPER * RELAXATION * (t - since)
 
     @staticmethod
     @equation

@@ -15,8 +15,9 @@ from .audit import AuditError
 from .compiled import Compiled, compile, linearize  # noqa: A004 (what it does)
 from .diagram.schedule import AlgebraicLoopError
 from .ensemble import Ensemble, ensemble_response
-from .integrate.driver import Settings, Statistics
+from .integrate.driver import Settings
 from .integrate.methods.tableau import Tableau
+from .integrate.results import Statistics
 from .integrate.state import Status
 from .machine.ahead import compile_ahead
 from .machine.store import CacheWarning

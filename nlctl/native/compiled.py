@@ -13,17 +13,18 @@ import cloudpickle
 import control as ct
 import numpy as np
 
-from ..diagrams import not_a_system, override
+from ..annotations import as_annotated
+from ..diagrams import Apart, apart, not_a_system, override
 from ..errors import CompileError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
 from ..upstream.control_internals import StandIn, is_system
 from ..wording import counted
-from .codegen.blocks import Equations, equations
 from .codegen.lower import Lowered, lower
 from .codegen.program import Program, program
 from .describe import called, described
 from .diagram.schedule import Schedule, schedule
+from .equations.blocks import Equations, equations
 from .jacobians import Tangent, linear_system, parameter_jacobian, tangent
 from .machine.evaluations import evaluations
 from .parameters import packed
@@ -45,6 +46,10 @@ class Compiled(StandIn):
         What was read from the diagram.
     program : Program
         The arrays that machine code takes and fills.
+    original : control.InputOutputSystem or None
+        The diagram itself; none in another process.
+    apart : Apart or None
+        The copy of it that was read, in which runs write their parameters.
 
     Notes
     -----
@@ -64,6 +69,8 @@ class Compiled(StandIn):
 
     schedule: Schedule
     program: Program
+    original: Any = None
+    apart: Apart | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         # functions made at run time are pickled by value; machine code is found on disk again
@@ -78,8 +85,8 @@ class Compiled(StandIn):
 
     @property
     def system(self) -> Any:
-        """The diagram that was compiled."""
-        return self.schedule.system
+        """The diagram that was compiled; runs write their parameters into a copy of it."""
+        return self.schedule.system if self.original is None else self.original
 
     def _refused(self, *_: Any, **__: Any) -> Any:
         raise UsageError(
@@ -139,14 +146,20 @@ class Compiled(StandIn):
         UsageError
             If a value that a function reads from around it has changed since.
         """
-        other = changed(self.schedule.captured)
-        if other is not None:
-            raise UsageError(
-                f"'{other.name}' was {_short(other.then)} when '{self.system.name}' was compiled "
-                f"and is {_short(other.now)} now: compile again, or make it a parameter"
-            )
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks
-            override(self.system, params)
+            if self.apart is not None and not self.apart.refreshed():
+                raise UsageError(
+                    f"'{self.system.name}' has other blocks than when it was compiled: compile "
+                    "again"
+                )
+            other = changed(self.schedule.captured)
+            if other is not None:
+                raise UsageError(
+                    f"'{other.title}' was {_short(other.then)} when '{self.system.name}' was "
+                    f"compiled and is {_short(other.now)} now: compile again, or make it a "
+                    "parameter"
+                )
+            override(self.schedule.system, params)
             return packed(self.schedule.holders, self.program.layout, self.program.fixed)
 
     def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
@@ -175,7 +188,7 @@ class Compiled(StandIn):
         ParameterError, UnknownNameError
             If x or u has another length, or an override is refused.
         """
-        g = np.empty(self.program.events)
+        g = np.empty(self.lowered.rows["g"])
         return self._call(self.native[0], self.system.nstates, t, x, u, params, g)
 
     def output(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
@@ -318,6 +331,7 @@ class Compiled(StandIn):
     __str__ = __repr__
 
 
+@as_annotated
 def compile(  # noqa: A001 (what it does)
     system: Any,
     *,
@@ -385,17 +399,19 @@ def compile(  # noqa: A001 (what it does)
         )
     if not is_system(system):
         raise CompileError(not_a_system("compile", system))
-    override(system, checked_params(params))
+    own = apart(system)  # nothing is written into what the user may run in another thread
+    override(own.system, checked_params(params))
     if algebraic_loops not in LOOPS:
         raise unknown("choice", str(algebraic_loops), LOOPS, "for algebraic_loops")
-    read = schedule(system, solve_loops=algebraic_loops == "solve")
+    read = schedule(own.system, solve_loops=algebraic_loops == "solve")
     arrays = program(read)
     check_sizes(system, [node.sampled or node.system for node in read.nodes])
-    made = Compiled(schedule=read, program=arrays)
+    made = Compiled(schedule=read, program=arrays, original=system, apart=own)
     _ = made.equations  # what expressions would understand otherwise is refused now
     return made
 
 
+@as_annotated
 def linearize(
     system: Any,
     x0: Any,

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
+from ..blocks import Block
 from ..wording import counted
-from .codegen.program import Program, count_switching_functions, memory
+from .codegen.program import Program, count_guards, count_switching_functions, memory
 from .diagram.schedule import Node, signal_name
 from .jacobians import inexact
 from .parameters import Slot
@@ -44,6 +45,7 @@ def described(compiled: Compiled) -> str:
         why = inexact(compiled)
         how = "exact" if why is None else f"by differences, since {why}"
         lines.append(f"  Jacobian     {how}")
+    lines += [f"  conditions   {line}" for line in _conditions(compiled)]
     for loop in schedule.loops:
         torn = ", ".join(signal_name(nodes, s) for s in loop.torn)
         lines.append(f"  solved for   {torn}")
@@ -53,6 +55,11 @@ def described(compiled: Compiled) -> str:
         lines += [
             f"    {name:<12} {text}" for name, text in _facts(i, nodes[i], program, p) if text
         ]
+        own = [
+            each for each in compiled.equations.conditions.located if each.block == nodes[i].path
+        ]
+        if own:
+            lines.append(f"    {'conditions':<12} {sum(each.rows for each in own)}")
     return "\n".join(lines)
 
 
@@ -69,6 +76,18 @@ def called(compiled: Compiled) -> Iterator[str]:
         yield f"{call.kind} of block '{call.block}', {how}: {call.reason}"
 
 
+def _conditions(compiled: Compiled) -> Iterator[str]:
+    """Yield how many conditions of the equations are located, and what may hide others."""
+    found = compiled.equations.conditions
+    parts = [f"{found.rows} located"] if found.rows else []
+    parts += [f"{len(found.of_time)} of t alone, solved before a run"] if found.of_time else []
+    parts += [f"{found.beyond} too many to be located"] if found.beyond else []
+    if parts:
+        yield ", ".join(parts)
+    if compiled.equations.calls:
+        yield "none known of functions that are called as they stand: steps may pass over theirs"
+
+
 def _timebase(system: Any) -> str:
     if ct.isctime(system):
         return "continuous time"
@@ -76,7 +95,7 @@ def _timebase(system: Any) -> str:
 
 
 def _kind(node: Node) -> str:
-    spec = getattr(node.system, "spec", node.system)
+    spec = node.system.spec if isinstance(node.system, Block) else node.system
     text = "feedthrough" if node.direct.any() else "no feedthrough"
     if node.direct.any() and not node.direct.all():
         text = "feedthrough from some inputs to some outputs"
@@ -90,6 +109,7 @@ def _facts(i: int, node: Node, program: Program, p: np.ndarray) -> Iterator[tupl
     parameters += [f"{k} = {value!r} (fixed)" for k, value in program.fixed.get(i, {}).items()]
     yield "parameters", _listed(parameters)
     yield "switching functions", str(count_switching_functions(node) or "")
+    yield "guards", str(count_guards(node) or "")
     yield "memory", _listed([labels[j - first] for j in memory(node)])
 
 

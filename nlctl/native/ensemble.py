@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import control as ct
 import numpy as np
 
+from ..annotations import as_annotated
 from ..delays.variation import Variation
 from ..errors import ParameterError
 from ..host.notebook import table_html
@@ -28,15 +29,14 @@ from .histories import variations
 from .integrate.driver import (
     Run,
     Settings,
-    Trajectory,
     begin,
     finish,
-    made,
     prepared,
     trajectory,
     watched,
 )
 from .integrate.methods.tableau import Tableau
+from .integrate.results import Trajectory, made
 from .integrate.state import RUNNING, STIFF, Status
 from .machine.ahead import compile_for
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
@@ -108,6 +108,7 @@ class Ensemble:
         )
 
 
+@as_annotated
 def ensemble_response(
     compiled: Compiled | ct.InputOutputSystem,
     timepts: Any,
@@ -210,7 +211,9 @@ def ensemble_response(
         if signal not in labels:
             raise unknown("signal", signal, labels)
     u = input_array(compiled.system, inputs, times)
-    settings = Settings(rtol=rtol, atol=atol, max_steps=max_steps, method=method or "auto")
+    settings = Settings(
+        rtol=rtol, atol=atol, max_steps=max_steps, method="auto" if method is None else method
+    )
     varied = variations(compiled, times)  # once for all members
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
     _, p = every.batch(range(1), ENSEMBLE_WIDTH)  # checks all members before anything runs

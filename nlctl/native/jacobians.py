@@ -11,20 +11,22 @@ import control as ct
 import numpy as np
 from scipy.linalg import expm
 
+from ..arguments import number
+from ..blocks import Block
 from ..delays.lines import delayed_blocks
 from ..errors import CompileError, ParameterError, UnknownKeywordError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Untraceable, needed
 from ..names import unknown
-from ..params import declared_params, equation_arguments, with_overrides
+from ..params import as_numbers, declared_params, equation_arguments, with_overrides
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from ..sampling.system import clocks_of
 from ..wording import counted
-from .codegen.blocks import Equations
 from .codegen.lower import DIRECTION
 from .codegen.solver import searched
+from .equations.blocks import Equations
 from .parameters import length
 
 if TYPE_CHECKING:
@@ -156,7 +158,7 @@ def jacobian(
         ``"dx"`` of shape (nstates, k) and ``"y"`` of shape (noutputs, k), and of next states of
         sampled blocks ``"sample0"`` and so on.
     """
-    system, made = compiled.system, compiled.tangent
+    system, made, t = compiled.system, compiled.tangent, number("linearize", "t", t)
     p = compiled.parameter_vector(params)
     for place, value in made.assumed.items():
         if p[place] != value:
@@ -183,9 +185,10 @@ def jacobian(
 
 def _inputs(system: Any, u0: Any) -> np.ndarray:
     count = system.ninputs or 0
-    u = np.asarray(0.0 if u0 is None else u0, dtype=float)
-    u = np.full(count, float(u)) if u.ndim == 0 else u.reshape(-1)
-    if u.size != count or not np.all(np.isfinite(u)):
+    u = as_numbers(0.0 if u0 is None else u0)
+    if u is not None:
+        u = np.full(count, float(u)) if u.ndim == 0 else u.reshape(-1)
+    if u is None or u.size != count or not np.all(np.isfinite(u)):
         raise ParameterError(
             f"u0 needs {counted(count, 'finite number')} for '{system.name}', got {u0!r}"
         )
@@ -310,7 +313,7 @@ def parameter_jacobian(
 
 def _check_enters_alone(node: Node, name: str) -> None:
     """Refuse a parameter that numbers follow from: these are constants to the equations."""
-    spec: Any = getattr(node.system, "current_spec", None)
+    spec: Any = node.system.current_spec if isinstance(node.system, Block) else None
     field, _, place = name.removeprefix(f"{node.path}.").partition("[")
     if not hasattr(spec, "derived") or field not in declared_params(spec):
         return

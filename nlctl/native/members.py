@@ -11,6 +11,7 @@ import numpy as np
 
 from ..blocks import Block
 from ..diagrams import initial_state, state_names
+from ..diagrams.addresses import divided
 from ..errors import ParameterError, UsageError
 from ..names import Parameters, base_name, find_name
 from ..params import as_numbers, equation_arguments, with_overrides
@@ -125,7 +126,10 @@ class Members:
     def _owners(self) -> list[tuple[Block, Mapping[str, Slot], dict[str, str]]] | None:
         """Blocks whose parameters vary, with their places; None if third-party ones do."""
         self._first_vector  # noqa: B018 (names and fixed values are resolved first)
-        known = self.compiled.system.params
+        diagram = self.compiled.schedule.system
+        known = diagram.params
+        if divided(diagram, self.given(0)).alone:
+            return None
         nodes = [node.system for node in self.compiled.schedule.holders]
         found: dict[int, dict[str, str]] = {}
         for name, values in self.params.items():

@@ -13,6 +13,7 @@ import numpy as np
 from ..blocks import Block
 from ..errors import UsageError
 from ..upstream.control_internals import current_parameters
+from .thirdparty.captured import same
 
 if TYPE_CHECKING:
     from .diagram.schedule import Node
@@ -146,7 +147,7 @@ def packed(
                     f"was compiled: declare it in the block's params, or compile with "
                     f"params={{'{name}': ...}}"
                 )
-            elif not _same(value, constants[name]):
+            elif not (same(value, constants[name]) or _equal(value, constants[name])):
                 raise UsageError(
                     f"parameter '{path}.{name}' is not a number and was {constants[name]!r} when "
                     f"the diagram was compiled; it cannot be {value!r} now: compile again"
@@ -180,10 +181,8 @@ def filled(p: np.ndarray, slot: Slot, value: Any) -> None:
     p[slot.offset : slot.offset + slot.size] = array.ravel()
 
 
-def _same(one: Any, other: Any) -> bool:
+def _equal(one: Any, other: Any) -> bool:
     """Whether two values that are no numbers are equal."""
-    if one is other:
-        return True
     try:
         return type(one) is type(other) and bool(np.all(one == other))
     except (TypeError, ValueError):

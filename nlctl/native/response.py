@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import control as ct
 import numpy as np
 
-from ..errors import ChatteringError, DivergedError
+from ..annotations import as_annotated
+from ..errors import ChatteringError, DivergedError, ParameterError, ZenoError
 from ..responses.arguments import evaluation_array, input_array, interpolated, state_array
 from ..responses.time_response import Response, response_of
+from ..responses.watched import Watched
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.place import chattering_words
 from .compiled import Compiled
-from .integrate.driver import Settings, Statistics, Trajectory, trajectory
+from .integrate.driver import Settings, trajectory
+from .integrate.results import Statistics, Trajectory
 from .integrate.state import Status
 
 
@@ -31,6 +35,7 @@ def respond(
     ignore_errors: bool = False,
     progress: Callable[[float], object] | None = None,
     audit: Audit = True,
+    watched: tuple[Watched, ...] = (),
     **form: Any,
 ) -> Response:
     """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments.
@@ -38,6 +43,8 @@ def respond(
     Parameters
     ----------
     settings : Settings
+    watched : tuple of Watched
+        Functions whose changes of sign are events.
     **form
         ``squeeze``, ``transpose`` and ``return_states`` of the response.
 
@@ -52,6 +59,7 @@ def respond(
         If an argument has a wrong shape, or times do not fit a discrete-time diagram.
     """
     system = compiled.system
+    compiled = _with_watched(compiled, watched, params)
     wanted = evaluation_array(evaluation_times, times)
     u, x0 = input_array(system, inputs, times), state_array(system, initial_state)
     grid = times if wanted is times else _grid(system, times, wanted)
@@ -67,12 +75,54 @@ def respond(
     if run.status is Status.STOPPED and not ignore_errors:
         # whoever takes it for an error continues
         raise KeyboardInterrupt(_message(compiled, run, p, params))
-    if run.status is not Status.OK and not ignore_errors:
-        kind = ChatteringError if run.status is Status.CHATTERING else DivergedError
-        raise kind(_message(compiled, run, p, params), run.time)
-    shown = np.flatnonzero(np.isin(made.time, wanted))
-    message = None if run.status is Status.OK else _message(compiled, run, p, params)
-    return _response(compiled, made, u, shown, (params, form, message))
+    ended = run.status is Status.ENDED
+    fine = ended or run.status is Status.OK
+    if not fine and not ignore_errors:
+        raise _error(compiled, made, p, params)
+    shown = np.isin(made.time, wanted)
+    shown[-1:] |= ended
+    message = None if fine else str(_error(compiled, made, p, params))
+    return _response(compiled, made, np.flatnonzero(shown), (params, form, message))
+
+
+def _with_watched(
+    compiled: Compiled, watched: tuple[Watched, ...], params: Mapping[str, Any] | None
+) -> Compiled:
+    """Return a diagram that is compiled with functions of a run."""
+    if not watched:
+        return compiled
+    if not ct.isctime(compiled.system):
+        raise ParameterError(
+            f"'{compiled.system.name}' is in discrete time, where nothing is between two samples: "
+            "stop_when and events are for diagrams in continuous time"
+        )
+    read = replace(compiled.schedule, watched=watched, overrides=dict(params or {}))
+    return replace(compiled, schedule=read)
+
+
+def _error(
+    compiled: Compiled, made: Trajectory, p: np.ndarray, params: Mapping[str, Any] | None
+) -> DivergedError:
+    """Return why a run has not reached its last time."""
+    run, guards = made.statistics, compiled.program.guards
+    if made.culprit >= 0 and run.status in (Status.ZENO, Status.DIVERGED):
+        block = compiled.schedule.nodes[guards[made.culprit]].path
+        if run.status is Status.ZENO:
+            return ZenoError.of(block, _falls(compiled, made), made.since)
+        if not np.isfinite(made.guard):
+            why = f"block '{block}' has a guard that is NaN at t = {run.time:.6g} s"
+            return DivergedError(why, run.time)
+    kind = ChatteringError if run.status is Status.CHATTERING else DivergedError
+    return kind(_message(compiled, run, p, params), run.time)
+
+
+def _falls(compiled: Compiled, made: Trajectory) -> list[float]:
+    """Return when the guard has fallen that has ended a run."""
+    guards = compiled.program.guards
+    own = [k for k, block in enumerate(guards) if block == guards[made.culprit]]
+    path = compiled.schedule.nodes[guards[made.culprit]].path
+    name = "guard" if len(own) == 1 else f"guard {own.index(made.culprit) + 1}"
+    return [t for t, block, which, _ in made.happened if (block, which) == (path, name)]
 
 
 def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -86,6 +136,7 @@ def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -
     return np.union1d(times if system.ninputs else times[[0, -1]], wanted)
 
 
+@as_annotated
 def uninterrupted(response: Any) -> Any:
     """Return a response that was computed with `ignore_errors`, if Ctrl-C has not ended it.
 
@@ -103,7 +154,14 @@ def uninterrupted(response: Any) -> Any:
     ------
     KeyboardInterrupt
         If Ctrl-C ended the run.
+    ParameterError
+        If it is not such a response.
     """
+    if getattr(response, "statistics", None) is None:
+        raise ParameterError(
+            "uninterrupted needs a response of nlctl.input_output_response, got "
+            f"{type(response).__name__}"
+        )
     if response.statistics.status is Status.STOPPED:
         raise KeyboardInterrupt(response.message)
     return response
@@ -117,6 +175,7 @@ def _message(
         Status.STEP_LIMIT: "stopped at the limit of steps at",
         Status.STOPPED: "was stopped at",
         Status.CHATTERING: "is chattering at",
+        Status.ZENO: "jumps without end before",
         Status.STEP_TOO_SMALL: "diverged or jumps: no step is small enough after",
     }
     told = f"'{compiled.system.name}' {what[run.status]} t = {run.time:.6g} s"
@@ -128,15 +187,16 @@ def _message(
 def _response(
     compiled: Compiled,
     made: Trajectory,
-    inputs: np.ndarray,
     shown: np.ndarray,
     told: tuple[Mapping[str, Any] | None, Mapping[str, Any], str | None],
 ) -> Response:
     system, run, (params, form, message) = compiled.system, made.statistics, told
+    inputs = made.inputs[: system.ninputs or 0]
     signals = (made.time, made.outputs, made.states, inputs)
     response = response_of(
         system, [x[..., shown] for x in signals], params, form,
         success=message is None, message=message,
     )  # fmt: skip
     response.statistics = run
+    response.happened = made.happened
     return response

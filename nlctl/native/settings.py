@@ -19,7 +19,7 @@ _METHODS = {  # of `scipy.integrate.solve_ivp` -> what comes nearest
 }
 JACOBIAN = "its stiff method makes the Jacobian itself"
 _REFUSED = {  # of the keywords of `solve_ivp` -> what there is instead
-    "max_step": "step= is a fixed step, and break points of the inputs are never stepped over",
+    "max_step": "max_step= of the run bounds its steps",
     "min_step": "step= is a fixed step, max_steps= bounds their number",
     "first_step": "it chooses its first step by the tolerances; step= is a fixed step",
     "dense_output": "evaluation_times= are the times that are wanted",
@@ -70,4 +70,4 @@ def solver_settings(
         if name not in ("rtol", "atol"):
             raise unknown("keyword", name, ["rtol", "atol", *_REFUSED], "in solve_ivp_kwargs")
     given = {name: value for name, value in settings.items() if value is not None}
-    return Settings(**given | keywords, method=method or "auto")
+    return Settings(**given | keywords, method="auto" if method is None else method)

@@ -35,9 +35,12 @@ def ship(path: Path = SHIPPED) -> None:
     replace_file(path, lambda file: file.write(json.dumps(header).encode() + b"\n" + code))
 
 
-def source_files(first: str = "integrate/advance.py") -> list[str]:
-    """Return the files of the engine that a module is made of: itself and all that it imports."""
-    found = [first]
+def source_files(*modules: str) -> list[str]:
+    """Return the files of the engine that modules are made of: themselves and what they import.
+
+    By default those of the integrators.
+    """
+    found = [*(modules or ("integrate/advance.py", "integrate/start.py"))]
     for name in found:  # which grows meanwhile
         found += [other for other in dict.fromkeys(_imported(HERE / name)) if other not in found]
     return sorted(found)

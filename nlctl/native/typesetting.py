@@ -16,16 +16,17 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..annotations import as_annotated
 from ..blocks import Block, slides
-from ..diagrams import override
+from ..diagrams import apart, known_system, override
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
 from ..expressions.graph import Expr, Graph, needed
 from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol, with_index
 from ..params import declared_params
-from .codegen.blocks import Reader
 from .diagram.feedthrough import feedthrough
 from .diagram.schedule import Node, Schedule, Signal, schedule
+from .equations.reader import Reader
 from .parameters import Slot, slots_of
 
 _OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
@@ -69,6 +70,7 @@ class BlockEquations:
         return f"$${self.latex}$$"
 
 
+@as_annotated
 def typeset(
     system: Any, *, values: bool = False, params: Mapping[str, Any] | None = None
 ) -> tuple[BlockEquations, ...]:
@@ -103,7 +105,9 @@ def typeset(
     >>> print(law.equations[0])
     u = -\\kappa \\left(\\beta r + W_{\\psi} + \\mathrm{robust} + Y_{d}\\right)
     """
+    system = known_system("typeset", system)
     system = ct.ss(system) if isinstance(system, ct.TransferFunction) else system
+    system = apart(system).system
     override(system, params)
     read = schedule(system, solve_loops=True)
     return tuple(_block(read, node, values) for node in read.nodes)

@@ -16,6 +16,7 @@ from ..errors import ParameterError, UnknownKeywordError
 from ..names import unknown
 from ..params import as_numbers
 from ..wording import counted
+from .watched import Watched
 
 ALIASES = {  # python-control's short names
     **{"T": "timepts", "U": "inputs", "X0": "initial_state"},
@@ -38,6 +39,7 @@ class RunArguments:
     audit: Any  # True, False or "every run"
     form: Mapping[str, Any]  # squeeze, transpose, return_states
     solver: Mapping[str, Any]  # method, rtol, ..., and what SciPy is told
+    watched: tuple[Watched, ...] = ()  # functions whose changes of sign are events
 
 
 def checked_params(params: Any) -> Mapping[str, Any] | None:

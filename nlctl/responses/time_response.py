@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
 
 from ..host.notebook import table_html
 from ..wording import counted
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _SHOWN = 6  # names that are listed before the rest is only counted
 
@@ -21,9 +24,23 @@ class Response(ct.TimeResponseData):
     ----------
     statistics : Statistics or None
         Status, time reached and steps of a run in machine code.
+    happened : tuple
+        Rows of `events`.
     """
 
     statistics: Any = None
+    happened: tuple[tuple[float, str, str, str], ...] = ()
+
+    @property
+    def events(self) -> pd.DataFrame:
+        """What has happened in the run: time (s), block, which, direction; a row each.
+
+        Guards that have fallen, switching functions that blocks declare, and conditions of the
+        equations, where steps have ended.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(list(self.happened), columns=["time", "block", "which", "direction"])
 
     def plot(self, *args: Any, **kwargs: Any) -> Any:
         """Plot the response as `control.time_response_plot` does, also without inputs."""

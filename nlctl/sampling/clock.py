@@ -153,7 +153,7 @@ def instants(
     clocks : mapping
         Each clock by its owner.
     begin, end : float
-        Times of a run (s).  What happens at its end is left to a run that resumes there.
+        Times (s).
     known : sequence of frozenset, optional
         Patterns that come first, in this order.
 

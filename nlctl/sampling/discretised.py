@@ -6,8 +6,9 @@ from typing import Any
 
 import control as ct
 
+from ..annotations import as_annotated
 from ..arguments import number, one_of
-from ..blocks import memory_states, sampling_of
+from ..blocks import Block, memory_states, sampling_of
 from ..diagrams import leaves, not_a_system
 from ..errors import ParameterError
 from ..upstream.control_internals import is_system
@@ -16,6 +17,7 @@ from .rebuilt import rebuilt
 _METHODS = ("euler", "tustin", "zoh")
 
 
+@as_annotated
 def discretise(system: Any, dt: float, method: str = "euler") -> Any:
     """Make a block or diagram in discrete time of one in continuous time.
 
@@ -117,7 +119,7 @@ def _discretised(system: Any, dt: float, method: str) -> Any:
             f"discretise needs method='euler' for '{system.name}', which is not linear, got "
             f"{method!r}"
         )
-    spec = getattr(system, "spec", None)
+    spec = system.spec if isinstance(system, Block) else None
     for name in memory_states(spec)[:1]:
         raise ParameterError(
             f"'{system.name}' has a memory, '{name}', that is a state in continuous time only: "

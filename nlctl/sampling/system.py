@@ -10,8 +10,10 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..annotations import as_annotated
 from ..arguments import number
 from ..blocks import Block, block, default_state
+from ..diagrams import leaves
 from ..errors import ParameterError, UsageError
 from ..names import Parameters
 from ..params import integer
@@ -29,6 +31,7 @@ from .parameters import Sampling
 from .rebuilt import rebuilt, staged
 
 Happening = frozenset[Moment]
+_MOST_WAITING = 10_000  # samples, each a state of its own
 _HAPPENING: ContextVar[Happening | None] = ContextVar("nlctl_happening", default=None)
 
 
@@ -280,6 +283,7 @@ def oldest(waiting: Any, size: int, pending: Any) -> Any:
     return found
 
 
+@as_annotated
 def sampled(
     system: Any,
     dt: float | None = None,
@@ -340,10 +344,14 @@ def sampled(
         If a number is out of its bounds, `system` is in continuous time, does not say in which, is
         sampled already, or has another sampling time than `dt`.
 
+    UsageError
+        If a block of it has a guard.
+
     Notes
     -----
-    A run ends before what happens at its last instant: another one that starts from its last
-    state resumes there.
+    What is due at the last instant of a run happens there, and its outputs are the new ones; the
+    last column of its states is what they were before, as python-control's x[N] is: a run that
+    begins at an instant takes the sample that is due there.
 
     The numbers are parameters, ``"sampling.dt"`` and so on, that runs, ensembles and studies
     override without compiling again.  Whether there are a delay and converters is part of the
@@ -364,6 +372,7 @@ def sampled(
         is_discrete = getattr(system, "discrete", False)
         system = block(system, "sampled", dt=dt if is_discrete else None)
     system = with_equations("nlctl.sampled", system)
+    _refuse_guards(system)
     euler = method == "euler" and system.dt in (0, None)
     if method is not None and system.dt in (0, None):
         made = discretise(system, number("sampled", "dt", dt, above=0), method)
@@ -378,6 +387,16 @@ def sampled(
         converts_inputs=input_quantum is not None, converts_outputs=output_quantum is not None,
     )  # fmt: skip
     return _sampled(system, spec, euler)
+
+
+def _refuse_guards(system: Any) -> None:
+    """Refuse blocks whose guards fall in continuous time."""
+    for leaf in leaves(system):
+        if isinstance(leaf.system, Block) and hasattr(leaf.system.spec, "guard"):
+            raise UsageError(
+                f"block '{leaf.path or leaf.system.name}' has a guard, which falls in continuous "
+                "time, and is sampled: say in update what becomes of it at a sample"
+            )
 
 
 def _sampled(system: Any, spec: Sampling, euler: bool) -> Any:
@@ -402,7 +421,9 @@ def _sampled(system: Any, spec: Sampling, euler: bool) -> Any:
 def _waiting(dt: float, delay: float, waiting: int | None) -> int:
     """Return how many samples may be on their way."""
     least = Clock(dt=dt, delay=delay).pending
-    return least if waiting is None else integer("sampled", "waiting", waiting, at_least=least)
+    if waiting is None:
+        return least
+    return integer("sampled", "waiting", waiting, at_least=least, at_most=_MOST_WAITING)
 
 
 def _through(

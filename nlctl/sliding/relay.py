@@ -52,11 +52,23 @@ class IdealRelay:
     What is left of u where the entry is located, and by rounding, decays with `rate` while it
     slides.  Beyond `rest` it slides no longer: something else has made u jump.
 
+    v may enter u' through saturations and other bends, u' = R(v) in straight pieces (np.clip,
+    min, max, abs, choices that do not jump), if u' only falls or only rises with v: v is then the
+    zero of R, and it slides as long as there is one.  What v does to the rates of other states is
+    taken at that v, Utkin's way.
+
+    With b = 0 and u'' = A(v) (behind a lag, relative degree two) it switches, and every passage
+    through u = 0 is slower than the one before where J(height) / A(height)^2 is larger than
+    J(-height) / A(-height)^2, with J = A', for a small u'.  There it slides in second order,
+    u = u' = 0, as soon as |u'| < rest_rate and u'^2 < rest |A|: before, every switch is
+    integrated; behind, u is off by `rest` and u' by `rest_rate` at most, until what is left has
+    decayed.  With rest_rate = 0 it never does.  Other switches that accumulate end as
+    chattering, with the reason.
+
     It runs in machine code.  `nlctl.compile` refuses it where u jumps with v, where v enters u'
-    otherwise than as a + b v, where u depends on a delayed signal, whose rate nobody knows, and
-    where several such relays act on each other's u'.  Inputs of the diagram have the rates of a
-    run, in which they are linear between its times.  With b = 0 (relative degree above one) it
-    never slides; switches that accumulate end as chattering.
+    in another way, where u depends on a delayed signal, whose rate nobody knows, and where
+    several such relays act on each other's u'.  Inputs of the diagram have the rates of a run, in
+    which they are linear between its times.
 
     Examples
     --------
@@ -78,6 +90,9 @@ class IdealRelay:
     height: float = param(1.0, unit="1", meaning="output |v| beside u = 0", above=0)
     rest: float = param(1e-6, unit="1", meaning="input up to which it may slide", above=0)
     rate: float = param(1.0, unit="1/s", meaning="rate at which u decays in sliding", at_least=0)
+    rest_rate: float = param(
+        1e-3, unit="1/s", meaning="|u'| up to which it may slide in second order", at_least=0
+    )
 
     inputs = ("u",)
     outputs = ("v",)

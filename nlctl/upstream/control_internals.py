@@ -4,17 +4,21 @@
   to its parts.  ``dynamics`` and ``output`` call it first.
 - ``NonlinearIOSystem._current_params``: what the equations get from then on.
 - ``NonlinearIOSystem._rhs(t, x, u)`` and ``_out(t, x, u)``: the equations with these parameters.
+- ``InterconnectedSystem._compute_static_io(t, x, u)``: inputs of its parts, one after the other.
 - ``InputOutputSystem`` reads its own ``name``, ``dt``, sizes and ``*_index`` and writes them in its
   ``__init__`` only: a subclass can have them as properties.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import control as ct
 import numpy as np
+
+RESOLVED = ("_current_params",)
+"""Attributes that a run writes into a system."""
 
 
 def set_parameters(system: Any, params: Mapping[str, Any] | None) -> None:
@@ -37,8 +41,31 @@ def outputs_now(system: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarr
     return np.asarray(system._out(t, x, u)).reshape(-1)
 
 
+def parts_now(
+    system: Any, t: float, x: np.ndarray, u: np.ndarray
+) -> Iterator[tuple[Any, np.ndarray, np.ndarray]]:
+    """Yield the blocks of a diagram, nested ones flattened, with their states and inputs."""
+    if not isinstance(system, ct.InterconnectedSystem):
+        yield system, x, u
+        return
+    given, _ = system._compute_static_io(t, x, u)
+    n = m = 0
+    for part in system.syslist:
+        states, inputs = part.nstates or 0, part.ninputs or 0
+        yield from parts_now(part, t, x[n : n + states], given[m : m + inputs])
+        n, m = n + states, m + inputs
+
+
 class OwnParameters(ct.NonlinearIOSystem):
-    """A system that makes what its equations get of the overrides that python-control has."""
+    """A system that makes what its equations get of the overrides that python-control has.
+
+    Attributes
+    ----------
+    reads_a_dict : bool
+        Whether that is a dict: of a third-party system.
+    """
+
+    reads_a_dict = False
 
     def taken(self, params: Mapping[str, Any]) -> Any:
         """Return what the equations get, of the overrides of a run."""
@@ -49,16 +76,20 @@ class OwnParameters(ct.NonlinearIOSystem):
         return super()._out(t, x, u)
 
     def _update_params(self, params: Mapping[str, Any] | None) -> None:
-        self._current_params = self.taken(params or {})
+        self._current_params = type(self).taken(self, params or {})
 
     def _out(self, t: float, x: Any, u: Any) -> Any:
-        return self.answer(t, x, u)
+        return type(self).answer(self, t, x, u)  # an object of others may have one of its own
 
 
 class Around(ct.NonlinearIOSystem):
-    """A system around another one, ``inner``, with its parameters and equations of its own."""
+    """A system around another one, ``inner``, with its parameters and equations of its own.
+
+    ``sampling`` is the block with the parameters of its clock.
+    """
 
     inner: Any
+    sampling: Any
 
     def rates(self, t: float, x: Any, u: Any) -> np.ndarray:
         """Return its derivatives."""
@@ -120,3 +151,9 @@ class StandIn(ct.InputOutputSystem):
 def is_system(thing: Any) -> bool:
     """Whether a thing is a system itself, and does not stand for one."""
     return isinstance(thing, ct.InputOutputSystem) and not isinstance(thing, StandIn)
+
+
+def takes_a_dict(system: Any) -> bool:
+    """Whether a system's equations get its parameters as python-control has them, in a dict."""
+    usual = type(system)._update_params is ct.NonlinearIOSystem._update_params
+    return usual or (isinstance(system, OwnParameters) and type(system).reads_a_dict)

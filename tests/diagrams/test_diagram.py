@@ -81,15 +81,14 @@ class TestForeignBlocks:
         assert out(system, {"q": 10.0, ours: 5.0}) == 50.0
         assert out(system, {ours: 5.0}) == 10.0
 
-    @makers
-    def test_their_equal_names_are_python_controls_affair(self, join):
+    def test_their_equal_names_are_python_controls_affair_in_its_diagrams(self):
         """Two third-party blocks with one name share the last default, as without our blocks."""
         parts = [
             third_party("f", "q", 2.0, "u", "m"),
             gain("ours", 1.0, "m", "n"),
             third_party("g", "q", 5.0, "n", "y"),
         ]
-        with_ours = join(parts, inputs=["u"], outputs=["y"])
+        with_ours = ct.interconnect(parts, inputs=["u"], outputs=["y"])
         parts[1] = ct.nlsys(None, lambda t, x, u, p: u, inputs=["m"], outputs=["n"], name="ours")
         without = ct.interconnect(parts, inputs=["u"], outputs=["y"])
         for params in (None, {"q": 3.0}):

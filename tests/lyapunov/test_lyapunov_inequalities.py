@@ -222,15 +222,34 @@ def test_a_wrong_decomposition_of_the_actuator_is_found():
     assert seen["A1 range"].holds == bool(np.max(np.abs(healthy(1)["u"])) <= 5.0)
 
 
-def test_forcing_in_g_breaks_the_proof_as_printed():
-    """Example 1 read literally: (18) holds, (20) does not; Example 2 has no forcing."""
-    printed = literal(premises(found(1)), found(1))
-    corner = 1.0**2 + 1.1**2
-    assert printed.d == pytest.approx(0.1 * corner, abs=1e-3)
-    seen = {m.equation: m for m in inequalities(healthy(1), printed)}
-    assert seen["(18)"].holds
-    assert all(seen[key].holds for key in EQUALITIES)
-    assert not seen["(20)"].holds
+FORCINGS = {
+    "printed": {},
+    "a larger ripple": {"q_ripple": 2.0},
+    "a small forcing": {"q_mean": 0.3, "q_ripple": 0.4},
+    "a negative one": {"q_mean": -4.0},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", FORCINGS, ids=list(FORCINGS))
+def test_a_proof_with_the_forcing_in_g_holds_with_the_eps_of_that_g(change):
+    """Every premise of one reading is of the same g: then no step fails at any state."""
+    loop = example(1, plant=nlctl.ForcedDuffing(**FORCINGS[change]))
+    own = constants(loop, BOXES[1], W=np.linspace(-0.2, 0.3, 27))
+    printed = literal(premises(own), own)
+    assert printed.d == pytest.approx(0.1 * (1.0**2 + 1.1**2), abs=1e-3)
+    assert printed.delta == pytest.approx(premises(own).delta, rel=1e-2)  # the same, split anew
+    signals = at_random(loop, BOXES[1])
+    steps = (*inequalities(signals, printed), *assumptions(signals, printed, own.box, np.inf))
+    seen = {m.equation: m for m in steps}
+    assert all(seen[key].holds for key in (*STEPS, *EQUALITIES, "A2", "(10)"))
+    mixed = dataclasses.replace(printed, eps=premises(own).eps)
+    premised = assumptions(signals, mixed, own.box, np.inf)
+    assert {m.equation for m in premised if not m.holds} == {"(10)"}
+
+
+def test_another_plant_has_no_literal_reading():
+    """Example 2 has no forcing."""
     assert literal(premises(found(2)), found(2)) is None
 
 

@@ -24,7 +24,9 @@ def rates(z, sigma=SIGMA, sign=1.0):
 
 
 def proof(equations, floor, most=3000):
-    return prove_decrease(V, gradient, equations, BOX, level=8.0, floor=floor, max_boxes=most)
+    return prove_decrease(
+        V, equations, BOX, level=8.0, floor=floor, gradient=gradient, max_boxes=most
+    )
 
 
 @pytest.mark.slow

@@ -8,10 +8,10 @@ from numba.core import config
 import nlctl
 from nlctl.errors import ParameterError, UsageError
 from nlctl.expressions.graph import Graph
-from nlctl.native import AuditError
+from nlctl.native import AuditError, audit
 from nlctl.native.codegen import interpret
-from nlctl.native.codegen.blocks import Reader
 from nlctl.native.codegen.ir import numbers
+from nlctl.native.equations.reader import Reader
 from nlctl.response import EngineWarning
 
 TIMES = np.linspace(0, 1, 11)
@@ -130,13 +130,13 @@ def test_the_block_is_named_and_not_the_one_behind_it(monkeypatch):
 @pytest.fixture
 def calls(monkeypatch):
     """Count how often python-control's own right-hand side is asked."""
-    counted, right = [], ct.NonlinearIOSystem.dynamics
+    counted, right = [], audit.values_now
 
-    def dynamics(self, *args, **kwargs):
-        counted.append(args[0])
-        return right(self, *args, **kwargs)
+    def counting(system, point):
+        counted.append(point[0])
+        return right(system, point)
 
-    monkeypatch.setattr(ct.NonlinearIOSystem, "dynamics", dynamics)
+    monkeypatch.setattr(audit, "values_now", counting)
     return counted
 
 
@@ -170,9 +170,7 @@ def test_values_that_differ_from_call_to_call_are_the_error(monkeypatch):
     system = one_state(lambda t, x, u, params: -x)
     compiled = nlctl.compile(system)
     drawn = iter(range(1000))
-    monkeypatch.setattr(
-        type(system), "dynamics", lambda self, t, x, u, params=None: x + next(drawn)
-    )
+    monkeypatch.setattr(type(system), "_rhs", lambda self, t, x, u: x + next(drawn))
     with pytest.raises(AuditError, match="differ from call to call at t = 0 s: a block has a mem"):
         nlctl.input_output_response(compiled, TIMES, 0, [1.0])
 
@@ -181,10 +179,10 @@ def test_where_python_control_fails_machine_code_must_not_run_on(monkeypatch):
     system = one_state(lambda t, x, u, params: -x)
     compiled = nlctl.compile(system)
 
-    def fails(self, t, x, u, params=None):
+    def fails(self, t, x, u):
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr(type(system), "dynamics", fails)
+    monkeypatch.setattr(type(system), "_rhs", fails)
     with pytest.raises(AuditError, match="raises an error at t = 0 s: ZeroDivisionError: division"):
         nlctl.input_output_response(compiled, TIMES, 0, [1.0])
 
@@ -244,10 +242,8 @@ def test_in_discrete_time_as_well(monkeypatch):
                       dt=0.1, name="filter")  # fmt: skip
     compiled = nlctl.compile(system)
     nlctl.input_output_response(compiled, np.arange(5) * 0.1, 1.0, [1.0])
-    right = type(system).dynamics
-    monkeypatch.setattr(
-        type(system), "dynamics", lambda self, t, x, u, params=None: 1.01 * right(self, t, x, u)
-    )
+    right = type(system)._rhs
+    monkeypatch.setattr(type(system), "_rhs", lambda self, t, x, u: 1.01 * right(self, t, x, u))
     with pytest.raises(AuditError, match="of block 'filter'"):
         nlctl.input_output_response(compiled, np.arange(5) * 0.1, 1.0, [1.0], audit="every run")
 

@@ -111,6 +111,117 @@ def test_what_only_looks_like_it_ends_well(name):
     assert run(*WELL[name]).statistics.status is Status.OK
 
 
+DENSE = np.linspace(0, 20, 20_001)
+GIVEN = {
+    "constant": np.ones_like(DENSE),
+    "ramp": 0.02 * DENSE,
+    "staircase": np.floor(DENSE) / 20,
+    "fine staircase": np.floor(7 * DENSE) / 140,
+}
+
+
+@pytest.mark.parametrize("given", GIVEN)
+@pytest.mark.parametrize("method", ["auto", "tsit5", "rodas5p", "taylor"])
+def test_samples_of_an_input_are_no_chattering(given, method):
+    """A lag at rest goes from sample to sample, and its rate is rounding; it follows its input."""
+    lag = nlctl.block(nlctl.Lag(T=0.5), "lag")
+    made = nlctl.input_output_response(lag, DENSE, GIVEN[given], method=method)
+    assert made.statistics.status is Status.OK
+    if given == "constant":
+        np.testing.assert_allclose(made.outputs, 1 - np.exp(-2 * DENSE), atol=1e-7)
+
+
+@pytest.mark.parametrize("given", GIVEN)
+@pytest.mark.parametrize(
+    "part", [nlctl.DeadZone, nlctl.Saturation, nlctl.Backlash, nlctl.Relay, nlctl.Quantiser]
+)
+def test_nor_are_they_behind_a_nonlinearity(part, given):
+    loop = nlctl.actuators.cascade({"part": part(), "lag": nlctl.Lag()})
+    made = nlctl.input_output_response(loop, DENSE, GIVEN[given])
+    assert made.statistics.status is Status.OK
+
+
+@pytest.mark.parametrize("end", [50.0, 1000.0])
+def test_nor_is_a_long_rest(end):
+    times = np.linspace(0, end, 100_001)
+    made = nlctl.input_output_response(
+        nlctl.block(nlctl.Lag(T=0.5), "lag"), times, np.ones_like(times)
+    )
+    assert made.states[0, -1] == pytest.approx(1, abs=1e-12)
+
+
+@pytest.mark.parametrize("e", [0.0, 1.0])
+def test_clocks_and_breaks_of_delays_are_no_chattering(e):
+    """A sampled controller at 1 kHz, and a delay, with 20,001 samples of a constant input."""
+    law = nlctl.sampled(
+        ct.ss(1.0, 1e-3, 1.0, 0.5, 1e-3, inputs=["e"], outputs=["u"], name="law"), 1e-3
+    )
+    sampled = nlctl.interconnect({"law": law, "lag": nlctl.Lag()}, inputs=["e"], outputs=["v"])
+    delayed = nlctl.interconnect(
+        {"delay": nlctl.TransportDelay(), "lag": nlctl.Lag()}, inputs=["u"], outputs=["v"]
+    )
+    for loop in (sampled, delayed):
+        made = nlctl.input_output_response(loop, DENSE, np.full(DENSE.size, e))
+        assert made.statistics.status is Status.OK
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6])
+def test_what_jumps_with_time_alone_is_no_chattering(rtol):
+    """x' = sign(sin 2000 pi t) - x: a run does not come back to where time has been."""
+    made = run(
+        *plain(lambda t, x, u, p: np.sign(np.sin(2000 * np.pi * t)) - x, [1.0]),
+        rtol=rtol, atol=0.01 * rtol,
+    )  # fmt: skip
+    assert made.statistics.status is Status.OK
+
+
+def hand_relay(t, x, u, p):
+    """x'' = u - 2 where s = x + x' / 2 > 0, otherwise u + 2."""
+    return np.array([x[1], u[0] - 2 * (1.0 if x[0] + 0.5 * x[1] > 0 else -1.0)])
+
+
+def hand_friction(t, x, u, p):
+    return u[0] - np.sign(x)
+
+
+@pytest.mark.parametrize("drive", ["constant", "ramp", "sine"])
+@pytest.mark.parametrize(("rtol", "atol"), [(1e-8, 1e-10), (1e-6, 1e-8)])
+def test_chattering_is_found_between_dense_samples(drive, rtol, atol):
+    """x' = c - sign x and a relay by hand, with an input every millisecond: at the right place.
+
+    Without a drive they are at their jump at t = 1 and (sqrt 3 - 1) / 2; drives of 0.01 move that
+    by less than 0.02.
+    """
+    small = {"constant": 0.01, "ramp": 0.0005 * DENSE, "sine": 0.01 * np.sin(DENSE)}[drive]
+    given = small * np.ones_like(DENSE)
+    for rate, start, exact, jump in (
+        (hand_friction, [1.0], 1.0, 2.0),
+        (hand_relay, [0.5, 0.0], (np.sqrt(3) - 1) / 2, 4.0),
+    ):
+        block = ct.nlsys(
+            rate, lambda t, x, u, p: x[0], states=len(start), inputs=1, outputs=1, name="hand"
+        )
+        made = nlctl.input_output_response(
+            block, DENSE, given, start, rtol=rtol, atol=atol, ignore_errors=True
+        )
+        assert made.statistics.status is Status.CHATTERING
+        assert made.statistics.time == pytest.approx(exact, abs=0.02 + 2e4 * rtol)
+        words = made.message.partition(f"'x[{len(start) - 1}]'' of block 'hand' jumps between ")[2]
+        one, _, other = words.partition(";")[0].partition(" and ")
+        assert abs(float(one) - float(other)) == pytest.approx(jump, rel=1e-4)
+
+
+@pytest.mark.parametrize("c", [0.3, 3.0])
+def test_a_moving_jump_is_found(c):
+    """x' = -5 sign(x - sin c t) is at its jump where 1 - 5 t = sin c t."""
+    from scipy.optimize import brentq
+
+    made = run(*plain(lambda t, x, u, p: -5 * np.sign(x - np.sin(c * t)), [1.0]))
+    assert made.statistics.status is Status.CHATTERING
+    exact = brentq(lambda t: 1 - 5 * t - np.sin(c * t), 0, 1)
+    assert made.statistics.time == pytest.approx(exact, abs=1e-3)
+
+
 @pytest.mark.parametrize("width", [1e-3, 1e-5])
 def test_a_hysteresis_that_the_tolerance_resolves_is_integrated(width):
     """x' = 0.5 - v stays within the thresholds; v is in the mean what holds x: 1/2."""

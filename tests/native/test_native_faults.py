@@ -211,8 +211,8 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("settings", "message"),
         [
-            ({"rtol": 0}, "finite rtol > 0, got 0"),
-            ({"rtol": np.nan}, "finite rtol > 0, got nan"),
+            ({"rtol": 0}, "0 < rtol < 1, got 0"),
+            ({"rtol": np.nan}, "0 < rtol < 1, got nan"),
             ({"atol": -1.0}, "finite atol > 0"),
             ({"step": -0.1}, "step must be > 0"),
             ({"step": np.nan}, "step must be > 0"),
@@ -233,8 +233,8 @@ class TestBadInput:
             run(play, [0, 1], params={"play.c_x": 1.0})
         with pytest.raises(nlctl.UnknownNameError, match=r"x\[7\]"):
             run(linear, [0, 1], 0, {"x[7]": 1.0})
-        with pytest.raises(TypeError, match="max_step"):
-            run(linear, [0, 1], max_step=1)
+        with pytest.raises(TypeError, match="longest"):
+            run(linear, [0, 1], longest=1)
 
     def test_states_of_a_wrong_length(self, linear):
         """Three numbers for one state."""

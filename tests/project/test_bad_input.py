@@ -41,7 +41,6 @@ def refused(error, *told):
         ("GaussianBasis", {"centres": [[0.0, np.nan]]}, ["a finite centres[0, 1]", "nan"]),
         ("FilteredError", {"lambdas": (-1.0,)}, ["Hurwitz", "(14)", "(-1.0,)", "root at 1"]),
         ("FilteredError", {"lambdas": (2.0, -1.0)}, ["Hurwitz", "(2.0, -1.0)"]),
-        ("FilteredError", {"lambdas": ()}, ["at least one value in lambdas"]),
         ("FilteredError", {"lambdas": (1.0, np.inf)}, ["a finite lambdas[1]", "inf"]),
         ("AdaptiveWeights", {"nodes": 0}, ["nodes >= 1", "got 0"]),
         ("AdaptiveWeights", {"Gamma": 0}, ["Gamma > 0", "got 0"]),

@@ -552,7 +552,7 @@ LYAPUNOV = {
     "prove bounds": lambda: lyapunov.prove(lambda x: x[0], SQUARE, low=1.0, high=0.0),
     "prove nan": lambda: lyapunov.prove(lambda x: x[0], SQUARE, high=NAN),
     "prove_decrease level": lambda: lyapunov.prove_decrease(
-        lambda x: x[0] ** 2, lambda x: x, lambda x: x, SQUARE, level=NAN, floor=0.0
+        lambda x: x[0] ** 2, lambda x: x, SQUARE, level=NAN, floor=0.0
     ),
     "nussbaum_property end": lambda: lyapunov.nussbaum_property(end=NAN),
     "nussbaum_property end neg": lambda: lyapunov.nussbaum_property(end=-1.0),
@@ -563,6 +563,9 @@ LYAPUNOV = {
         nlctl.ForcedDuffing(), nlctl.GaussianBasis(), [NAN], SQUARE
     ),
     "burst_peak": lambda: lyapunov.burst_peak(None, 1.0),
+    "aftermath zeta": lambda: lyapunov.aftermath(NAN),
+    "aftermath kG": lambda: lyapunov.aftermath(3.0, kG=(2.0, 1.0)),
+    "aftermath kG number": lambda: lyapunov.aftermath(3.0, kG=1.0),
     "read_parts": lambda: lyapunov.read_parts(3),
     "read_parts plain": lambda: lyapunov.read_parts(loop()),
     "signals_of": lambda: lyapunov.signals_of(3),

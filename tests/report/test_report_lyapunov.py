@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 from drawn import hidden
+from rows import each_row
 from test_report import made_up_runs, outline
 
 import nlctl
@@ -16,7 +17,10 @@ from analysis.lyapunov.loop.roles import read_parts
 from analysis.lyapunov.loop.signals import equality, inequality
 from analysis.lyapunov.nussbaum.long_run import LongRun, long_run
 from analysis.lyapunov.nussbaum.property import antiderivative, lobe_around
+from analysis.paper import BOUND
+from analysis.paper.burst import through_the_burst
 from analysis.paper.evidence import far_runs_in_background
+from analysis.paper.figures import after_burst
 from analysis.paper.page import proof_text as text
 from analysis.paper.page.notation import formulas
 from analysis.paper.page.proof import LONG_RUN, evidence, lyapunov_sections
@@ -231,7 +235,7 @@ def test_no_word_of_the_figures_is_hidden():
     record = read_record(dataclasses.replace(burst(), predictions=(found()[2].slow_drift,) * 2))
     made = [i.figure for s in part() for i in s.items if isinstance(i, Figure)]
     made += [figures.burst(record), figures.story(*np.zeros((3, 9)), record)]
-    made += [figures.long_zeta({"Example 2 with the phase": record})]
+    made += [figures.long_zeta({"Example 2 with the phase": record}), after_burst(carried())]
     assert len(made) > 8
     for figure in made:
         assert hidden(figure) == []
@@ -275,7 +279,7 @@ def test_the_burst_is_at_the_top_of_the_part():
     words, figure, *_ = first.items
     assert isinstance(words, Paragraph)
     assert f"t = {run.burst:.1f} s" in words.text
-    assert f"predicted for {run.predictions[0].burst:.0f} s" in words.text
+    assert f"forecast for {run.predictions[0].burst:.0f} s" in words.text
     assert isinstance(figure, Figure)
     lines = [line.get_xdata() for line in figure.figure.axes[0].lines]
     marks = {float(x[0]) for x in lines if len(x) == 2 and x[0] == x[1]}
@@ -359,20 +363,82 @@ def test_a_record_is_of_two_tolerances_that_agree():
         agreed(late, dataclasses.replace(shifted, time=late.time + 1.1 * AGREE))
 
 
+@functools.cache
+def carried():
+    """Example 2 beyond its run."""
+    return through_the_burst(burst())
+
+
 def test_the_verdict_and_the_claims_say_what_becomes_of_the_loop():
-    """A burst is in the first sentences, and the paper's theorem is a claim that fails."""
+    """The proof is refuted; that signals stay bounded is open, whatever the burst looks like."""
     run = read_record(long_run(nlctl.paper.example_2(), 210.0))
-    report = paper_report(made_up_runs(), proofs=found(), far={"2": run})
+    report = paper_report(made_up_runs(), proofs=found(), far={"2": run}, burst=carried())
+    assert f"keeps |e₁| ≤ {BOUND:g} from 10 s on" in report.verdict
+    assert "not proved, and not refuted either" in report.verdict
     assert f"loses the sign of its gain at {run.burst:.0f} s" in report.verdict
     claims = {claim.text: claim for claim in report.claims}
-    theorem = claims["The paper's theorem: do all signals stay bounded for all time?"]
-    assert not theorem.holds
+    theorem = next(c for text, c in claims.items() if "does its proof show" in text)
     assert claim_status(theorem) == ("refuted", "refuted")  # the paper is wrong, not the report
+    bounded = claims["Example 2: do all signals stay bounded for all time?"]
+    assert claim_status(bounded) == ("undecided", "caution")
+    assert f"ζ = {carried().rest:.2f}" in bounded.measured
     look, told = summary(report.claims)
     assert look == "refuted"
-    assert told.startswith("1 claim of the paper is refuted; 9 others hold")
+    assert told.startswith("1 claim of the paper is refuted; 1 is open; 9 others hold")
     proved = [c for c in report.claims if c.status == "proved"]
     assert len(proved) == 2
     assert all(c.holds for c in proved)
     anchors = {section.key for section in report.sections}
     assert {c.evidence for c in report.claims if c.evidence.startswith("proof")} <= anchors
+
+
+def test_the_theorem_is_a_claim_without_long_runs_too():
+    """Lemma 1 is false whatever a loop does; nothing is said of a burst that nobody ran."""
+    report = paper_report(made_up_runs(), proofs=found())
+    assert any("does its proof show" in claim.text for claim in report.claims)
+    assert not any("stay bounded for all time?" in c.text and "Example" in c.text
+                   for c in report.claims)  # fmt: skip
+    assert "Far beyond" not in report.verdict
+
+
+@each_row("key", ["1", "2", "1-backlash", "2-dead-zone"])
+def test_following_is_a_bound_of_the_error(key):
+    """Not agreement with numbers of others: a case just beyond the bound fails, and is named."""
+    for factor in (0.999, 1.001):
+        runs = made_up_runs()
+        metrics = {**runs[key].metrics, "tail_max_e": factor * BOUND}
+        runs[key] = dataclasses.replace(runs[key], metrics=metrics)
+        report = paper_report(runs)
+        claims = [c for c in report.claims if c.limit == f"|e₁| ≤ {BOUND:g}"]
+        assert len(claims) == 4
+        assert sum(not c.holds for c in claims) == (factor > 1)
+
+
+def test_nothing_is_called_unbounded():
+    """What a run shows is that it was given up: every sentence of the part is worded so."""
+    run = dataclasses.replace(burst(), predictions=(found()[2].slow_drift,) * 2)
+    first = lyapunov_sections(found(), {"2": run}, carried())[0]
+    words = [i.text for i in first.items if isinstance(i, Paragraph)]
+    words += [i.caption for i in first.items if isinstance(i, Figure | Table)]
+    told = " ".join(words)
+    assert "does not stay bounded" not in told
+    assert "beyond bounds" not in told
+    assert "unbounded is not shown" in told
+    assert "neither proved nor refuted" in told
+    assert "proof-after" in {i.key for i in first.items if isinstance(i, Figure)}
+
+
+def test_every_forecast_is_marked():
+    """With what became of it, those that failed as well."""
+    run = dataclasses.replace(burst(), predictions=(found()[2].slow_drift,))
+    still = long_run(nlctl.paper.example_2(), 210.0)
+    failed = dataclasses.replace(still.predictions[0], rest=1.5, rest_range=(1.4, 1.6))
+    far = {"2": run, "1": dataclasses.replace(still, predictions=(failed, *still.predictions))}
+    first = lyapunov_sections(found(), far)[0]
+    (table,) = (t for t in tables([first]) if t.caption == text.FORECASTS)
+    assert table.status == "outcome"
+    outcomes = [row[-1] for row in table.rows]
+    assert len(outcomes) == 3
+    assert outcomes[0] == "failed"  # it was told of a run from another start
+    assert outcomes[2] == "open"
+    assert all(light(one) for one in ("held", "failed", "open"))

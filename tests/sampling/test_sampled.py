@@ -11,7 +11,7 @@ import nlctl
 from nlctl import AlgebraicLoopError, Clock, DivergedError, ParameterError
 from nlctl.errors import UsageError
 from nlctl.native import AuditError
-from nlctl.native.codegen.blocks import Reader
+from nlctl.native.equations.reader import Reader
 from nlctl.params import declared_params
 from nlctl.sampling.clock import common_period
 from nlctl.sampling.system import happening

@@ -73,9 +73,13 @@ def test_what_is_read_back_has_the_same_margin(formula, seed):
 
 
 def test_and_binds_tighter_than_or_and_prefixes_tighter_than_both():
-    """As in every logic; "always" reaches over the next part only."""
+    """As in every logic; what "always" reaches over is in brackets."""
     assert str(parse_formula("a <= 1 or b <= 2 and c <= 3")) == "(a <= 1 or (b <= 2 and c <= 3))"
-    assert str(parse_formula("always a <= 1 and b <= 2")) == "(always a <= 1 and b <= 2)"
+    text = "((always a <= 1) and b <= 2)"
+    assert str(parse_formula("(always a <= 1) and b <= 2")) == text
+    assert str(parse_formula("always a <= 1 and always b <= 2")) == (
+        "(always a <= 1 and always b <= 2)"
+    )
     assert str(parse_formula("not a <= 1 and b <= 2")) == "(not a <= 1 and b <= 2)"
 
 
@@ -112,3 +116,55 @@ def test_any_text_is_read_or_refused(text):
     except ParameterError:
         return
     assert str(parse_formula(str(formula))) == str(formula)
+
+
+WINDOWS = ["always", "eventually", "always from 1 s on", "eventually in [0, 2] s", "not always",
+           "always eventually", "always not eventually in [1, 2] s"]  # fmt: skip
+
+
+@given(st.sampled_from(WINDOWS), bands(), bands(), st.sampled_from(["and", "or"]), st.booleans())
+def test_a_band_next_to_a_window_needs_brackets(window, one, other, word, is_first):
+    """`always |e| <= 0.6 and |u| <= 0.5` would look at u at t = 0 only, in whatever order."""
+    parts = [f"{window} {one}", str(other)]
+    text = f" {word} ".join(parts if is_first else reversed(parts))
+    for whole in (text, f"always ({text})", f"not ({text})", f"(a <= 1 and ({text}))"):
+        with pytest.raises(ParameterError, match=r"at one time only.*write 'always \("):
+            parse_formula(whole)
+    apart = f" {word} ".join([f"({parts[0]})", parts[1]])
+    assert str(parse_formula(str(parse_formula(apart)))) == str(parse_formula(apart))
+    both = parse_formula(f"{window} ({one} {word} {other})")
+    assert str(parse_formula(str(both))) == str(both)
+
+
+@given(st.sampled_from(WINDOWS), bands(), bands(), bands(), st.booleans(), st.booleans())
+def test_windows_that_stand_together_need_brackets_next_to_a_band(
+    window, one, two, other, is_first, in_brackets
+):
+    """`always a and eventually b or c` would look at c at t = 0 only."""
+    first = f"({window} {one})" if in_brackets else f"{window} {one}"
+    parts = [f"{first} and eventually {two}", str(other)]
+    text = " or ".join(parts if is_first else reversed(parts))
+    with pytest.raises(ParameterError, match="at one time only") as told:
+        parse_formula(text)
+    meant = str(told.value).partition("or '")[2].partition("' where")[0]
+    assert str(parse_formula(meant)) == str(parse_formula(f"({parts[0]}) or {parts[1]}"))
+
+
+def test_the_message_has_what_is_meant_and_what_is_written():
+    """Both ways to go on can be read by the parser."""
+    with pytest.raises(ParameterError) as told:
+        parse_formula("always |e| <= 0.6 and |u| <= 0.5")
+    assert "looks at '|u| <= 0.5' at one time only" in str(told.value)
+    assert "'(always |e| <= 0.6) and |u| <= 0.5' where that is meant" in str(told.value)
+    parse_formula("(always |e| <= 0.6) and |u| <= 0.5")
+    parse_formula("always (|e| <= 0.6 and |u| <= 0.5)")
+
+
+@pytest.mark.parametrize("text", [
+    "always a <= 1 and eventually b <= 2", "always (a <= 1 and b <= 2)", "a <= 1 and b <= 2",
+    "always a <= 1 or always b <= 2", "not a <= 1 or b <= 2",
+    "always (a <= 1 or (eventually b <= 2))",
+])  # fmt: skip
+def test_what_can_be_read_in_one_way_needs_no_brackets(text):
+    """Windows next to windows, bands next to bands."""
+    assert parse_formula(text) is not None

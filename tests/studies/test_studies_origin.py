@@ -85,8 +85,8 @@ EDITS = {
 }  # fmt: skip
 COMMANDS = {
     "resume": ("run", "study.toml", "--resume", "--out", "out"),
-    "report": ("report", "out"),
-    "replay": ("replay", "out", "0", "--part", "worst-case"),
+    "report": ("report", "out", "--trust"),  # edited code is not what was run
+    "replay": ("replay", "out", "0", "--part", "worst-case", "--trust"),
 }
 
 
@@ -280,3 +280,18 @@ def test_edited_rows_are_refused_and_run_again(copied, done, by):
     whole, made = (load_result(f / "out") for f in (done / "rows", folder))
     columns = [c for c in whole.rows.table if c != "wall_time"]
     pd.testing.assert_frame_equal(made.rows.table[columns], whole.rows.table[columns])
+
+
+def test_what_no_key_can_see_is_told_when_it_runs_and_on_the_page(tmp_path):
+    """Here a function that NumPy has made of another one."""
+    path = write(tmp_path, HEAD, SEARCHES)
+    edit(tmp_path / "loop.py", "x[0] ** 3", "x[0] ** 3 + 0.0 * HIDDEN(x[0])")
+    edit(tmp_path / "loop.py", "import nlctl\n", "import nlctl\n" + HIDDEN)
+    words = "What 'lag' computes depends on what no key can see"
+    told = nlctl_here("run", path, "--out", "out", cwd=tmp_path)
+    assert (told.returncode, words in told.stderr) == (0, True), told
+    assert nlctl_here("report", "out", cwd=tmp_path).returncode == 0
+    assert words.replace("'", "&#39;") in (tmp_path / "out" / "index.html").read_text()
+
+
+HIDDEN = "import numpy as np\n\nHIDDEN = np.frompyfunc(lambda v: 2.0 * v, 1, 1)\n"

@@ -293,7 +293,7 @@ def test_a_run_can_be_read_whose_kind_has_gone(tmp_path, forgotten):
 
 @pytest.mark.slow
 def test_a_kind_from_elsewhere_is_imported_for_who_trusts_it(tmp_path):
-    """Without trust a run is read all the same, and the note says what its page lacks."""
+    """It is recorded; what was edited since is read all the same, without its figures."""
     home = tmp_path / "study"
     home.mkdir()
     path = written(home, SPREAD.replace("spread.py", "../spread.py"))
@@ -301,10 +301,13 @@ def test_a_kind_from_elsewhere_is_imported_for_who_trusts_it(tmp_path):
     with pytest.raises(StudyError, match=r"analysis\[1\]\.kind: .* Trust it with --trust"):
         read_study(path)
     found = run(read_study(path, trust=True), home / "run")
-    for trust in (False, True):
+    for edited, trust in ((False, False), (True, False), (True, True), (True, False)):
+        if edited:
+            (tmp_path / "spread.py").write_text(f"# {trust}\n{KIND}", encoding="utf-8")
         again = load_result(home / "run", trust=trust)
         assert again["spread"].plain() == found["spread"].plain()
-        assert any("Trust it with --trust" in note for note in again.notes) is not trust
+        told = any("Trust it with --trust" in note for note in again.notes)
+        assert told is (edited and not trust)
 
 
 def test_a_run_is_not_continued_with_another_kind(tmp_path, forgotten):

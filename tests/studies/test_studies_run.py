@@ -33,6 +33,7 @@ from analysis.studies import (
 from analysis.studies.file.schema import keyed
 from analysis.studies.folder import load_finding, load_run, save_finding
 from analysis.studies.sealed import origin_key
+from analysis.studies.whole.contents import seal
 from nlctl import ParameterError, UnknownNameError
 
 EVERY_KIND = """
@@ -205,10 +206,12 @@ def test_a_replay_tells_a_difference(result):
     table = before.tables["rows"].copy()
     table.loc[3, "iae"] = np.nextafter(table.loc[3, "iae"], np.inf)
     save_finding(result.folder, replace(before, tables=before.tables | {"rows": table}), origin)
+    seal(result)
     try:
         made = replay(result.folder, 3, "worst-case")
     finally:
         save_finding(result.folder, before, origin)
+        seal(result)
     assert made.differences == ("iae",)
     assert "1 column differs" in str(made)
     assert "The loop is the same; so are all versions: another processor?" in str(made)

@@ -99,10 +99,14 @@ def test_who_trusts_it_may_run_it(place, monkeypatch, name):
         ("report", "out"),
     ):
         assert nlctl_here(*command, "--trust", cwd=folder).returncode == 0
-    sys.modules.pop("stray_module_of_a_test", None)
     assert (outside / "ran").exists()
+    assert nlctl_here("replay", "out", 1, cwd=folder).returncode == 0  # it is what was trusted
+    for changed in outside.glob("*.py"):
+        changed.write_text("# another content\n" + changed.read_text())
+    sys.modules.pop("stray_module_of_a_test", None)
     (outside / "ran").unlink()
-    assert nlctl_here("replay", "out", 1, cwd=folder).returncode == 2
+    for command in (("validate", path), ("replay", "out", 1)):
+        assert nlctl_here(*command, cwd=folder).returncode == 2
     drawn = nlctl_here("report", "out", cwd=folder)
     assert (drawn.returncode, "no fans" in drawn.stderr) == (0, True)
     assert not (outside / "ran").exists()
@@ -240,10 +244,14 @@ def with_functions(folder, name):
              "analysis.cli.report:write_gallery_of", "matplotlib.pyplot:savefig"]
 )  # fmt: skip
 def test_installed_packages_make_loops_or_are_not_called(place, name):
-    """They may be imported; what they offer is mostly no diagram."""
+    """What is not built on nlctl needs trust; whoever is trusted offers mostly no diagram."""
     folder, _ = place
-    with pytest.raises(StudyError, match=r"nothing shows|returns a diagram"):
+    with pytest.raises(
+        StudyError, match=r"reading this study would run it\. Trust it with --trust"
+    ):
         read_study(write(folder, *in_loop(name)))
+    with pytest.raises(StudyError, match=r"nothing shows|returns a diagram"):
+        read_study(write(folder, *in_loop(name)), trust=True)
 
 
 def test_installed_packages_and_nlctl_are_trusted(place):

@@ -3,10 +3,10 @@
 import control as ct
 import numpy as np
 
-from nlctl.native.codegen.blocks import equations
 from nlctl.native.codegen.lower import lower
 from nlctl.native.codegen.program import count_switching_functions, memory
 from nlctl.native.compiled import compile as compile_diagram
+from nlctl.native.equations.blocks import equations
 from nlctl.native.machine.routine import plain_functions
 from nlctl.upstream.control_internals import outputs_now, rates_now
 
@@ -20,17 +20,20 @@ def interpreted(compiled):
         prepare, rhs, out = plain_functions(lowered)
         c = np.full((lowered.size, 1), np.nan)
         prepare(p[:, None], c)
-        return c, rhs, out
+        return c, rhs, out, lowered.rows["g"]
 
     def column(values):
         return np.array(values, dtype=float).reshape(-1, 1)
 
     def right_hand_side(t, x, u, p, dx, g):
-        c, rhs, _ = prepared(p)
-        rhs(np.array([t]), column(x), column(u), c, dx[:, None], g[:, None])
+        c, rhs, _, rows = prepared(p)
+        declared, every = compiled.program.switching, np.full((rows, 1), np.nan)
+        rhs(np.array([t]), column(x), column(u), c, dx[:, None], every)
+        located = rows - compiled.program.events  # conditions that no block declares
+        g[:declared], g[declared:] = every[:declared, 0], every[declared + located :, 0]
 
     def outputs(t, x, u, p, y):
-        c, _, out = prepared(p)
+        c, _, out, _ = prepared(p)
         out(np.array([t]), column(x), column(u), c, y[:, None])
 
     return right_hand_side, outputs

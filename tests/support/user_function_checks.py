@@ -17,8 +17,8 @@ import user_functions
 
 import nlctl
 from nlctl.errors import UsageError
-from nlctl.native.codegen.blocks import equations
 from nlctl.native.codegen.lower import lower
+from nlctl.native.equations.blocks import equations
 from nlctl.native.machine.routine import plain_functions
 
 LANES = 20
@@ -140,14 +140,13 @@ class Plain:
         lanes = at.t.size
         lowered = self.lowered(lanes)
         p = np.repeat(self.compiled.parameter_vector(params)[:, None], lanes, axis=1)
-        sizes = (self.system.nstates, self.compiled.program.events, self.system.noutputs)
-        dx, g, y = (np.full((n or 0, lanes), np.nan) for n in sizes)
         if not lowered.holds_for(p):  # an integer has changed: the functions are read again
             read = self.compiled.schedule
             found = equations(read, self.compiled.program.layout, p[:, 0])
             lowered = lower(read, self.compiled.program, lanes, found)
         prepare, rhs, out = plain_functions(lowered)
-        c = np.full((lowered.size, lanes), np.nan)
+        sizes = (lowered.size, self.system.nstates, lowered.rows["g"], self.system.noutputs)
+        c, dx, g, y = (np.full((n or 0, lanes), np.nan) for n in sizes)
         prepare(p, c)
         rhs(at.t.copy(), at.x.copy(), at.u.copy(), c, dx, g)
         out(at.t.copy(), at.x.copy(), at.u.copy(), c, y)

@@ -119,3 +119,16 @@ def test_python_control_asks_what_is_overridden(params, nested):
         run = ct.input_output_response(asked, [0.0, 1e-6], 1.0, 0.5, params=params)
         assert run.outputs[0] == pytest.approx(output)
         assert (run.states[0, 1] - 0.5) / 1e-6 == pytest.approx(rate, rel=1e-4)
+
+
+def test_inputs_of_parts_are_those_of_the_connections():
+    """``_compute_static_io``, of a nested diagram: each block with its states and inputs."""
+    diagram, _ = both()
+    outer = ct.interconnect([diagram, lag("third")], [["third.u", "both.y[0]"]],
+                            inplist=["both.u[0]"], outlist=["third.y"], name="outer")  # fmt: skip
+    x, u = np.array([0.5, -1.0, 4.0]), np.array([2.0])
+    internals.set_parameters(outer, None)
+    found = list(internals.parts_now(outer, 0.0, x, u))
+    assert [part.name for part, _, _ in found] == ["first", "second", "third"]
+    np.testing.assert_array_equal([own for _, own, _ in found], x[:, None])
+    np.testing.assert_array_equal([given for _, _, given in found], [[2.0], [1.0], [-2.0]])

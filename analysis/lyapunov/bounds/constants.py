@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, vector
 from nlctl.errors import ParameterError
 from nlctl.functions import smooth_sign
@@ -24,7 +25,15 @@ from .provenance import Constant, Constants, Provenance, bound, per_second
 from .sector import Sector, plant_terms, sector
 from .weights import approximation_error, network_on_grid, tightest_weights
 
-__all__ = ["Constant", "Constants", "constants", "disturbance", "kappa", "visited_box"]
+__all__ = [
+    "Constant",
+    "Constants",
+    "constants",
+    "constants_of",
+    "disturbance",
+    "kappa",
+    "visited_box",
+]
 
 
 def kappa() -> Proof:
@@ -47,6 +56,7 @@ def kappa() -> Proof:
     return prove(lambda s: s[0] - s[0] * smooth_sign(s[0], 1.0), Box.of(s=(0, 10)), high=KAPPA)
 
 
+@as_annotated
 def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float = 1e-3) -> Range:
     """Prove the range of d(x, t) over a box and a span of time, which may be infinite.
 
@@ -90,6 +100,7 @@ def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float 
     return enclose(lambda z: d(z[:-1], z[-1]), box.times("t", *times), tol=tol)
 
 
+@as_annotated
 def constants(
     loop: ct.InterconnectedSystem,
     box: Box,
@@ -143,12 +154,23 @@ def constants(
     parts = read_parts(loop, start, params)
     box = of_type("constants", "box", box, Box, "Box.of(x1=(-1, 1), v=(-5, 5))")
     number("constants", "tol", tol, above=0)
+    reach = {"u_max": max(map(abs, box["u"]))} if "u" in box.names else {}
+    return constants_of(parts, decompose(parts.actuator, k=k, **reach), box, W, times, tol)
+
+
+def constants_of(
+    parts: Parts,
+    split: Decomposition,
+    box: Box,
+    W: Any = None,
+    times: tuple[float, float] = (0.0, np.inf),
+    tol: float = 1e-3,
+) -> Constants:
+    """Assemble the constants of a loop that is read already, see `constants`."""
     states = box.only(*coordinate_names(parts.order))
     v = box["v"] if "v" in box.names else (-np.inf, np.inf)
     over_v = states.times("v", *v)
     bounds = sector(parts.plant, over_v, tol=tol)
-    reach = {"u_max": max(map(abs, box["u"]))} if "u" in box.names else {}
-    split = decompose(parts.actuator, k=k, **reach)
     d = disturbance(parts.plant, states, times, tol=tol)
     rest = total_error(bounds.G_max, split.eps_star, d.magnitude, 0.0)
     W, origin = _weights(parts, states, W, rest)

@@ -12,27 +12,22 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from flint import arb
 
 from nlctl import actuators
 from nlctl.actuators import Backlash, DeadZone
+from nlctl.annotations import as_annotated
 from nlctl.arguments import number, vector
 from nlctl.errors import ParameterError, UsageError
-from nlctl.functions import clip
 from nlctl.params import equation_arguments
 from nlctl.wording import counted
 
-from ...intervals.arithmetic import Ball, as_ball, common
-from ...intervals.branch_and_bound import Box, Range, Undecided, enclose
-from ...intervals.paths import on_balls
-from ...intervals.quotient import slope_in
-from ...intervals.time_dependence import UNREAD, reads_time
+from ...intervals.agreement import on_balls
+from ...intervals.branch_and_bound import Range
+from .clipped import Edge, clipped_split, eps_range
 
-__all__ = ["Decomposable", "Decomposition", "DecompositionError", "clipped_split", "decompose"]
+__all__ = ["Decomposable", "Decomposition", "DecompositionError", "decompose"]
 
-UNTIMED, _TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
-_Edge = Callable[[Any, Any], Any]
-TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared splits are tried
+_TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared splits are tried
 
 
 class DecompositionError(UsageError):
@@ -65,6 +60,8 @@ class Decomposition:
         samples do not refute it, and nothing proves it.
     how, over : str
         How the bounds were obtained, and for which inputs they hold.
+    largest_u : float
+        They hold for |u| up to this.
 
     Examples
     --------
@@ -79,6 +76,7 @@ class Decomposition:
     provenance: Literal["proved", "computed", "given"]
     how: str
     over: str
+    largest_u: float = np.inf
 
     def __post_init__(self) -> None:
         if not 0 < self.k_1 <= self.k_2 < np.inf:
@@ -132,44 +130,6 @@ class Decomposable(Protocol):
         ...
 
 
-def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
-    """Return k u of the split k = min(max(v/u, k_1), k_2), written without the division.
-
-    It serves numbers, arrays and balls, and leaves the smallest |eps_u| that any split with
-    k_1 <= k <= k_2 leaves at (u, v).
-
-    Parameters
-    ----------
-    k_1, k_2 : float
-        Bounds of k.
-
-    Returns
-    -------
-    callable
-        ``part(u, v)`` is k u.
-
-    Raises
-    ------
-    ParameterError
-        If not 0 < k_1 <= k_2, both finite.
-
-    Examples
-    --------
-    >>> from analysis.lyapunov import clipped_split
-    >>> part = clipped_split(0.5, 2.0)
-    >>> print(part(1.0, 1.5), part(1.0, 3.0))  # k = v/u, and at most 2
-    1.5 2.0
-    """
-    number("clipped_split", "k_1", k_1, above=0)
-    number("clipped_split", "k_2", k_2, at_least=k_1)
-
-    def part(u: Any, v: Any) -> Any:
-        one, other = k_1 * u, k_2 * u
-        return clip(v, np.minimum(one, other), np.maximum(one, other))
-
-    return part
-
-
 def check_gain(who: str, k: Any) -> None:
     """Refuse bounds of k that are no pair with 0 < k_1 <= k_2; None is none.
 
@@ -182,6 +142,7 @@ def check_gain(who: str, k: Any) -> None:
         raise ParameterError(f"{who} needs k = (k_1, k_2) with 0 < k_1 <= k_2, got {k}")
 
 
+@as_annotated
 def decompose(
     actuator: Any,
     *,
@@ -302,7 +263,7 @@ def _refute(actuator: Any, split: Decomposition, u_max: float) -> None:
         return
     _, output = _edges(actuator)
     points = [(u, 0.0) for u in np.linspace(-u_max, u_max, 2001)]
-    points += [(u, t) for t in TIMES for u in np.linspace(-u_max, u_max, 101)]
+    points += [(u, t) for t in _TIMES for u in np.linspace(-u_max, u_max, 101)]
     for u, t in points:
         v = output(u, t)
         k, eps_u = split.gain(u, v), split.eps_u(u, v)
@@ -359,14 +320,14 @@ def _play(play: Backlash) -> Decomposition:
 
 def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: float) -> Decomposition:
     edges = _edges(actuator)
-    wide = _eps_range(k, edges, 2 * u_max, tol)
+    wide = eps_range(k, edges, 2 * u_max, tol)
     undecided = sum(end.undecided for end in wide)
     if undecided:
         raise DecompositionError(
             f"eps_u of {type(actuator).__name__} could not be bounded for |u| <= {2 * u_max:g}: "
             f"{counted(undecided, 'box is', 'boxes are')} undecided"
         )
-    _refuse_growth(actuator, k, u_max, (_eps_range(k, edges, u_max, tol), wide))
+    _refuse_growth(actuator, k, u_max, (eps_range(k, edges, u_max, tol), wide))
     declared = hasattr(actuator, "band") and not _is_of_nlctl(actuator)
     if declared:
         _refute_band(actuator, edges, u_max)
@@ -381,6 +342,7 @@ def _proved_split(actuator: Any, k: tuple[float, float], u_max: float, tol: floa
         how=f"k = v/u clipped to [{k[0]:g}, {k[1]:g}]; {boxes}"
         + (", within the band that the record declares" if declared else ""),
         over=f"|u| <= {2 * u_max:g}, all t",
+        largest_u=2 * u_max,
     )
 
 
@@ -389,10 +351,10 @@ def _is_of_nlctl(actuator: Any) -> bool:
     return getattr(actuators, type(actuator).__name__, None) is type(actuator)
 
 
-def _refute_band(actuator: Any, edges: tuple[_Edge, _Edge], u_max: float) -> None:
+def _refute_band(actuator: Any, edges: tuple[Edge, Edge], u_max: float) -> None:
     """Look for an input and a memory at which an actuator leaves the band that it declares."""
     p, rng = equation_arguments(actuator), np.random.default_rng(0)
-    for t in (0.0, *TIMES):
+    for t in (0.0, *_TIMES):
         for u in np.linspace(-u_max, u_max, 101):
             x = 0.5 * u_max * rng.standard_normal(len(actuator.states))
             v = float(np.asarray(actuator.output(t, x, np.array([u]), p)).reshape(-1)[0])
@@ -406,7 +368,7 @@ def _refute_band(actuator: Any, edges: tuple[_Edge, _Edge], u_max: float) -> Non
                 )
 
 
-def _edges(actuator: Any) -> tuple[_Edge, _Edge]:
+def _edges(actuator: Any) -> tuple[Edge, Edge]:
     """Return the least and the greatest output v that the actuator can have at input u, time t."""
     p, name = equation_arguments(actuator), type(actuator).__name__
     band: Any = getattr(actuator, "band", None)
@@ -425,53 +387,9 @@ def _edges(actuator: Any) -> tuple[_Edge, _Edge]:
     if band is not None:
         low, high = (on_balls(lambda u, t, i=i: band(t, u, p)[i], refusal) for i in (0, 1))
         return low, high
-    output = on_balls(lambda u, t: actuator.output(t, (), (u,), p)[0], refusal)
+    function = actuator.output
+    output = on_balls(lambda u, t: function(t, (), (u,), p)[0], refusal)
     return output, output
-
-
-def _eps_range(
-    k: tuple[float, float], edges: tuple[_Edge, _Edge], u_max: float, tol: float
-) -> tuple[Range, Range]:
-    """Ranges of eps_u along both edges, for all t >= 0; it grows with v, so these are its ends."""
-    part = clipped_split(*k)
-
-    def along(edge: _Edge) -> Range:
-        def eps_u(point: tuple[Any, ...]) -> Any:
-            u, t = (*point, UNREAD)[:2]
-            v = edge(u, t)
-            rest = as_ball(v - part(u, v))
-            return rest if t is UNREAD else _sharpened(rest, edge, k, u, t)
-
-        if reads_time(edge):
-            box, limit = Box.of(u=(-u_max, u_max), t=(0.0, np.inf)), _TIMED
-        else:
-            box, limit = Box.of(u=(-u_max, u_max)), UNTIMED
-        return enclose(eps_u, box, tol=tol, max_boxes=limit)
-
-    low = along(edges[0])
-    return low, low if edges[1] is edges[0] else along(edges[1])
-
-
-def _sharpened(rest: Any, edge: _Edge, k: tuple[float, float], u: Any, t: Any) -> Any:
-    """Return eps_u from the difference quotient q of v in u as well, v = q u + v(0, t).
-
-    v - clip(v, k_1 u, k_2 u) grows with v, and no faster: it is u (q - clip(q, k_1, k_2)) and what
-    lies between 0 and v(0, t).  Between v and its clipped self intervals forget that t is one time.
-    """
-    try:
-        q, start = slope_in(lambda w: edge(w, t), u).value, as_ball(edge(0.0, t)).value
-    except Undecided:
-        return rest
-    low, high = (_excess(end, k) for end in (q.lower(), q.upper()))
-    sharper = as_ball(u).value * low.union(high) + arb(0).union(start)
-    if not rest.value.overlaps(sharper):  # answers that contradict each other: nobody goes this way
-        return rest
-    value = common(rest.value, sharper)
-    return Ball(value, (arb(0, "inf"),) * len(as_ball(u).gradient))
-
-
-def _excess(q: arb, k: tuple[float, float]) -> arb:
-    return (q - k[1]).max(arb(0)) + (q - k[0]).min(arb(0))
 
 
 def _refuse_growth(

@@ -9,16 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.params import equation_arguments
 from nlctl.plants import ForcedDuffing, duffing_forcing
 
-from ...intervals.branch_and_bound import enclose
+from ...intervals.arithmetic import as_ball
+from ...intervals.box import Box
+from ...intervals.branch_and_bound import enclose, upper
 from ..loop.integral import sharpest
 from .decomposition import Decomposition
 from .final_bound import Gains, alpha_0, alpha_1, total_error
 from .provenance import Constants, bound
 
-__all__ = ["Premises", "literal", "premises"]
+__all__ = ["Premises", "forcing_bound", "literal", "premises"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +89,7 @@ class Premises:
         return bound(self.alpha_0, self.alpha_1, V_0, Q)
 
 
+@as_annotated
 def premises(
     constants: Constants, gains: Gains | None = None, split: Decomposition | None = None
 ) -> Premises:
@@ -124,17 +128,19 @@ def premises(
     )
 
 
+@as_annotated
 def literal(given: Premises, constants: Constants, plant: Any = None) -> Premises | None:
     """Return the premises of Example 1 as the paper prints them; None for another plant.
 
-    There q cos(w t) stands inside the static g(x), so that d* bounds 0.1 |x|^2 sin t alone.
+    There q cos(w t) stands inside g, so that d* bounds 0.1 |x|^2 sin t alone, and eps* the error
+    of the network against that g, with q cos(w t) in it.
 
     Parameters
     ----------
     given : Premises
         The derived ones.
     constants : Constants
-        Their plant and box give d*.
+        Their plant and box give d* and eps*.
     plant : record, optional
         Of a member of an ensemble, for its forcing.
 
@@ -145,7 +151,7 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
 
     Examples
     --------
-    Example 1's forcing belongs to the disturbance, so that the printed d* is too small:
+    What leaves the disturbance comes back as an error of the network:
 
     >>> import numpy as np
     >>> import nlctl
@@ -155,8 +161,11 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
     >>> box = Box(names=("x1", "x2", "v"), low=(-1.0, -1.0, -5.0), high=(1.0, 1.0, 5.0))
     >>> found = constants(loop, box, times=(0.0, 1.0))
     >>> given = premises(found)
-    >>> bool(literal(given, found).d < 0.21 < 5.0 < given.d)
+    >>> printed = literal(given, found)
+    >>> bool(printed.d < 0.21 < 5.0 < given.d)
     True
+    >>> print(round(printed.eps - given.eps, 2))
+    5.1
     """
     declared: Any = constants.parts.plant
     plant = declared if plant is None else plant
@@ -166,9 +175,21 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
     own, p = equation_arguments(quiet), equation_arguments(plant)
     box = constants.box.only("x1", "x2").times("t", 0.0, np.inf)
     d = enclose(lambda z: quiet.d(z[:-1], z[-1], own), box).magnitude
+    eps = upper(as_ball(given.eps) + forcing_bound(declared))
     return dataclasses.replace(
         given,
         d=d,
-        delta=float(total_error(given.G_max, given.split.eps_star, d, given.eps)),
+        eps=eps,
+        delta=upper(total_error(as_ball(given.G_max), given.split.eps_star, d, eps)),
         forcing=lambda t: duffing_forcing(t, p),
     )
+
+
+def forcing_bound(plant: ForcedDuffing) -> float:
+    """Return a proved bound of |q cos(w t)| for all time.
+
+    No network of x alone comes closer to a g with q cos(w t) in it: at one x such a g takes values
+    that are that far from their middle.
+    """
+    p = equation_arguments(plant)
+    return enclose(lambda z: duffing_forcing(z[0], p), Box.of(t=(0.0, np.inf))).magnitude

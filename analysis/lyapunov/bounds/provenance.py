@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from nlctl.errors import UsageError
 from nlctl.host.notebook import table_html
 from nlctl.names import unknown
 
@@ -18,11 +21,13 @@ from ..loop.roles import Parts
 from .decomposition import Decomposition
 from .final_bound import final_bound
 from .sector import Sector
+from .starts import Starts
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
+    "FROM_STARTS",
     "Constant",
     "Constants",
     "Provenance",
@@ -31,6 +36,7 @@ __all__ = [
     "per_second",
 ]
 
+FROM_STARTS = "all t, from the starts"
 Provenance = Literal["proved", "computed", "sampled", "given", "undecided"]
 
 
@@ -173,16 +179,19 @@ class Shown:
 
     Attributes
     ----------
+    name : str
+        Of the loop.
     holds : bool
-        Whether the bounds hold for all t >= 0, proved.
+        Whether the bounds hold for all t >= 0 from the starts, proved.
     reason : str
-        Why they hold, or why not.
+        Why they hold, or what is missing.
     params : mapping
         Parameters of the proof that are not those of the loop as it stands.
     loop_facts : mapping
         What the loop consists of, see `analysis.loop_record`.
     """
 
+    name: str
     holds: bool
     reason: str
     params: Mapping[str, Any] = field(default_factory=dict, repr=False)
@@ -194,6 +203,32 @@ class Shown:
         raise NotImplementedError
 
     @property
+    def starts(self) -> Starts:
+        """The initial states that the bounds hold for."""
+        raise NotImplementedError
+
+    @property
+    def disturbance(self) -> float:
+        """Bound of what external inputs add to the plant's v."""
+        raise NotImplementedError
+
+    @property
+    def status(self) -> Literal["proved", "undecided"]:
+        """Whether the bound is proved; a bound that is not is not refuted by that."""
+        return "proved" if self.holds else "undecided"
+
+    @property
+    def missing(self) -> str:
+        """What a proof would need; nothing if there is one."""
+        return "" if self.holds else self.reason
+
+    @property
+    def claim(self) -> str:
+        """What is proved, with the starts and inputs that it is about."""
+        added = f", whatever external inputs add up to {self.disturbance:.6g} to v"
+        return f"{self.bound} from {self.starts}{added if self.disturbance else ''}"
+
+    @property
     def constants(self) -> tuple[Constant, ...]:
         """Every constant of the proof; without the bounds if nothing is proved."""
         raise NotImplementedError
@@ -201,7 +236,39 @@ class Shown:
     @property
     def verdict(self) -> str:
         """What is proved, in a sentence."""
-        return f"{self.bound if self.holds else 'no bound is proved'}: {self.reason}"
+        lost = f"no bound is proved from {self.starts}, and none is refuted; undecided"
+        return f"{self.claim if self.holds else lost}: {self.reason}"
+
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Write the proof so that others can check it: rationals, boxes and the claim, as JSON.
+
+        ``python -m analysis.recheck FILE`` answers yes or no, with integer arithmetic of its own.
+        Bounds are rounded up, as a rule by less than a thousandth.
+
+        Parameters
+        ----------
+        file : path
+            Where to write.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        UsageError
+            If nothing is proved, or the proof needs functions or tighter enclosures than the
+            recheck has.
+        """
+        if not self.holds:
+            raise UsageError(
+                f"nothing is proved of '{self.name}' that could be saved: {self.reason}"
+            )
+        return self._saved(file)
+
+    def _saved(self, file: str | os.PathLike[str]) -> Path:
+        raise NotImplementedError
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

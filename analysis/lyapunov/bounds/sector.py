@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import of_type
 from nlctl.errors import DiagramError, ParameterError
 from nlctl.params import equation_arguments
 from nlctl.plants import PureFeedback, coordinate_names
 
+from ...intervals.agreement import agreeing
 from ...intervals.box import Box
 from ...intervals.branch_and_bound import Range, enclose
 from ...intervals.quotient import slope_in
@@ -85,19 +87,28 @@ def plant_terms(plant: Any) -> tuple[Callable[[Any, Any], Any], Callable[[Any, A
     Raises
     ------
     DiagramError
-        If the record has no f and d.
+        If the record has no f and d, or, when these are called, they make of balls what they do
+        not make of floats.
     """
     if not (hasattr(plant, "f") and hasattr(plant, "d")):
         raise DiagramError(
             f"{type(plant).__name__} is not a plant of the class (1): it lacks f and d; see "
             "nlctl.PureFeedback"
         )
+    f, d = (agreeing(function, _refusal(plant)) for function in (plant.f, plant.d))
     if isinstance(plant, PureFeedback):  # the user's functions, without parameters
-        return plant.f, plant.d
+        return f, d
     p = equation_arguments(plant)
-    return lambda x, v: plant.f(x, v, p), lambda x, t: plant.d(x, t, p)
+    return lambda x, v: f(x, v, p), lambda x, t: d(x, t, p)
 
 
+def _refusal(plant: Any) -> Callable[[str], DiagramError]:
+    return lambda why: DiagramError(
+        f"f and d of {type(plant).__name__} are not what they are of numbers: {why}"
+    )
+
+
+@as_annotated
 def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) -> Sector:
     """Prove the sector constants m1, ..., m4 and G_max of Assumption 3 over a box.
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.controllers import AdaptiveWeights
 from nlctl.errors import ParameterError
 from nlctl.params import equation_arguments
@@ -80,6 +81,7 @@ def network_on_grid(plant: Any, basis: Any, box: Box, per_side: int | None = Non
     return Network(psi=psi, g=np.array([f(tuple(x), 0.0) for x in points]), points=points)
 
 
+@as_annotated
 def minimax_weights(network: Network, largest: float | None = None) -> np.ndarray:
     """Return W* of (11): the weights with the smallest max |g - W^T psi| on the grid.
 
@@ -142,6 +144,7 @@ def least_squares_weights(network: Network) -> np.ndarray:
     return np.linalg.lstsq(network.psi / scale, network.g, rcond=None)[0] / scale
 
 
+@as_annotated
 def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.ndarray:
     """Return the weights that make the final bound C_0 of (36) smallest, for Q = 0.
 
@@ -198,6 +201,7 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
     return np.array(W.value)
 
 
+@as_annotated
 def approximation_error(
     plant: Any, basis: Any, W: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000
 ) -> Range:

@@ -9,11 +9,13 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.controllers import KnownSignLaw
 from nlctl.diagrams import leaves
 from nlctl.errors import DiagramError, ParameterError
 from nlctl.params import integer
 
+from ...intervals.box import Box
 from ...loop_record import loop_facts
 from ..bounds.decomposition import check_gain
 from ..loop.roles import declared, record_of
@@ -28,11 +30,13 @@ __all__ = ["AnyCertificate", "certify"]
 AnyCertificate = Certificate | ModelReferenceCertificate | SlidingModeCertificate
 
 
+@as_annotated
 def certify(
     loop: Any,
     *,
     params: Mapping[str, Any] | None = None,
     inputs: Mapping[str, float] | None = None,
+    starts: Mapping[str, Any] | Box | None = None,
     k: tuple[float, float] | None = None,
     W: Sequence[float] | None = None,
     u_max: float = 250.0,
@@ -59,6 +63,13 @@ def certify(
     inputs : mapping, optional
         Bound of |w| for every external input w of the diagram, by name.  It must be added to the
         plant's v, whatever its gain; it then belongs to eps_u.
+    starts : mapping or Box, optional
+        The initial states that the bounds shall hold for, at t = 0.  By state, or by the name of a
+        vector of states (``"weights.W_hat"``): a number, or ``(low, high)``.  States that are not
+        named start where the loop starts, so that by default this is one point.  With a
+        reference model ``"V"`` bounds V(0): plant and weights may then start anywhere in that
+        level set, unless they are named, too; the states of the model are always taken from the
+        box.
     k : (k_1, k_2), optional
         Bounds that the actuator's k shall have, see `decompose`; a tight choice makes eps_u*
         small.
@@ -83,10 +94,13 @@ def certify(
     DiagramError
         If the loop has other blocks, connections or equations than the proof is about, or an
         external input without a bound.
+    UnknownNameError, AmbiguousNameError
+        If `starts` names no state, or several.
     DecompositionError
         If the actuator has no split (2).
     ParameterError
-        If `u_max`, `tol` or `max_iterations` is not positive, a bound of an input is refused,
+        If `u_max`, `tol` or `max_iterations` is not positive, a bound of an input or an end of a
+        start is refused,
         or `W` is of another size, or of a loop without a reference model.
 
     Examples
@@ -114,6 +128,15 @@ def certify(
     >>> found = certify(nlctl.interconnect({**blocks, "plant": plant, "controller": controller}))
     >>> print(found.holds, round(found.V_max, 6))
     True 0.925
+
+    From a box of starts, in which V(0) is larger:
+
+    >>> found = certify(
+    ...     nlctl.interconnect({**blocks, "plant": plant, "controller": controller}),
+    ...     starts={"plant.x1": (-1.0, 1.0), "weights.W_hat": (0.0, 1.0)},
+    ... )
+    >>> print(found.status, round(found.V_max, 6), round(found.V_0, 6))
+    proved 1.5 1.5
     """
     max_iterations = integer("certify", "max_iterations", max_iterations, at_least=1)
     for name, value in (("u_max", u_max), ("tol", tol)):
@@ -121,7 +144,8 @@ def certify(
             raise ParameterError(f"certify needs a finite {name} > 0, got {value}")
     check_gain("certify", k)
     how: dict[str, Any] = {
-        "params": params, "inputs": inputs, "k": k, "tol": tol, "max_iterations": max_iterations,
+        "params": params, "inputs": inputs, "starts": starts, "k": k, "tol": tol,
+        "max_iterations": max_iterations,
     }  # fmt: skip
     found = _certified(loop, W, u_max, how)
     return replace(found, params=dict(params or {}), loop_facts=loop_facts(loop))

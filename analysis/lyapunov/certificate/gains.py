@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number
 from nlctl.errors import DivergedError, ParameterError
 from nlctl.native import compile as compiled_loop
@@ -87,7 +88,7 @@ class GainDesign:
     def __str__(self) -> str:
         gains = ", ".join(f"{name} = {value:.5g}" for name, value in self.gains.items())
         lines = [
-            f"|r| <= {self.certificate.C_0:.6g} for all t, proved; max |u| = {self.u:.5g} over "
+            f"{self.certificate.claim}; max |u| = {self.u:.5g} over "
             f"{self.horizon:g} s (sampled; limit {self.u_limit:g})",
             gains,
             "trade-off (max |u|, C_0): "
@@ -96,6 +97,7 @@ class GainDesign:
         return "\n".join(lines)
 
 
+@as_annotated
 def design(
     loop: Any,
     *,

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from flint import arb
 
 from nlctl.controllers import (
@@ -20,11 +19,12 @@ from nlctl.controllers import (
 from nlctl.params import equation_arguments
 from nlctl.references import SumOfSines
 
+from ..bounds.starts import Sides, Starts
 from ..loop.checked import read_checked
 from ..loop.plant_form import Acceleration, acceleration
 from ..loop.roles import PIECES, Parts, Roles, read_parts
 
-__all__ = ["KnownSignLoop", "initial_errors", "read_loop"]
+__all__ = ["KnownSignLoop", "filtered_error", "initial_errors", "read_loop"]
 
 PROVED_FOR = {
     "reference": (SumOfSines,),
@@ -45,8 +45,13 @@ class KnownSignLoop:
     parts : Parts
         Records of the blocks, and the gains.
     reference : SumOfSines
+    starts : Starts
+        Initial states.
     e0 : tuple of n arb
-        Initial errors e_1(0), ..., e_n(0).
+        Initial errors e_1(0), ..., e_n(0): of all starts.
+    delta_hat_0 : arb
+    W_hat_0 : tuple of arb
+        Initial estimates, of all starts.
     acceleration : callable
         x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
     disturbance : float
@@ -55,7 +60,10 @@ class KnownSignLoop:
 
     parts: Parts
     reference: SumOfSines
+    starts: Starts
     e0: tuple[arb, ...]
+    delta_hat_0: arb
+    W_hat_0: tuple[arb, ...]
     acceleration: Acceleration
     disturbance: float = 0.0
 
@@ -74,11 +82,21 @@ class KnownSignLoop:
         """Number of nodes of the network; 0 without one."""
         return len(self.parts.gains.W_hat_0)
 
+    def states(self, part: str) -> list[str]:
+        """Names of the states of a part."""
+        return self.starts.names_of(self.parts.roles.places[part])
+
+    @property
+    def r_0(self) -> arb:
+        """r(0) of (14)."""
+        return filtered_error(self.lambdas, self.e0)
+
 
 def read_loop(
     loop: Any,
     params: Mapping[str, Any] | None = None,
     inputs: Mapping[str, float] | None = None,
+    starts: Any = None,
 ) -> KnownSignLoop:
     """Read a loop that is made of the paper's blocks and `nlctl.KnownSignLaw`.
 
@@ -89,6 +107,8 @@ def read_loop(
         Overrides by qualified name, as in a run.
     inputs : mapping, optional
         Bound of |w| for every external input w that is added to the plant's v, by name.
+    starts : mapping or Box, optional
+        Initial states, by default the loop's own.
 
     Raises
     ------
@@ -96,20 +116,33 @@ def read_loop(
         As `read_parts` and `read_checked` do.
     """
     parts = read_parts(loop, params=params, inputs=True)
-    checked = read_checked(loop, PIECES, PROVED_FOR, params, inputs)
+    checked = read_checked(loop, PIECES, PROVED_FOR, params, inputs, starts)
     return KnownSignLoop(
         parts=parts,
         reference=parts.roles.spec("reference"),
-        e0=initial_errors(parts.roles, checked.x0),
+        starts=checked.starts,
+        e0=initial_errors(parts.roles, checked.start("plant")),
+        delta_hat_0=between(*checked.start("robust")[0]),
+        W_hat_0=tuple(between(*ends) for ends in checked.start("weights")) if parts.weights else (),
         acceleration=acceleration(checked.roles.places["plant"]),
         disturbance=checked.disturbance,
     )
 
 
-def initial_errors(roles: Roles, x0: np.ndarray) -> tuple[arb, ...]:
+def between(low: float, high: float) -> arb:
+    """Return an interval."""
+    return arb(low) if low == high else arb(low).union(arb(high))
+
+
+def filtered_error(lambdas: Sequence[float], e: Sequence[arb]) -> arb:
+    """Return r of (14)."""
+    coefficients = (*map(arb, reversed(lambdas)), arb(1))
+    return sum((a * b for a, b in zip(coefficients, e, strict=True)), arb(0))
+
+
+def initial_errors(roles: Roles, sides: Sides) -> tuple[arb, ...]:
     """Return e_1(0), ..., e_n(0) of a plant and a reference without states."""
-    plant, reference = roles.places["plant"], roles.spec("reference")
+    reference = roles.spec("reference")
     yd = reference.output(0.0, (), (), equation_arguments(reference))
-    own = x0[plant.state_offset :][: plant.system.nstates]
     # the radius covers what double precision has lost in yd(0)
-    return tuple(arb(float(x)) - arb(float(y), 1e-12) for x, y in zip(own, yd, strict=False))
+    return tuple(between(*x) - arb(float(y), 1e-12) for x, y in zip(sides, yd, strict=False))

@@ -14,8 +14,10 @@ in the box, and so |r| <= C_0(C).  No Nussbaum function and no Lemma 1 take part
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,10 +29,12 @@ from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition, decompose, only_declared
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
-from ..bounds.provenance import Constant, Shown, per_second
+from ..bounds.provenance import FROM_STARTS, Constant, Shown, per_second
+from ..bounds.starts import Starts
 from ..loop.external_inputs import disturbed
 from .known_sign import KnownSignLoop, read_loop
 from .plant_bounds import Demand, demand, feedforward
+from .saved import filtered_attempts, save_certificate
 
 __all__ = ["Certificate", "bound_of_r", "certify_known_sign"]
 
@@ -47,11 +51,11 @@ class Certificate(Shown):
     name : str
         Of the loop.
     holds : bool
-        True: |r| <= C_0 for all t >= 0, proved.
+        True: |r| <= C_0 for all t >= 0 from the starts, proved.
     reason : str
         Why it holds, or why not.
     C_0 : float
-        Bound of |r| for all time; infinite if nothing is proved.
+        Bound of |r| for all time, from all `starts`; infinite if nothing is proved.
     ultimate : float
         Bound of limsup |r|, sqrt(2 alpha_0 / alpha_1).
     u_max : float
@@ -108,19 +112,48 @@ class Certificate(Shown):
             ("delta*", need.delta_star, unit, sure, "sup |g + d| + G_max eps_u*", over),
             ("alpha_0", self.alpha_0, per_second(2 * n - 1), sure, alpha_0, over),
             ("alpha_1", self.alpha_1, "1/s", "computed", alpha_1, "all t"),
-            ("V(0)", self.V_0, energy, sure, "(21) with W = 0", "this initial state"),
+            ("V(0)", self.V_0, energy, sure, "(21) with W = 0", "all starts"),
         ]
         if self.holds:
             bound, ultimate = "sqrt(2 max{V(0), alpha_0/alpha_1})", "sqrt(2 alpha_0/alpha_1)"
             rows += [
-                ("C_0", self.C_0, error, "proved", bound, "all t"),
+                ("C_0", self.C_0, error, "proved", bound, FROM_STARTS),
                 ("limsup |r|", self.ultimate, error, "proved", ultimate, "t -> infinity"),
-                ("max |u|", self.u_max, "1", "proved", "from V <= C_0^2/2 and the box", "all t"),
+                (
+                    "max |u|",
+                    self.u_max,
+                    "1",
+                    "proved",
+                    "from V <= C_0^2/2 and the box",
+                    FROM_STARTS,
+                ),
             ]
         return tuple(
             Constant(symbol=s, value=v, unit=per, provenance=p, how=how, over=where)
             for s, v, per, p, how, where in rows
         )
+
+    @property
+    def starts(self) -> Starts:
+        """The initial states that the bounds hold for."""
+        return self.loop.starts
+
+    @property
+    def disturbance(self) -> float:
+        """Bound of what external inputs add to the plant's v."""
+        return self.loop.disturbance
+
+    def _saved(self, file: Any) -> Path:
+        gains, law = self.loop.parts.gains, self.loop.law
+        names = {"sigma_1", "sigma_2", "Gamma", "gamma", "beta", "tau", "b"}
+        states = {
+            "plant": self.loop.states("plant"),
+            "weights": self.loop.states("weights") if self.loop.nodes else [],
+            "delta_hat": self.loop.states("robust")[:1],
+        }
+        numbers = {name: getattr(gains, name) for name in sorted(names)} | {"N_0": law.N_0}
+        attempts = lambda: filtered_attempts(self.loop, self.demand, self.split, numbers, states)  # noqa: E731
+        return save_certificate(file, "known sign", self.name, attempts)
 
     @property
     def bound(self) -> str:
@@ -133,7 +166,9 @@ def bound_of_r(loop: KnownSignLoop, delta_star: float) -> tuple[arb, arb, float,
     gains, delta = loop.parts.gains, Ball(arb(delta_star))
     rate = alpha_1(gains)
     drive = alpha_0(gains, delta, 0.0).value * OUTWARD
-    V_0 = initial_V(gains, delta, sum(w * w for w in gains.W_hat_0)).value * OUTWARD
+    start = dataclasses.replace(gains, r_0=Ball(loop.r_0), delta_hat_0=Ball(loop.delta_hat_0))
+    squares: Any = sum((Ball(w) ** 2 for w in loop.W_hat_0), Ball(arb(0)))
+    V_0 = arb(upper(initial_V(start, delta, squares).value * OUTWARD))
     return (2 * V_0.max(drive / rate * OUTWARD)).sqrt(), drive, rate, V_0
 
 
@@ -142,15 +177,16 @@ def certify_known_sign(
     *,
     params: Mapping[str, Any] | None = None,
     inputs: Mapping[str, float] | None = None,
+    starts: Any = None,
     k: tuple[float, float] | None = None,
     u_max: float = 250.0,
     tol: float = 1e-3,
     max_iterations: int = 60,
 ) -> Certificate:
     """Prove a bound of a loop with `nlctl.KnownSignLaw`; see `certify`."""
-    read = read_loop(loop, params, inputs)
+    read = read_loop(loop, params, inputs, starts)
     split = disturbed(decompose(read.parts.actuator, k=k, u_max=u_max, tol=tol), read.disturbance)
-    C = abs(read.parts.gains.r_0)
+    C = upper(abs(read.r_0))
     iterations = [C]
     for _ in range(max_iterations):
         need = demand(read, split, C * (1 + tol) + tol * tol, tol=tol)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import control as ct
@@ -29,13 +30,15 @@ from nlctl.wording import counted
 from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition, decompose, only_declared
 from ..bounds.error_bounds import error_bounds
-from ..bounds.provenance import Constant, Shown, per_second
+from ..bounds.provenance import FROM_STARTS, Constant, Shown, per_second
+from ..bounds.starts import Starts
 from ..loop.checked import read_checked
 from ..loop.external_inputs import ADDED, disturbed
 from ..loop.plant_form import Acceleration, acceleration
 from ..loop.roles import Pieces, Roles, record_of
-from .known_sign import initial_errors
+from .known_sign import filtered_error, initial_errors
 from .plant_bounds import Demand, demand, feedforward
+from .saved import filtered_attempts, save_certificate
 
 __all__ = ["SlidingModeCertificate", "SlidingModeLoop", "certify_sliding_mode", "is_sliding_mode"]
 
@@ -64,8 +67,10 @@ class SlidingModeLoop:
     reference : SumOfSines
     lambdas : tuple of float
         Of the filtered error.
+    starts : Starts
+        Initial states.
     e0 : tuple of n arb
-        Initial errors e_1(0), ..., e_n(0).
+        Initial errors e_1(0), ..., e_n(0): of all starts.
     acceleration : callable
         x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
     disturbance : float
@@ -76,6 +81,7 @@ class SlidingModeLoop:
     law: SlidingModeLaw
     reference: SumOfSines
     lambdas: tuple[float, ...]
+    starts: Starts
     e0: tuple[arb, ...]
     acceleration: Acceleration
     disturbance: float
@@ -83,8 +89,7 @@ class SlidingModeLoop:
     @property
     def r_0(self) -> arb:
         """r(0) of (14)."""
-        coefficients = (*map(arb, reversed(self.lambdas)), arb(1))
-        return sum((a * e for a, e in zip(coefficients, self.e0, strict=True)), arb(0))
+        return filtered_error(self.lambdas, self.e0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,11 +101,11 @@ class SlidingModeCertificate(Shown):
     name : str
         Of the loop.
     holds : bool
-        True: the bounds hold for all t >= 0, proved.
+        True: the bounds hold for all t >= 0 from the starts, proved.
     reason : str
         Why they hold, or why not.
     C_0 : float
-        Bound of |r| for all time; infinite if nothing is proved, as all bounds.
+        Bound of |r| for all time, from all `starts`; infinite if nothing is proved, as all bounds.
     errors : tuple of n floats
         Bounds of |e_1|, ..., |e_n| for all time.
     ultimate, ultimate_e : float
@@ -174,18 +179,34 @@ class SlidingModeCertificate(Shown):
     def _bounds(self) -> Iterator[tuple[Any, ...]]:
         n = len(self.loop.e0)
         how = "max{|r(0)|, phi M/(K k_1 G_min)}"
-        yield "C_0", self.C_0, per_second(n - 1), "proved", how, "all t"
+        yield "C_0", self.C_0, per_second(n - 1), "proved", how, FROM_STARTS
         for i, error in enumerate(self.errors):
-            yield f"|e_{i + 1}|", error, per_second(i), "proved", "filters of r", "all t"
+            yield f"|e_{i + 1}|", error, per_second(i), "proved", "filters of r", FROM_STARTS
         yield "max |u|", self.u_max, "1", "computed", "K", "all t"
         end = "the second, with M on the box of the end"
         yield "limsup |r|", self.ultimate, per_second(n - 1), "proved", end, "t -> infinity"
         yield "limsup |e|", self.ultimate_e, "1", "proved", "filters of r", "t -> infinity"
 
     @property
+    def starts(self) -> Starts:
+        """The initial states that the bounds hold for."""
+        return self.loop.starts
+
+    @property
+    def disturbance(self) -> float:
+        """Bound of what external inputs add to the plant's v."""
+        return self.loop.disturbance
+
+    def _saved(self, file: Any) -> Path:
+        loop, numbers = self.loop, {"K": self.loop.law.K, "phi": self.loop.law.phi}
+        states = {"plant": loop.starts.names_of(loop.roles.places["plant"])}
+        attempts = lambda: filtered_attempts(loop, self.demand, self.split, numbers, states)  # noqa: E731
+        return save_certificate(file, "sliding mode", self.name, attempts)
+
+    @property
     def bound(self) -> str:
         """What is proved, in words."""
-        return f"|r| <= {self.C_0:.6g} proved for all t, {self.ultimate:.6g} in the end"
+        return f"|r| <= {self.C_0:.6g} proved for all t, {self.ultimate:.6g} in the end,"
 
 
 def is_sliding_mode(loop: Any) -> bool:
@@ -196,17 +217,21 @@ def is_sliding_mode(loop: Any) -> bool:
 
 
 def read_sliding_mode(
-    loop: Any, params: Mapping[str, Any] | None, inputs: Mapping[str, float] | None
+    loop: Any,
+    params: Mapping[str, Any] | None,
+    inputs: Mapping[str, float] | None,
+    starts: Any = None,
 ) -> SlidingModeLoop:
     """Read a loop with `nlctl.SlidingModeLaw`; raises as `read_checked` does."""
-    read = read_checked(loop, _PIECES, _PROVED_FOR, params, inputs)
+    read = read_checked(loop, _PIECES, _PROVED_FOR, params, inputs, starts)
     roles = read.roles
     return SlidingModeLoop(
         roles=roles,
         law=roles.spec("law"),
         reference=roles.spec("reference"),
         lambdas=roles.spec("filtered_error").lambdas,
-        e0=initial_errors(roles, read.x0),
+        starts=read.starts,
+        e0=initial_errors(roles, read.start("plant")),
         acceleration=acceleration(roles.places["plant"]),
         disturbance=read.disturbance,
     )
@@ -217,12 +242,13 @@ def certify_sliding_mode(
     *,
     params: Mapping[str, Any] | None = None,
     inputs: Mapping[str, float] | None = None,
+    starts: Any = None,
     k: tuple[float, float] | None = None,
     tol: float = 1e-3,
     max_iterations: int = 60,
 ) -> SlidingModeCertificate:
     """Prove a bound of a loop with `nlctl.SlidingModeLaw`; see `certify`."""
-    read = read_sliding_mode(loop, params, inputs)
+    read = read_sliding_mode(loop, params, inputs, starts)
     actuator = read.roles.spec("actuator")
     split = disturbed(decompose(actuator, k=k, u_max=read.law.K, tol=tol), read.disturbance)
     start = abs(read.r_0)

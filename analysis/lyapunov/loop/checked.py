@@ -10,9 +10,9 @@ import control as ct
 import numpy as np
 
 from nlctl.blocks import block
-from nlctl.diagrams import initial_state, interconnect, override
-from nlctl.upstream.control_internals import set_parameters
+from nlctl.diagrams import initial_state, interconnect, overridden, state_names
 
+from ..bounds.starts import Sides, Starts, read_starts
 from .external_inputs import bound_of_inputs
 from .plant_form import check_chain
 from .roles import Pieces, Roles, check_kind, joined_again, read_roles
@@ -31,21 +31,21 @@ class CheckedLoop:
         Places of the blocks, with the parameters of the run.
     disturbance : float
         Bound of what external inputs add to the plant's v.
-    x0 : ndarray of shape (n,)
-        Initial state of the loop.
+    starts : Starts
+        Initial states that the proof shall be about.
     understood : control.InterconnectedSystem
         The loop, connected again by name, with all its signals as outputs.
     """
 
     roles: Roles
     disturbance: float
-    x0: np.ndarray
+    starts: Starts
     understood: ct.InterconnectedSystem = field(repr=False)
 
-    def start(self, part: str) -> np.ndarray:
-        """Return the initial state of a part."""
+    def start(self, part: str) -> Sides:
+        """Return the ends of the initial states of a part."""
         place = self.roles.places[part]
-        return self.x0[place.state_offset :][: place.system.nstates or 0]
+        return self.starts.sides(place.state_offset, place.system.nstates or 0)
 
 
 def read_checked(
@@ -54,8 +54,10 @@ def read_checked(
     kinds: Mapping[str, tuple[type, ...]],
     params: Mapping[str, Any] | None,
     inputs: Mapping[str, float] | None,
+    starts: Any = None,
+    free: tuple[str, ...] = (),
 ) -> CheckedLoop:
-    """Read a loop by its wiring; its blocks have the parameters of the run from then on.
+    """Read a loop by its wiring, in a copy whose blocks have the parameters of the run.
 
     Parameters
     ----------
@@ -68,6 +70,10 @@ def read_checked(
         Overrides by qualified name, as in a run.
     inputs : mapping or None
         Bound of |w| for every external input w that is added to the plant's v, by name.
+    starts : mapping or Box, optional
+        As for `read_starts`.
+    free : tuple of str, optional
+        Parts whose states a level of V bounds.
 
     Raises
     ------
@@ -76,16 +82,33 @@ def read_checked(
         block's function, is another one; if the plant is not a chain of integrators; if an
         external input has no bound.
     """
+    if isinstance(loop, ct.InterconnectedSystem):  # else it is refused
+        loop = overridden(loop, params)
     roles = read_roles(loop, pieces)
     disturbance = bound_of_inputs(roles, inputs or {}, loop)
-    override(loop, dict(params or {}))
     for part, wanted in kinds.items():
         if part in roles.places:  # a network may be left out
             check_kind(roles.places[part], wanted)
     check_chain(roles.places["plant"])
-    x0 = initial_state(loop)
+    begins = read_starts(
+        loop,
+        starts,
+        free=tuple(name for part in free for name in _states(loop, roles, part)),
+        kept=_states(loop, roles, "actuator"),
+    )
     again = joined_again(loop, roles, lambda part, spec, name: block(spec, name))
     understood = interconnect(again, name=str(loop.name))
-    check_same(loop, understood, points_around(x0), params)
-    set_parameters(loop, dict(params or {}))
-    return CheckedLoop(roles=roles, disturbance=disturbance, x0=x0, understood=understood)
+    check_same(loop, understood, _compared_at(loop, begins), params)
+    return CheckedLoop(roles=roles, disturbance=disturbance, starts=begins, understood=understood)
+
+
+def _states(loop: Any, roles: Roles, part: str) -> tuple[str, ...]:
+    """Return the states of a part, by path."""
+    place = roles.places[part]
+    return tuple(state_names(loop)[place.state_offset :][: place.system.nstates or 0])
+
+
+def _compared_at(loop: Any, starts: Starts) -> list[tuple[float, np.ndarray]]:
+    """Return times and states: around the loop's own start, and the corners of all starts."""
+    found = points_around(initial_state(loop))
+    return found if starts.is_point else found + [(0.0, x) for x in starts.points()]

@@ -13,6 +13,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.blocks import Block, block
 from nlctl.diagrams import interconnect
 from nlctl.equations import equation
@@ -48,14 +49,16 @@ def input_gain(f: Callable) -> Callable:
     @equation
     def gain(x, v, p):
         at_rest = f(x, 0.0, p)
-        if abs(v) >= NEAR:  # false for NaN, which then reaches G
-            return (f(x, v, p) - at_rest) / v
+        far = abs(v) >= NEAR  # false for NaN, which then reaches G
+        # a choice of values, not a case: cases of f would be followed twice
+        quotient = (f(x, v, p) - at_rest) / np.where(far, v, 1.0)
         right, left = (f(x, NEAR, p) - at_rest) / NEAR, (at_rest - f(x, -NEAR, p)) / NEAR
-        return 0.5 * (right + left) + 0.5 * (right - left) * (v / NEAR)
+        return np.where(far, quotient, 0.5 * (right + left) + 0.5 * (right - left) * (v / NEAR))
 
     return gain
 
 
+@as_annotated
 def observed(
     loop: ct.InterconnectedSystem, parts: Parts, split: Decomposition, alpha_1: float
 ) -> ct.InterconnectedSystem:

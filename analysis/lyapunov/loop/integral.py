@@ -13,14 +13,17 @@ from typing import Any
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.equations import equation
 from nlctl.params import param, record
 
-from ..bounds.decomposition import Decomposition, clipped_split
+from ..bounds.clipped import clipped_split
+from ..bounds.decomposition import Decomposition
 
 __all__ = ["NussbaumIntegral", "sharpest"]
 
 
+@as_annotated
 def sharpest(split: Decomposition) -> Decomposition:
     """Return the split with the same bounds of k and the smallest abs(eps_u) at every (u, v).
 

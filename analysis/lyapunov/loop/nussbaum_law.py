@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from nlctl.diagrams import state_names
+from nlctl.diagrams import known_system, state_names
+from nlctl.diagrams.points import OF_RESPONSES, agree, rates_and_outputs
 from nlctl.errors import DiagramError
 
 from ...response_of_loop import check_response, check_shape, own_outputs, own_parameters
@@ -16,7 +17,6 @@ from .roles import read_parts
 __all__ = ["law_of_response"]
 
 _SIGNALS = ("zeta", "r", "u")
-_EQUAL = 1e-6  # relative, and absolute below 1
 
 
 def law_of_response(loop: Any, response: Any) -> GainFunction:
@@ -37,7 +37,7 @@ def law_of_response(loop: Any, response: Any) -> GainFunction:
         If the loop is not the one that the proof is about, has no Nussbaum law, or its law is not
         (23), (24); if the response is not one of the loop.
     """
-    loop = getattr(loop, "system", loop)
+    loop = known_system("slow_drift", loop)
     check_shape(loop, response, _SIGNALS)
     params = own_parameters(loop, response)
     parts = read_parts(loop, params=params)
@@ -47,11 +47,12 @@ def law_of_response(loop: Any, response: Any) -> GainFunction:
             f"slow_drift is about laws with a Nussbaum argument, got {type(parts.law).__name__}"
         )
     place = state_names(loop).index(f"{parts.paths['law']}.zeta")
+    evaluate = rates_and_outputs(loop, params)
     for i, own in own_outputs(loop, response, params):
         t, x = float(response.time[i]), np.asarray(response.states)[:, i]
-        rate = float(np.asarray(loop.dynamics(t, x, np.zeros(0), params=params))[place])
+        rate = float(evaluate(t, x, np.zeros(0))[0][place])
         a, b = parts.law.N(own["zeta"]) * rate, own["r"] * own["u"]
-        if not abs(a - b) <= _EQUAL * max(1.0, abs(a), abs(b)):
+        if not agree(a, b, OF_RESPONSES, relative=OF_RESPONSES):
             raise DiagramError(
                 f"N(zeta) zeta' and r u of '{loop.name}' differ at t = {t:g} s: {a:.9g} and {b:.9g}"
             )

@@ -17,8 +17,9 @@ from nlctl.errors import DiagramError
 from nlctl.plants import coordinate_names
 from nlctl.upstream.control_internals import current_parameters
 
+from ...intervals.agreement import on_balls
 from ...intervals.arithmetic import Ball, as_ball
-from ...intervals.paths import Undecided, every_way, on_balls
+from ...intervals.paths import Undecided, every_way
 
 __all__ = ["Acceleration", "acceleration", "check_chain", "on_intervals"]
 
@@ -45,12 +46,13 @@ def on_intervals(path: str, function: Callable[..., Any]) -> Callable[..., Any]:
 
 def acceleration(plant: Place) -> Acceleration:
     """Return x_n' as ``function(t, x, v)``, from what a run integrates, with its parameters."""
-    update, p = plant.system.updfcn, current_parameters(plant.system)
+    p = current_parameters(plant.system)
+    update = on_intervals(plant.path, plant.system.updfcn)  # with arrays of floats, as a run
 
     def last(t: Any, x: Any, v: Any) -> Any:
         return update(t, _objects(x), _objects((v,)), p)[-1]
 
-    return on_intervals(plant.path, last)
+    return last
 
 
 def check_chain(plant: Place) -> None:

@@ -15,9 +15,11 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.blocks import Block
 from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
-from nlctl.diagrams import Place, initial_state, interconnect, override
+from nlctl.diagrams import Place, initial_state, interconnect, overridden
+from nlctl.diagrams.points import values_now
 from nlctl.errors import CompileError, DiagramError
 from nlctl.native.diagram.wiring import Combination, Signal, Wiring
 from nlctl.native.thirdparty.checks import check_functions, check_sizes
@@ -392,6 +394,7 @@ class Parts:
         return len(self.plant.states)
 
 
+@as_annotated
 def read_parts(
     loop: ct.InterconnectedSystem,
     start: Mapping[str, float] | None = None,
@@ -414,7 +417,8 @@ def read_parts(
     Returns
     -------
     Parts
-        The pieces, with their records and initial states.
+        The pieces, with their records and initial states; their blocks are a copy's, so that the
+        loop keeps its parameters.
 
     Raises
     ------
@@ -429,6 +433,8 @@ def read_parts(
     >>> type(parts.actuator).__name__, parts.gains.beta
     ('DeadZone', 3.0)
     """
+    if isinstance(loop, ct.InterconnectedSystem):  # else it is refused
+        loop = overridden(loop, params)
     roles = read_roles(loop)
     if roles.disturbances and not inputs:
         names = ", ".join(f"'{name}'" for name in roles.disturbances)
@@ -436,11 +442,10 @@ def read_parts(
             f"external input {names} is added to the plant's v: the proof needs its bound, and "
             "takes one in certify(loop, inputs={...}) only"
         )
-    override(loop, dict(params or {}))
     specs = {part: roles.spec(part) for part in roles.places}
     x0 = initial_state(loop, start)
     own = {p: x0[f.state_offset :][: f.system.nstates or 0] for p, f in roles.places.items()}
-    outputs = np.asarray(loop.output(0.0, x0, np.zeros(loop.ninputs or 0), dict(params or {})))
+    _, outputs = values_now(loop, (0.0, x0, np.zeros(loop.ninputs or 0)))
     weights = specs["weights"] if isinstance(specs["weights"], AdaptiveWeights) else None
     gains = Gains(
         beta=specs["law"].beta,

@@ -1,8 +1,7 @@
 """Whether a loop as the proof understands it is the loop that was given.
 
-Reading a diagram is a second description of it, and second descriptions can be wrong.  Before
-anything is said, derivatives and outputs of both are compared, by python-control's own evaluation,
-at the initial state, around it and wherever a run has been.
+Before anything is said, derivatives and outputs of both are compared, by python-control's own
+evaluation (`nlctl.diagrams.points`), at the initial state, around it and wherever a run has been.
 """
 
 from __future__ import annotations
@@ -14,12 +13,12 @@ import control as ct
 import numpy as np
 
 from nlctl.diagrams import state_names
+from nlctl.diagrams.points import PointFunction, PointValues, agree, explained, rates_and_outputs
 from nlctl.errors import DiagramError, UsageError
 
 __all__ = ["check_same", "points_around"]
 
 _Point = tuple[float, np.ndarray]
-_EQUAL = 1e-9  # relative, and absolute below 1: the same functions at the same arguments
 _COUNT, SPREADS = 24, (0.03, 0.3, 1.0)  # points of each spread
 LATEST = 1e4  # s
 
@@ -70,43 +69,56 @@ def check_same(
     names, u = state_names(given), np.zeros(given.ninputs or 0)
     more = np.zeros((understood.nstates or 0) - (given.nstates or 0))
     shared = [label for label in given.output_labels if label in understood.output_labels]
-    places = [
+    rows, others = (
         np.array([s.output_labels.index(label) for label in shared], dtype=int)
         for s in (given, understood)
-    ]
+    )
     what = [*(f"d/dt {name}" for name in names), *(f"output '{label}'" for label in shared)]
+    one, other = _named(given, params), _named(understood, own)
+
+    def told(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
+        rates, outputs = one(t, x, u)
+        return (np.concatenate([rates, outputs[rows]]),)
+
+    def read(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
+        rates, outputs = other(t, np.append(x, more), u[:0])
+        return (np.concatenate([rates[: x.size], outputs[others]]),)
+
     with np.errstate(all="ignore"):
         for t, x in points:
-            rates, outputs = _evaluated(given, t, x, u, params)
-            again, likewise = _evaluated(understood, t, np.append(x, more), np.zeros(0), own)
-            a = np.concatenate([rates, outputs[places[0]]])
-            b = np.concatenate([again[: x.size], likewise[places[1]]])
-            _compare(given, t, what, a, b)
+            _compare(given, (told, read), (t, x, u), what)
 
 
-def _evaluated(
-    system: Any, t: float, x: np.ndarray, u: np.ndarray, params: Any
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return derivatives and outputs as python-control computes them."""
-    own = dict(params or {})
-    try:
-        found = system.dynamics(t, x, u, params=own), system.output(t, x, u, params=own)
-    except UsageError:
-        raise
-    except Exception as error:  # the blocks' functions may raise whatever they like
+def _named(system: Any, params: Mapping[str, Any] | None) -> PointFunction:
+    """Return what evaluates a system, and says which one where that fails."""
+    function = rates_and_outputs(system, params)
+
+    def values(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
+        try:
+            return function(t, x, u)
+        except UsageError:
+            raise
+        except Exception as error:  # the blocks' functions may raise whatever they like
+            raise DiagramError(
+                f"'{system.name}' cannot be evaluated at t = {t:.6g} s, as the proof needs: "
+                f"{type(error).__name__}: {error}"
+            ) from error
+
+    return values
+
+
+def _compare(
+    given: Any, both: tuple[PointFunction, PointFunction], point: Any, what: list[str]
+) -> None:
+    """Compare one point; what is not a number in both is the same."""
+    (a,), (b,) = (function(*point) for function in both)
+    differ = ~agree(a, b) & ~(np.isnan(a) & np.isnan(b))
+    if differ.any():
+        (most,) = explained(both[0], point, (a,))
+        differ &= ~agree(a, b, most)
+    if differ.any():
+        i = int(np.argmax(differ))
         raise DiagramError(
-            f"'{system.name}' cannot be evaluated at t = {t:.6g} s, as the proof needs: "
-            f"{type(error).__name__}: {error}"
-        ) from error
-    return np.asarray(found[0], dtype=float), np.asarray(found[1], dtype=float)
-
-
-def _compare(given: Any, t: float, what: list[str], a: np.ndarray, b: np.ndarray) -> None:
-    size = np.maximum(1.0, np.maximum(np.abs(a), np.abs(b)))
-    same = (a == b) | (np.isnan(a) & np.isnan(b)) | (np.abs(a - b) <= _EQUAL * size)
-    if not same.all():
-        i = int(np.argmin(same))
-        raise DiagramError(
-            f"'{given.name}' is not the loop that the proof is about: at t = {t:.6g} s {what[i]} "
-            f"is {a[i]:.9g}, and {b[i]:.9g} with the blocks connected by name"
+            f"'{given.name}' is not the loop that the proof is about: at t = {point[0]:.6g} s "
+            f"{what[i]} is {a[i]:.9g}, and {b[i]:.9g} with the blocks connected by name"
         )

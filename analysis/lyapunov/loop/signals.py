@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
-__all__ = ["Margin", "Signals", "equality", "inequality", "signals_of"]
+__all__ = ["Margin", "Signals", "equality", "inequality", "peak_by_rates", "signals_of"]
 
 POINTWISE = 1e-9  # of a statement's size: rounding, and G near v = 0
 INTEGRATED = 1e-6  # of V: the integrator's error at its default tolerance
@@ -78,6 +80,7 @@ class Signals:
         return {name: float(self.values[name][i]) for name in shown if name in self.values}
 
 
+@as_annotated
 def signals_of(response: Any) -> Signals:
     """Return the outputs of a response by name.
 
@@ -114,6 +117,32 @@ def signals_of(response: Any) -> Signals:
         t=np.asarray(response.time, dtype=float),
         values=dict(zip(response.output_labels, rows, strict=True)),
     )
+
+
+def peak_by_rates(t: np.ndarray, y: np.ndarray, rate: np.ndarray) -> float:
+    """Return max \\|y\\| of a signal whose derivative is known at the samples.
+
+    Between two samples it is the cubic with their values and derivatives, which needs no sign that
+    the signal is smooth: r of (14) bends where the actuator does, and never jumps.
+
+    Parameters
+    ----------
+    t, y, rate : ndarray of shape (m,)
+        Times (s), samples, and derivative along the diagram (1/s).
+
+    Returns
+    -------
+    float
+        In the unit of y; NaN where one is not a number, and not below the largest sample.
+    """
+    if not np.all(np.isfinite(y) & np.isfinite(rate)):
+        return float(np.max(np.abs(y)))
+    if t.size < 2:
+        return float(np.max(np.abs(y), initial=0.0))
+    curve = CubicHermiteSpline(t, y, rate)
+    turning = curve.derivative().roots(extrapolate=False)
+    inside = np.abs(curve(turning[np.isfinite(turning)]))
+    return float(max(np.max(np.abs(y)), np.max(inside, initial=0.0)))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,9 +13,9 @@ from nlctl import native
 from nlctl.arguments import number
 from nlctl.diagrams import initial_state
 from nlctl.diagrams import state_names as all_states
-from nlctl.errors import ParameterError
+from nlctl.errors import DiagramError, ParameterError
+from nlctl.native import AlgebraicLoopError
 from nlctl.response import input_output_response
-from nlctl.upstream.control_internals import set_parameters
 from nlctl.wording import counted
 
 from ...response_of_loop import own_parameters
@@ -31,6 +31,7 @@ __all__ = ["SAMPLING_INTERVAL", "Member", "MemberRun", "members_of", "observe", 
 
 SAMPLING_INTERVAL = 4e-3  # s, sampling interval of a run that is given by its horizon
 _LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
+_MOST = 10_000_000  # samples of a run
 _AGREE = 1e-3  # relative distance beyond which a response is not one of the loop
 
 
@@ -122,6 +123,10 @@ def members_of(
     horizon, step = number("ledger", "horizon", run), number("ledger", "step", step)
     if not (0 < step < horizon < np.inf):
         raise ParameterError(f"ledger needs 0 < step < horizon, got {step:g} and {horizon:g}")
+    if horizon > _MOST * step:
+        raise ParameterError(
+            f"ledger needs horizon <= {_MOST:g} step, got {horizon:g} and {step:g}"
+        )
     times = np.linspace(0.0, horizon, round(horizon / step) + 1)
     varied = {**(start or {}), **(params or {})}
     sizes = {len(v) for v in varied.values() if np.ndim(v) == 1 and not isinstance(v, tuple)}
@@ -139,6 +144,10 @@ def members_of(
 
 
 def _of_response(loop: ct.InterconnectedSystem, response: Any) -> Member:
+    if getattr(response, "states", None) is None or not hasattr(response, "time"):
+        raise ParameterError(
+            f"ledger needs a horizon in s, or responses with their states, got {response!r:.60}"
+        )
     states = np.atleast_2d(np.asarray(response.states))
     if states.shape[0] != (loop.nstates or 0):
         raise ParameterError(
@@ -204,7 +213,7 @@ def observe(
             signals=signals,
             lost=lost,
             message=message,
-            reference=_reference(loop, parts, response, signals, member.params),
+            reference=_reference(loop, parts, response, signals),
         )
 
 
@@ -221,10 +230,8 @@ def _reference(
     parts: Parts,
     response: Any,
     signals: Signals,
-    params: Mapping[str, Any],
 ) -> Margin | None:
     """Compare the reference's derivatives with those of its own outputs."""
-    set_parameters(loop, dict(params))
     states = np.asarray(response.states)[: loop.nstates or 0]
     whole = np.isfinite(states).all(axis=0)
     place = parts.roles.places["reference"]
@@ -234,7 +241,15 @@ def _reference(
 def observed_loop(loop: ct.InterconnectedSystem, split: Decomposition) -> native.Compiled:
     """Compile what `observe` runs."""
     base = read_parts(loop)
-    return native.compile(observed(loop, base, split, alpha_1(base.gains)))
+    try:
+        return native.compile(observed(loop, base, split, alpha_1(base.gains)))
+    except AlgebraicLoopError as error:
+        native.compile(loop)  # a loop that has one itself says so
+        raise DiagramError(
+            f"the rates, g, G and d of '{base.paths['plant']}' cannot be written as expressions, "
+            "which the ledger needs of them: its functions have too many cases, or call what is "
+            "not traced; write cases as np.where, or leave some out, and call NumPy functions"
+        ) from error
 
 
 def _check_reproduced(member: Member, signals: Signals) -> None:

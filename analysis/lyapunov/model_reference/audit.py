@@ -16,6 +16,7 @@ from flint import arb
 from nlctl.controllers import AdaptiveWeights, ProjectedWeights
 from nlctl.controllers.mrac.reference_model import model_state_names
 from nlctl.diagrams import initial_state
+from nlctl.diagrams.points import rates_and_outputs
 from nlctl.errors import DiagramError
 from nlctl.plants import coordinate_names
 
@@ -36,13 +37,12 @@ def check_decrease(loop: Any, match: Matching, params: Mapping[str, Any] | None 
     DiagramError
         If they differ.
     """
-    own = dict(params or {})
-    understood, u = match.loop.understood, np.zeros(loop.ninputs or 0)
+    u, understood = np.zeros(loop.ninputs or 0), match.loop.understood
+    rates_of, outputs_of = rates_and_outputs(loop, params), rates_and_outputs(understood)
     labels = list(understood.output_labels)
     for t, x in points_around(initial_state(loop), seed=1):
         with np.errstate(all="ignore"):
-            rates = np.asarray(loop.dynamics(t, x, u, params=own), dtype=float)
-            seen = np.asarray(understood.output(t, x, np.zeros(0)), dtype=float)
+            (rates, _), (_, seen) = rates_of(t, x, u), outputs_of(t, x, u[:0])
         signals = dict(zip(labels, seen, strict=True))
         told, true, scale = _both(match, t, x, rates, signals)
         projected = isinstance(match.loop.spec("weights"), ProjectedWeights)

@@ -19,7 +19,8 @@ from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
 from ...intervals.branch_and_bound import upper
-from ..bounds.decomposition import Decomposition, clipped_split, decompose, only_declared
+from ..bounds.clipped import clipped_split
+from ..bounds.decomposition import Decomposition, decompose, only_declared
 from ..loop.external_inputs import disturbed
 from .audit import check_decrease
 from .decrease import Decrease, decrease, outside_ball
@@ -40,6 +41,7 @@ def certify_model_reference(
     *,
     params: Mapping[str, Any] | None = None,
     inputs: Mapping[str, float] | None = None,
+    starts: Any = None,
     k: tuple[float, float] | None = None,
     W: Sequence[float] | None = None,
     u_max: float = 250.0,
@@ -47,12 +49,12 @@ def certify_model_reference(
     max_iterations: int = 60,
 ) -> ModelReferenceCertificate:
     """Prove bounds of a loop that `is_model_reference`; see `certify`."""
-    read = read_model_reference(loop, params, inputs)
+    read = read_model_reference(loop, params, inputs, starts)
     split = disturbed(_split(read, k, u_max, tol), read.disturbance)
     match = matching(read, split, _checked_weights(W, len(read.W_hat_0)))
     if not outside_ball(match):
         check_decrease(loop, match, params)
-    V_0 = ball(match.energy(read.E_0, read.W_hat_0))
+    V_0 = ball(match.V_0)
     C, iterations, reason = V_0, [upper(V_0)], ""
     for _ in range(max_iterations):
         need = region(match, split, C * (1 + tol) + tol * tol, tol=tol)

@@ -204,8 +204,7 @@ def _projection(match: Matching, D: arb, V_0: arb) -> Decrease:
 
 def largest_weights(match: Matching) -> arb:
     """Return the radius that |W_hat| does not leave under projection: where f >= 1 it falls."""
-    start = sum((w * w for w in match.loop.W_hat_0), exact(0.0))
-    return arb(match.loop.spec("weights").W_max).max(ball(start).sqrt())
+    return arb(match.loop.spec("weights").W_max).max(match.weights_at_start)
 
 
 def outside_ball(match: Matching) -> str:

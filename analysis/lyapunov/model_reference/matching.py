@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
 from flint import arb
 
 from nlctl.controllers.mrac.reference_model import model_state_names
@@ -66,11 +67,30 @@ class Matching:
         """|W|^2."""
         return sum((w * w for w in self.W), Fraction(0))
 
-    def energy(self, E: Sequence[Fraction], W_hat: Sequence[Fraction]) -> Fraction:
-        """Return V = E^T P E + lambda |W_hat - W|^2 / Gamma of exact numbers."""
-        value = self.loop.form.value(E)
-        error = sum(((a - b) ** 2 for a, b in zip(W_hat, self.W, strict=True)), Fraction(0))
-        return Fraction(int(value.p), int(value.q)) + error / self.Gamma
+    @functools.cached_property
+    def V_0(self) -> Fraction:  # noqa: N802
+        """The largest V = E^T P E + lambda |W_hat - W|^2 / Gamma of the starts, exactly."""
+        loop, level = self.loop, self.loop.starts.level
+        if not np.all(np.isfinite([*loop.x_0, *loop.W_hat_0])):
+            assert level is not None
+            return exact(level)
+        E = [
+            (exact(x[0]) - exact(xm[1]), exact(x[1]) - exact(xm[0]))
+            for x, xm in zip(loop.x_0, loop.xm_0, strict=True)
+        ]
+        value = loop.form.largest(E)
+        ends = zip(loop.W_hat_0, self.W, strict=True)
+        error = sum((max((exact(w) - W) ** 2 for w in side) for side, W in ends), Fraction(0))
+        found = Fraction(int(value.p), int(value.q)) + error / self.Gamma
+        return found if level is None else min(found, exact(level))
+
+    @property
+    def weights_at_start(self) -> arb:
+        """A bound of |W_hat(0)|."""
+        if np.all(np.isfinite(self.loop.W_hat_0)):
+            largest = (max(abs(exact(w)) for w in side) for side in self.loop.W_hat_0)
+            return ball(sum((w * w for w in largest), Fraction(0))).sqrt()
+        return (ball(self.V_0 * self.Gamma)).sqrt() + ball(self.W_squared).sqrt()
 
     @property
     def Gamma(self) -> Fraction:  # noqa: N802

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,13 @@ from nlctl.controllers.mrac.reference_model import model_state_names
 from nlctl.wording import counted
 
 from ..bounds.decomposition import Decomposition
-from ..bounds.provenance import Constant, Shown, per_second
+from ..bounds.provenance import FROM_STARTS, Constant, Shown, per_second
+from ..bounds.starts import Starts
+from ..certificate.saved import save_certificate
 from ..loop.external_inputs import ADDED
 from .matching import Matching
 from .region import Region
+from .saved import model_attempts
 
 __all__ = ["ModelReferenceCertificate"]
 
@@ -28,19 +32,19 @@ class ModelReferenceCertificate(Shown):
     """What `certify` proved of model reference adaptive control, with every constant.
 
     The function is V = E^T P E + lambda |W_hat - W|^2 / Gamma, E = x - xm.  The bounds hold from
-    every initial state with V(0) <= V_max whose model starts as here or at rest; with projection
-    the weights have to start in the ball, or not farther out than here.
+    every initial state of `starts`: of the plant, the model, and the weights.
 
     Attributes
     ----------
     name : str
         Of the loop.
     holds : bool
-        True: the bounds hold for all t >= 0, proved.
+        True: the bounds hold for all t >= 0 from the starts, proved.
     reason : str
         Why they hold, or why not.
     e : float
-        Bound of |e| = |E_1| for all time; infinite if nothing is proved, as all bounds.
+        Bound of |e| = |E_1| for all time, from all `starts`; infinite, as all bounds, if nothing is
+        proved.
     errors : tuple of n floats
         Bounds of |E_1|, ..., |E_n| for all time.
     W_error : float
@@ -55,7 +59,7 @@ class ModelReferenceCertificate(Shown):
     u_max : float
         Bound of |u| for all time.
     V_max, V_0 : float
-        Bound of V for all time, and V(0).
+        Bound of V for all time, and the largest V(0) of the starts.
     alpha_0, alpha_1 : float
         V' <= -alpha_1 V + alpha_0; NaN where the modification gives no such inequality.
     iterations : tuple of float
@@ -134,21 +138,21 @@ class ModelReferenceCertificate(Shown):
         over, box = f"V <= {need.C:.6g}", need.box
         for i, name in enumerate(model_state_names(n)):
             how = "E^T P E of the model, driven by yd"
-            yield f"sup |{name}|", box[name][1], per_second(i), "proved", how, "all t"
+            yield f"sup |{name}|", box[name][1], per_second(i), "proved", how, FROM_STARTS
         yield "sup |psi|", need.psi, "1", "proved", "one box", over
         what = counted(need.boxes, "box", "boxes") if need.boxes else "all of it has cancelled"
         rest = (per_second(n), "proved", f"{what}; disturbance, and what psi does not span", over)
         yield "sup |rest|", need.rest, *rest
         delta = "sup |rest| + |beta| (eps_u* + (k_2 - k_1)|u|/2)"
         yield "D", need.D, per_second(n), sure, delta, over
-        yield "V(0)", self.V_0, "1", "computed", "rational", "this initial state"
+        yield "V(0)", self.V_0, "1", "computed", "rational", "all starts"
         if np.isfinite(self.alpha_1):
             rate = "V' <= -alpha_1 V + alpha_0: chosen between 0 and min{mu, 2 Gamma sigma}"
             yield "alpha_1", self.alpha_1, "1/s", "computed", rate, over
             yield "alpha_0", self.alpha_0, "1/s", sure, _ALPHA_0, over
 
     def _bounds(self) -> Iterator[tuple[Any, ...]]:
-        always = f"all t, every start with V(0) <= {self.V_max:.6g}"
+        always = FROM_STARTS
         yield "V", self.V_max, "1", "proved", self.how, always
         for i, error in enumerate(self.errors):
             yield f"|E_{i + 1}|", error, per_second(i), "proved", "sqrt(V (P^-1)_ii)", always
@@ -167,7 +171,21 @@ class ModelReferenceCertificate(Shown):
         ball = "; the ball of the projection is invariant" if projected else ""
         return f"|W| + |W_hat - W|{ball}"
 
+    def _saved(self, file: Any) -> Path:
+        attempts = lambda: model_attempts(self.matching, self.split, self.region.C)  # noqa: E731
+        return save_certificate(file, "reference model", self.name, attempts)
+
+    @property
+    def starts(self) -> Starts:
+        """The initial states that the bounds hold for."""
+        return self.matching.loop.starts
+
+    @property
+    def disturbance(self) -> float:
+        """Bound of what external inputs add to the plant's v."""
+        return self.matching.loop.disturbance
+
     @property
     def bound(self) -> str:
         """What is proved, in words."""
-        return f"|e| <= {self.e:.6g} proved for all t, {self.ultimate:.6g} in the end"
+        return f"|e| <= {self.e:.6g} proved for all t, {self.ultimate:.6g} in the end,"

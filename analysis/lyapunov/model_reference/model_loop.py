@@ -31,6 +31,7 @@ from ...intervals.box import Box
 from ...intervals.branch_and_bound import enclose
 from ...intervals.normal_form import exact
 from ..bounds.error_bounds import reference_bounds
+from ..bounds.starts import Sides, Starts
 from ..loop.checked import read_checked
 from ..loop.plant_form import Acceleration, acceleration, on_intervals
 from ..loop.roles import Pieces, Roles, declared, record_of
@@ -55,6 +56,7 @@ _PROVED_FOR = {
     "weights": (AdaptiveWeights, EModifiedWeights, ProjectedWeights),
     "law": (ModelReferenceLaw, DirectLaw),
 }
+_OF_V = ("plant", "weights")  # parts whose states V is of, besides those of the model
 Regressor = Callable[[Mapping[str, Any]], list[Any]]
 
 
@@ -73,8 +75,11 @@ class ModelReferenceLoop:
         E^T P E of the error, with the P of the loop's own r = b^T P E, and one of the model.
     command : float
         Proved bound of |yd| for all time.
-    E_0, xm_0, W_hat_0 : tuple of Fraction
-        Initial error, state of the model and weights.
+    starts : Starts
+        Initial states.
+    x_0, xm_0, W_hat_0 : tuple of pairs of floats
+        Ends of the initial states of plant, model and weights; where V(0) bounds those of plant
+        and weights they may be infinite.
     acceleration : callable
         x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
     regressor : callable
@@ -90,9 +95,10 @@ class ModelReferenceLoop:
     form: QuadraticForm
     model_form: QuadraticForm
     command: float
-    E_0: tuple[Fraction, ...]
-    xm_0: tuple[Fraction, ...]
-    W_hat_0: tuple[Fraction, ...]
+    starts: Starts
+    x_0: Sides
+    xm_0: Sides
+    W_hat_0: Sides
     acceleration: Acceleration
     regressor: Regressor = field(repr=False)
     disturbance: float
@@ -124,6 +130,7 @@ def read_model_reference(
     loop: Any,
     params: Mapping[str, Any] | None = None,
     inputs: Mapping[str, float] | None = None,
+    starts: Any = None,
 ) -> ModelReferenceLoop:
     """Read a loop such as `nlctl.mrac` makes with a plant and an actuator.
 
@@ -134,6 +141,8 @@ def read_model_reference(
         Overrides by qualified name, as in a run.
     inputs : mapping, optional
         Bound of |w| for every external input w that is added to the plant's v, by name.
+    starts : mapping or Box, optional
+        Initial states, by default the loop's own; ``"V"`` bounds V(0).
 
     Raises
     ------
@@ -141,9 +150,8 @@ def read_model_reference(
         As `read_checked` does; if plant, model and error differ in their order; if the regressor
         has memory or takes other signals; if the reference has no proved bound.
     """
-    read = read_checked(loop, ADAPTIVE_PIECES, _PROVED_FOR, params, inputs)
+    read = read_checked(loop, ADAPTIVE_PIECES, _PROVED_FOR, params, inputs, starts, _OF_V)
     roles, order = read.roles, _checked_orders(read.roles)
-    x, xm, W_hat = (tuple(map(exact, read.start(part))) for part in ("plant", "model", "weights"))
     model, error = roles.spec("model"), roles.spec("error")
     own_P = np.atleast_2d(error.lyapunov_matrix).copy()
     own_P[:, -1] = current_parameters(roles.places["error"].system).P_b
@@ -154,9 +162,10 @@ def read_model_reference(
         form=quadratic_form(roles.paths["error"], error.K, own_P),
         model_form=quadratic_form(roles.paths["model"], model.a, P_of_model),
         command=_bound_of_command(roles.places["reference"], read.start("reference")),
-        E_0=tuple(a - b for a, b in zip(x, xm, strict=True)),
-        xm_0=xm,
-        W_hat_0=W_hat,
+        starts=read.starts,
+        x_0=read.start("plant"),
+        xm_0=read.start("model"),
+        W_hat_0=read.start("weights"),
         acceleration=acceleration(roles.places["plant"]),
         regressor=_regressor(roles.places["basis"], order),
         disturbance=read.disturbance,
@@ -198,14 +207,14 @@ def _regressor(basis: Place, order: int) -> Regressor:
     return psi
 
 
-def _bound_of_command(place: Place, x0: np.ndarray) -> float:
+def _bound_of_command(place: Place, x0: Sides) -> float:
     """Return a proved bound of |yd| for all time."""
     spec = record_of(place)
     if isinstance(spec, SumOfSines):
         return reference_bounds(spec)[0]
     if isinstance(spec, FilteredStep):
         if np.any(x0):
-            raise DiagramError(f"the proof needs '{place.path}' to start from 0, got {x0.tolist()}")
+            raise DiagramError(f"the proof needs '{place.path}' to start from 0, got {x0}")
         return abs(spec.height)  # the step response of (omega / (s + omega))^(n+1) rises to 1
     p, output = current_parameters(place.system), on_intervals(place.path, place.system.outfcn)
     wide = Box.of(t=(0.0, np.inf))

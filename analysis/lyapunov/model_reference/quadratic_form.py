@@ -7,6 +7,7 @@ exactly.  That P and Q are positive definite, and that Q - mu P is, is proved by
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -64,6 +65,11 @@ class QuadraticForm:
     def value(self, E: Sequence[Any]) -> fmpq:
         """Return E^T P E of exact numbers."""
         return quadratic(self.P, E)
+
+    def largest(self, sides: Sequence[tuple[Fraction, Fraction]]) -> fmpq:
+        """Return the largest E^T P E of a box: a convex function is largest at a corner."""
+        ends = [dict.fromkeys(side) for side in sides]  # one of equal ends
+        return max(self.value(corner) for corner in itertools.product(*ends))
 
     def reach(self, level: arb, direction: Sequence[Any]) -> arb:
         """Return the largest c^T E of a direction c where E^T P E <= level."""

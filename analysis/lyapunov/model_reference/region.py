@@ -65,7 +65,8 @@ def model_reach(match: Matching) -> arb:
     """Return the level that xm^T P xm does not leave: the command drives the model."""
     loop = match.loop
     drive = ball(abs(exact(loop.spec("model").b))) * loop.command
-    return ball(loop.model_form.value(loop.xm_0)).max(loop.model_form.driven(drive))
+    sides = [(exact(low), exact(high)) for low, high in loop.xm_0]
+    return ball(loop.model_form.largest(sides)).max(loop.model_form.driven(drive))
 
 
 def region(match: Matching, split: Decomposition, C: arb, *, tol: float) -> Region:

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from nlctl import functions
+from nlctl.annotations import as_annotated
 from nlctl.arguments import number
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
@@ -80,6 +81,7 @@ def signal(response: Any, name: str) -> np.ndarray:
     return values
 
 
+@as_annotated
 def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
     """Read the energies of the Nussbaum term off a response.
 
@@ -160,6 +162,7 @@ class DriftMargin:
         return float(self.time[int(np.argmin(self.values))])
 
 
+@as_annotated
 def drift_margin(
     run: Drift,
     V_0: float,
@@ -223,6 +226,7 @@ class SafeHorizon:
     zeta: float
 
 
+@as_annotated
 def safe_horizon(
     V_0: float,
     alpha_0: float,

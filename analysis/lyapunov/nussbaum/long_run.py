@@ -13,6 +13,7 @@ from nlctl import native
 from nlctl.response import input_output_response
 
 from ..loop.roles import read_parts
+from .outcome import Outcome, outcome
 from .property import Lobe, lobe_around
 from .slow_drift import SlowDrift, slow_drift
 
@@ -53,6 +54,8 @@ class LongRun:
     again : tuple of two floats or None
         Relative tolerance and `burst` (s) of a second run, if there was one: what errors that add
         up over hours make of it.
+    last : tuple of float
+        State of the loop at the end of `time`.
     """
 
     loop: str
@@ -64,6 +67,7 @@ class LongRun:
     predictions: tuple[SlowDrift, ...]
     lost: float | None
     again: tuple[float, float] | None = None
+    last: tuple[float, ...] = field(default=(), repr=False)
 
     @property
     def burst(self) -> float:
@@ -82,6 +86,11 @@ class LongRun:
         settled = np.abs(self.signals["e"][(self.time >= 200.0) & (self.time <= end)])
         return float(np.max(settled)) if settled.size else np.nan
 
+    @property
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """What became of each of the predictions."""
+        return tuple(outcome(p, self.time, self.signals["zeta"]) for p in self.predictions)
+
     def __str__(self) -> str:
         end, zeta = self.time[-1], self.signals["zeta"][-1]
         what = f"no burst, zeta ends at {zeta:.4g}"
@@ -94,12 +103,13 @@ class LongRun:
             f"{self.loop} at rtol {self.rtol:g} over {end:.6g} s: {what}{lost}",
             f"max |e| before, from 200 s on: {self.calm:.3g}",
         ]
-        for p in self.predictions:
+        for p, became in zip(self.predictions, self.outcomes, strict=True):
             rest = "" if p.rest is None else f", at rest at zeta = {p.rest:.4g}"
             burst = f", burst at {p.burst:.4g} s"
             lines.append(
                 f"predicted after {p.time:g} s: {p.verdict}"
                 + (burst if np.isfinite(p.burst) else rest)
+                + f": {became}"
             )
         return "\n".join(lines)
 
@@ -152,7 +162,7 @@ def long_run(
         for look, window in LOOKS.items()
         if look <= last
     )
-    lost = None
+    lost, last = None, whole.states[:, -1]
     if not whole.success:
         i = max(int(np.searchsorted(time, whole.statistics.time - END)) - 1, 0)
         again = np.arange(time[i], whole.statistics.time + END, _FINEST)
@@ -160,7 +170,7 @@ def long_run(
         late = _signals(end)
         time = np.append(time[:i], end.time)
         signals = {name: np.append(signals[name][:i], late[name]) for name in LONG_RUN_SIGNALS}
-        lost = None if end.success else end.statistics.time
+        lost, last = None if end.success else end.statistics.time, end.states[:, -1]
     return LongRun(
         loop=str(loop.name),
         horizon=horizon,
@@ -170,6 +180,7 @@ def long_run(
         lobe=lobe_around(float(signals["zeta"][0]), N),
         predictions=predictions,
         lost=lost,
+        last=tuple(map(float, last)),
     )
 
 

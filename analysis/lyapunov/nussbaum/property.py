@@ -19,6 +19,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq, minimize_scalar
 
 from nlctl import functions
+from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 
 __all__ = [
@@ -233,6 +234,7 @@ def lobe_around(zeta: float, N: GainFunction = functions.nussbaum, *, reach: flo
     return inside[0]
 
 
+@as_annotated
 def nussbaum_property(
     N: GainFunction = functions.nussbaum, end: float | None = None
 ) -> NussbaumProperty:

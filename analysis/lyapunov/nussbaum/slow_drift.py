@@ -26,6 +26,7 @@ import numpy as np
 from scipy.integrate import quad, trapezoid
 
 from nlctl import functions
+from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number, of_type
 from nlctl.errors import ParameterError
 
@@ -165,6 +166,7 @@ class SlowDrift:
         return "\n".join(lines)
 
 
+@as_annotated
 def burst_peak(lobe: Lobe, kG: float) -> float:
     """Return max |r| = sqrt(2 k G |int N|) of a burst through a lobe of the wrong sign.
 
@@ -201,6 +203,7 @@ def burst_peak(lobe: Lobe, kG: float) -> float:
     return float(np.sqrt(2 * kG * lobe.budget))
 
 
+@as_annotated
 def slow_drift(
     response: Any,
     N: GainFunction = functions.nussbaum,

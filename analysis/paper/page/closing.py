@@ -78,14 +78,14 @@ def _numerics(runs: _Runs, found: pd.DataFrame | None) -> Section:
                 text=f"The runs over {HORIZON:g} s were made by machine code that nlctl compiles "
                 "from the python-control diagrams: an explicit Runge-Kutta pair of orders 5(4) at "
                 f"relative tolerance {runs['1'].case.rtol:g}; steps end at the break points of the "
-                "dead zone. Peaks between samples are those of a parabola. The tests of nlctl "
-                "repeat published cases in plain python-control."
+                "dead zone. Peaks between samples are those of a curve where they are smooth. The "
+                "tests of nlctl repeat published cases in plain python-control."
             ),
             Paragraph(
                 text="The backlash is the play operator itself: within a step its memory stands "
-                "still or is carried along, and a step ends where it reverses or touches. (In "
-                "plain python-control, which has no hook for accepted steps, its memory relaxes "
-                "onto the play at 1000 1/s; the figures then hold to 5e-5.)"
+                "still or is carried along, and a step ends where it reverses or touches, in both "
+                "engines. (In plain python-control, which has no hook for accepted steps, its "
+                "memory relaxes onto the play at 1000 1/s; the figures then hold to 5e-5.)"
             ),
             *([] if found is None else [_apart(found)]),
         ],

@@ -10,7 +10,9 @@ from ... import figures
 from ...lyapunov.ledger import Line
 from ...lyapunov.nussbaum.long_run import LongRun
 from ...report.document import Figure, Item, Paragraph, Section, Table
+from ..burst import Burst
 from ..evidence import FAR_HORIZONS, LOOK, Evidence, evidence
+from ..figures import after_burst
 from . import proof_text as text
 from .notation import formulas
 from .proof_text import LONG_RUN
@@ -27,7 +29,9 @@ _GROUPS = (  # of the ledger's lines, each a table of its own
 
 
 def lyapunov_sections(
-    found: Mapping[int, Evidence], far: Mapping[str, LongRun] | None = None
+    found: Mapping[int, Evidence],
+    far: Mapping[str, LongRun] | None = None,
+    burst: Burst | None = None,
 ) -> list[Section]:
     """Compose the part from what was found.
 
@@ -37,6 +41,8 @@ def lyapunov_sections(
         Result of `evidence` by number of the example; without any there is no part.
     far : mapping, optional
         Runs far beyond 20 s, by key of `analysis.paper.evidence.FAR_HORIZONS`.
+    burst : Burst, optional
+        Example 2 beyond its run.
 
     Returns
     -------
@@ -45,22 +51,24 @@ def lyapunov_sections(
     if not found:
         return []
     parts = [section for number, one in found.items() for section in _example(number, one)]
-    return [_finding(found, far or {}), _lemma(), *parts]
+    return [_finding(found, far or {}, burst), _lemma(), *parts]
 
 
-def _finding(found: Mapping[int, Evidence], far: Mapping[str, LongRun]) -> Section:
+def _finding(
+    found: Mapping[int, Evidence], far: Mapping[str, LongRun], burst: Burst | None
+) -> Section:
     return Section(
         key="proof",
         title="The proof, and what happens far beyond 20 s",
         items=[
-            *_burst(far),
+            *_burst(far, burst),
             _slow_drift_table(found),
             *(Paragraph(text=words, code=command) for words, command in text.COMMANDS),
         ],
     )
 
 
-def _burst(far: Mapping[str, LongRun]) -> Iterator[Item]:
+def _burst(far: Mapping[str, LongRun], burst: Burst | None) -> Iterator[Item]:
     run = far.get("2")
     if run is not None and np.isfinite(run.burst):
         yield Paragraph(text=text.burst_text(run))
@@ -70,6 +78,8 @@ def _burst(far: Mapping[str, LongRun]) -> Iterator[Item]:
             description=f"{text.burst_text(run)} {text.BURST}",
             figure=figures.burst(run),
         )
+        if burst is not None:
+            yield from _after(run, burst)
     else:
         yield Paragraph(text=text.NO_LONG_RUN if run is None else text.calm(run))
     calm = {FAR_HORIZONS[key][0]: r for key, r in far.items() if key != "2"}
@@ -82,22 +92,53 @@ def _burst(far: Mapping[str, LongRun]) -> Iterator[Item]:
         )
     if far:
         yield _far_table(far)
+        yield _forecast_table(far)
+
+
+def _after(run: LongRun, burst: Burst) -> Iterator[Item]:
+    told = text.after_text(run, burst)
+    yield Paragraph(text=told)
+    yield Figure(
+        key="proof-after",
+        caption=text.AFTER,
+        description=f"{told} {text.AFTER}",
+        figure=after_burst(burst),
+    )
 
 
 def _far_table(far: Mapping[str, LongRun]) -> Table:
     return Table(
         caption=text.FAR_CAPTION,
-        columns=("loop", "rtol", "runs until (s)", "max |e₁| before", "predicted", "happened"),
+        columns=("loop", "rtol", "runs until (s)", "max |e₁| before", "happened"),
         rows=[
             (
                 FAR_HORIZONS[key][0],
                 f"{r.rtol:g}",
                 f"{r.time[-1]:.0f}",
                 r.calm,
-                *text.prediction_text(r),
+                text.what_happened(r),
             )
             for key, r in far.items()
         ],
+    )
+
+
+def _forecast_table(far: Mapping[str, LongRun]) -> Table:
+    return Table(
+        caption=text.FORECASTS,
+        columns=("loop", "from the first (s)", "forecast", "range", "happened", "outcome"),
+        rows=[
+            (
+                FAR_HORIZONS[key][0],
+                f"{p.time:g}",
+                *text.forecast_text(p),
+                text.what_happened(r),
+                became,
+            )
+            for key, r in far.items()
+            for p, became in zip(r.predictions, r.outcomes, strict=True)
+        ],
+        status="outcome",
     )
 
 

@@ -17,6 +17,7 @@ from ...report.document import Figure, History, Item, Paragraph, Report, Section
 from ...report.equations import equations_of
 from .. import CASES, HORIZON, TAIL, CaseRun, Check, checks
 from .. import figures as histories
+from ..burst import Burst
 from . import text as text
 from .claims import paper_claims, paper_verdict, proof_claims
 from .closing import closing_sections, metric_table
@@ -34,6 +35,7 @@ def paper_report(
     *,
     proofs: Mapping[int, Evidence] | None = None,
     far: Mapping[str, LongRun] | None = None,
+    burst: Burst | None = None,
     studies: Sequence[Section] = (),
     numerics: pd.DataFrame | None = None,
     sampling: pd.DataFrame | None = None,
@@ -50,6 +52,8 @@ def paper_report(
         What `analysis.paper.page.proof.evidence` found, by number of the example.
     far : mapping, optional
         Runs far beyond 20 s, of `analysis.paper.evidence.far_runs_in_background`.
+    burst : Burst, optional
+        Example 2 beyond its run, of `analysis.paper.burst.through_the_burst`.
     studies : sequence of Section, optional
         The part on robustness, see `analysis.studies.page.report.study_part`.
     numerics : pandas.DataFrame, optional
@@ -67,13 +71,13 @@ def paper_report(
     """
     compared = checks(runs)
     if sections is None:
-        sections = paper_sections(runs, proofs=proofs, far=far)
+        sections = paper_sections(runs, proofs=proofs, far=far, burst=burst)
     return Report(
         title="Adaptive neural control with an uncertain actuator, reproduced",
         question=text.QUESTION,
-        verdict=paper_verdict(compared, far or {}),
+        verdict=paper_verdict(runs, compared, far or {}),
         lead=_lead(runs, (far or {}).get("2")),
-        claims=[*paper_claims(runs, compared), *proof_claims(proofs or {}, far or {})],
+        claims=[*paper_claims(runs, compared), *proof_claims(proofs or {}, far or {}, burst)],
         sections=[
             *sections,
             *([] if sampling is None else [sampling_section(sampling)]),
@@ -94,6 +98,7 @@ def paper_sections(
     *,
     proofs: Mapping[int, Evidence] | None = None,
     far: Mapping[str, LongRun] | None = None,
+    burst: Burst | None = None,
 ) -> list[Section]:
     """Return the sections of `paper_report` up to those on studies; the arguments are the same."""
     compared = checks(runs)
@@ -102,7 +107,7 @@ def paper_sections(
         *_example(1, runs, compared),
         *_example(2, runs, compared),
         _exchange(runs),
-        *lyapunov_sections(proofs or {}, far),
+        *lyapunov_sections(proofs or {}, far, burst),
     ]
 
 

@@ -23,8 +23,8 @@ LEAD_DRIFT = (
     r"Bottom, the same loop over hours: the argument \(\zeta\) of the Nussbaum gain drifts upwards."
 )
 LEAD_BURST = (
-    "After {hours:.1f} h it reaches 3, where the gain changes to the wrong sign, and the loop "
-    "bursts."
+    "After {hours:.1f} h it reaches 3, where the gain changes to the wrong sign, and the input "
+    "grows by orders of magnitude within milliseconds."
 )
 
 METHODS_TEXT = (

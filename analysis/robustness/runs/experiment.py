@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from nlctl import native
+from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
@@ -41,6 +42,7 @@ __all__ = [
 ]
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Experiment:
     """A loop, what is uncertain in it, and what is asked of it.
@@ -145,6 +147,7 @@ class Prepared:
     loops: tuple[tuple[Mapping[str, str], Compiled], ...]
 
 
+@as_annotated
 def prepare(experiment: Experiment) -> Prepared:
     """Build and compile every diagram of an experiment, and validate names and values against them.
 
@@ -203,6 +206,7 @@ def prepare(experiment: Experiment) -> Prepared:
     return Prepared(experiment=replace(experiment, space=full), loops=loops)
 
 
+@as_annotated
 def evaluate(
     prepared: Prepared,
     table: pd.DataFrame,

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction
 
 from ..statistics.guarantee import check_iid, checked_confidence
@@ -131,6 +132,7 @@ class Tally:
         )
 
 
+@as_annotated
 def until_decided(
     design: Design, threshold: float, confidence: float = 0.99
 ) -> Callable[[Progress], SequentialTest | None]:

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
+from nlctl.arguments import integer
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 from nlctl.wording import some_of
@@ -33,6 +33,7 @@ from nlctl.wording import some_of
 from .experiment import Columns, typed
 from .identity import differences_of
 
+CHUNKS_FORMAT = 2
 SEALS = b"nlctl.seals"  # a key of each column, in a chunk's file
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "locked",
     "opened",
     "put",
+    "read_parquet",
     "stored",
     "table_of",
     "taken_up",
@@ -165,8 +167,9 @@ def _identify(store: ChunkStore, resume: bool) -> None:
                 "it with what it was begun with, or take another folder"
             )
         return
-    content = {"format": 1, "identity": store.identity, "columns": store.columns}
-    _write(store, store.folder / "study.json", json.dumps(content, indent=1).encode())
+    content = {"format": CHUNKS_FORMAT, "identity": store.identity, "columns": store.columns}
+    text = json.dumps(content | {"sha256": _key(content)}, indent=1)
+    _write(store, store.folder / "study.json", text.encode())
 
 
 def opened(folder: str | os.PathLike[str]) -> ChunkStore:
@@ -180,11 +183,36 @@ def opened(folder: str | os.PathLike[str]) -> ChunkStore:
     path = Path(folder) / "study.json"
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        return ChunkStore(
+        kept = content["format"]
+        if kept == CHUNKS_FORMAT and content.pop("sha256") != _key(content):
+            raise ValueError("it is not as it was written")
+        store = ChunkStore(
             folder=path.parent, identity=content["identity"], columns=content["columns"]
         )
-    except (OSError, ValueError, KeyError) as error:
+        integer("a sweep", "size", store.size, at_least=0)
+        typed(pd.DataFrame(columns=list(store.columns)), store.columns)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise StoreError(f"'{path}' is not a study of a sweep: {error}") from error
+    if kept != CHUNKS_FORMAT:
+        raise StoreError(
+            f"'{path}' has the format {str(kept)[:20]!a}, and this nlctl reads "
+            f"{CHUNKS_FORMAT}: read it with the nlctl that wrote it, or run the study again"
+        )
+    return store
+
+
+def _key(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def read_parquet(path: Path) -> pd.DataFrame:
+    """Read a table that `DataFrame.to_parquet` has written, without threads.
+
+    Those of pyarrow's datasets, which `read_table` begins, wait for ever where memory is too short
+    to begin others.
+    """
+    with pq.ParquetFile(path) as file:
+        return file.read(use_threads=False).to_pandas(use_threads=False)
 
 
 def _write(store: ChunkStore, path: Path, content: bytes | memoryview) -> None:
@@ -311,10 +339,15 @@ def table_of(store: ChunkStore, columns: Sequence[str] | None = None) -> pd.Data
         If a file cannot be read.
     """
     try:
-        return _read(store, [_path(store, numbers) for numbers in _ranges(store)], columns)
-    except (OSError, ValueError) as error:
+        ranges = _ranges(store)
+        frame = _read(store, [_path(store, numbers) for numbers in ranges], columns)
+        if frame.index.tolist() != [row for numbers in ranges for row in numbers]:
+            raise ValueError("they hold other rows than their names say")
+        return frame
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        reason = str(error).partition("\n")[0]  # pyarrow's go on with every column
         raise StoreError(
-            f"cannot read the chunks in '{store.chunks}': {error}. Run damaged ones again with "
+            f"cannot read the chunks in '{store.chunks}': {reason}. Run damaged ones again with "
             "resume=True (--resume)"
         ) from error
 
@@ -328,12 +361,25 @@ def _read(
             pd.DataFrame(columns=list(chosen), index=pd.Index([], name="row", dtype="int64")),
             chosen,
         )
-    options = ds.ParquetFragmentScanOptions(page_checksum_verification=True)
-    layout = ds.ParquetFileFormat(default_fragment_scan_options=options)
-    found = ds.dataset([str(path) for path in paths], format=layout)
-    frame = found.to_table(columns=["row", *chosen]).to_pandas().set_index("row")
+    tables = [_columns_in(path, ["row", *chosen]) for path in paths]
+    frame = pa.concat_tables(tables).to_pandas(use_threads=False).set_index("row")
     frame, end = typed(frame, chosen), 0
     for path in paths:
         first, end = end, end + pq.read_metadata(path).num_rows
         _check_seals(path, frame.iloc[first:end])
     return frame
+
+
+def _columns_in(path: Path, names: Sequence[str]) -> pa.Table:
+    """Read some columns of a chunk's file, without threads.
+
+    Raises
+    ------
+    ValueError
+        If it lacks one.
+    """
+    with pq.ParquetFile(path, page_checksum_verification=True) as file:
+        lacking = [name for name in names if name not in file.schema_arrow.names]
+        if lacking:
+            raise ValueError(f"'{path.name}' has no column '{lacking[0]}'")
+        return file.read(list(names), use_threads=False).replace_schema_metadata(None)

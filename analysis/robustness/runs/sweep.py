@@ -16,6 +16,7 @@ from typing import Any
 
 import pandas as pd
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
@@ -93,6 +94,7 @@ class Sweep:
         return table_of(opened(self.folder), names or None)
 
 
+@as_annotated
 def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
     """Return the rows in a folder, finished or not, also while a sweep is working in it.
 
@@ -136,6 +138,7 @@ def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
     return Sweep(design=design, folder=store.folder, done=done, complete=done == store.size)
 
 
+@as_annotated
 def sweep(
     prepared: Prepared,
     design: Design,

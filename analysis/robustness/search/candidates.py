@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..uncertainty.design import numbered
+from ..uncertainty.design import with_row_numbers
 from ..uncertainty.lattice import corners
 from ..uncertainty.space import Space, ends, from_unit_cube
 from .evaluation import Evaluate, evaluated, margins_of
@@ -56,7 +56,7 @@ class Found:
 
     def run(self, searcher: str, table: pd.DataFrame) -> np.ndarray:
         """Run rows, return their margins."""
-        table = numbered(table, self.margins.size)
+        table = with_row_numbers(table, self.margins.size)
         results = evaluated(self.evaluate, table)
         margins = margins_of(results)
         self.tables.append(table)

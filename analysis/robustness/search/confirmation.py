@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import flag, of_type
 from nlctl.errors import DivergedError
 from nlctl.native import Status
 from nlctl.response import input_output_response
 
+from ...metrics import breaks_of
 from ..runs.experiment import Experiment, Prepared, by_diagram, evaluate
 from ..stl.spec import margins, unfinished_margin
 from ..uncertainty.space import arguments, checked_row
@@ -76,6 +78,7 @@ class Confirmation:
         )
 
 
+@as_annotated
 def confirm(
     prepared: Prepared, row: Mapping[str, Any], *, python_control: bool = False
 ) -> Confirmation:
@@ -93,7 +96,7 @@ def confirm(
         ``{name: value}``, such as `WorstCase.witness`.
     python_control : bool, optional
         Also run it in python-control, at the tighter tolerances: another engine, and other code of
-        the diagram.  There memory blocks relax instead of being exact, see `nlctl.Backlash`.
+        the diagram.
 
     Returns
     -------
@@ -180,7 +183,8 @@ def _in_python_control(
         margin = unfinished_margin(error.time, end)
         return told(Status.DIVERGED.name, error.time, margin)
     signals = dict(zip(loop.system.output_labels, np.atleast_2d(response.outputs), strict=True))
-    margin = margins(experiment.spec, experiment.timepts, signals)["spec"]
+    breaks = breaks_of(response)
+    margin = margins(experiment.spec, experiment.timepts, signals, breaks=breaks)["spec"]
     return told(Status.OK.name, end, margin)
 
 

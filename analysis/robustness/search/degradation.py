@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import flag, integer, of_type, vector
 from nlctl.errors import ParameterError
 
@@ -66,6 +67,7 @@ class Degradation:
         return pd.DataFrame(rows, index=pd.Index(self.factors, name="factor"))
 
 
+@as_annotated
 def degradation_curve(
     evaluate: Evaluate,
     space: Space,

@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import Delaunay
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
-from ..uncertainty.design import affordable, numbered
+from ..uncertainty.design import affordable, with_row_numbers
 from ..uncertainty.space import Space, ends, from_unit_cube, nominal
 from .evaluation import Evaluate, evaluated, margins_of
 
@@ -64,6 +65,7 @@ class FailureMap:
     is_finished: bool
 
 
+@as_annotated
 def failure_map(
     evaluate: Evaluate,
     space: Space,
@@ -206,7 +208,9 @@ class _Plane:
         for name, coordinates in zip(self.axes, np.transpose(new), strict=True):
             unit[:, self.space.names.index(name)] = coordinates / self.steps
         others = {k: v for k, v in self.given.items() if k not in self.axes}
-        rows = numbered(from_unit_cube(self.space, unit).assign(**others), len(self.margins))
+        rows = with_row_numbers(
+            from_unit_cube(self.space, unit).assign(**others), len(self.margins)
+        )
         results = evaluated(self.evaluate, rows)
         self.margins |= zip(new, margins_of(results), strict=True)
         self.tables.append(rows.assign(spec=results["spec"].to_numpy(), round=len(self.tables)))
@@ -243,6 +247,7 @@ def _quarters(cell: _Cell) -> tuple[_Cell, ...]:
     return tuple((i + k * half, j + m * half, half) for k in range(2) for m in range(2))
 
 
+@as_annotated
 def boundary(made: FailureMap) -> pd.DataFrame:
     """Return points on the boundary: where margins connected by lines along the triangles are 0.
 

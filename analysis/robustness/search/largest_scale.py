@@ -10,6 +10,7 @@ from typing import Any
 
 import control as ct
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import base_name, unknown
@@ -26,6 +27,7 @@ FEW = 10
 """Of up to so many quantities of one block all corners are tried."""
 
 
+@as_annotated
 def largest_scale(
     prepared: Prepared, at_most: float = 4.0, names: Collection[str] | None = None
 ) -> tuple[float, str]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction, integer, number, of_type
 from nlctl.errors import UsageError
 
@@ -120,6 +121,7 @@ def size_of(space: Space, row: Mapping[str, Any]) -> float:
     return float(np.max(sizes))
 
 
+@as_annotated
 def robustness_radius(
     evaluate: Evaluate,
     space: Space,

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.wording import counted, some_of
@@ -20,6 +21,7 @@ from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, tow
 __all__ = ["Shrunk", "shrink"]
 
 _Row = dict[str, Any]
+_BITS = 60  # after as many bisections two numbers are neighbours
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +67,7 @@ class Shrunk:
         )
 
 
+@as_annotated
 def shrink(
     evaluate: Evaluate,
     space: Space,
@@ -124,7 +127,7 @@ def shrink(
     ('a',) 0.5 1.0 True
     """
     of_type("shrinking", "space", space, Space)
-    steps = integer("shrinking", "steps", steps, at_least=0)
+    steps = integer("shrinking", "steps", steps, at_least=0, at_most=_BITS)
     most = integer("shrinking", "most", most, at_least=0)
     first = checked_row(space, row)
     task = _Task(evaluate, space)

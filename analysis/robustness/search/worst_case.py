@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number, of_type
 from nlctl.wording import counted
 
@@ -96,6 +97,7 @@ class WorstCase:
         return f"{verdict}: of {counted(self.design.size, 'run')} ({rows}) {found}."
 
 
+@as_annotated
 def worst_case(
     evaluate: Evaluate,
     space: Space,

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction, of_type, one_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
@@ -73,6 +74,7 @@ class Comparison:
         )
 
 
+@as_annotated
 def crossed(design: Design, choice: Choice) -> pd.DataFrame:
     """Return every row of a design once with each option of a choice.
 
@@ -112,6 +114,7 @@ def crossed(design: Design, choice: Choice) -> pd.DataFrame:
     return table.rename_axis("row").assign(**{choice.name: labels * design.size})
 
 
+@as_annotated
 def compare(
     design: Design,
     choice: Choice,

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction, integer, of_type, one_of
 from nlctl.errors import ParameterError, UsageError
 from nlctl.wording import counted, some_of
@@ -111,7 +112,9 @@ class Violation:
         first, *rest = [text for text, is_there in sides.items() if is_there] or ["at most 1"]
         if self.lower > 0 and rest:  # the side that was asked for comes first
             first, rest = rest[0], [first]
-        return f"{told} {first}" + "".join(f"; with the same confidence, {r}" for r in rest)
+        both = f"(both together: {max(0.0, 200 * self.confidence - 100):.10g} %)"
+        told = f"{told} {first}"
+        return told + "".join(f"; with the same confidence, {other} {both}" for other in rest)
 
 
 def rounded_up(value: float) -> str:
@@ -142,6 +145,7 @@ def checked_confidence(confidence: float) -> float:
     return fraction("a statement", "confidence", confidence)
 
 
+@as_annotated
 def clopper_pearson(
     violations: int, runs: int, confidence: float = 0.99, side: Side = "upper"
 ) -> tuple[float, float]:
@@ -206,6 +210,7 @@ def checked_counts(violations: int, runs: int) -> tuple[int, int]:
     return k, n
 
 
+@as_annotated
 def runs_needed(probability: float, confidence: float = 0.99, violations: int = 0) -> int:
     """Return the least number of runs that proves a probability, if few enough of them violate.
 
@@ -278,6 +283,7 @@ def least_count(
     return more
 
 
+@as_annotated
 def violation_probability(
     design: Design,
     margins: Margins,
@@ -383,6 +389,9 @@ def series_of(values: Any, name: str) -> pd.Series:
         If they are no numbers, or not one-dimensional.
     """
     try:
+        kind = pd.Series(values).dtype.kind
+        if kind in "mMc":  # times and complex numbers, which would be converted
+            raise TypeError(kind)
         return pd.Series(values, dtype=float)
     except (TypeError, ValueError):
         shape = f" of shape {np.shape(values)}" if isinstance(values, np.ndarray) else ""

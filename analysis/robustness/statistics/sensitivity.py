@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.wording import counted
@@ -17,6 +18,7 @@ from ..stl.spec import FAILED
 from ..uncertainty.design import Design, affordable, checked_entropy, listed, sobol_points
 from ..uncertainty.space import Space, from_quantiles, from_unit_cube
 from .guarantee import Margins, checked_confidence, series_of
+from .independence import independence_test
 from .paired import holm
 
 __all__ = ["censored", "elementary_effects", "morris", "regional", "saltelli", "sobol_indices"]
@@ -24,6 +26,7 @@ __all__ = ["censored", "elementary_effects", "morris", "regional", "saltelli", "
 _WHO = "shares of the variance"
 
 
+@as_annotated
 def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
     """Return margins with one number for all failed runs, for effects and shares of a variance.
 
@@ -71,6 +74,7 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
     return np.where(ended, values, least), int(np.sum(~ended)), least
 
 
+@as_annotated
 def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None = None) -> Design:
     """Walk through the boxes, one quantity a step: for `elementary_effects`.
 
@@ -124,6 +128,7 @@ def morris(space: Space, trajectories: int, levels: int = 4, entropy: int | None
     return listed(space, "Morris", points, entropy, {"trajectories": r})
 
 
+@as_annotated
 def elementary_effects(
     design: Design, values: Sequence[float] | np.ndarray, confidence: float = 0.95
 ) -> pd.DataFrame:
@@ -187,6 +192,7 @@ def elementary_effects(
     )
 
 
+@as_annotated
 def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
     """Make the rows that `sobol_indices` needs: size (number of names + 2) of them.
 
@@ -229,6 +235,7 @@ def saltelli(space: Space, size: int, entropy: int | None = None) -> Design:
     return listed(space, "Saltelli", points, entropy, {"size": size})
 
 
+@as_annotated
 def sobol_indices(
     design: Design,
     values: Sequence[float] | np.ndarray,
@@ -308,11 +315,13 @@ def _checked(design: Design, values: Sequence[float] | np.ndarray, kind: str, ma
     return y
 
 
+@as_annotated
 def regional(design: Design, margins: Margins) -> pd.DataFrame:
     """Return how far values in failing runs differ from those in passing ones.
 
     For numbers the statistic is the largest distance between the two empirical distributions
-    (Kolmogorov-Smirnov), for choices Cramér's V of the table of options; 0: alike, 1: apart.
+    (Kolmogorov-Smirnov, exact), for choices Cramér's V of the table of options (an exact or a
+    permutation test where counts are small, see `independence`); 0: alike, 1: apart.
 
     Parameters
     ----------
@@ -354,7 +363,8 @@ def regional(design: Design, margins: Margins) -> pd.DataFrame:
     for name in design.space.names:
         column = table[name].to_numpy()
         if name in [choice.name for choice in design.space.choices]:
-            rows.append(_cramer(column, passed))
+            counts = pd.crosstab(column, passed).to_numpy()
+            rows.append(independence_test(counts, design.entropy))
         else:
             test: Any = stats.ks_2samp(column[passed].astype(float), column[~passed].astype(float))
             rows.append((float(test.statistic), float(test.pvalue)))
@@ -362,12 +372,3 @@ def regional(design: Design, margins: Margins) -> pd.DataFrame:
     p = p if design.is_iid else np.full(p.shape, np.nan)
     columns = {"statistic": statistic, "p": p, "p_holm": holm(p)}
     return pd.DataFrame(columns, index=pd.Index(design.space.names, name="quantity"))
-
-
-def _cramer(labels: np.ndarray, passed: np.ndarray) -> tuple[float, float]:
-    """Cramér's V between options and passing, and the p-value of the chi-square test."""
-    counts = pd.crosstab(labels, passed).to_numpy()
-    if counts.shape[0] == 1:
-        return 0.0, 1.0
-    test: Any = stats.chi2_contingency(counts, correction=False)
-    return float(np.sqrt(test.statistic / counts.sum())), float(test.pvalue)

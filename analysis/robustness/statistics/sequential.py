@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import optimize, special
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction
 from nlctl.wording import counted
 
@@ -58,6 +59,7 @@ def log_evidence(violations: Any, runs: Any, p: float) -> Any:
     return mixed - special.xlogy(k, p) - special.xlog1py(n - k, -p)
 
 
+@as_annotated
 def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tuple[float, float]:
     """Return bounds of the probability of a violation that may be looked at after every run.
 
@@ -143,6 +145,7 @@ class SequentialTest:
         return f"Decided {runs}: {self.decision} {self.threshold:g}. {self.statement}"
 
 
+@as_annotated
 def confidence_sequence(
     design: Design,
     margins: Margins,
@@ -201,6 +204,7 @@ def _statement(design: Design, k: int, n: int, confidence: float) -> Violation:
     )
 
 
+@as_annotated
 def decide(
     design: Design,
     margins: Margins,

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from scipy import stats
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction
 from nlctl.errors import ParameterError
 from nlctl.wording import counted
@@ -43,6 +44,7 @@ class Verdict:
         return f"{self.answer} (needs {self.needs})" if self.needs else self.answer
 
 
+@as_annotated
 def bound_verdict(statement: Violation, limit: float) -> Verdict:
     """Judge the claim that the probability of a violation is at most a limit.
 
@@ -92,6 +94,7 @@ def bound_verdict(statement: Violation, limit: float) -> Verdict:
     return Verdict(answer="not shown yet", needs=_more(planned - statement.runs))
 
 
+@as_annotated
 def test_verdict(test: SequentialTest) -> Verdict:
     """Judge the claim that the probability of a violation is below the threshold of a test.
 

@@ -7,18 +7,20 @@
     eventually(a):  max of rho_a over the same
 
 (Donzé, Maler: Robust satisfaction of temporal logic over real-valued signals, FORMATS 2010).
-rho > 0 holds, rho < 0 fails.  Signals are connected by lines between samples, through the
-parabola's vertex at local extrema; on these lines the margins are exact, sliding windows included.
+rho > 0 holds, rho < 0 fails.  Signals are connected by lines between samples, through a curve's
+extreme where samples support one; with the breaks of a run known, by curves between them (see
+`analysis.metrics.curves`).  On these lines the margins are exact, sliding windows included.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, text
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
@@ -88,7 +90,7 @@ class Not(Formula):
 
     def __str__(self) -> str:
         if isinstance(self.part, And):
-            return f"({' or '.join(str(~part) for part in self.part.parts)})"
+            return _listed([~part for part in self.part.parts], " or ")
         return f"not {self.part}"
 
 
@@ -99,7 +101,7 @@ class And(Formula):
     parts: tuple[Formula, ...]
 
     def __str__(self) -> str:
-        return f"({' and '.join(map(str, self.parts))})"
+        return _listed(self.parts, " and ")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,12 +128,32 @@ class Always(Formula):
         return f"always{_interval(self)} {self.part}"
 
 
+def _listed(parts: Sequence[Formula], word: str) -> str:
+    """Return parts in brackets; "always" has its own where it might be read as of all of them."""
+    apart = not all(map(looks_ahead, parts))
+    texts = (f"({part})" if apart and begins_window(part) else str(part) for part in parts)
+    return f"({word.join(texts)})"
+
+
+def looks_ahead(formula: Formula) -> bool:
+    """Whether a formula is of other times than the one at which it stands."""
+    return any(isinstance(part, Always | Eventually) for part in parts_of(formula))
+
+
+def begins_window(formula: Formula) -> bool:
+    """Whether the text of a formula begins with "always" or "eventually", or with "not" and one."""
+    while isinstance(formula, Not) and not isinstance(formula.part, And):
+        formula = formula.part
+    return isinstance(formula, Always | Eventually)
+
+
 def _interval(window: Always | Eventually) -> str:
     if np.isfinite(window.end):
         return f" in [{window.start:g}, {window.end:g}] s"
     return f" from {window.start:g} s on" if window.start else ""
 
 
+@as_annotated
 def in_band(
     signal: str, *, lower: float = -np.inf, upper: float = np.inf, scale: float | None = None
 ) -> Band:
@@ -183,6 +205,7 @@ def in_band(
     return Band(signal=signal, lower=float(lower), upper=float(upper), scale=float(scale))
 
 
+@as_annotated
 def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
     """Require `part` all the time from start to end, in s from where the formula stands.
 
@@ -223,6 +246,7 @@ def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
     return Always(part=part, start=float(start), end=float(end))
 
 
+@as_annotated
 def eventually(part: Formula, start: float = 0.0, end: float = np.inf) -> Eventually:
     """Require `part` once between start and end; arguments and errors as in `always`.
 
@@ -304,11 +328,19 @@ class SampledSignals:
         Arrays of shape (m,).
     until : float
         Time (s) at which windows without an end stop, at most ``t[-1]``.
+    breaks : ndarray of shape (k,)
+        Increasing times (s) at which signals may jump or bend.
     """
 
     t: np.ndarray
     samples: Mapping[str, np.ndarray]
     until: float
+    breaks: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def apart(self) -> float:
+        """How long (s) before and after a break all signals jump, at once."""
+        return 1e-12 * float(self.t[-1] - self.t[0])
 
 
 def margin_trace(formula: Formula, signals: SampledSignals, low: float, high: float) -> Trace:
@@ -350,15 +382,19 @@ def margin_trace(formula: Formula, signals: SampledSignals, low: float, high: fl
     raise TypeError(f"no formula: {formula!r}")
 
 
-def _near(
-    band: Band, signals: SampledSignals, low: float, high: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and samples of the band's signal in [low, high], with a few more around."""
+_AROUND = 6  # samples on each side of a window that its curves go through
+
+
+def _near(band: Band, signals: SampledSignals, low: float, high: float) -> tuple[np.ndarray, ...]:
+    """Return times, samples and breaks of the band's signal in [low, high] and a little around."""
     if band.signal not in signals.samples:
         raise unknown("signal", band.signal, signals.samples)
-    i, j = np.searchsorted(signals.t, low, "right"), np.searchsorted(signals.t, high, "left")
-    near = slice(max(i - 3, 0), j + 3)  # with the neighbours that vertices need
-    return signals.t[near], signals.samples[band.signal][near]
+    t, breaks = signals.t, signals.breaks
+    i, j = np.searchsorted(t, low, "right"), np.searchsorted(t, high, "left")
+    near = slice(max(i - _AROUND, 0), j + _AROUND)
+    t = t[near]
+    breaks = breaks[(breaks >= t[0]) & (breaks <= t[-1])]
+    return t, signals.samples[band.signal][near], breaks
 
 
 def _beyond(band: Band, y: np.ndarray) -> list[np.ndarray]:
@@ -368,11 +404,13 @@ def _beyond(band: Band, y: np.ndarray) -> list[np.ndarray]:
 
 
 def _band(band: Band, signals: SampledSignals, low: float, high: float) -> Trace:
-    y = with_vertices(*_near(band, signals, low, high)).between(low, high)
-    return -pointwise_maximum([Trace(y.t, beyond) for beyond in _beyond(band, y.y)])
+    t, y, breaks = _near(band, signals, low, high)
+    y = with_vertices(t, y, breaks, signals.apart).between(low, high)
+    return -pointwise_maximum([Trace(y.t, beyond, y.jump) for beyond in _beyond(band, y.y)])
 
 
 def _worst(band: Band, signals: SampledSignals, low: float, high: float) -> float:
     """Return the largest violation in [low, high]: an extreme value has it."""
-    values = np.array(extremes(*_near(band, signals, low, high), low, high))
+    t, y, breaks = _near(band, signals, low, high)
+    values = np.array(extremes(t, y, low, high, breaks, signals.apart))
     return float(np.max(_beyond(band, values)))

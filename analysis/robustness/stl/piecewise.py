@@ -12,7 +12,7 @@ import numpy as np
 
 from nlctl.native.machine.machine_code import kept
 
-from ...metrics import consecutive_differences, vertex
+from ...metrics.curves import path, turning_points
 
 __all__ = ["Trace", "extremes", "higher", "largest", "pointwise_maximum", "with_vertices"]
 
@@ -26,13 +26,16 @@ class Trace:
     t : ndarray of shape (m,)
         Increasing times (s); one is enough.
     y : ndarray of shape (m,)
+    jump : float
+        An interval (s) that is not longer is a jump: only its ends are values.
     """
 
     t: np.ndarray
     y: np.ndarray
+    jump: float = 0.0
 
     def __neg__(self) -> Trace:
-        return Trace(self.t, -self.y)
+        return Trace(self.t, -self.y, self.jump)
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """Values at times between the first and the last."""
@@ -44,50 +47,70 @@ class Trace:
         ends = np.array([low, high] if low < high else [low])
         first, last = np.split(self.at(ends), [1])
         t = np.concatenate([ends[:1], self.t[i:j], ends[1:]])
-        return Trace(t, np.concatenate([first, self.y[i:j], last]))
+        return Trace(t, np.concatenate([first, self.y[i:j], last]), self.jump)
 
     def refined(self, t: np.ndarray) -> Trace:
         """The same function with more points."""
         if t is self.t:
             return self
         t = np.union1d(self.t, t)
-        return Trace(t, self.at(t))
+        return Trace(t, self.at(t), self.jump)
 
 
-def with_vertices(t: np.ndarray, y: np.ndarray) -> Trace:
-    """Join samples by lines, through the parabola's vertex at every strict local extremum.
+_NONE = np.empty(0)
 
-    Peaks between samples are then seen as `analysis.metrics.highest` sees them.
+
+def with_vertices(
+    t: np.ndarray, y: np.ndarray, breaks: np.ndarray = _NONE, apart: float = 0.0
+) -> Trace:
+    """Return a signal between samples: lines, through the extremes that samples support.
+
+    Peaks between samples are then seen as `analysis.metrics.highest` sees them.  With breaks it is
+    the path of `analysis.metrics.curves`: curves between them, and jumps, each `apart` (s) before
+    and after its break.
     """
-    at, place, value = _vertices(t, y)
+    if breaks.size:
+        return Trace(*_path(t, y, breaks, apart), jump=3 * apart)
+    at, place, value = _vertices(t, y, breaks)
     return Trace(np.insert(t, at, place), np.insert(y, at, value)) if at.size else Trace(t, y)
 
 
 @kept(nogil=True, error_model="numpy")
-def _vertices(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the vertices between samples: before which sample each is, when, and its value."""
-    d = consecutive_differences(y)
-    i = np.nonzero(d[:-1] * d[1:] < 0)[0] + 1
-    if i.size == 0:
-        return i, t[:0], y[:0]
-    offset, value = vertex(t[i] - t[i - 1], t[i + 1] - t[i], y[i - 1], y[i], y[i + 1])
-    place = t[i] + offset
-    new = (place != t[i]) & (place > t[i - 1]) & (place < t[i + 1])
-    return (i + (offset > 0))[new], place[new], value[new]
+def _vertices(
+    t: np.ndarray, y: np.ndarray, breaks: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the extremes between samples: before which sample each is, when, and its value."""
+    return turning_points(t, y, breaks)
 
 
-def extremes(t: np.ndarray, y: np.ndarray, low: float, high: float) -> tuple[float, float]:
-    """Return the least and the largest value of ``with_vertices(t, y)`` in [low, high]."""
+@kept(nogil=True, error_model="numpy")
+def _path(
+    t: np.ndarray, y: np.ndarray, breaks: np.ndarray, apart: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points of a path through samples, see `analysis.metrics.curves`."""
+    return path(t, y, breaks, apart)
+
+
+def extremes(
+    t: np.ndarray,
+    y: np.ndarray,
+    low: float,
+    high: float,
+    breaks: np.ndarray = _NONE,
+    apart: float = 0.0,
+) -> tuple[float, float]:
+    """Return the least and the largest value of a signal between samples in [low, high]."""
     i, j = np.searchsorted(t, low, "left"), np.searchsorted(t, high, "right")
-    if t[i] != low or t[j - 1] != high:  # ends between samples
-        inside = with_vertices(t, y).between(low, high).y
-        return float(np.min(inside)), float(np.max(inside))
-    _, place, value = _vertices(t, y)
-    inside = np.concatenate([y[i:j], value[(place > low) & (place < high)]])
+    if breaks.size or t[i] != low or t[j - 1] != high:  # ends between samples
+        inside = with_vertices(t, y, breaks, apart).between(low, high).y
+    else:
+        inside = y[i:j]
+    _, place, value = _vertices(t, y, breaks)
+    inside = np.concatenate([inside, value[(place > low) & (place < high)]])
     return float(np.min(inside)), float(np.max(inside))
 
 
-def crossings(t0, t1, a0, a1, b0, b1) -> tuple[np.ndarray, np.ndarray]:
+def crossings(t0, t1, a0, a1, b0, b1, jump=0.0) -> tuple[np.ndarray, np.ndarray]:
     """Return where two lines cross inside an interval, and in which intervals they do.
 
     Parameters
@@ -96,9 +119,11 @@ def crossings(t0, t1, a0, a1, b0, b1) -> tuple[np.ndarray, np.ndarray]:
         Ends of the intervals.
     a0, a1, b0, b1 : ndarray of shape (n,)
         Values of the two lines there.
+    jump : float, optional
+        Intervals that are not longer have no inside.
     """
     d0, d1 = a0 - b0, a1 - b1
-    k = np.nonzero(((d0 < 0) & (d1 > 0)) | ((d0 > 0) & (d1 < 0)))[0]
+    k = np.nonzero((((d0 < 0) & (d1 > 0)) | ((d0 > 0) & (d1 < 0))) & (t1 - t0 > jump))[0]
     share = 1 / (1 - d1[k] / d0[k])
     return t0[k] + share * (t1[k] - t0[k]), k
 
@@ -107,11 +132,12 @@ def higher(one: Trace, other: Trace) -> Trace:
     """Return the larger of two functions over the same interval."""
     one, other = one.refined(other.t), other.refined(one.t)
     t, a, b = one.t, one.y, other.y
-    at, k = crossings(t[:-1], t[1:], a[:-1], a[1:], b[:-1], b[1:])
+    jump = max(one.jump, other.jump)
+    at, k = crossings(t[:-1], t[1:], a[:-1], a[1:], b[:-1], b[1:], jump)
     y = np.maximum(a, b)
-    return (
-        Trace(np.insert(t, k + 1, at), np.insert(y, k + 1, one.at(at))) if k.size else Trace(t, y)
-    )
+    if not k.size:
+        return Trace(t, y, jump)
+    return Trace(np.insert(t, k + 1, at), np.insert(y, k + 1, one.at(at)), jump)
 
 
 def largest(part: Trace, low: float, high: float, start: float, end: float) -> Trace:
@@ -125,7 +151,7 @@ def largest(part: Trace, low: float, high: float, start: float, end: float) -> T
     last = part.t[-1]
     if low == high:  # one window: nothing slides
         window = part.between(low + start, min(low + end, last))
-        return Trace(np.array([low]), np.max(window.y, keepdims=True))
+        return Trace(np.array([low]), np.max(window.y, keepdims=True), part.jump)
     events = np.concatenate([part.t - start, part.t - end])
     events = np.unique(np.append(events[(events > low) & (events < high)], [low, high]))
     t0, t1 = events[:-1], events[1:]
@@ -139,13 +165,13 @@ def largest(part: Trace, low: float, high: float, start: float, end: float) -> T
     times, values = [t0, t1], [np.maximum(a0, b0), np.maximum(a1, b1)]
     intervals = [np.arange(t0.size)] * 2
     for p0, p1, q0, q1 in ((a0, a1, b0, b1), (a0, a1, inner, inner), (b0, b1, inner, inner)):
-        t, k = crossings(t0, t1, p0, p1, q0, q1)
+        t, k = crossings(t0, t1, p0, p1, q0, q1, part.jump)
         times.append(t)
         values.append(np.maximum(*ends(t)))
         intervals.append(k)
     t, first = np.unique(np.concatenate(times), return_index=True)
     y = np.maximum(np.concatenate(values), inner[np.concatenate(intervals)])
-    return Trace(t, y[first])
+    return Trace(t, y[first], part.jump)
 
 
 def _inner_largest(part: Trace, low: np.ndarray, high: np.ndarray) -> np.ndarray:

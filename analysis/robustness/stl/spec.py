@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, text, tuple_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
@@ -30,6 +31,7 @@ FAILED = 1e6
 """No margin of a run that reached its end is below -FAILED, and none of another run above it."""
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Requirement:
     """A named formula that has to hold at the start of a response.
@@ -78,7 +80,9 @@ class Requirement:
         """Names of the signals that it looks at."""
         return signals_named(self.formula)
 
-    def function(self, t: np.ndarray, *samples: np.ndarray) -> float:
+    def function(
+        self, t: np.ndarray, *samples: np.ndarray, breaks: ArrayLike | None = None
+    ) -> float:
         """Return the margin, with the samples in the order of `signals`.
 
         Parameters
@@ -87,15 +91,18 @@ class Requirement:
             Times (s).
         *samples : ndarray of shape (m,)
             Samples of each signal.
+        breaks : array_like of shape (k,), optional
+            As in `margin`.
 
         Returns
         -------
         float
             Positive where the requirement holds.
         """
-        return margin(self, t, dict(zip(self.signals, samples, strict=True)))
+        return margin(self, t, dict(zip(self.signals, samples, strict=True)), breaks=breaks)
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Spec:
     """Requirements that all have to hold.
@@ -127,6 +134,7 @@ def violates(margins: ArrayLike) -> np.ndarray:
     return ~(np.asarray(margins, dtype=float) > 0)
 
 
+@as_annotated
 def unfinished_margin(time: float, until: float) -> float:
     """Return the margin of a run that ended at `time` (s) before the end `until` (s).
 
@@ -159,7 +167,14 @@ def unfinished_margin(time: float, until: float) -> float:
     return float(-FAILED * (2 - reached))
 
 
-def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.ndarray]) -> float:
+@as_annotated
+def margin(
+    requirement: Requirement,
+    t: np.ndarray,
+    signals: Mapping[str, np.ndarray],
+    *,
+    breaks: ArrayLike | None = None,
+) -> float:
     """Return by how much a response meets a requirement; > 0 holds.
 
     Dimensionless, see `formula.in_band`.  A response that ends before ``requirement.until``, or
@@ -174,6 +189,10 @@ def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.nda
         Increasing times (s).
     signals : mapping
         Samples of shape (m,) by name.
+    breaks : array_like of shape (k,), optional
+        Increasing times (s) at which signals may jump or bend, such as those of the events of a
+        run.  Between them signals are smooth curves, and their limits there count; without them,
+        samples alone say where a signal is smooth.
 
     Returns
     -------
@@ -183,7 +202,7 @@ def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.nda
     Raises
     ------
     ParameterError
-        If the response starts after t = 0.
+        If the response starts after t = 0, or breaks are not increasing numbers.
     UnknownNameError
         If a signal is missing.
 
@@ -210,10 +229,21 @@ def margin(requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.nda
         )
     if t.size == 0 or t[-1] < until * (1 - 1e-12):
         return unfinished_margin(t[-1] if t.size else 0.0, until)
-    finite = SampledSignals(t, dict(zip(requirement.signals, samples, strict=True)), until)
+    named = dict(zip(requirement.signals, samples, strict=True))
+    finite = SampledSignals(t, named, until, checked_breaks(breaks))
     with np.errstate(over="ignore", invalid="ignore"):  # samples near the largest number
         value = margin_trace(requirement.formula, finite, 0.0, 0.0).y[0]
     return float(np.fmax(value, -FAILED))  # NaN becomes -FAILED
+
+
+def checked_breaks(breaks: ArrayLike | None) -> np.ndarray:
+    """Return times of breaks as an array; none by default."""
+    times = np.empty(0) if breaks is None else as_numbers(breaks)
+    if times is None or times.ndim != 1 or not np.all(np.isfinite(times)):
+        raise ParameterError(f"breaks need finite times (s) in one row, got {breaks!r}")
+    if np.any(np.diff(times) < 0):
+        raise ParameterError(f"breaks need increasing times (s), got {breaks!r}")
+    return np.unique(times)
 
 
 def _samples(requirement: Requirement, t: Any, signals: Mapping[str, Any]) -> np.ndarray:
@@ -235,7 +265,14 @@ def _samples(requirement: Requirement, t: Any, signals: Mapping[str, Any]) -> np
     return np.array([*rows.values()], dtype=float)
 
 
-def margins(spec: Spec, t: np.ndarray, signals: Mapping[str, np.ndarray]) -> dict[str, float]:
+@as_annotated
+def margins(
+    spec: Spec,
+    t: np.ndarray,
+    signals: Mapping[str, np.ndarray],
+    *,
+    breaks: ArrayLike | None = None,
+) -> dict[str, float]:
     """Return the margin of every requirement by key, and the least of them as ``"spec"``.
 
     Arguments and errors as in `margin`.
@@ -248,6 +285,8 @@ def margins(spec: Spec, t: np.ndarray, signals: Mapping[str, np.ndarray]) -> dic
         Increasing times (s).
     signals : mapping
         Samples of shape (m,) by name.
+    breaks : array_like of shape (k,), optional
+        As in `margin`.
 
     Returns
     -------
@@ -263,5 +302,5 @@ def margins(spec: Spec, t: np.ndarray, signals: Mapping[str, np.ndarray]) -> dic
     >>> margins(Spec(requirements=(low, high)), np.zeros(1), {"u": np.array([5.0])})
     {'low': 0.5, 'high': 1.5, 'spec': 0.5}
     """
-    values = {r.key: margin(r, t, signals) for r in spec.requirements}
+    values = {r.key: margin(r, t, signals, breaks=breaks) for r in spec.requirements}
     return values | {"spec": float(min(values.values()))}

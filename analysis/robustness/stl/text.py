@@ -7,15 +7,25 @@
     band     = "|" signal "|" "<=" number | signal ("<=" | ">=") number
              | number "<=" signal "<=" number
 
-"not", "always" and "eventually" hold for the next part only; use parentheses for more.
+"not", "always" and "eventually" hold for the next part only; use parentheses for more.  A part that
+looks at its own time alone may not stand next to one that begins with "always" or "eventually":
+``always |e| <= 0.6 and |u| <= 0.5`` would look at u at t = 0 only.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from analysis.robustness.stl.formula import And, Formula, always, eventually, in_band
+from analysis.robustness.stl.formula import (
+    And,
+    Formula,
+    always,
+    begins_window,
+    eventually,
+    in_band,
+    looks_ahead,
+)
 from nlctl.errors import ParameterError
 
 __all__ = ["parse_formula"]
@@ -92,6 +102,15 @@ class _Reader:
         self.next += 1
         return self.words[self.next - 1][1]
 
+    def is_bracketed(self, first: int) -> bool:
+        """Whether what was read from a word on stands in one pair of brackets."""
+        depth = 0
+        for number, (_, word, _) in enumerate(self.words[first : self.next], first):
+            depth += (word == "(") - (word == ")")
+            if depth == 0:
+                return word == ")" and number == self.next - 1
+        return False
+
     def error(self, wanted: str) -> ParameterError:
         if self.next < len(self.words):
             _, word, column = self.words[self.next]
@@ -104,17 +123,43 @@ class _Reader:
 
 
 def _formula(reader: _Reader, depth: int) -> Formula:
-    parts = [_both(reader, depth)]
-    while reader.took("or"):
-        parts.append(_both(reader, depth))
+    parts = _parts(reader, depth, "or", _both)
     return parts[0] if len(parts) == 1 else ~And(parts=tuple(~part for part in parts))
 
 
 def _both(reader: _Reader, depth: int) -> Formula:
-    parts = [_part(reader, depth)]
-    while reader.took("and"):
-        parts.append(_part(reader, depth))
+    parts = _parts(reader, depth, "and", _part)
     return parts[0] if len(parts) == 1 else And(parts=tuple(parts))
+
+
+def _parts(
+    reader: _Reader, depth: int, word: str, read: Callable[[_Reader, int], Formula]
+) -> list[Formula]:
+    """Read the parts between words; refuse what is easily read as something else.
+
+    Raises
+    ------
+    ParameterError
+        If a part without a window stands next to one that begins with its window.
+    """
+    parts, are_open = [], []
+    while not parts or reader.took(word):
+        first = reader.next
+        parts.append(read(reader, depth))
+        are_open.append(not reader.is_bracketed(first))
+    windows = [
+        p
+        for p, is_open in zip(parts, are_open, strict=True)
+        if is_open and any(map(begins_window, p.parts if isinstance(p, And) else (p,)))
+    ]
+    now = [part for part in parts if not looks_ahead(part)]
+    if windows and now:
+        raise ParameterError(
+            f"formula '{reader.text}' looks at '{now[0]}' at one time only, since 'always' and "
+            f"'eventually' hold for the next part alone: write 'always (... {word} ...)' for all "
+            f"of it, or '({windows[0]}) {word} {now[0]}' where that is meant"
+        )
+    return parts
 
 
 def _part(reader: _Reader, depth: int) -> Formula:

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .formula import Always, And, Formula, SampledSignals, horizon, margin_trace
-from .spec import Requirement, margin
+from .spec import Requirement, checked_breaks, margin
 
 __all__ = ["ViolationTime", "violation_time"]
 
@@ -43,13 +44,20 @@ class ViolationTime:
         """Names of the signals that it looks at."""
         return self.requirement.signals
 
-    def function(self, t: np.ndarray, *samples: np.ndarray) -> float:
+    def function(
+        self, t: np.ndarray, *samples: np.ndarray, breaks: ArrayLike | None = None
+    ) -> float:
         """Return the time, with the samples in the order of `signals`."""
-        return violation_time(self.requirement, t, dict(zip(self.signals, samples, strict=True)))
+        named = dict(zip(self.signals, samples, strict=True))
+        return violation_time(self.requirement, t, named, breaks=breaks)
 
 
 def violation_time(
-    requirement: Requirement, t: np.ndarray, signals: Mapping[str, np.ndarray]
+    requirement: Requirement,
+    t: np.ndarray,
+    signals: Mapping[str, np.ndarray],
+    *,
+    breaks: ArrayLike | None = None,
 ) -> float:
     """Return the first time in s at which a response violates a requirement; inf if it does not.
 
@@ -65,6 +73,8 @@ def violation_time(
         Increasing times (s) from 0.
     signals : mapping
         Samples of shape (m,) by name, NaN after the end of a run.
+    breaks : array_like of shape (k,), optional
+        As in `margin`.
     """
     rows = np.array([t, *(signals[name] for name in requirement.signals)], dtype=float)
     good = np.all(np.isfinite(rows), axis=0)
@@ -75,10 +85,10 @@ def violation_time(
     found = dict(zip(requirement.signals, samples, strict=True))
     until = min(requirement.until, float(t[-1]))
     is_short = until < requirement.until * (1 - 1e-12)
-    first = _first(requirement.formula, SampledSignals(t, found, until))
+    first = _first(requirement.formula, SampledSignals(t, found, until, checked_breaks(breaks)))
     if is_short:
         return min(first, until)
-    if margin(requirement, t, found) > 0:
+    if margin(requirement, t, found, breaks=breaks) > 0:
         return np.inf
     return min(first, until)
 

@@ -12,6 +12,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, of_type
 from nlctl.blocks import Block, within
 from nlctl.diagrams import all_parameter_rows, initial_state, leaves, samplings, state_names
@@ -27,6 +28,7 @@ from .space import Space, combinations
 __all__ = ["check_keyword", "diagrams", "owner_of", "resolved"]
 
 
+@as_annotated
 def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
     """Return the space with full names, and units and nominal values that it left to the diagram.
 
@@ -154,6 +156,7 @@ def check_keyword(function: Callable[..., Any], name: str) -> None:
         raise unknown("keyword", name, known, where and f"of {where}")
 
 
+@as_annotated
 def diagrams(
     space: Space, build: Callable[..., ct.InputOutputSystem]
 ) -> list[tuple[Mapping[str, str], ct.InputOutputSystem]]:

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import flag, integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
@@ -25,12 +26,12 @@ __all__ = [
     "independent",
     "latin_hypercube",
     "listed",
-    "numbered",
     "row_seed",
     "rows",
     "seed_number",
     "sobol",
     "sobol_points",
+    "with_row_numbers",
 ]
 
 _MOST_ROWS = 10**9
@@ -84,6 +85,7 @@ class Design:
         return rows(self, range(self.size))
 
 
+@as_annotated
 def row_seed(design: Design, row: int) -> np.random.SeedSequence:
     """Return the seed that everything random in a row follows from.
 
@@ -120,6 +122,7 @@ def row_seed(design: Design, row: int) -> np.random.SeedSequence:
     return np.random.SeedSequence(design.entropy, spawn_key=(row,))
 
 
+@as_annotated
 def seed_number(design: Design, row: int) -> int:
     """Return the row's seed as one number of 64 bits, for the table of results.
 
@@ -146,6 +149,7 @@ def seed_number(design: Design, row: int) -> int:
     return int(row_seed(design, row).generate_state(1, np.uint64)[0])
 
 
+@as_annotated
 def rows(design: Design, numbers: range) -> pd.DataFrame:
     """Return some rows, indexed by their numbers; one column for each name of the space.
 
@@ -188,7 +192,7 @@ def rows(design: Design, numbers: range) -> pd.DataFrame:
     return from_quantiles(design.space, unit).set_axis(index)
 
 
-def numbered(table: pd.DataFrame, first: int) -> pd.DataFrame:
+def with_row_numbers(table: pd.DataFrame, first: int) -> pd.DataFrame:
     """Return rows with the numbers `first`, `first` + 1, ... as their index."""
     return table.set_axis(pd.RangeIndex(first, first + len(table), name="row"))
 
@@ -200,6 +204,7 @@ def checked_entropy(entropy: int | None) -> int:
     return integer("a design", "entropy", entropy, at_least=0)
 
 
+@as_annotated
 def independent(space: Space, size: int, entropy: int | None = None) -> Design:
     """Draw rows from the laws, independent of each other: for statements about probabilities.
 
@@ -257,6 +262,7 @@ def affordable(what: str, rows: int, columns: int) -> int:
     return rows
 
 
+@as_annotated
 def from_table(
     space: Space,
     table: pd.DataFrame,
@@ -347,6 +353,7 @@ def listed(
     )
 
 
+@as_annotated
 def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
     """Fill the space evenly with a scrambled Sobol' sequence: for means, maps and sensitivity.
 
@@ -398,6 +405,7 @@ def sobol_points(dimension: int, size: int, entropy: int) -> np.ndarray:
     return qmc.Sobol(dimension, rng=entropy).random_base2(size.bit_length() - 1)
 
 
+@as_annotated
 def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Design:
     """Fill the space so that each quantity has one value in each of `size` equally likely parts.
 

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
@@ -19,6 +20,7 @@ from .space import Space, from_unit_cube, nominal
 __all__ = ["corners", "grid", "one_at_a_time"]
 
 
+@as_annotated
 def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = None) -> Design:
     """Cross evenly spaced values of every box, ends included, and all options of every choice.
 
@@ -64,6 +66,7 @@ def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = No
     return listed(space, "grid", _crossed(space, axes), checked_entropy(entropy))
 
 
+@as_annotated
 def corners(space: Space, entropy: int | None = None) -> Design:
     """Cross both ends of every box, and all options of every choice: 2^d rows for d quantities.
 
@@ -110,6 +113,7 @@ def _crossed(space: Space, axes: Sequence[np.ndarray]) -> pd.DataFrame:
     return from_unit_cube(space, np.array(list(itertools.product(*axes, *options))))
 
 
+@as_annotated
 def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> Design:
     """Vary one quantity over its box, or one choice over its options, the others nominal.
 

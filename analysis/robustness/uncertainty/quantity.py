@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, text, vector
 from nlctl.errors import UsageError
 from nlctl.params import as_numbers
@@ -33,6 +34,7 @@ class SpaceError(UsageError):
     """
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Uncertain:
     """A number that is not known exactly.
@@ -134,6 +136,7 @@ def _interval(name: str, bounds: Sequence[float] | np.ndarray) -> tuple[float, f
     return float(ends[0]), float(ends[1])
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Choice:
     """One of several blocks: another controller, actuator or reference.

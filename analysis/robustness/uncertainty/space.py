@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, tuple_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
@@ -31,6 +32,7 @@ __all__ = [
 ]
 
 
+@as_annotated
 @dataclass(frozen=True, kw_only=True)
 class Space:
     """Everything that is uncertain in a study, independent of each other.
@@ -100,6 +102,7 @@ def _nominal_of(quantity: Uncertain) -> float:
     return quantity.nominal
 
 
+@as_annotated
 def nominal(space: Space) -> dict[str, Any]:
     """Return ``{name: nominal value or label}``.
 
@@ -126,6 +129,7 @@ def nominal(space: Space) -> dict[str, Any]:
     return numbers | {c.name: c.nominal for c in space.choices}
 
 
+@as_annotated
 def scaled(space: Space, factor: float) -> Space:
     """Return the space with all deviations from the nominal values multiplied by `factor`.
 
@@ -229,6 +233,7 @@ def _table(space: Space, unit: np.ndarray, value: Any) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
+@as_annotated
 def arguments(space: Space, table: pd.DataFrame) -> dict[str, dict[str, np.ndarray]]:
     """Return the ``params`` and ``initial_state`` of `nlctl.ensemble_response` for these rows.
 

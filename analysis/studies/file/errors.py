@@ -43,6 +43,8 @@ class Problem:
         Line of the file, from 1; None for what is not in the file.
     settings : tuple of str
         Of the command line, ``key=value``, that are mistaken or have a part in it.
+    needs_trust : bool
+        Whether it is none for who trusts the code that the study names.
 
     Examples
     --------
@@ -53,6 +55,7 @@ class Problem:
     message: str
     line: int | None = None
     settings: tuple[str, ...] = ()
+    needs_trust: bool = False
 
     def plain(self) -> dict[str, Any]:
         """Return it as JSON can hold it.

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from pydantic import ConfigDict
 
 from nlctl.errors import ParameterError, UsageError
 
+from ..code.rule import Grant, untrusted
 from ..finding import Finding
 from ..kind import Asked, Ground, Kind
 from ..kinds import KINDS
 from .errors import KeyPath, Problem
 from .resolve import named_kind
 from .schema import Study, study_model
-from .trust import untrusted_names
 
-__all__ = ["model_of", "own_kinds", "stand_ins"]
+__all__ = ["STAND_IN", "model_of", "own_kinds", "stand_ins"]
+
+STAND_IN = "gone"
+"""Name of the kinds that stand in for those that are not known."""
 
 
 def model_of(own: Mapping[str, Kind]) -> type[Study]:
@@ -26,31 +28,27 @@ def model_of(own: Mapping[str, Kind]) -> type[Study]:
     return study_model((*((kind.name, kind) for kind in KINDS), *own.items()))
 
 
-def own_kinds(
-    data: Mapping[str, Any], folder: Path, *, trust: bool = False
-) -> tuple[dict[str, Kind], list[Problem]]:
+def own_kinds(data: Mapping[str, Any], grant: Grant) -> tuple[dict[str, Kind], list[Problem]]:
     """Return the kinds that a study file names by their place, and the mistakes among them.
 
-    The files and modules that they stand in are run, see `trust`.
+    The files and modules that they stand in are run, see `code.rule`.
 
     Parameters
     ----------
     data : mapping
         What stands in the file.
-    folder : Path
-        What paths in the study are relative to.
-    trust : bool, optional
-        As in `parse.read_study`.
+    grant : Grant
+        What may run.
     """
     named = list(_named(data))
-    problems = [] if trust else untrusted_names(named, folder)
+    problems = untrusted(named, grant)
     refused = {problem.place for problem in problems}
     found: dict[str, Kind] = {}
     for place, name in named:
         if place in refused or name in found:
             continue
         try:
-            found[name] = named_kind(name, folder)
+            found[name] = named_kind(name, grant)
         except UsageError as error:
             problems.append(Problem(place=place, message=str(error)))
     return found, problems
@@ -79,7 +77,7 @@ def _stand_in(name: str) -> Kind:
         raise ParameterError(f"the kind of analysis '{name}' has gone: put it back")
 
     title = name.rpartition(":")[2].replace("_", " ").capitalize()
-    return Kind(name="gone", schema=_AnyTable, run=run, title=title)
+    return Kind(name=STAND_IN, schema=_AnyTable, run=run, title=title)
 
 
 class _AnyTable(Asked):

@@ -13,13 +13,16 @@ from typing import Any
 from pydantic import ValidationError
 
 from analysis.robustness import Experiment
-from nlctl.errors import ParameterError
+from nlctl.annotations import as_annotated
+from nlctl.errors import ParameterError, UsageError
 
+from ..code.record import study_digest
+from ..code.rule import Grant, Reach, named_in, remember_code, untrusted
 from .errors import KeyPath, Problem, StudyError, line_numbers, located, place_text, schema_problems
 from .own_kinds import model_of, own_kinds
+from .resolve import checked_definition
 from .schema import Study
-from .toml import check_depth, read_toml
-from .trust import untrusted
+from .toml import check_depth, read_toml, study_text
 from .validate import checked_experiment
 
 __all__ = ["StudyFile", "read_study"]
@@ -60,16 +63,18 @@ class StudyFile:
         return self.path.parent
 
 
+@as_annotated
 def read_study(
     path: Path,
     settings: Sequence[str] = (),
     *,
     folder: Path | None = None,
     trust: bool = False,
+    received: bool = False,
 ) -> StudyFile:
     """Read a study file, and validate every name in it against the loop.
 
-    The files and modules that it names are run, see `trust`.
+    The files and modules that it names are run, if they may: see `code.rule`.
 
     Parameters
     ----------
@@ -81,7 +86,11 @@ def read_study(
     folder : Path, optional
         What paths in the study are relative to; by default the file's folder.
     trust : bool, optional
-        Whether code may be run from outside of that folder and of installed packages.
+        Whether any code that it names may be run.  What was trusted once need not be again, as
+        long as study and code stay what they are.
+    received : bool, optional
+        Whether the file came with a folder of results: then code of that folder runs only if this
+        user has run or trusted it.
 
     Returns
     -------
@@ -106,9 +115,10 @@ def read_study(
     >>> file.experiment.timepts.size  # 20 s in steps of 0.01 s
     2001
     """
-    text = path.read_bytes().decode("utf-8-sig", errors="replace")
+    content = path.read_bytes()
     folder = path.parent if folder is None else folder
     try:
+        text = study_text(content)
         data = read_toml(text)
         lines = line_numbers(text)
         given = {_set(data, setting): setting for setting in settings}
@@ -117,11 +127,13 @@ def read_study(
         raise
     except ValueError as error:
         raise StudyError(str(path), [Problem(place=(), message=str(error))]) from None
-    own, mistaken = own_kinds(data, folder, trust=trust)
+    reach: Reach = "all" if trust else "nlctl" if received else "study"
+    grant = Grant(reach=reach, folder=folder, study=study_digest(data))
+    own, mistaken = own_kinds(data, grant)
     study, problems, entries = _validated(data, model_of(own), mistaken)
     experiment = None
     if study is not None:
-        more = [] if trust else untrusted(study, folder)
+        more = _refused(study, grant)
         if not more:
             tables = {name: data[name] for name in _SPOKEN_OF if name in data}
             named = {k: list(v) if isinstance(v, dict) else [] for k, v in tables.items()}
@@ -131,7 +143,23 @@ def read_study(
     if problems or study is None or experiment is None:
         placed = [located(p, lines, given) for p in problems]
         raise StudyError(str(path), sorted(placed, key=lambda p: p.line or 0))
+    if trust:
+        remember_code(study, grant.study, folder)
     return StudyFile(path=folder / path.name, study=study, experiment=experiment)
+
+
+def _refused(study: Study, grant: Grant) -> list[Problem]:
+    """Return the functions that a study names and that may not run; nothing has been called."""
+    named = list(named_in(study))
+    if problems := untrusted(named, grant):
+        return problems
+    for place, name in named if grant.reach != "all" else ():
+        try:
+            checked_definition(name, grant)
+        except UsageError as error:
+            if grant.remedy in str(error):
+                problems.append(Problem(place=place, message=str(error), needs_trust=True))
+    return problems
 
 
 def _validated(

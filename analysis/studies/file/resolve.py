@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
-import importlib.util
-import sys
+import inspect
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import cloudpickle
 from scipy import stats
 
 from analysis.catalogue import named_block
@@ -20,12 +17,15 @@ from nlctl.errors import ParameterError, UnknownNameError, UsageError
 from nlctl.names import unknown
 from nlctl.paper import named_example
 
+from ..code.loading import Admits, load_file
+from ..code.rule import Grant, check_defined, check_function, check_loop_function, check_place
 from ..kind import Kind
 from .schema import Law
-from .trust import check_function, check_loop_function, check_place
 
 __all__ = [
     "DEFAULT",
+    "check_complete",
+    "checked_definition",
     "loop_function",
     "named",
     "named_function",
@@ -78,7 +78,19 @@ def named_function(name: str, folder: Path) -> Callable[..., Any]:
     return function
 
 
-def named_kind(name: str, folder: Path) -> Kind:
+def checked_definition(name: str, grant: Grant) -> None:
+    """Import what a study names, and refuse it where code that may not run has defined it.
+
+    Raises
+    ------
+    UsageError
+        As in `named_function`, or with the rule.
+    """
+    named(name, grant.folder, grant.refuses)
+    check_defined(named_function(name, grant.folder), name, grant)
+
+
+def named_kind(name: str, grant: Grant) -> Kind:
     """Return the kind of analysis ``"path/to/file.py:name"`` or ``"module:name"``.
 
     Raises
@@ -88,7 +100,7 @@ def named_kind(name: str, folder: Path) -> Kind:
     UnknownNameError
         If there is nothing of that name.
     """
-    found = named(name, folder)
+    found = named(name, grant.folder, grant.refuses)
     if not isinstance(found, Kind):
         raise ParameterError(
             f"a kind of analysis is an analysis.studies.Kind, '{name}' is a {type(found).__name__}"
@@ -96,8 +108,16 @@ def named_kind(name: str, folder: Path) -> Kind:
     return found
 
 
-def named(name: str, folder: Path) -> Any:
+def named(name: str, folder: Path, admits: Admits | None = None) -> Any:
     """Return whatever ``"path/to/file.py:name"`` or ``"module:name"`` is.
+
+    Parameters
+    ----------
+    name : str
+    folder : Path
+        What the path is relative to.
+    admits : callable, optional
+        Which files may be run, see `code.loading.load_file`.
 
     Raises
     ------
@@ -106,36 +126,20 @@ def named(name: str, folder: Path) -> Any:
     UnknownNameError
         If there is nothing of that name.
     """
-    module, source, attribute = _place(name, folder)
+    module, source, attribute = _place(name, folder, admits)
     if not hasattr(module, attribute):
         known = [key for key in vars(module) if not key.startswith("_")]
         raise unknown("name", attribute, known, f"in '{source}'")
     return getattr(module, attribute)
 
 
-def _place(name: str, folder: Path) -> tuple[Any, str, str]:
+def _place(name: str, folder: Path, admits: Admits | None = None) -> tuple[Any, str, str]:
     """Return the module that a place is in, how the file calls it, and the name in it."""
     check_place(name)
     source, _, attribute = name.rpartition(":")
-    module = _from_file(folder / source) if source.endswith(".py") else _from_module(source)
+    file = source.endswith(".py")
+    module = load_file(folder / source, admits) if file else _from_module(source)
     return module, source, attribute
-
-
-def _from_file(path: Path) -> Any:
-    path = path.resolve()
-    if not path.is_file():
-        raise ParameterError(f"there is no file '{path}'")
-    name = f"{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
-    if name not in sys.modules:
-        spec: Any = importlib.util.spec_from_file_location(name, path)
-        module = sys.modules[name] = importlib.util.module_from_spec(spec)
-        try:
-            spec.loader.exec_module(module)
-        except BaseException:
-            del sys.modules[name]
-            raise
-        cloudpickle.register_pickle_by_value(module)  # worker processes cannot import it
-    return sys.modules[name]
 
 
 def _from_module(name: str) -> Any:
@@ -172,6 +176,9 @@ def option(value: Any, folder: Path) -> Any:
             'a block is { block = "DeadZone", b_r = 0.6 } or { function = "file.py:name", ... }, '
             f"got the keys {sorted(value)}"
         )
+    for key in ("block", "function"):
+        if key in value and not isinstance(value[key], str):
+            raise ParameterError(f"{key} needs a text, got {value[key]!r}"[:200])
     arguments = {key: option(part, folder) for key, part in value.items()}
     name = arguments.pop("block", None)
     made = (
@@ -181,7 +188,27 @@ def option(value: Any, folder: Path) -> Any:
     )
     for key in arguments:
         check_keyword(made, key)
+    check_complete(made, str(value.get("function", name)), arguments)
     return made(**arguments)
+
+
+def check_complete(function: Callable[..., Any], name: str, given: Mapping[str, Any]) -> None:
+    """Refuse to call a function without what it needs.
+
+    Raises
+    ------
+    ParameterError
+        With the keywords that are missing.
+    """
+    try:
+        needed = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):  # none that Python knows
+        return
+    fixed = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    open_ = [p for p in needed if p.default is p.empty and p.kind not in fixed]
+    missing = [parameter.name for parameter in open_ if parameter.name not in given]
+    if missing:
+        raise ParameterError(f"'{name}' needs {', '.join(missing)} as well")
 
 
 def uncertain(name: str, law: Law) -> Uncertain:

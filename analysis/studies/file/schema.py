@@ -105,7 +105,7 @@ class Measured(Strict):
 class SolverTable(Strict):
     """How runs are integrated."""
 
-    rtol: Number = Field(1e-6, gt=0, description="Relative tolerance.")
+    rtol: Number = Field(1e-6, gt=0, lt=1, description="Relative tolerance.")
     atol: Number = Field(1e-8, gt=0, description="Absolute tolerance.")
     max_steps: Whole = Field(
         1_000_000, ge=1, le=10**15, description="A run that needs more has failed."

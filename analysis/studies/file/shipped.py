@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from nlctl.annotations import as_annotated
 from nlctl.names import unknown
 
 __all__ = ["shipped"]
@@ -12,6 +13,7 @@ __all__ = ["shipped"]
 FOLDERS = (Path(__file__).parents[3] / "reports", Path(__file__).parents[1] / "reports")
 
 
+@as_annotated
 def shipped(name: str) -> Path:
     """Return the study file of this name, such as ``"example-1-quick"``.
 

@@ -7,15 +7,34 @@ import tomllib
 from collections.abc import Iterator
 from typing import Any
 
-__all__ = ["check_depth", "read_toml", "statements"]
+__all__ = ["check_depth", "read_toml", "statements", "study_text"]
 
 _LARGEST = 200_000  # characters of a file
 _LONGEST = 8_000  # characters of a line; a key takes the square of its dots to be read
 DEEPEST = 20  # tables and lists inside of each other
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e]")
 _TOKEN = re.compile(
     r'"""(?:[^\\]|\\.)*?"""|\'\'\'.*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*|[\[\]{}\n]',
     re.DOTALL,
 )
+
+
+def study_text(content: bytes) -> str:
+    """Return the text in a file.
+
+    Raises
+    ------
+    ValueError
+        If it is not UTF-8; the message is one sentence, with the place.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise ValueError(
+            f"is not UTF-8, as TOML is: byte 0x{content[error.start]:02x} in line {line}; save it "
+            "as UTF-8"
+        ) from None
 
 
 def read_toml(text: str) -> dict[str, Any]:
@@ -46,7 +65,30 @@ def read_toml(text: str) -> dict[str, Any]:
     except ValueError:  # of int()
         raise ValueError("has an integer of thousands of digits") from None
     check_depth(data)
+    _check_printable(data, "")
     return data
+
+
+def _check_printable(value: Any, place: str) -> None:
+    """Refuse control characters, which a terminal would obey.
+
+    Raises
+    ------
+    ValueError
+        With the place.
+    """
+    if isinstance(value, dict):
+        for key, part in value.items():
+            _check_printable(str(key), f"{place}.{key}" if place else str(key))
+            _check_printable(part, f"{place}.{key}" if place else str(key))
+    elif isinstance(value, list):
+        for part in value:
+            _check_printable(part, place)
+    elif isinstance(value, str) and (found := _CONTROL.search(value)):
+        raise ValueError(
+            f"has a control character, U+{ord(found[0]):04X}, in {place!a}: texts have lines, tabs "
+            "and characters that can be printed"
+        )
 
 
 def check_depth(data: Any) -> None:

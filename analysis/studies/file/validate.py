@@ -37,7 +37,7 @@ from ..build import (
 )
 from ..kind import Asked, Setup
 from .errors import KeyPath, Problem
-from .resolve import loop_function, option, uncertain
+from .resolve import check_complete, loop_function, option, uncertain
 from .schema import RESERVED, Faulty, Study
 
 __all__ = ["checked_experiment"]
@@ -215,8 +215,9 @@ def _diagram(build: Callable[[], Any], name: str) -> ct.InputOutputSystem:
     Raises
     ------
     ParameterError
-        If it returns something else.
+        If it returns something else, or needs what it is not given.
     """
+    check_complete(build, name, {})
     made = build()
     if not is_system(made):
         raise ParameterError(f"'{name}' returns {type(made).__name__}, and not a diagram")

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 
 import tomli_w
 
+from nlctl.annotations import as_annotated
+
 from ..kind import Kind
 from .own_kinds import model_of
 from .schema import Study
@@ -14,6 +16,7 @@ from .toml import read_toml
 __all__ = ["from_toml", "to_toml"]
 
 
+@as_annotated
 def to_toml(study: Study) -> str:
     """Return the text of a study file with this study; what is left to defaults is left out.
 
@@ -42,6 +45,7 @@ def to_toml(study: Study) -> str:
     return tomli_w.dumps(study.model_dump(mode="json", exclude_unset=True, exclude_none=True))
 
 
+@as_annotated
 def from_toml(text: str, own: Mapping[str, Kind] | None = None) -> Study:
     """Return the study in a text that `to_toml` has written.
 

@@ -21,6 +21,7 @@ from analysis.robustness import (
     prepare,
 )
 from analysis.robustness.statistics.comparison import Comparison, compare, crossed
+from analysis.robustness.statistics.paired import TRUSTED_ROWS
 from analysis.robustness.statistics.verdict import better_verdict
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
@@ -58,8 +59,11 @@ MCNEMAR = (
 )
 _DIFFERENCES = (
     "Paired differences a − b with intervals, confidence {confidence:g} % each: of the median, "
-    "exact, and of the mean, by bootstrap (NaN where a run did not end). p: sign test; Holm: "
-    "adjusted for the pairs of a metric."
+    "exact whatever the law, and of the mean, by bootstrap, which is approximate (NaN where a run "
+    "did not end). Mean trusted: no, where the rows are fewer than {rows}, or skew, or one of them "
+    "weighs a tenth: the interval of the mean then may have far less than its confidence, and that "
+    "of the median is the one to read. What happens in fewer than about 3 of {size} runs is in no "
+    "interval of a mean. p: sign test; Holm: adjusted for the pairs of a metric."
 )
 FIRST = " Shown are the pairs with {first}; {file} in the run's folder has all."
 MEDIANS = (
@@ -291,7 +295,10 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield from _medians(t["differences"], result.metrics["unit"].to_dict(), key)
     columns = {c: c.replace("_", " ") for c in t["differences"].columns} | {"p_holm": "p (Holm)"}
     pairs, only = _with_first(t["differences"], f"{finding.key}/differences.parquet")
-    yield result_table(pairs, _DIFFERENCES.format(confidence=confidence) + only, columns)
+    if "mean_trusted" in pairs:
+        pairs = pairs.assign(mean_trusted=np.where(pairs["mean_trusted"], "yes", "no"))
+    words = _DIFFERENCES.format(confidence=confidence, rows=TRUSTED_ROWS, size=asked.runs)
+    yield result_table(pairs, words + only, columns)
     columns = {c: c.replace("_", " ") for c in t["violations"].columns} | {"p_holm": "p (Holm)"}
     pairs, only = _with_first(t["violations"], f"{finding.key}/violations.parquet")
     yield result_table(pairs, MCNEMAR + only, columns)
@@ -340,7 +347,8 @@ COMPARE = Kind(
     method=(
         "Controllers are compared on the same samples: violations by McNemar's test, exact (1947), "
         "medians of paired differences by exact intervals and the sign test, means by bootstrap "
-        "(Efron 1987); p-values are adjusted for the number of pairs (Holm 1979)."
+        "(Efron 1987), which is approximate and marked where it is not to be trusted; p-values are "
+        "adjusted for the number of pairs (Holm 1979)."
     ),
     sources=(
         MCNEMAR_1947,

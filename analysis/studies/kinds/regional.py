@@ -35,6 +35,12 @@ SPEAR = (
 )
 
 
+FREEMAN = (
+    "G. H. Freeman, J. H. Halton: Note on an exact treatment of contingency, goodness of fit and "
+    "other problems of significance. Biometrika 38 (1951) 141–149. doi 10.1093/biomet/38.1-2.141."
+)
+
+
 class Regional(Asked):
     """How far values in failing rows differ from those in passing ones."""
 
@@ -87,11 +93,13 @@ REGIONAL = Kind(
     answers="how failing rows differ from passing ones",
     method=(
         "Regional sensitivity compares the values in failing and in passing runs (Spear and "
-        "Hornberger 1980) by the test of Kolmogorov and Smirnov, choices by chi-square; p-values "
-        "are adjusted for their number (Holm 1979)."
+        "Hornberger 1980) by the test of Kolmogorov and Smirnov, choices by chi-square, exact over "
+        "all tables with the same sums (Freeman and Halton 1951) or over draws of them where "
+        "counts are small; p-values are adjusted for their number (Holm 1979)."
     ),
     sources=(
         SPEAR,
+        FREEMAN,
         HOLM,
     ),
     needs_rows=True,

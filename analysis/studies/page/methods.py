@@ -27,7 +27,7 @@ def methods(result: Result, published: Published | None = None) -> tuple[list[st
         f"python-control diagram (rtol {study.solver.rtol:g}, atol {study.solver.atol:g}), sampled "
         f"every {study.time.step:g} s. Margins follow the quantitative semantics of signal "
         "temporal logic (Donzé and Maler 2010), with the peaks between samples taken from "
-        "parabolas."
+        "curves where the samples show that the signal is smooth."
     )
     if result.rows is not None and study.runs is not None:
         first += (

@@ -9,7 +9,7 @@ from nlctl.errors import UsageError
 from ...robustness import Prepared
 from ..result import Result
 from ..run import reopened
-from ..sealed import RunFolderError
+from ..sealed import RunFolderError, as_written
 from .histories import Histories, histories
 
 __all__ = ["loop_again", "rows_again"]
@@ -52,10 +52,11 @@ def rows_again(
     """Simulate some rows of the main table again; None without rows or loop."""
     if prepared is None or result.rows is None or not result.rows.done:
         return None
-    told = [
-        look(f)
-        for f in result.findings
-        if (look := result.asked[f.key].definition.witness) is not None and f.is_answered
-    ]
+    with as_written(f"'{result.folder}'"):
+        told = [
+            look(f)
+            for f in result.findings
+            if (look := result.asked[f.key].definition.witness) is not None and f.is_answered
+        ]
     witness = min(told, key=lambda pair: pair[1], default=None)
     return histories(prepared, result.rows.table, witness, threads=threads)

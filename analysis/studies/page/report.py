@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Any
 from ...report.document import Figure, Item, Paragraph, Report, Section, Table, versions
 from ...report.outline import summary
 from ...report.render import file_hashes
+from ..file.own_kinds import STAND_IN
 from ..kind import Varied
 from ..kinds import KINDS
+from ..result import LISTED
+from ..sealed import as_written
 from . import methods as how
 from . import text as text
 from .claims import claims, verdict
@@ -27,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["study_part", "study_report", "study_sections"]
 
-_LISTED = 400  # lines of a table that report.json holds as well; longer ones are files beside it
 OUTCOMES = {  # by the light
     "pass": "shown",
     "caution": "not shown yet",
@@ -57,7 +59,27 @@ def study_report(
         What was simulated; without it there is no diagram.
     published : Published, optional
         Where the loop was published.
+
+    Raises
+    ------
+    RunFolderError
+        If the folder holds findings that no analysis of nlctl writes.
     """
+    if any(":" in a.kind and a.definition.name != STAND_IN for a in result.study.analysis):
+        return _composed(
+            result, kept, command, loop, published
+        )  # errors of theirs are told as such
+    with as_written(f"'{result.folder}'"):
+        return _composed(result, kept, command, loop, published)
+
+
+def _composed(
+    result: Result,
+    kept: Histories | None,
+    command: str,
+    loop: StudyLoop | None,
+    published: Published | None,
+) -> Report:
     paragraphs, sources = how.methods(result, published)
     return Report(
         title=result.study.study.title,
@@ -292,7 +314,7 @@ def numbers(result: Result) -> dict[str, Any]:
         finding.key: {
             name: table.reset_index().to_dict("records")
             for name, table in sorted(finding.tables.items())
-            if len(table) <= _LISTED
+            if len(table) <= LISTED
         }
         for finding in result.findings
     }

@@ -6,6 +6,7 @@ from typing import Any
 
 import control as ct
 
+from ...annotations import as_annotated
 from ...diagrams import as_system, interconnect
 from ...plants import coordinate_names
 from ..mrac import ModelReferenceLaw
@@ -15,6 +16,7 @@ from .dynamic_surface import DynamicSurface
 __all__ = ["dynamic_surface_control"]
 
 
+@as_annotated
 def dynamic_surface_control(
     surface: DynamicSurface | None = None,
     *,

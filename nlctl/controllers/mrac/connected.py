@@ -7,6 +7,7 @@ from typing import Any
 
 import control as ct
 
+from ...annotations import as_annotated
 from ...diagrams import as_system, interconnect
 from ...errors import ParameterError
 from ...plants import coordinate_names
@@ -19,6 +20,7 @@ from .regressors import LinearRegressor
 __all__ = ["mrac"]
 
 
+@as_annotated
 def mrac(
     model: ReferenceModel | None = None,
     *,

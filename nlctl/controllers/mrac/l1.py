@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ...annotations import as_annotated
 from ...diagrams import as_system, interconnect
 from ...equations import equation
 from ...errors import ParameterError
@@ -116,6 +117,7 @@ class FilteredLaw:
         return (x[0],)
 
 
+@as_annotated
 def l1_adaptive(
     predictor: StatePredictor | None = None,
     *,

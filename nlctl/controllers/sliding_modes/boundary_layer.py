@@ -6,6 +6,7 @@ from typing import Any
 
 import control as ct
 
+from ...annotations import as_annotated
 from ...diagrams import as_system, interconnect
 from ...equations import equation
 from ...functions import clip
@@ -56,6 +57,7 @@ class SlidingModeLaw:
         return r + p.phi, r - p.phi
 
 
+@as_annotated
 def sliding_mode(
     filtered_error: Any = None, law: Any = None, *, name: str = "controller"
 ) -> ct.InterconnectedSystem:

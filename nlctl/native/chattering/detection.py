@@ -6,7 +6,14 @@ tell that from stiffness and from fast oscillations:
 
 * by what it moves in a mean step, a state changes by no more than some tolerances;
 * of the last steps tried many contain a jump, of the right-hand side or of what a memory becomes;
-* halving the way across, down to neighbouring numbers, does not make it smaller.
+* halving the way across, down to neighbouring numbers, does not make it smaller, and next to it on
+  both sides there is none, as there is with rounding;
+* it depends on the state: a run does not come back to what jumps with time alone.
+
+A step that got to where it had to end, at a sample of the inputs, a clock or a break of a delay,
+is as long as it could be, and no sign of anything: a run at rest is all such steps.
+
+Switches that come ever closer together are another thing, see `accumulation`.
 
 It is looked for in windows of so many steps that a usual run has none, and rarely in a run that
 goes on as it began.  What is found of a member never depends on the members beside it.
@@ -14,17 +21,21 @@ goes on as it began.  What is found of a member never depends on the members bes
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..integrate.state import RUNNING
+from ..integrate.workspace import TAYLOR
+from .accumulation import accumulating
+from .steps import Attempt, Jump, LaneEquations, parameters_of
 
-__all__ = ["PROBE", "Attempt", "Jump", "asked", "jump_of", "new_paces", "snapshot"]
+__all__ = ["Attempt", "Jump", "asked", "jump_of", "new_paces", "probe_of", "snapshot"]
 
 PROBE = 200  # steps tried that are looked at, at the end of a window
+_PROBES = 5  # as many of Taylor's method: it has few steps, and tries a hundred for a switch
 _JUMPS = 10  # of them with a jump
 _WITHIN = 100.0  # tolerances that a state moves in a mean step
 _SLOW = 0.1  # part of the longest window
@@ -32,52 +43,10 @@ _LONG = 8  # windows after which a run is looked at that has not become slow
 _LEAST = 0.1  # part of the range of the right-hand side that counts as a jump
 _REMAINS = 0.4  # part of it that is still there between neighbours; sign has a half at 0
 _HALVINGS = 200
+_FLAT = 0.25  # part of it by which what does not jump may change
+_BESIDE = 2.0 ** np.arange(4, 22)  # distances between neighbours, any four in a row of which do
+_WAYS = np.random.default_rng(1).choice([-1.0, 1.0], (4, 1000))  # signs, to move a state by
 _PACES = np.dtype([("t", "f8"), ("longest", "f8"), ("windows", "i8"), ("slow", "i8")])
-
-
-@dataclass(frozen=True, kw_only=True)
-class Jump:
-    """A jump at which a run chatters.
-
-    Attributes
-    ----------
-    times : tuple of float
-        On both sides of the jump (s); the same, or neighbouring ones.
-    before, after : ndarray of shape (nstates,)
-        Neighbouring states on both sides.
-    inputs : ndarray
-        Inputs of the program there.
-    """
-
-    times: tuple[float, float]
-    before: np.ndarray
-    after: np.ndarray
-    inputs: np.ndarray
-
-    @property
-    def time(self) -> float:
-        """Time of the jump (s)."""
-        return self.times[1]
-
-    def sides(self, wider: float = 0.0) -> list[tuple[float, np.ndarray, np.ndarray]]:
-        """Return times, states and inputs on both sides, further apart by so many distances."""
-        (t, t_2), (x, x_2) = self.times, (self.before, self.after)
-        apart, later = wider * (x_2 - x), wider * (t_2 - t)
-        return [(t - later, x - apart, self.inputs), (t_2 + later, x_2 + apart, self.inputs)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Attempt:
-    """One step tried in every lane, as it was before and after; arrays as in `workspace`."""
-
-    t: np.ndarray
-    x: np.ndarray
-    first: np.ndarray
-    x_new: np.ndarray
-    h: np.ndarray
-    k: np.ndarray
-    u: np.ndarray
-    stiff: bool
 
 
 def new_paces(lanes: np.ndarray) -> np.ndarray:
@@ -104,21 +73,38 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     )
 
 
+def probe_of(task: Any) -> int:
+    """Return how many steps are looked at, at the end of a window of a run."""
+    return PROBE * (_PROBES if task.method == TAYLOR else 1)
+
+
 def snapshot(work: Any, advance: Callable[[], Any]) -> tuple[Any, Attempt]:
     """Try one step; return what `advance` returns, and the step."""
     t, x, first = work.lanes["t"].copy(), work.x.copy(), work.k[0].copy()
     run = advance()
     w = run.work
     lanes = w.t.size
+    moved = w.lanes["t"] > t
     return run, Attempt(
         t=t, x=x, first=first, x_new=w.x_new.copy(), h=w.hh[:lanes].copy(), k=w.k.copy(),
-        u=w.u.copy(), stiff=bool(w.lanes["stiff"][0]),
+        u=w.u.copy(), stiff=bool(w.lanes["stiff"][0]), free=~(moved & (w.lanes["ends"] != 0)),
     )  # fmt: skip
 
 
 def jump_of(run: Any, attempts: list[Attempt], j: int) -> Jump | None:
     """Return the last jump in the steps that lane `j` has tried, if it chatters there."""
+    c = parameters_of(run, j)
+    return _stayed_at(run, attempts[-PROBE:], j, c) or accumulating(
+        LaneEquations(run=run, j=j, c=c), attempts
+    )
+
+
+def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump | None:
+    """Return the last jump in the steps of a lane, if they do not come away from it."""
     task = run.task
+    free = [a for a in reversed(attempts) if a.free[j]]
+    if len(free) < _JUMPS:
+        return None
     slopes = np.concatenate([a.k[:, :, j] for a in attempts])
     slopes = slopes[np.isfinite(slopes).all(axis=1)]
     states = np.array([a.x[:, j] for a in attempts])
@@ -129,14 +115,13 @@ def jump_of(run: Any, attempts: list[Attempt], j: int) -> Jump | None:
     step = (run.lanes["t"][j] - attempts[0].t[j]) / len(attempts)
     if not np.all(step * extent <= _WITHIN * scale):
         return None
-    c = np.ascontiguousarray(np.repeat(task.p[:, j : j + 1], run.machine.width, axis=1))
-    evaluated = _Evaluated(run=run, j=j, c=c)
+    evaluated = _Places(run=run, j=j, c=c)
     weights = np.zeros(extent.size + task.memory.size)
     weights[: extent.size] = 1.0 / scale
     weights[extent.size :] = 1.0 / (task.atol + task.rtol)  # memories jump by what they are
     least = np.append(_LEAST * extent, np.full(task.memory.size, 1e3 * (task.atol + task.rtol)))
     found, last = 0, None
-    for attempt in reversed(attempts):
+    for attempt in free:
         jump = evaluated.jump(attempt, weights, least)
         found, last = found + (jump is not None), last or jump
         if found == _JUMPS:
@@ -145,35 +130,8 @@ def jump_of(run: Any, attempts: list[Attempt], j: int) -> Jump | None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Evaluated:
-    """The right-hand side of one lane, with what its memories would become behind it."""
-
-    run: Any
-    j: int
-    c: np.ndarray  # its parameters, in every lane
-
-    def __call__(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        width, task = self.run.machine.width, self.run.task
-        tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), width, axis=1) for v in (t, x, u))
-        dx, g = np.empty_like(xx), np.empty((self.run.work.g.shape[0], width))
-        self.run.machine.rhs(tt[0].copy(), xx, uu, self.c, dx, g)
-        dx[task.memory] = 0.0
-        return np.concatenate([dx[:, 0], g[task.switching :, 0]])
-
-    def points(self, attempt: Attempt) -> Iterator[tuple[float, np.ndarray]]:
-        """Yield where a step has been: at its ends and, of an explicit pair, at its stages."""
-        j, h = self.j, attempt.h[self.j]
-        t, x, A, C = attempt.t[j], attempt.x[:, j], self.run.task.A, self.run.task.C
-        yield t, x
-        if attempt.stiff:
-            yield t, attempt.x_new[:, j]
-            return
-        if self.run.task.highest:
-            yield t + h, attempt.x_new[:, j]
-            return
-        slopes = np.vstack([attempt.first[None, :, j], attempt.k[1:, :, j]])
-        for s in range(1, C.size):
-            yield t + C[s] * h, x + h * (A[s, :s] @ slopes[:s])
+class _Places(LaneEquations):
+    """Where one lane has been, and what jumps there."""
 
     def jump(self, attempt: Attempt, weights: np.ndarray, least: np.ndarray) -> Jump | None:
         """Return a jump inside of a step, if there is one."""
@@ -186,9 +144,11 @@ class _Evaluated:
             return None
         i = int(np.argmax(change))
         low, high = places[int(values[:, i].argmin())], places[int(values[:, i].argmax())]
-        return self._narrowed(low, high, u, i)
+        return self._narrowed(low, high, u, i, weights)
 
-    def _narrowed(self, low: Any, high: Any, u: np.ndarray, i: int) -> Jump | None:
+    def _narrowed(
+        self, low: Any, high: Any, u: np.ndarray, i: int, weights: np.ndarray
+    ) -> Jump | None:
         """Halve the way from one place to another; return where component `i` jumps, if it does."""
         first, last = self(low[0], low[1], u)[i], self(high[0], high[1], u)[i]
         whole = abs(last - first)
@@ -206,4 +166,39 @@ class _Evaluated:
         # the jump itself may have a value of its own, as sign(0) has: beside it on both sides
         wider = Jump(times=(low[0], high[0]), before=low[1], after=high[1], inputs=u).sides(1.0)
         (t, before, _), (t_2, after, _) = wider
-        return Jump(times=(float(t), float(t_2)), before=before, after=after, inputs=u)
+        jump = Jump(times=(float(t), float(t_2)), before=before, after=after, inputs=u)
+        away = 1.0 / weights[: jump.before.size]
+        found = self._stands_out(jump, i) and self._depends_on_state(jump, i, away)
+        return jump if found else None
+
+    def _stands_out(self, jump: Jump, i: int) -> bool:
+        """Whether component `i` jumps by more than it changes next to the jump.
+
+        What changes by rounding does so everywhere, and what is smooth changes by more over a
+        longer way.
+        """
+        with np.errstate(all="ignore"):
+            points = [jump.sides(wider) for wider in _BESIDE]
+            below, above = (
+                np.array([self(t, x, u)[i] for t, x, u in side])
+                for side in zip(*points, strict=True)
+            )
+        for k in range(_BESIDE.size - 3):
+            low, high = below[k : k + 4], above[k : k + 4]
+            whole = abs(high[0] - low[0])
+            if max(np.ptp(low), np.ptp(high)) <= _FLAT * whole and whole > 0.0:
+                return True
+        return False
+
+    def _depends_on_state(self, jump: Jump, i: int, away: np.ndarray) -> bool:
+        """Whether states within the tolerance `away` are on the other side at the same time."""
+        if jump.times[0] == jump.times[1]:
+            return True
+        sides = jump.sides()
+        least = _FLAT * abs(np.subtract(*(self(t, x, u)[i] for t, x, u in sides)))
+        moves = np.resize(_WAYS, (len(_WAYS), away.size)) * away
+        for t, x, u in sides:
+            there = [self(t, x + move, u)[i] for move in (*moves, *-moves)]
+            if not np.all(np.abs(np.subtract(there, self(t, x, u)[i])) <= least):
+                return True
+        return False

@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from ...upstream.control_internals import rates_now, set_parameters
+from ...diagrams import apart, override
+from ...upstream.control_internals import rates_now
 from ..audit import block_outputs
 from ..codegen.program import count_switching_functions, memory
 from ..compiled import Compiled
 from ..diagram.block_inputs import block_inputs
+from ..happened import row_labels
 from ..sliding.reading import relay_places
-from .detection import Jump
+from .steps import Crowd, Jump
 
 __all__ = ["chattering_words"]
 
@@ -23,6 +25,12 @@ _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in 
 _WIDER = (0.0, *(4.0**k for k in range(14)))  # in distances between neighbouring states
 _JUMPS = 1e3  # change of an output over that of inputs and states, which no usual function has
 _ROUNDING = 1e-9  # of a value: what is not a jump
+_FINITE = 0.99  # of two periods: a sum that is not far away
+_SECOND_ORDER = (
+    "what switches does not reach the rate of what is compared, and cannot hold it at 0 (second-"
+    "order sliding): give it hysteresis (nlctl.Relay), smooth it over a small width, make a sign "
+    "an nlctl.IdealRelay with a larger rest_rate, or let the run end before"
+)
 _SMALL = 1e-300  # what is divided by where nothing else has changed
 
 
@@ -42,6 +50,10 @@ def chattering_words(
         Where the run chatters.
     """
     relays = relay_places(compiled.schedule.nodes)
+    if jump.crowd is not None:
+        return _accumulation(compiled, jump, jump.crowd)
+    if relays and _keeps_on_switching(compiled, p, jump):
+        return f"{_committed(compiled, p, jump)}: its switches accumulate; {_SECOND_ORDER}"
     advice = (
         "the run comes back to it with each of the shortest steps: smooth the jump over a small "
         "width, give it hysteresis, or sample the controller (nlctl.sampled)"
@@ -51,15 +63,41 @@ def chattering_words(
     return f"{found}; {advice}"
 
 
+def _accumulation(compiled: Compiled, jump: Jump, crowd: Crowd) -> str:
+    """Return whose switches come ever closer together, and how."""
+    labels = row_labels(compiled, compiled.lowered.conditions)
+    block, which = labels[crowd.row] if crowd.row < len(labels) else ("", "a condition")
+    whose = f"block '{block}' ({which})" if block else which
+    end = jump.time + 0.5 * crowd.period * crowd.ratio**0.5 / (1 - crowd.ratio**0.5)
+    left = f"{crowd.more:.2g}" if np.isfinite(crowd.more) else "no end of them"
+    where = f"near t = {end:.6g} s" if crowd.ratio < _FINITE else "ever faster"
+    return (
+        f"the switches of {whose} accumulate {where}: two of them in {crowd.period:.3g} s at "
+        f"t = {jump.time:.6g} s, {left} to come, and what is compared is within tolerances of 0; "
+        f"{_SECOND_ORDER}"
+    )
+
+
+def _keeps_on_switching(compiled: Compiled, p: np.ndarray, jump: Jump) -> bool:
+    """Whether what jumps is the mode of an ideal relay."""
+    nodes, program = compiled.schedule.nodes, compiled.program
+    sides = [_events(compiled, p, side) for side in jump.sides()]
+    changes = np.abs(sides[1] - sides[0])[-len(program.memory) or sides[0].size :]
+    if not changes.size or not changes.max() > 1e-3:
+        return False
+    m = program.memory[int(changes.argmax())]
+    return any(m in memory(nodes[i]) for i in relay_places(nodes))
+
+
 def _committed(compiled: Compiled, p: np.ndarray, jump: Jump) -> str:
     """Return which memory switches, if one does and that is what jumps."""
     program, nodes = compiled.program, compiled.schedule.nodes
     sides = [_events(compiled, p, side) for side in jump.sides()]
-    changes = np.abs(sides[1] - sides[0])[program.switching :]
+    changes = np.abs(sides[1] - sides[0])[-len(program.memory) or sides[0].size :]
     if not changes.size or not changes.max() > 1e-3:
         return ""
     m = program.memory[int(changes.argmax())]
-    place = program.switching + int(changes.argmax())
+    place = sides[0].size - changes.size + int(changes.argmax())
     node = next(node for node in nodes if m in memory(node))
     label = node.system.state_labels[m - node.state_offset]
     return _between(label, node.path, sides[0][place], sides[1][place])
@@ -68,7 +106,7 @@ def _committed(compiled: Compiled, p: np.ndarray, jump: Jump) -> str:
 def _events(compiled: Compiled, p: np.ndarray, side: Any) -> np.ndarray:
     """Return switching functions, and what memories would become."""
     rhs, _ = compiled.native
-    g = np.zeros(compiled.program.events)
+    g = np.zeros(compiled.lowered.rows["g"])
     t, x, u = side
     rhs(t, x.copy(), u.copy(), p, np.empty(x.size), g)
     return g
@@ -79,10 +117,10 @@ def _changed(
 ) -> str:
     """Return the block whose values change most for what changes at its inputs and states."""
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
-        if compiled.system.nstates:
-            set_parameters(compiled.system, dict(params) if params else None)
+        system = apart(compiled.schedule.system).system
+        override(system, params)
         for wider in _WIDER:  # it rounds otherwise than machine code
-            before, after = (list(_blocks(compiled, p, side)) for side in jump.sides(wider))
+            before, after = (list(_blocks(compiled, system, p, side)) for side in jump.sides(wider))
             found = _sharpest(compiled, p, jump, before, after)
             if found:
                 return found
@@ -109,7 +147,7 @@ def _sharpest(compiled: Compiled, p: np.ndarray, jump: Jump, before: list, after
 
 
 def _blocks(
-    compiled: Compiled, p: np.ndarray, point: Any
+    compiled: Compiled, system: Any, p: np.ndarray, point: Any
 ) -> Iterator[tuple[np.ndarray, list[str], np.ndarray]]:
     """Yield for each block what it is given, and its outputs and rates with their names."""
     t, x, u = point
@@ -117,7 +155,7 @@ def _blocks(
     y = block_outputs(compiled, p, point)
     counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
     outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
-    given = block_inputs(compiled.system, u[: compiled.system.ninputs or 0], outputs)
+    given = block_inputs(system, u[: system.ninputs or 0], outputs)
     for i, (node, (block, inputs)) in enumerate(zip(nodes, given, strict=True)):
         own = x[node.state_offset :][: block.nstates or 0]
         values, labels = [np.asarray(outputs[i], dtype=float)], list(block.output_labels)

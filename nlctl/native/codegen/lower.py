@@ -8,7 +8,7 @@ generator makes machine code of the plan (`codegen.ir`), and one interpreter car
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,8 +17,10 @@ import numpy as np
 from ...expressions.arrays import Tracer
 from ...expressions.graph import Expr, needed
 from ..diagram.schedule import Schedule
+from ..equations.blocks import Equations, equations
+from ..equations.located import Conditions
 from ..parameters import length
-from .blocks import Equations, equations
+from ..timed.ahead import read_parameters
 from .calls import Call
 from .ir.program import program_text
 from .plan import Function, Store, plan_function, split
@@ -28,7 +30,7 @@ from .solver import Solver
 
 PREPARE = {"prepare": ("p", "c")}
 EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g"), "out": ("t", "x", "u", "c", "y")}
-SAMPLE = ("t", "x", "u", "c", "s")  # of those of sampled blocks
+SAMPLE = ("t", "x", "u", "c", "s")  # of those of sampled blocks, and of resets
 POINT, DIRECTION = "point", "v"
 ALONG = {POINT: ("t", "x", "u", "c"), "along": ("t", "x", "u", "c", DIRECTION, "dx")}
 
@@ -57,6 +59,8 @@ class Lowered:
         Rows of every array.
     lanes : int
         Number of members.
+    conditions : Conditions
+        What it switches at.
     assumed : mapping
         Integer parameters that steer what is computed: for places in `p` the values for which the
         program holds.
@@ -69,6 +73,7 @@ class Lowered:
     rows: Mapping[str, int]
     lanes: int
     assumed: Mapping[int, int]
+    conditions: Conditions = field(default_factory=Conditions)
 
     @property
     def size(self) -> int:
@@ -78,6 +83,16 @@ class Lowered:
     def shape(self, array: str) -> tuple[int, ...]:
         """Return the shape of one of its arrays."""
         return (self.lanes,) if array == "t" else (self.rows[array], self.lanes)
+
+    @cached_property
+    def known_ahead(self) -> dict[Any, Any]:
+        """What has been found of its functions of time alone, see `nlctl.native.timed`."""
+        return {}
+
+    @cached_property
+    def read_ahead(self) -> np.ndarray:
+        """Places of the parameters that these depend on."""
+        return read_parameters(self.conditions)
 
     @property
     def opaque(self) -> dict[str, str]:
@@ -118,6 +133,7 @@ def lower(
     stores = stores_of(found, found.results)
     wanted = {"rhs": [*stores["dx"], *stores["g"]], "out": stores["y"]}
     samples = {name: SAMPLE for name in stores if name.startswith("sample")}
+    samples |= {name: SAMPLE for name in stores if name == "reset"}
     wanted |= {name: stores[name] for name in samples}
     return _lowered(schedule, program, found, EVALUATE | samples, wanted, lanes)
 
@@ -169,12 +185,13 @@ def _lowered(
     functions, size = planned(stores, arguments, parameters)
     n, m = schedule.system.nstates or 0, schedule.ninputs
     rows = {
-        "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n, "g": program.events,
-        "y": len(schedule.outputs), "v": n + m + 1, "s": len(program.sampled),
+        "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n,
+        "g": program.events + found.conditions.rows,
+        "y": len(schedule.outputs), "v": n + m + 1, "s": max(len(program.sampled), program.resets),
     }  # fmt: skip
     return Lowered(
         functions=functions, exact=exact, calls=found.calls, solvers=found.solvers, rows=rows,
-        lanes=lanes, assumed=found.graph.assumptions,
+        lanes=lanes, assumed=found.graph.assumptions, conditions=found.conditions,
     )  # fmt: skip
 
 
@@ -220,7 +237,7 @@ def planned(
 
 def _array(results: str) -> str:
     """Return the array that results are written to."""
-    return "s" if results.startswith("sample") else results
+    return "s" if results.startswith(("sample", "reset")) else results
 
 
 def _stores(name: str, row: int, array: Tracer) -> list[Store]:

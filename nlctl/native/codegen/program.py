@@ -10,7 +10,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...blocks import Block, event_count, memory_states
+from ...blocks import Block, event_count, guard_count, memory_states
 from ...errors import BlockError, CompileError
 from ...expressions.arrays import Tracer
 from ...expressions.continuity import may_jump
@@ -19,6 +19,7 @@ from ...sampling.system import Happening, clocks_of
 from ...upstream.control_internals import StandIn
 from ..diagram.schedule import Node, Schedule
 from ..parameters import Slot, current_values, slots
+from ..thirdparty.captured import recorded
 
 _MOST = 40  # ways in which clocks meet
 
@@ -37,6 +38,10 @@ class Program:
         Number of switching functions.
     memory : tuple of int
         Indices of the memory states.
+    guards : tuple of int
+        Of each guard, in their order, the block that it belongs to.
+    jumping : tuple of tuple
+        Of each block with guards its number, and where its states begin and end.
     sampled : tuple of int
         Indices of the states of sampled blocks.
     clocks : mapping
@@ -47,6 +52,8 @@ class Program:
     fixed: Mapping[int, Mapping[str, Any]]
     switching: int
     memory: tuple[int, ...]
+    guards: tuple[int, ...] = ()
+    jumping: tuple[tuple[int, int, int], ...] = ()
     sampled: tuple[int, ...] = ()
     clocks: Mapping[Any, Clock] = field(default_factory=dict)
 
@@ -71,10 +78,15 @@ class Program:
 
     @property
     def events(self) -> int:
-        """Size of the array `g`: the switching functions of all blocks, then what the memory
-        states would be committed to.
+        """Size of the array `g` but for located conditions: the switching functions of all
+        blocks, their guards, then what the memory states would be committed to.
         """
-        return self.switching + len(self.memory)
+        return self.switching + len(self.guards) + len(self.memory)
+
+    @property
+    def resets(self) -> int:
+        """Number of states that resets return."""
+        return sum(end - begin for _, begin, end in self.jumping)
 
 
 def program(schedule: Schedule) -> Program:
@@ -89,7 +101,7 @@ def program(schedule: Schedule) -> Program:
         _check_kind(node)
     layout = slots(schedule.holders)
     fixed = {
-        i: {k: v for k, v in current_values(node.system).items() if k not in layout[i]}
+        i: {k: recorded(v) for k, v in current_values(node.system).items() if k not in layout[i]}
         for i, node in enumerate(schedule.holders)
     }
     return Program(
@@ -97,6 +109,12 @@ def program(schedule: Schedule) -> Program:
         fixed={i: values for i, values in fixed.items() if values},
         switching=sum(count_switching_functions(node) for node in schedule.nodes),
         memory=tuple(i for node in schedule.nodes for i in memory(node)),
+        guards=tuple(i for i, node in enumerate(schedule.nodes) for _ in range(count_guards(node))),
+        jumping=tuple(
+            (i, node.state_offset, node.state_offset + node.size)
+            for i, node in enumerate(schedule.nodes)
+            if count_guards(node)
+        ),
         sampled=tuple(
             node.state_offset + i
             for node in schedule.nodes
@@ -109,7 +127,8 @@ def program(schedule: Schedule) -> Program:
 def instants_of(
     schedule: Schedule, program: Program, times: np.ndarray, p: np.ndarray
 ) -> list[Instants]:
-    """Return when something happens to sampled blocks, for each column of `p`."""
+    """Return what is due to sampled blocks, for each column of `p`; at the last time, too."""
+    begin, behind_end = float(times[0]), float(np.nextafter(times[-1], np.inf))
     first = len(schedule.nodes)
     places = [(h.system, program.layout[first + k]) for k, h in enumerate(schedule.samplings)]
     known: dict[tuple[Clock, ...], Instants] = {}
@@ -118,7 +137,7 @@ def instants_of(
         clocks = {owner: _clock(slots, column) for owner, slots in places}
         key = tuple(clocks.values())
         if key not in known:
-            known[key] = instants(clocks, float(times[0]), float(times[-1]), program.meetings)
+            known[key] = instants(clocks, begin, behind_end, program.meetings)
         found.append(known[key])
     return found
 
@@ -133,6 +152,11 @@ def _clock(slots: Mapping[str, Slot], p: np.ndarray) -> Clock:
 def count_switching_functions(node: Node) -> int:
     """Return the number of switching functions that a block declares."""
     return event_count(node.system) if isinstance(node.system, Block) and not node.sampled else 0
+
+
+def count_guards(node: Node) -> int:
+    """Return the number of guards of a block."""
+    return guard_count(node.system) if isinstance(node.system, Block) and not node.sampled else 0
 
 
 def memory(node: Node) -> list[int]:

@@ -19,6 +19,7 @@ import numpy as np
 from ...blocks import is_delayed, slides, within
 from ...delays.lines import delayed_blocks
 from ...diagrams import places, samplings
+from ...responses.watched import Watched
 from ...sampling.system import Happening, Sampled
 from ...sliding.blocks import sliding_blocks
 from ..thirdparty.captured import Captured, noted
@@ -116,6 +117,10 @@ class Schedule:
         What the blocks' functions read from around them.
     samplings : tuple of Node
         What says how blocks are sampled: without signals, but with parameters.
+    watched : tuple of Watched
+        Functions of the run whose changes of sign are events.
+    overrides : mapping
+        Parameters that they get.
     """
 
     system: Any
@@ -126,6 +131,8 @@ class Schedule:
     loops: tuple[AlgebraicLoop, ...]
     captured: tuple[Captured, ...]
     samplings: tuple[Node, ...] = ()
+    watched: tuple[Watched, ...] = ()
+    overrides: Mapping[str, Any] = field(default_factory=dict)
     lines: tuple[Signal, ...] = ()
 
     @property

@@ -11,8 +11,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .control import choose_method, choose_step, next_step, rejected
+from .control import choose_method, choose_step, limit_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
+from .events.crossing import NOTHING, crossing
 from .events.excursions import look_between
 from .events.location import (
     AGAIN,
@@ -25,13 +26,15 @@ from .events.location import (
     step_accepted,
 )
 from .events.near_side import look_before
+from .log import OF_TIME, log_is_full, note
 from .methods import explicit, taylor
 from .methods.dense import solution_at
 from .methods.stiff import stiff_attempt
+from .resets import fall
 from .restart import memory_rates, restart
-from .samples import begin_afresh, next_stop, take_samples
-from .state import DERIVATIVES, INNER, RUNNING
-from .workspace import AUTO, UNKNOWN
+from .samples import begin_afresh, next_stop, pass_jumps, take_samples
+from .state import DERIVATIVES, ENDED, INNER, RUNNING
+from .workspace import AUTO, UNKNOWN, inputs_at
 
 
 @numba.njit(**INNER)
@@ -55,18 +58,26 @@ def _judge(task, lanes, w, found):
     for j in range(lanes.size):
         lane = lanes[j]
         found[j] = REFUSED
-        if lane.status != RUNNING or rejected(lane, w.error[j], task):
+        if lane.status != RUNNING:
+            continue
+        if task.switching > task.declared:
+            found[j] = crossing(task, lane, w, j)
+            if found[j] == AGAIN:
+                lane.rejected += 1
+            if found[j] == AGAIN or found[j] == REFUSED or (lane.across and found[j] != NOTHING):
+                continue
+        if rejected(lane, w.error[j], task):
+            found[j] = REFUSED
             continue
         found[j] = CLEAR
         is_behind = task.memory.size > 0 and jumped(task, lane, w, j)
         if is_behind or lane.seeks > 0:
             found[j] = locate_jump(lane, task.rtol, is_behind)
         elif w.e.shape[0]:
-            found[j] = locate(
-                lane, task.switching, task.rtol, w.e_start, w.e_low, w.e_high, w.e, w.behind, j
-            )
+            found[j] = locate(lane, task, w.e_start, w.e_low, w.e_high, w.e, w.behind, j)
         if found[j] == AGAIN:
             lane.rejected += 1
+            lane.cross = 0.0
 
 
 @numba.njit(**INNER)
@@ -87,7 +98,14 @@ def _accept(task, lanes, w, found, done, passed):
             _sample(lane, j, task, t_new, w)
         step_accepted(lane, event)
         lane.t = t_new
-        next_step(lane, w.error[j], w.rate[j], task)
+        if task.opaque:
+            lane.rests = _rests(task, w, j)
+        if lane.across:
+            lane.left_zero = _was_zero(task, w, j)
+            lane.across, lane.cross = 0, 0.0
+        else:
+            lane.left_zero = lane.left_zero and _was_zero(task, w, j)
+            next_step(lane, w.error[j], w.rate[j], task)
         if task.fixed == 0.0 and w.e.shape[0]:
             lane.h = min(lane.h, w.resolved[j])
         done[j] = True
@@ -99,6 +117,24 @@ def _accept(task, lanes, w, found, done, passed):
         if task.method == AUTO:
             choose_method(lane, task)
     return any_passed
+
+
+@numba.njit(**INNER)
+def _was_zero(task, w, j):
+    """Whether a step began where a condition was exactly 0."""
+    for i in range(task.declared, task.guarded):
+        if w.e_start[i, j] == 0.0:
+            return 1
+    return 0
+
+
+@numba.njit(**INNER)
+def _rests(task, w, j):
+    """Whether an accepted step has moved no state by more than its tolerance."""
+    for i in range(w.x.shape[0]):
+        if abs(w.x_new[i, j] - w.x[i, j]) > task.atol + task.rtol * abs(w.x[i, j]):
+            return 0
+    return 1
 
 
 @numba.njit(**INNER)
@@ -121,7 +157,7 @@ def _take(task, w, done):
         for i in range(x.shape[0]):
             x[i, j] = w.x_new[i, j]
             k[0, i, j] = k[last, i, j]
-        for i in range(switching):
+        for i in range(task.declared):
             w.behind[i, j] = w.e_start[i, j] * w.e[i, j] < 0.0
         for i in range(task.memory.size):
             m, become = task.memory[i], w.g[switching + i, j]
@@ -157,6 +193,19 @@ def _attempt(rhs, point, along, task, lanes, w):
         explicit.explicit_attempt(rhs, task, lanes, w)
 
 
+@numba.njit(**INNER)
+def _chosen(task, lanes, w):
+    """Choose the next steps; return in how many lanes there is one."""
+    running = 0
+    for j in range(lanes.size):
+        if lanes[j].status == RUNNING:
+            over = lanes[j].segment == task.times.size - 1
+            limit_step(task, lanes[j], j)
+            choose_step(lanes[j], next_stop(task, lanes[j], w, j), over, task.max_steps)
+            running += lanes[j].status == RUNNING
+    return running
+
+
 def advance(rhs, point, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
@@ -167,15 +216,9 @@ def advance(rhs, point, along, task, w, rounds):
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     sampled, found = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.int64)
     for _ in range(rounds):
-        running = 0
         if task.highest:
             taylor.expand(task, lanes, w)
-        for j in range(lanes.size):
-            if lanes[j].status == RUNNING:
-                over = lanes[j].segment == task.times.size - 1
-                choose_step(lanes[j], next_stop(task, lanes[j], w, j), over, task.max_steps)
-                running += lanes[j].status == RUNNING
-        if not running or is_full(task, lanes, w):
+        if not _chosen(task, lanes, w) or is_full(task, lanes, w) or log_is_full(task, lanes, w):
             return
         if lanes[0].stiff and task.derivatives == UNKNOWN:
             lanes[0].status = DERIVATIVES
@@ -190,13 +233,74 @@ def advance(rhs, point, along, task, w, rounds):
         if task.memory.size:
             look_before(rhs, task, lanes, w, found)
         any_passed = _accept(task, lanes, w, found, done, passed)
+        _note_events(task, lanes, w, found, done)
         _take(task, w, done)
-        delays = task.delays.shape[0] > 0
-        jumped = delays and keep(task, lanes, w, done, passed)
-        if task.ticks.size and take_samples(task, lanes, w, sampled):
+        again = task.memory.size > 0 and any_passed
+        if task.delays.shape[0]:
+            again |= keep(task, lanes, w, done, passed)
+        elif not task.memory.size:
+            passed[:] = False
+        again |= _happens(task, lanes, w, passed, sampled)
+        if again:
+            restart(rhs, task, lanes, w, passed)
+        if task.guarded < task.switching:
             for j in range(lanes.size):
-                passed[j] = sampled[j] or (passed[j] and (task.memory.size > 0 or delays))
-            begin_afresh(task, lanes, w, sampled)
-            restart(rhs, task, lanes, w, passed)
-        elif jumped or (task.memory.size and any_passed):
-            restart(rhs, task, lanes, w, passed)
+                done[j] |= passed[j]
+            fall(rhs, task, lanes, w, done)
+        if task.ways.size:
+            _look_at_inputs(task, lanes, w)
+
+
+@numba.njit(**INNER)
+def _look_at_inputs(task, lanes, w):
+    """Leave in w.u the inputs where a run has ended."""
+    for j in range(lanes.size):
+        w.t[j] = lanes[j].t
+    if lanes[0].status == ENDED and w.u.shape[0]:
+        inputs_at(task, lanes, w)
+
+
+@numba.njit(**INNER)
+def _counts(task, lane, i, end):
+    """Whether a change of sign counts; of functions that the run watches one may end it."""
+    k = i - task.watched
+    if k < 0:
+        return True
+    if task.ways[k] != 0 and (task.ways[k] > 0) != (end > 0.0):
+        return False
+    if task.ending[k] and lane.status == RUNNING:
+        lane.status = ENDED
+    return True
+
+
+@numba.njit(**INNER)
+def _note_events(task, lanes, w, found, done):
+    """Note the switching functions that have changed their signs in accepted steps."""
+    for j in range(lanes.size if task.alone else 0):
+        if not done[j] or found[j] != EVENT:
+            continue
+        for i in range(task.guarded):
+            if w.e_start[i, j] * w.e[i, j] < 0.0 and _counts(task, lanes[j], i, w.e[i, j]):
+                note(task, lanes[j], w, i, w.e[i, j] > 0.0, j)
+
+
+@numba.njit(**INNER)
+def _happens(task, lanes, w, passed, sampled):
+    """Let happen what is due at the times that lanes have come to; add them to ``passed``.
+
+    Return whether anything is.
+    """
+    again = False
+    if task.jumps.shape[1] and pass_jumps(task, lanes, sampled):
+        again = True
+        for j in range(lanes.size):
+            passed[j] |= sampled[j]
+            lanes[j].log_error_before *= 0.0 if sampled[j] else 1.0
+            if sampled[j]:
+                note(task, lanes[j], w, OF_TIME, True, j)
+    if task.ticks.size and take_samples(task, lanes, w, sampled):
+        again = True
+        for j in range(lanes.size):
+            passed[j] |= sampled[j]
+        begin_afresh(task, lanes, w, sampled)
+    return again

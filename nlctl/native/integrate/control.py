@@ -29,9 +29,34 @@ def choose_step(lane, stop, over, max_steps):
         lane.status = STEP_TOO_SMALL
     if lane.status != RUNNING:
         lane.step = 0.0
+    elif lane.tries == 0 and lane.cross > 0.0:
+        lane.ends = 1 if lane.t + lane.cross >= stop else 0
+        lane.step = stop - lane.t if lane.ends else lane.cross
+        lane.across = 1
     elif lane.tries == 0:
+        lane.across = 0
         lane.ends = 1 if lane.t + 1.01 * lane.h >= stop else 0
         lane.step = stop - lane.t if lane.ends else lane.h
+
+
+@numba.njit(**INNER)
+def limit_step(task, lane, j):
+    """Shorten the step that is proposed where it might pass over a function of t alone.
+
+    A function that is called as it stands may move at any time: from rest, where error control
+    sees nothing of it, no step passes an output sample.
+    """
+    if task.fixed > 0.0 or lane.tries > 0 or lane.status != RUNNING:
+        return
+    longest, cells = task.longest[j], task.reach.shape[1]
+    if cells:
+        times = task.times
+        share = (lane.t - times[0]) / (times[times.size - 1] - times[0])
+        longest = min(longest, task.reach[j, min(int(share * cells), cells - 1)] - lane.t)
+    if task.opaque and lane.rests and lane.segment < task.times.size - 1:
+        longest = min(longest, task.times[lane.segment + 1] - lane.t)
+    if lane.h > longest > 0.0:
+        lane.h = longest
 
 
 @numba.njit(**INNER)
@@ -64,7 +89,8 @@ def rejected(lane, error, task):
     if error <= 1.0 or (task.fixed > 0.0 and finite):
         return False
     lane.rejected += 1
-    lane.tries = lane.seeks = 0
+    lane.tries = lane.seeks = lane.traces = 0
+    lane.cross = 0.0
     order = rodas5p.ORDER if lane.stiff else task.pair_order
     lane.h = lane.step * (max(0.2, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
     if task.fixed > 0.0 or not (finite or lane.h > SMALLEST * abs(lane.t)):
@@ -76,7 +102,8 @@ def rejected(lane, error, task):
 def shorten(lane, part):
     """Have part of the step just tried be tried instead, whatever was located in it."""
     lane.rejected += 1
-    lane.tries = lane.seeks = 0
+    lane.tries = lane.seeks = lane.traces = 0
+    lane.cross = 0.0
     lane.h = part * lane.step
 
 

@@ -55,7 +55,7 @@ def simulate_discrete(
     code, c = prepared_parameters(compiled, p)
     outputs = np.empty((count, system.noutputs or 0, 1))
     states = np.empty((count, system.nstates or 0, 1))
-    g = np.empty((compiled.program.events, 1))
+    g = np.empty((code.lowered.rows["g"], 1))
     columns = np.array(inputs.T, dtype=float, order="C")[:, :, None]  # may be written to
     states[:1, :, 0] = x0
     each = np.array(times, dtype=float)[:, None]

@@ -15,21 +15,25 @@ import numpy as np
 from ...delays.variation import Variation
 from ...errors import ParameterError
 from ...names import unknown
+from ...responses.watched import Watched
 from ...sampling.clock import Instants
-from ..chattering.detection import PROBE, Jump, asked, jump_of, new_paces, snapshot
+from ..chattering.detection import Jump, asked, jump_of, new_paces, probe_of, snapshot
 from ..codegen.along import Along, derivatives
-from ..codegen.program import instants_of
+from ..codegen.program import Program, instants_of
 from ..compiled import Compiled
+from ..happened import happened, with_log
 from ..histories import lines_of, variations, with_past, with_room
 from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
 from ..taylor.method import taylor_task
+from ..timed.ahead import ahead
 from .discrete import simulate_discrete
 from .memory import with_table
 from .methods import EXPLICIT_PAIRS
 from .methods.lu import WHOLE, Elimination, cost
 from .methods.tableau import Tableau
 from .methods.tsit5 import TSIT5
+from .results import Statistics, Trajectory, at_its_end, made
 from .state import DERIVATIVES, RUNNING, Status
 from .workspace import (
     AUTO,
@@ -69,6 +73,8 @@ class Settings:
         expressions and have no memories; an explicit pair of your own as its tableau.
     step : float
         Fixed step (s) instead of error control; 0 for error control.
+    max_step : float
+        Longest step (s), under error control too.
     """
 
     rtol: float = 1e-8
@@ -76,6 +82,7 @@ class Settings:
     max_steps: int = 10_000_000_000
     method: str | Tableau = "auto"
     step: float = 0.0
+    max_step: float = np.inf
 
     @property
     def pair(self) -> Tableau:
@@ -89,55 +96,19 @@ class Settings:
     def __post_init__(self) -> None:
         if not isinstance(self.method, Tableau) and self.method not in METHODS:
             raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
-        for name in ("rtol", "atol", "step", "max_steps"):
+        for name in ("rtol", "atol", "step", "max_steps", "max_step"):
             if not isinstance(getattr(self, name), Real):
                 raise ParameterError(f"{name} must be one number, got {getattr(self, name)!r}")
-        for name in ("rtol", "atol"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise ParameterError(f"{name} must be > 0, got {getattr(self, name)!r}")
+        for name, most in (("rtol", 1), ("atol", np.inf)):
+            if not 0 < getattr(self, name) < most:
+                rule = "> 0 and < 1" if most == 1 else "> 0"
+                raise ParameterError(f"{name} must be {rule}, got {getattr(self, name)!r}")
         if not 0 <= self.step < np.inf:
             raise ParameterError(f"step must be > 0, or 0 for error control, got {self.step!r}")
+        if not self.max_step > 0:
+            raise ParameterError(f"max_step must be > 0, got {self.max_step!r}")
         if self.max_steps < 1:
             raise ParameterError(f"max_steps must be >= 1, got {self.max_steps!r}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Statistics:
-    """What a run took.
-
-    Attributes
-    ----------
-    status : Status
-    time : float
-        Time that was reached (s).
-    accepted, rejected : int
-        Steps of the integrator; steps tried to locate events count as rejected.
-    events : int
-        Break points and turning memories at which a step was ended.
-    stiff : bool
-        Whether the run ended with the stiff method.
-    jump : Jump or None
-        Where it chatters, of a run that ended as CHATTERING.
-    """
-
-    status: Status
-    time: float
-    accepted: int
-    rejected: int
-    events: int = 0
-    stiff: bool = False
-    jump: Jump | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trajectory:
-    """One run: times that were reached, outputs (outputs, m), states (states, m), inputs."""
-
-    time: np.ndarray
-    outputs: np.ndarray
-    states: np.ndarray
-    statistics: Statistics
-    inputs: np.ndarray  # what leaves transport delays, and rates: as the program has them
 
 
 def trajectory(
@@ -166,7 +137,8 @@ def trajectory(
         except KeyboardInterrupt:
             run.lanes["status"] = Status.STOPPED
         outputs = finish(run)
-    return made(run, outputs, 0)
+    found = replace(made(run, outputs, 0), happened=happened(compiled, run))
+    return at_its_end(run, found)
 
 
 def _sampled(
@@ -227,7 +199,7 @@ def begin(run: Run) -> None:
 
 def go_on(run: Run, rounds: int = ROUNDS) -> Run:
     """Try up to `rounds` steps in every lane that is still running."""
-    run = replace(run, work=with_room(run.task, run.work))
+    run = replace(run, work=with_log(run.task, with_room(run.task, run.work)))
     rhs, _ = run.machine.entries
     point, along = (0, 0) if run.along is None else run.along.entries
     integrators()["advance"](rhs, point, along, run.task, run.work, rounds)
@@ -241,12 +213,13 @@ def watched(run: Run, paces: np.ndarray) -> Run:
     The window is the same number of steps whatever lanes are looked at, so that what becomes of
     one does not depend on the others.
     """
-    run = go_on(run, ROUNDS - PROBE)
+    probe = probe_of(run.task)
+    run = go_on(run, ROUNDS - probe)
     lanes = np.flatnonzero(asked(run.lanes, paces)) if run.task.fixed == 0.0 else ()
     if not len(lanes):
-        return go_on(run, PROBE)
+        return go_on(run, probe)
     attempts = []
-    for _ in range(PROBE):
+    for _ in range(probe):
         run, attempt = snapshot(run.work, partial(go_on, run, 1))
         attempts.append(attempt)
     found = {
@@ -300,8 +273,7 @@ def prepared(
         times=times,
         inputs=inputs,
         p=c,
-        switching=program.switching,
-        memory=np.array(program.memory, dtype=np.int64),
+        **_rows(program, code, method, read.watched),
         rtol=float(settings.rtol),
         atol=float(settings.atol),
         fixed=float(settings.step),
@@ -310,6 +282,9 @@ def prepared(
         **_pair(settings.pair) | expansion,
         alone=int(count == 1),
         **_instants(compiled, code, due),
+        **_jumping(program, code),
+        **ahead(code.lowered, p, times, settings.max_step),
+        opaque=int(bool(code.lowered.calls)),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),
         **lines_of(compiled, p, varied),
@@ -318,17 +293,41 @@ def prepared(
         **_linear_equations(len(x0), WHOLE),
     )
     work = new_work(
-        x0, times, read.ninputs, program.events, len(read.outputs),
-        len(program.sampled), len(read.lines), 2 if terms else settings.pair.stages,
-        terms or (1, 0),
+        x0, times, read.ninputs, code.lowered.rows["g"], len(read.outputs),
+        code.lowered.rows["s"], len(program.guards), len(read.lines),
+        2 if terms else settings.pair.stages, terms or (1, 0),
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"
     work = with_past(compiled, task, work, p)
     return Run(machine=code, task=task, work=work)
 
 
+def _rows(
+    program: Program, code: Machine, method: str | Tableau, watched: tuple[Watched, ...]
+) -> dict[str, Any]:
+    """Return how many rows are whose: declared, located, memories; Taylor has its own sides."""
+    located = code.lowered.rows["g"] - len(program.memory)
+    bending = code.lowered.conditions.bending
+    return {
+        "bending": program.switching,
+        "declared": program.switching + (0 if method == "taylor" else bending),
+        "guarded": program.switching if method == "taylor" else located - len(program.guards),
+        "switching": program.switching if method == "taylor" else located,
+        "watched": located - len(program.guards) - len(watched),
+        "ways": np.array([each.direction for each in watched], dtype=np.int64),
+        "ending": np.array([each.ends for each in watched], dtype=np.int64),
+        "memory": np.array(program.memory, dtype=np.int64),
+    }
+
+
 def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
     """Return the method of a run; what has delays is for the explicit one."""
+    located = compiled.program.guards or compiled.schedule.watched
+    if located and settings.method == "taylor":
+        raise ParameterError(
+            f"'{compiled.system.name}' has guards or events, which method='auto', 'tsit5' and "
+            "'rodas5p' locate, got method='taylor'"
+        )
     if not compiled.schedule.lines:
         return settings.method
     if settings.method not in ("auto", "tsit5"):
@@ -374,41 +373,13 @@ def _instants(compiled: Compiled, code: Machine, due: list[Instants]) -> dict[st
     }  # fmt: skip
 
 
-def made(run: Run, outputs: np.ndarray, j: int) -> Trajectory:
-    """Return what became of one member."""
-    lane, times, states, outputs = (
-        run.lanes[j],
-        run.task.times,
-        run.work.samples[:, :, j],
-        outputs[:, :, j],
-    )
-    status, reached = Status(int(lane["status"])), float(lane["t"])
-    done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
-    if status is Status.OK and not np.all(np.isfinite(outputs)):
-        status = Status.DIVERGED
-    statistics = Statistics(
-        status=status,
-        time=reached,
-        accepted=int(lane["accepted"]),
-        rejected=int(lane["rejected"]),
-        events=int(lane["events"]),
-        stiff=bool(lane["stiff"]),
-        jump=run.jumps.get(j),
-    )
-    return Trajectory(
-        time=times[:done],
-        outputs=outputs[:done].T,
-        states=states[:done].T,
-        statistics=statistics,
-        inputs=_every_input(run, j, done),
-    )
-
-
-def _every_input(run: Run, j: int, done: int) -> np.ndarray:
-    """Return all that the program takes as inputs, at the times that lane `j` has reached."""
-    given, times = run.task.inputs, run.task.times
-    parts = [given[:, :done], run.work.shown[:done, :, j].T]
-    if run.work.u.shape[0] > sum(map(len, parts)):  # the rates of the segment that begins
-        rates = np.diff(given) / np.diff(times)
-        parts.append(rates[:, np.minimum(np.arange(done), times.size - 2)])
-    return np.concatenate(parts)
+def _jumping(program: Program, code: Machine) -> dict[str, np.ndarray]:
+    """Return the function of resets, the states that it fills, and whose guards are whose."""
+    rows = [row for _, begin, end in program.jumping for row in range(begin, end)]
+    owners = [block for block, begin, end in program.jumping for _ in range(begin, end)]
+    owned = np.equal.outer(np.array(program.guards, dtype=int), np.array(owners, dtype=int))
+    return {
+        "resets": code.reset_entries,
+        "jumping": np.array(rows, dtype=np.int64),
+        "owned": np.ascontiguousarray(owned.reshape(len(program.guards), len(rows)), np.int64),
+    }

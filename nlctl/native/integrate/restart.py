@@ -5,7 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .samples import begin_afresh, take_samples
 from .state import INNER
 from .workspace import evaluate
 
@@ -18,10 +17,12 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     """Fill the memory rows of w.e with the rates at which memories would be carried along.
 
     A difference over a small part of the step: its error moves the turning point by so little
-    that the turning value does not change.
+    that the turning value does not change.  Where functions of t alone jump, it is taken backwards.
     """
     for j in range(lanes.size):
         w.t[j] = w.t_end[j] + AHEAD * max(lanes[j].h, 1e-12)
+        if w.t[j] > lanes[j].left:
+            w.t[j] = w.t_end[j] - AHEAD * max(lanes[j].last, 1e-12)
         ahead = w.t[j] - w.t_end[j]  # what is left of it after rounding
         w.h[j] = ahead
         for i in range(x.shape[0]):
@@ -29,10 +30,14 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
     for i in range(w.g.shape[0]):
         for j in range(lanes.size):
-            w.slope[i, j] = (w.g_ahead[i, j] - w.g[i, j]) / max(w.h[j], 1e-300)
+            w.slope[i, j] = (w.g_ahead[i, j] - w.g[i, j]) / (
+                w.h[j] if w.h[j] < 0.0 else max(w.h[j], 1e-300)
+            )
     for i in range(task.switching, w.g.shape[0]):
         for j in range(lanes.size):
             change = w.g_ahead[i, j] - w.g[i, j]  # exactly 0 where the memory stands still
+            if w.h[j] < 0.0:
+                change = -change
             noise = 1e-15 * max(abs(w.g[i, j]), abs(w.g_ahead[i, j]))
             w.e[i, j] = change if change == 0.0 or abs(change) > noise else w.e_start[i, j]
             if lanes[j].quiet > 0:
@@ -204,48 +209,3 @@ def _unchanged(task, w, j):
         if w.g_ahead[i, j] != w.g[i, j]:
             return False
     return True
-
-
-@numba.njit(**INNER)
-def _first_step(rhs, task, lanes, w):
-    """Propose a first step, after Hairer, Norsett, Wanner, Solving ODEs I, II.4."""
-    n, span = w.x.shape[0], task.times[-1] - task.times[0]
-    d0, d1, d2 = np.zeros(lanes.size), np.zeros(lanes.size), np.zeros(lanes.size)
-    for i in range(n):
-        for j in range(lanes.size):
-            if w.k[0, i, j] == 0.0:
-                continue  # a locked memory, for instance
-            scale = task.atol + task.rtol * abs(w.x[i, j])
-            d0[j] += (w.x[i, j] / scale) ** 2 / n
-            d1[j] += (w.k[0, i, j] / scale) ** 2 / n
-    for j in range(lanes.size):
-        small = d0[j] < 1e-10 or d1[j] < 1e-10
-        lanes[j].h = min(1e-6 if small else 0.01 * np.sqrt(d0[j] / d1[j]), span)
-        w.t[j] = lanes[j].t + lanes[j].h
-        for i in range(n):
-            w.x_ahead[i, j] = w.x[i, j] + lanes[j].h * w.k[0, i, j]
-    evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
-    for i in range(n):
-        for j in range(lanes.size):
-            scale = task.atol + task.rtol * abs(w.x[i, j])
-            d2[j] += ((w.dx_ahead[i, j] - w.k[0, i, j]) / scale) ** 2 / n
-    for j in range(lanes.size):
-        h0 = lanes[j].h
-        largest = max(np.sqrt(d1[j]), np.sqrt(d2[j]) / h0)
-        power = 1.0 / task.pair_order
-        h1 = max(1e-6, h0 * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** power
-        h = min(100 * h0, h1, span)
-        lanes[j].h = task.fixed if task.fixed > 0.0 else (h if np.isfinite(h) else h0)
-
-
-def start(rhs, task, w):
-    """Begin at the initial states in w.x: commit the memories, propose first steps."""
-    lanes = w.lanes
-    everyone = np.ones(lanes.size, np.bool_)
-    sampled = np.zeros(lanes.size, np.bool_)
-    if task.ticks.size:
-        take_samples(task, lanes, w, sampled)
-    restart(rhs, task, lanes, w, everyone)
-    _first_step(rhs, task, lanes, w)
-    begin_afresh(task, lanes, w, sampled)
-    restart(rhs, task, lanes, w, everyone)

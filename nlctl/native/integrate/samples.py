@@ -24,6 +24,8 @@ def next_stop(task, lane, w, j):
         stop = times[lane.segment + 1]
     if lane.tick < task.ticks.shape[1]:
         stop = min(stop, task.ticks[j, lane.tick])
+    if lane.jump < task.jumps.shape[1]:
+        stop = min(stop, task.jumps[j, lane.jump])
     return next_break(task, w, lane, j, stop) if task.delays.shape[0] else stop
 
 
@@ -37,6 +39,11 @@ def take_samples(task, lanes, w, sampled):
     for j in range(lanes.size):
         sampled[j] = _is_due(task, lanes[j], j)
         found |= sampled[j]
+    for j in range(lanes.size):
+        if sampled[j] and lanes[j].segment == task.times.size - 1:
+            lanes[j].resumes = 1
+            for i in range(w.x.shape[0]):
+                w.resume[i, j] = w.x[i, j]
     for k in range(task.samples.size if found else 0):
         wanted = False
         for j in range(lanes.size):
@@ -57,6 +64,33 @@ def take_samples(task, lanes, w, sampled):
 
 
 @numba.njit(**INNER)
+def pass_jumps(task, lanes, jumped):
+    """Go on to the other side of the break points that lanes have come to; fill ``jumped``.
+
+    Return whether any lane has come to one.
+    """
+    found, count = False, task.jumps.shape[1]
+    rounding = 1e-14 * max(abs(task.times[0]), abs(task.times[task.times.size - 1]))
+    for j in range(lanes.size):
+        lane = lanes[j]
+        jumped[j] = False
+        while lane.jump < count and task.jumps[j, lane.jump] <= lane.t + rounding:
+            lane.right = task.jumps[j, lane.jump]
+            lane.jump += 1
+            jumped[j] = True
+        next_one = task.jumps[j, lane.jump] if lane.jump < count else np.inf
+        lane.left = before(next_one)
+        found |= jumped[j]
+    return found
+
+
+@numba.njit(**INNER)
+def before(t):
+    """Return the number before a time."""
+    return np.nextafter(t, -np.inf) if t < np.inf else t
+
+
+@numba.njit(**INNER)
 def begin_afresh(task, lanes, w, sampled):
     """Forget what was known of steps where a sample is taken: a run that resumes there knows none.
 
@@ -69,7 +103,9 @@ def begin_afresh(task, lanes, w, sampled):
         gap = next_stop(task, lane, w, j) - lane.t
         lane.h = task.fixed if task.fixed > 0.0 else max(gap, 1e-12 * abs(lane.t))
         lane.log_error_before = lane.last = lane.low = lane.high = 0.0
+        lane.cross = 0.0
         lane.tries = lane.seeks = lane.same_side = lane.short = lane.quiet = lane.slow = 0
+        lane.traces = 0
 
 
 @numba.njit(**INNER)

@@ -16,9 +16,12 @@ class Status(IntEnum):
     STEP_TOO_SMALL = 3
     STOPPED = 4
     CHATTERING = 5
+    ZENO = 6
+    ENDED = 7
 
 
-OK, DIVERGED, STEP_LIMIT, STEP_TOO_SMALL, STOPPED, CHATTERING = map(int, Status)  # compiled code's
+# compiled code's
+OK, DIVERGED, STEP_LIMIT, STEP_TOO_SMALL, STOPPED, CHATTERING, ZENO, ENDED = map(int, Status)
 RUNNING, STIFF = -1, -2  # STIFF: to be finished by a method that only single runs have
 DERIVATIVES = -3  # to go on once it is known where the stiff method has its Jacobian from
 FIRST_PATIENCE = 15
@@ -43,6 +46,23 @@ _FIELDS = [
     ("jacobian_at", "f8"),  # time for which the Jacobian matrix is known
     ("judged_at", "f8"),  # time at which the methods were last compared
     ("judged_after", "i8"),  # and the steps tried until then
+    ("left", "f8"),  # the last time at which functions of t alone are what they are now
+    ("right", "f8"),  # and the first
+    ("cross", "f8"),  # width of the step that is to lead across a condition next, 0 if none is
+    ("across", "i8"),  # whether the step being tried is such a one
+    ("left_zero", "i8"),  # whether the step before led away from a condition that was exactly 0
+    ("right_high", "i8"),  # whether the error of the step `high` is small
+    ("low_before", "f8"),  # the step without it that was tried before `low`
+    ("whole", "f8"),  # the step in which the condition that is being located was found
+    ("fell_at", "f8"),  # time of the last reset
+    ("since", "f8"),  # time of the first of the resets without progress of time
+    ("crowd", "i8"),  # resets in a row without progress of time
+    ("culprit", "i8"),  # the guard that has fallen last, or has ended the run
+    ("resumes", "i8"),  # whether a sample has been taken at the last time, see `Work.resume`
+    ("noted", "i8"),  # what has been noted in the log
+    ("jump", "i8"),  # which of their break points comes next
+    ("traces", "i8"),  # whether what is being located is a condition
+    ("rests", "i8"),  # whether no state has moved by more than its tolerance in the last step
     ("segment", "i8"),  # interval of the time grid in which t lies
     ("tick", "i8"),  # what happens next to sampled blocks
     ("status", "i8"),
@@ -68,5 +88,9 @@ def new_lanes(times: np.ndarray, count: int) -> np.ndarray:
     lanes["t"] = times[0]
     lanes["jacobian_at"] = np.nan
     lanes["status"] = RUNNING
+    lanes["left"], lanes["right"] = np.inf, -np.inf
+    lanes["rests"] = 1
+    lanes["fell_at"] = np.nan
+    lanes["culprit"] = -1
     lanes["patience"] = FIRST_PATIENCE
     return lanes

@@ -29,7 +29,13 @@ class Task(NamedTuple):
     times: np.ndarray  # of the samples; inputs are linear in between
     inputs: np.ndarray  # (inputs, times)
     p: np.ndarray  # (rows, lanes): what the right-hand side reads besides its arguments
-    switching: int  # number of switching functions, the first rows of g
+    bending: int  # number of switching functions that blocks declare, the first rows of g
+    declared: int  # and with those of conditions at which nothing jumps, which follow
+    guarded: int  # and with those of other conditions
+    switching: int  # and with the guards
+    watched: int  # the first of those that the run watches, behind the other conditions
+    ways: np.ndarray  # which of their changes count: 1 rising, -1 falling, 0 both
+    ending: np.ndarray  # and whether the run ends there
     memory: np.ndarray  # indices of memory states; what they would become follows in g
     rtol: float
     atol: float
@@ -45,11 +51,18 @@ class Task(NamedTuple):
     inside: np.ndarray  # parts of a step at which event functions are kept: see `Tableau.arrays`
     kept: np.ndarray
     alone: int  # whether this is a single run
+    jumps: np.ndarray  # (lanes, instants): when functions of t alone jump or have kinks, then inf
+    longest: np.ndarray  # (lanes,) step in s that none may be longer than
+    reach: np.ndarray  # (lanes, cells): until when a step may lead that begins in a cell
+    opaque: int  # whether something is called as it stands: nobody knows when it jumps
     ticks: np.ndarray  # (lanes, instants): when something happens to sampled blocks, then inf
     which: np.ndarray  # (lanes, instants): which of the functions then
     samples: np.ndarray  # these functions
     due: np.ndarray  # (functions, sampled states): whether it makes the next state
     sampled: np.ndarray  # indices of these states
+    resets: np.ndarray  # the function that fills states behind jumps, if there are guards
+    jumping: np.ndarray  # indices of these states
+    owned: np.ndarray  # (guards, these states): whether a guard's fall is their jump
     derivatives: int  # UNKNOWN until the stiff method asks for them
     c_along: np.ndarray  # what exact ones read besides their arguments
     delays: np.ndarray  # (lines, lanes) in s, without what varies in time
@@ -110,7 +123,12 @@ class Work(NamedTuple):
     bracket: np.ndarray  # parts below, at and above the least value that is known
     height: np.ndarray  # and the values there
     e: np.ndarray  # event functions: switching functions, and the rates of memories
+    above: np.ndarray  # (guards, lanes): whether a guard was not negative when last seen
+    rising: np.ndarray  # the value of one that was negative behind its jump and is to rise, or NaN
+    log_t: np.ndarray  # of what has happened in a single run: see `log`
+    log_row: np.ndarray
     e_start: np.ndarray
+    e_before: np.ndarray  # at the end of a step that ended before a condition, see `crossing`
     e_low: np.ndarray  # at the ends of the bracket in which an event is located
     e_high: np.ndarray
     behind: np.ndarray  # 1 where the step before ended with this event
@@ -120,7 +138,8 @@ class Work(NamedTuple):
     error: np.ndarray  # of the step over its tolerance
     rate: np.ndarray  # estimate of the largest eigenvalue's magnitude (1/s)
     t_end: np.ndarray
-    s: np.ndarray  # next states of sampled blocks
+    s: np.ndarray  # next states of sampled blocks, or of those with guards behind a jump
+    resume: np.ndarray  # states at the last time, before a sample that is due there
     x_flat: np.ndarray  # the same memory as x, x_new, x_stage, x_ahead, k
     x_new_flat: np.ndarray
     x_stage_flat: np.ndarray
@@ -171,6 +190,7 @@ def new_work(
     events: int,
     outputs: int,
     sampled: int = 0,
+    guards: int = 0,
     lines: int = 0,
     stages: int = 3,
     terms: tuple[int, int] = (1, 0),
@@ -185,7 +205,7 @@ def new_work(
     shapes: dict[str, tuple[int, ...]] = {
         **dict.fromkeys(_STATES, (n, lanes)),
         **dict.fromkeys(("g", "g_ahead", "g_start", "slope", "slope_start"), (events, lanes)),
-        **dict.fromkeys(("e", "e_start", "e_low", "e_high", "behind"), (events, lanes)),
+        **dict.fromkeys(("e", "e_start", "e_before", "e_low", "e_high", "behind"), (events, lanes)),
         **dict.fromkeys(("t", "h", "error", "rate", "t_end"), (lanes,)),
         **dict.fromkeys(
             ("resolved", "part", "looked", "foreseen", "wrong", "narrow", "floor"), (lanes,)
@@ -197,16 +217,11 @@ def new_work(
         "k": (stages, n, lanes),
         **dict.fromkeys(("u", "u_rate"), (inputs, lanes)),
         "s": (sampled, lanes),
-        "jacobian": (stiff // DIRECTIONS + 1, stiff, DIRECTIONS),
-        "columns": (stiff, stiff),
-        "factors": (stiff * stiff,),
-        "f_t": (stiff,),
-        "U": (rodas5p.STAGES, stiff),
-        **dict.fromkeys(("t_along", "finite"), (DIRECTIONS,)),
-        "x_along": (stiff, DIRECTIONS),
-        "u_along": (inputs, DIRECTIONS),
+        "resume": (n, lanes),
+        **_of_the_stiff_method(stiff, inputs),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    arrays |= _guards(guards, lanes)
     counted = ("wanted", "sought", "attempts", "expanded")
     arrays |= {name: np.zeros(lanes, dtype=np.int64) for name in counted}
     arrays |= {"terms": zeros((*terms, lanes)), "largest": np.zeros((4, lanes))}
@@ -220,6 +235,30 @@ def new_work(
     k_flat = arrays["k"].reshape(stages, n * lanes)
     arrays |= {"k_flat": k_flat, "pivots": np.zeros(stiff, dtype=np.int64)}
     return with_table(Work, lanes=new_lanes(times, lanes), **arrays, **flat)
+
+
+def _of_the_stiff_method(n: int, inputs: int) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of the arrays of the stiff method."""
+    return {
+        "jacobian": (n // DIRECTIONS + 1, n, DIRECTIONS),
+        "columns": (n, n),
+        "factors": (n * n,),
+        "f_t": (n,),
+        "U": (rodas5p.STAGES, n),
+        **dict.fromkeys(("t_along", "finite"), (DIRECTIONS,)),
+        "x_along": (n, DIRECTIONS),
+        "u_along": (inputs, DIRECTIONS),
+    }
+
+
+def _guards(guards: int, lanes: int) -> dict[str, np.ndarray]:
+    """Return the arrays for guards, and for a log that has no room yet."""
+    counts = {"above": (guards, lanes), "log_row": (0,)}
+    return {
+        **{name: np.zeros(shape, dtype=np.int64) for name, shape in counts.items()},
+        "rising": np.zeros((guards, lanes)),
+        "log_t": np.zeros(0),
+    }
 
 
 def _past(times: int, outputs: int, lines: int, lanes: int) -> dict[str, np.ndarray]:
@@ -253,11 +292,14 @@ _LINE, _GRID, _NONE = np.zeros(1), np.zeros((1, 1)), np.zeros(0, dtype=np.int64)
 _PLACES = np.zeros((1, 1), dtype=np.int64)
 TASK = type_of(  # only the types of these matter
     with_table(
-        Task, times=_LINE, inputs=_GRID, p=_GRID, switching=0, memory=_NONE, rtol=0.0, atol=0.0,
-        fixed=0.0, max_steps=0, method=0, pair_order=0.0, stable=0.0, A=_GRID, B=_GRID,
-        C=_LINE, E=_LINE, inside=_GRID, kept=_NONE, alone=0,
+        Task, times=_LINE, inputs=_GRID, p=_GRID, memory=_NONE,
+        bending=0, declared=0, guarded=0, switching=0, watched=0, ways=_NONE, ending=_NONE,
+        rtol=0.0, atol=0.0, fixed=0.0, max_steps=0, method=0, pair_order=0.0, stable=0.0,
+        A=_GRID, B=_GRID, C=_LINE, E=_LINE, inside=_GRID, kept=_NONE, alone=0,
+        jumps=_GRID, longest=_LINE, reach=_GRID, opaque=0,
         ticks=_GRID, which=_PLACES, samples=_NONE,
-        due=_PLACES, sampled=_NONE, derivatives=0, c_along=_GRID,
+        due=_PLACES, sampled=_NONE, resets=_NONE, jumping=_NONE, owned=_PLACES,
+        derivatives=0, c_along=_GRID,
         delays=_GRID, varied=_NONE, vary_t=_GRID, vary_h=_GRID,
         vary=np.zeros((1, 1, 1)), kinks=_GRID,
         direct=_PLACES, signals=_NONE, outputs=0,
@@ -265,6 +307,13 @@ TASK = type_of(  # only the types of these matter
     )
 )  # fmt: skip
 WORK = type_of(new_work(_GRID, _LINE, 1, 1, 1))
+
+
+@numba.njit(**INNER)
+def on_this_side(lanes, w):
+    """Have functions of t alone seen on the side on which a step lies, also at its ends."""
+    for j in range(lanes.size):
+        w.t[j] = max(min(w.t[j], lanes[j].left), lanes[j].right)
 
 
 @numba.njit(**INNER)
@@ -387,6 +436,8 @@ def past_value(task, w, i, j, t):
 @numba.njit(**INNER)
 def evaluate(rhs, task, lanes, w, x, dx, g):
     """Evaluate the right-hand side at the times w.t; memory stands still within a step."""
+    if task.jumps.shape[1]:
+        on_this_side(lanes, w)
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
     call_rhs(rhs, w.t, x, w.u, task.p, dx, g)

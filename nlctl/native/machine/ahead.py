@@ -5,12 +5,14 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 
+from ...annotations import as_annotated
 from ..codegen.along import derivatives
 from ..compiled import Compiled
 from ..integrate.discrete import compile_discrete
 from .evaluations import ENSEMBLE_WIDTH, machine
 
 
+@as_annotated
 def compile_ahead(compiled: Compiled, *, ensemble: bool = False) -> None:
     """Make a diagram's machine code now, instead of with its first run; it stays in the cache.
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...sampling.system import Happening
-from ..codegen.blocks import equations
 from ..codegen.lower import Lowered, lower
+from ..equations.blocks import equations
 from .routine import called_back, entry, lowered_code, raise_failures
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ class Machine:
         ``rhs(t, x, u, c, dx, g)`` and ``out(t, x, u, c, y)``.
     samples : tuple of callable
         ``sample(t, x, u, c, s)`` for each meeting: the next states of sampled blocks.
+    resets : callable or None
+        ``resets(t, x, u, c, s)``: the states of all blocks with guards, behind a jump.
     meetings : tuple of frozenset
         What happens to them there.
     """
@@ -44,6 +46,7 @@ class Machine:
     rhs: Any
     out: Any
     samples: tuple[Any, ...] = ()
+    resets: Any = None
     meetings: tuple[Happening, ...] = ()
 
     @property
@@ -54,7 +57,12 @@ class Machine:
     @property
     def called_back(self) -> tuple[str, ...]:
         """Names of functions that call back into Python."""
-        return called_back((self.rhs, self.out, *self.samples))
+        return called_back(self._functions)
+
+    @property
+    def _functions(self) -> tuple[Any, ...]:
+        resets = () if self.resets is None else (self.resets,)
+        return (self.rhs, self.out, *self.samples, *resets)
 
     @property
     def entries(self) -> tuple[Any, Any]:
@@ -64,19 +72,27 @@ class Machine:
     @property
     def sample_entries(self) -> np.ndarray:
         """What integrators take of `samples`."""
-        found = [entry(function) for function in self.samples]
-        plain = any(callable(each) for each in found)
-        return np.array(found, dtype=object if plain else np.int64)
+        return _entries(self.samples)
+
+    @property
+    def reset_entries(self) -> np.ndarray:
+        """What integrators take of `resets`: one function, or none."""
+        return _entries(() if self.resets is None else (self.resets,))
 
     @property
     def signal_entry(self) -> np.ndarray:
         """What integrators take of `out` to look at delayed signals."""
-        found = entry(self.out)
-        return np.array([found], dtype=object if callable(found) else np.int64)
+        return _entries((self.out,))
 
     def check(self, c: np.ndarray) -> None:
         """Raise what an opaque function has raised, with `c` as the parameters."""
-        raise_failures((self.rhs, self.out, *self.samples), c)
+        raise_failures(self._functions, c)
+
+
+def _entries(functions: tuple[Any, ...]) -> np.ndarray:
+    found = [entry(function) for function in functions]
+    plain = any(callable(each) for each in found)
+    return np.array(found, dtype=object if plain else np.int64)
 
 
 def machine(
@@ -104,6 +120,7 @@ def machine(
     if not lowered.holds_for(p):
         raise ValueError("members whose integers differ have no machine code in common")
     prepare, rhs, out, *samples = lowered_code(lowered)
+    resets = samples.pop() if program.guards else None
     known.append(
         Machine(
             width=width,
@@ -112,6 +129,7 @@ def machine(
             rhs=rhs,
             out=out,
             samples=tuple(samples),
+            resets=resets,
             meetings=meetings,
         )
     )
@@ -130,7 +148,9 @@ def evaluations(compiled: Compiled) -> tuple[Callable[..., None], Callable[..., 
 
     def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: np.ndarray, g: np.ndarray) -> None:
         code, c = prepared_parameters(compiled, p)
-        code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], g[:, None])
+        events = np.empty((code.lowered.rows["g"], 1))  # others where integers steer what switches
+        code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], events)
+        g[:] = events[:, 0] if events.shape[0] == g.size else np.nan
 
     def out(t: float, x: Any, u: Any, p: np.ndarray, y: np.ndarray) -> None:
         code, c = prepared_parameters(compiled, p)

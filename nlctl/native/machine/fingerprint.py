@@ -8,9 +8,11 @@ was edited after it was imported misleads nobody.
 from __future__ import annotations
 
 import contextlib
+import dis
 import functools
 import hashlib
 import inspect
+import os
 import re
 import sys
 import sysconfig
@@ -22,6 +24,9 @@ from typing import Any, Protocol
 import numba
 import numpy as np
 
+from ..thirdparty.held import LAID_OUT, OPAQUE, held_by, inherited
+from ..thirdparty.outside import asked_outside, imports_in
+
 _LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"} | {  # their versions stand for them
     *("pandas", "pyarrow", "matplotlib", "jinja2", "rich"),  # in no equation, and
     *("pydantic", "pydantic_core", "annotated_types", "typing_extensions"),  # built from sets
@@ -29,7 +34,41 @@ _LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"} | {  # their versions stand
 MODULE = "\1of "  # begins a text that names a module and nothing of its content
 HEAP_TYPE = 1 << 9  # Py_TPFLAGS_HEAPTYPE: made by a class statement
 _CONSTANTS = (int, float, complex, str, bytes, tuple, list, dict, np.ndarray, np.generic)
+_MACHINERY = (
+    types.MemberDescriptorType,
+    types.GetSetDescriptorType,
+    types.WrapperDescriptorType,
+) + (
+    types.ClassMethodDescriptorType,
+    types.MethodDescriptorType,
+    property,
+)
+RUNNERS = {"eval", "exec", "__import__"}
+FINDERS = {"globals", "vars", *RUNNERS}
+READERS = {"open", "loadtxt", "genfromtxt", "fromfile", "memmap", "loadmat", "read_csv"} | {
+    *("read_excel", "read_hdf", "read_json", "read_parquet", "read_pickle", "read_table"),
+    *("read_text", "read_bytes", "read_feather", "read_sql", "urlopen", "open_memmap"),
+}
 STANDARD = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
+
+
+class _Seen(dict[int, Any]):
+    """Things that have been gone through, kept so that no other one takes their places.
+
+    `deep` says whether objects of libraries are looked into.
+    """
+
+    def __init__(self, *, deep: bool) -> None:
+        super().__init__()
+        self.deep = deep
+        self.kept: list[Any] = []
+
+    def add(self, thing: Any) -> bool:
+        """Note a thing; return whether it is new."""
+        if id(thing) in self:
+            return False
+        self[id(thing)] = thing
+        return True
 
 
 class Sourced(Protocol):
@@ -57,9 +96,25 @@ def content_key(*things: Any) -> str:
 
     Unlike `function_key` it does not tell functions of the same content in different modules.
     """
-    seen: set[int] = set()
-    texts = (text for thing in things for text in _fingerprint(thing, seen))
-    return _digest_of(text for text in texts if not text.startswith(MODULE))
+    return _digest_of(text for text in _content(things) if not _is_place(text))
+
+
+def unseen_in(*things: Any) -> list[str]:
+    """Return what `content_key` cannot see of functions: another content has the same key."""
+    found = (text for text in _content(things) if text.startswith(OPAQUE))
+    return list(dict.fromkeys(text.removeprefix(OPAQUE) for text in found))
+
+
+def _content(things: Iterable[Any]) -> Iterator[str]:
+    """Yield text for things and all that they reach, into objects of libraries as well."""
+    seen = _Seen(deep=True)
+    return (text for thing in things for text in _fingerprint(thing, seen))
+
+
+def _is_place(text: str) -> bool:
+    """Whether a text only says where something is, or what its module is called."""
+    names_module = text.startswith("module ") and not _is_library(text.split(" ")[1])
+    return text.startswith(MODULE) or names_module
 
 
 def module_key(*modules: types.ModuleType) -> str:
@@ -68,7 +123,7 @@ def module_key(*modules: types.ModuleType) -> str:
 
 
 def _digest(*things: Any) -> str:
-    seen: set[int] = set()
+    seen = _Seen(deep=False)
     return _digest_of(text for thing in things for text in _fingerprint(thing, seen))
 
 
@@ -79,17 +134,18 @@ def _digest_of(texts: Iterable[str]) -> str:
     return digest.hexdigest()[:32]
 
 
-def _fingerprint(thing: Any, seen: set[int], names: Iterable[str] = ()) -> Iterator[str]:
+def _fingerprint(thing: Any, seen: _Seen, names: Iterable[str] = ()) -> Iterator[str]:
     """Yield text for a thing and all that it refers to; `names` are what is read of a module."""
-    if isinstance(thing, str):
-        yield repr(thing)
-    elif isinstance(thing, tuple | list | dict):
-        yield from _of_container(thing, seen)
+    if isinstance(thing, str | tuple | list | dict):
+        is_text = isinstance(thing, str)
+        yield from (_of_text(thing, seen),) if is_text else _of_container(thing, seen)
+        if seen.deep and _is_users(type(thing)):
+            yield from _of_object(thing, seen)
     elif isinstance(thing, types.ModuleType):
         yield from _of_module(thing, seen, names)
     elif isinstance(thing, numba.types.Type):
         yield from _of_numba_type(thing, seen)
-    elif isinstance(function := _plain(thing), types.FunctionType):
+    elif isinstance(function := _plain(thing, seen), types.FunctionType):
         yield _constant(sorted(getattr(thing, "targetoptions", {}).items()))
         yield from _of_function(function, seen)
     elif isinstance(thing, functools.partial):
@@ -103,54 +159,109 @@ def _fingerprint(thing: Any, seen: set[int], names: Iterable[str] = ()) -> Itera
     elif _is_users(type(thing)):
         yield from _of_object(thing, seen)
     else:
-        yield _constant(thing)
+        yield from _of_library_object(thing, seen)
 
 
-def _plain(thing: Any) -> Any:
+def _of_text(text: str, seen: _Seen) -> str:
+    """Return a text as it counts: python-control numbers the systems of a process, ``sys[7]``."""
+    return repr(re.sub(r"sys\[\d+\]", "sys[]", text) if seen.deep else text)
+
+
+def _plain(thing: Any, seen: _Seen | None = None) -> Any:
     """Return the function that numba has compiled or will compile; any other thing as it is."""
     if isinstance(thing, types.FunctionType):
+        return thing
+    if seen is not None and seen.deep and _is_users(type(thing)):  # it may hold more
         return thing
     return getattr(thing, "py_func", getattr(thing, "__wrapped__", thing))
 
 
-def _of_container(thing: tuple | list | dict, seen: set[int]) -> Iterator[str]:
+def _of_container(thing: tuple | list | dict, seen: _Seen) -> Iterator[str]:
     yield f"{type(thing).__name__} of {len(thing)} {getattr(thing, '_fields', '')}"
-    if id(thing) in seen:  # it is inside itself
+    if not seen.add(thing):  # it is inside itself
         return
-    seen.add(id(thing))
     for item in thing.items() if isinstance(thing, dict) else thing:
         yield from _fingerprint(item, seen)
-    seen.discard(id(thing))
+    del seen[id(thing)]
+    seen.kept.append(thing)
 
 
-def _of_function(function: types.FunctionType, seen: set[int]) -> Iterator[str]:
-    if _is_library(function.__module__):
+def _of_function(function: types.FunctionType, seen: _Seen) -> Iterator[str]:
+    if _is_library(function.__module__) or (seen.deep and _is_controls(function)):
         yield f"{function.__module__}.{function.__qualname__}"
+        if seen.deep and (function.__closure__ or function.__dict__) and seen.add(function):
+            cells = [_in_cell(cell) for cell in function.__closure__ or ()]
+            yield from _fingerprint((cells, function.__defaults__, vars(function)), seen)
         return
-    if id(function) in seen:
+    if not seen.add(function):
         return
-    seen.add(id(function))
     yield f"{MODULE}{function.__module__}"  # what is on disk refers to it by this name
     yield from _code_text(function.__code__)
     for given in (function.__defaults__, function.__kwdefaults__):
         yield from _fingerprint(given, seen)
     names = _all_names(function.__code__)
+    if seen.deep and "getattr" in names:
+        names = sorted({*names, *_all_texts(function.__code__)})
     for cell in function.__closure__ or ():
-        yield from _fingerprint(_content(cell), seen, names)
+        yield from _fingerprint(_in_cell(cell), seen, names)
     for name in names:
         if name in function.__globals__:
             yield name
             yield from _fingerprint(function.__globals__[name], seen, names)
+    if seen.deep:
+        yield from _looked_up(function, names, seen)
+        yield from _fingerprint(vars(function), seen)
 
 
-def _of_class(kind: type, seen: set[int]) -> Iterator[str]:
+def _looked_up(function: types.FunctionType, names: list[str], seen: _Seen) -> Iterator[str]:
+    """Yield text for what a function finds by texts, ``globals()["K"]``, and what it reads then."""
+    where = f" in '{function.__qualname__}'"
+    calls = _globals_of(function.__code__) - set(function.__globals__)
+    texts, found = _all_texts(function.__code__), list[str]()
+    if calls & FINDERS:
+        found = [text for text in texts if text in function.__globals__ and text not in names]
+        for text in found:
+            yield text
+            yield from _fingerprint(function.__globals__[text], seen, names)
+    if {"environ", "getenv"} & set(names):
+        yield from (f"environment {text} {os.environ.get(text)}" for text in texts)
+    unknown = calls & RUNNERS | (set() if found else calls & {"globals", "vars"})
+    unknown |= {"import_module"} & set(names)
+    for name in sorted(unknown):
+        yield f"{OPAQUE}what '{name}' finds{where}"
+    for told in dict.fromkeys(asked_outside(function)):
+        yield f"{OPAQUE}{told}{where})"
+    for name in imports_in(function, _is_named):
+        yield f"{OPAQUE}what it imports when it is called ('{name}'{where})"
+    for name in sorted((set(names) - {"open"}) & READERS | calls & {"open"}):
+        yield f"{OPAQUE}files that are read when it is called ('{name}'{where})"
+
+
+def _all_texts(code: types.CodeType) -> list[str]:
+    """Return the texts that stand in a code object and in those nested in it."""
+    texts = {part for part in code.co_consts if isinstance(part, str)}
+    for part in code.co_consts:
+        if isinstance(part, types.CodeType):
+            texts.update(_all_texts(part))
+    return sorted(texts)
+
+
+def _globals_of(code: types.CodeType) -> set[str]:
+    """Return the names that a code object, and those nested in it, read by themselves."""
+    inner = [part for part in code.co_consts if isinstance(part, types.CodeType)]
+    found = {i.argval for i in dis.get_instructions(code) if "GLOBAL" in i.opname}
+    return found.union(*map(_globals_of, inner))
+
+
+def _of_class(kind: type, seen: _Seen) -> Iterator[str]:
     """Yield text for a class: a user's own for its functions and constants, and its bases."""
     yield _constant(kind)
-    if not _is_users(kind) or id(kind) in seen:
+    if not _is_users(kind) or (seen.deep and _is_controls(kind)) or not seen.add(kind):
         return
-    seen.add(id(kind))
     for name, part in sorted(vars(kind).items()):
-        functions = [getattr(part, key, None) for key in ("__func__", "func", "fget")]
+        is_partial = isinstance(part, functools.partial | functools.partialmethod)
+        keys = () if seen.deep and is_partial else ("__func__", "func", "fget")
+        functions = [getattr(part, key, None) for key in keys]
         function = next(filter(None, functions), part)  # of a method, a property
         if isinstance(_plain(function), types.FunctionType):
             yield name
@@ -158,58 +269,109 @@ def _of_class(kind: type, seen: set[int]) -> Iterator[str]:
         elif not name.startswith("__") and isinstance(part, _CONSTANTS):
             yield name
             yield from _fingerprint(part, seen)
-    for base in kind.__bases__:
+        elif seen.deep and not (_is_note(name) or isinstance(part, _MACHINERY)):
+            yield name
+            yield from _fingerprint(getattr(part, "__func__", part), seen)
+    for base in (*kind.__bases__, *((type(kind),) if seen.deep else ())):
         yield from _of_class(base, seen)
+
+
+def _is_note(name: str) -> bool:
+    """Whether an attribute of a class is Python's own."""
+    return name.startswith("__") or name in ("_abc_impl", "_is_protocol")
+
+
+def _is_controls(thing: Any) -> bool:
+    """Whether a function or a class is python-control's, whose version stands beside every key."""
+    return str(thing.__module__).partition(".")[0] == "control"
 
 
 def _is_users(kind: type) -> bool:
     """Whether somebody has written a class in Python; one in text that was run is of no module."""
-    in_text = kind.__module__ == "builtins"
-    return kind.__flags__ & HEAP_TYPE != 0 and (in_text or not _is_library(kind.__module__))
+    module = getattr(kind, "__module__", None)  # arrays of ctypes have none
+    if not isinstance(module, str):  # a class of C that describes those of its objects
+        return False
+    in_text = module == "builtins"
+    return kind.__flags__ & HEAP_TYPE != 0 and (in_text or not _is_library(module))
 
 
-def _of_object(thing: Any, seen: set[int]) -> Iterator[str]:
+def _of_object(thing: Any, seen: _Seen) -> Iterator[str]:
     """Yield text for an object: its class, and what its attributes are."""
-    if id(thing) in seen:
+    if not seen.add(thing):
         return
-    seen.add(id(thing))
     yield from _of_class(type(thing), seen)
-    slots = [name for kind in type(thing).__mro__ for name in getattr(kind, "__slots__", ())]
-    held = {name: getattr(thing, name) for name in slots if hasattr(thing, name)}
+    held = {name: getattr(thing, name) for name in _slots(type(thing)) if hasattr(thing, name)}
     for name, value in sorted({**held, **getattr(thing, "__dict__", {})}.items()):
-        yield name
-        yield from _fingerprint(value, seen)
+        if not (seen.deep and name in LAID_OUT):
+            yield name
+            yield from _fingerprint(value, seen)
+    bases = [base for base in type(thing).__mro__[:-1] if not _is_users(base)]
+    if seen.deep and any(_has_content(base) for base in bases):
+        held = inherited(thing)  # a float with a name, a list with more
+        yield from (held,) if isinstance(held, str) else _fingerprint(held, seen)
 
 
-def _content(cell: types.CellType) -> Any:
+def _has_content(base: type) -> bool:
+    """Whether objects of a library's class may hold what is in no attribute of Python's."""
+    return base.__flags__ & HEAP_TYPE == 0 or base.__module__.startswith("pandas.")
+
+
+def _slots(kind: type) -> Iterator[str]:
+    """Yield the names of slots as attributes have them."""
+    for base in kind.__mro__:
+        given = base.__dict__.get("__slots__", ())
+        for name in (given,) if isinstance(given, str) else given:
+            is_private = name.startswith("__") and not name.endswith("__")
+            yield f"_{base.__name__.lstrip('_')}{name}" if is_private else name
+
+
+def _of_library_object(thing: Any, seen: _Seen) -> Iterator[str]:
+    """Yield text for an object of a library, and for all that it holds."""
+    if not seen.deep:
+        yield _constant(thing)
+    elif isinstance(thing, set | frozenset):
+        yield f"{type(thing).__name__} {sorted(_digest_of(_fingerprint(t, seen)) for t in thing)}"
+    else:
+        yield from _of_held(thing, held_by(thing, _is_library), seen)
+
+
+def _of_held(thing: Any, held: Any, seen: _Seen) -> Iterator[str]:
+    if held is None:
+        yield _constant(thing)
+    elif isinstance(held, str):
+        yield held
+    elif seen.add(thing):
+        yield f"object {type(thing).__qualname__}"
+        yield from _fingerprint(held, seen)
+
+
+def _in_cell(cell: types.CellType) -> Any:
     try:
         return cell.cell_contents
     except ValueError:  # not yet filled
         return None
 
 
-def _of_module(module: types.ModuleType, seen: set[int], names: Iterable[str]) -> Iterator[str]:
+def _of_module(module: types.ModuleType, seen: _Seen, names: Iterable[str]) -> Iterator[str]:
     """Yield text for what is read of a module, ``module.name``; a library's version stands for it.
 
     Every name that the reader uses may be one.
     """
     yield f"module {module.__name__} {getattr(module, '__version__', '')}"
-    if _is_library(module.__name__) or id(module) in seen:
+    if _is_library(module.__name__) or not seen.add(module):
         return
-    seen.add(id(module))
     for name in names:
         if name in vars(module):
             yield name
             yield from _fingerprint(vars(module)[name], seen, names)
-    seen.discard(id(module))  # another function may read other names of it
+    del seen[id(module)]  # another function may read other names of it
 
 
-def _of_numba_type(kind: numba.types.Type, seen: set[int]) -> Iterator[str]:
+def _of_numba_type(kind: numba.types.Type, seen: _Seen) -> Iterator[str]:
     """Yield text for a type; one of our own also for the module that generates its code."""
     yield f"type {kind}"
     module = sys.modules[type(kind).__module__]
-    if not _is_library(module.__name__) and id(type(kind)) not in seen:
-        seen.add(id(type(kind)))
+    if not _is_library(module.__name__) and seen.add(type(kind)):
         yield from _defined(module)
 
 
@@ -227,6 +389,11 @@ def _defined(module: types.ModuleType) -> Iterator[str]:
             if isinstance(function := _plain(part), types.FunctionType):
                 yield name
                 yield from _code_text(function.__code__)
+
+
+def _is_named(module: str) -> bool:
+    """Whether the version of a module stands beside every key."""
+    return module.partition(".")[0] in ("nlctl", "analysis", "control") or _is_library(module)
 
 
 @functools.cache

@@ -20,7 +20,7 @@ import llvmlite.binding as llvm
 import numba
 
 from ...upstream.numba_internals import checks_indices, is_jit_disabled
-from ..integrate import advance, restart, workspace
+from ..integrate import advance, start, workspace
 from ..integrate.workspace import TASK, WORK
 from . import address, store
 from .fingerprint import function_key, module_key
@@ -38,7 +38,7 @@ WANTED = [
         options={"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True},
     )
     for function, *arguments in (
-        (restart.start, _ADDRESS, TASK, WORK),
+        (start.start, _ADDRESS, TASK, WORK),
         (advance.advance, _ADDRESS, _ADDRESS, _ADDRESS, TASK, WORK, numba.intp),
         (workspace.outputs, _ADDRESS, _ADDRESS, TASK, WORK),
     )

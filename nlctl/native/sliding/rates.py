@@ -1,7 +1,8 @@
 """The rate that a diagram gives the input of an ideal relay, as a function of the relay's output.
 
 The relay's output v is a leaf, read as if it came from outside.  Along x' the relay's input has the
-derivative u' = a + b v, where b is its derivative by v, and a its value at v = 0.
+derivative u' = a + b v, where b is its derivative by v, and a its value at v = 0; or one that is so
+piece by piece, see `pieces`.
 """
 
 from __future__ import annotations
@@ -12,9 +13,18 @@ from dataclasses import dataclass
 from ...errors import CompileError
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
+from .pieces import (
+    LeafDerivative,
+    affine,
+    bend_places,
+    replaced_parts,
+    slope_of,
+    unreadable,
+    zero_between,
+)
+from .second import Limits, SecondOrder, second_order
 
 OUTPUTS = "relays"  # the array of leaves that stand for the relays' outputs
-_LINEAR = ("add", "sub", "neg", "sum", "item", "slice", "concat")
 _SMOOTH = "smooth the jump over a small width, or give it hysteresis (nlctl.Relay)"
 
 
@@ -30,11 +40,14 @@ class SlidingInput:
         What stands for the relay's output.
     given : Expr
         The input, an expression.
+    limits : Limits
+        Its parameters.
     """
 
     name: str
     leaf: Expr
     given: Expr
+    limits: Limits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +74,10 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingRate:
-    """Drift a and gain b of the rate u' = a + b v of a relay's input, and the relay's output v."""
+    """Drift a and gain b of the rate u' = a + b v of a relay's input, and the relay's output v.
+
+    Of a rate in several pieces: a and b of the straight line through both ends, v = +-height.
+    """
 
     drift: Expr
     gain: Expr
@@ -91,7 +107,7 @@ def sliding_rates(
     """
     rates = [_rate(graph, relay, motion) for relay in relays]
     leaves = [relay.leaf for relay in relays]
-    read = [set(leaves).intersection(needed([rate])) for rate, _ in rates]
+    read = [set(leaves).intersection(needed([rate.whole])) for rate in rates]
     made: dict[int, SlidingRate] = {}
     while len(made) < len(relays):
         known = {leaves[i]: one.output for i, one in made.items()}
@@ -103,32 +119,23 @@ def sliding_rates(
                 f"where both inputs are 0 has no one answer; of one {_SMOOTH}"
             )
         for i in ready:
-            without = known | {leaves[i]: graph.const(0.0)}
-            drift, gain = replaced_parts(graph, rates[i], without)
-            v = output(i, (relays[i].given, drift, gain))
+            drift, gain, *here = replaced_parts(graph, [*rates[i].line, *rates[i].piece], known)
+            v = output(i, (relays[i].given, here[0], here[1]))
             made[i] = SlidingRate(drift=drift, gain=gain, output=v)
     return [made[i] for i in range(len(relays))]
 
 
-def replaced_parts(graph: Graph, exprs: Sequence[Expr], instead: Mapping[Expr, Expr]) -> list[Expr]:
-    """Return expressions with others in the places of some of their parts."""
-    new: dict[Expr, Expr] = {}
-    for node in needed(exprs, instead):
-        args = tuple(new.get(a, a) for a in node.args)
-        if node in instead:
-            new[node] = instead[node]
-        elif args != node.args:
-            new[node] = graph.node(
-                node.op, *args, data=node.data, size=node.size, kind=node.kind,
-                varies=node.varies, value=node.value,
-            )  # fmt: skip
-    return [new.get(e, e) for e in exprs]
+@dataclass(frozen=True, kw_only=True)
+class _Rate:
+    """u' of a relay; a and b of it between its ends, and where it vanishes."""
+
+    whole: Expr
+    line: Sequence[Expr]
+    piece: Sequence[Expr]
 
 
-def _rate(graph: Graph, relay: SlidingInput, motion: Motion) -> tuple[Expr, Expr]:
-    """Return u' of a relay, and its derivative by the relay's output."""
-    who = f"the ideal relay '{relay.name}'"
-    _check_input(who, relay, motion)
+def _along(graph: Graph, motion: Motion) -> Callable[[Expr], Expr | None]:
+    """Return what gives the derivatives of what is read, along the motion of the diagram."""
     states = graph.joined([(rate, 1) for rate in motion.rates]) if motion.rates else None
 
     def along(leaf: Expr) -> Expr | None:
@@ -136,6 +143,8 @@ def _rate(graph: Graph, relay: SlidingInput, motion: Motion) -> tuple[Expr, Expr
         if array == "t":
             return graph.const(1.0)
         if array == "u":
+            if start >= motion.inputs:
+                return None  # a rate, which is constant between the times of a run
             where = (array, motion.behind + start, step)
             return graph.node("leaf", data=where, size=leaf.size, varies=True)
         if array != "x" or states is None:
@@ -144,45 +153,76 @@ def _rate(graph: Graph, relay: SlidingInput, motion: Motion) -> tuple[Expr, Expr
             return motion.rates[start]
         return graph.part(states, start, step, leaf.size)
 
+    return along
+
+
+def _rate(graph: Graph, relay: SlidingInput, motion: Motion) -> _Rate:
+    """Return u' of a relay as a function of its output."""
+    who = f"the ideal relay '{relay.name}'"
+    _check_input(who, relay, motion)
     try:
-        (rate,) = tangents(graph, [relay.given], along, motion.solutions)
+        (rate,) = tangents(graph, [relay.given], _along(graph, motion), motion.solutions)
         rate = rate or graph.const(0.0)
-        (gain,) = tangents(
-            graph, [rate], lambda leaf: graph.const(1.0) if leaf is relay.leaf else None,
-            motion.solutions,
-        )  # fmt: skip
+        found = _read(graph, who, relay, rate, motion)
     except Untraceable as error:
         raise CompileError(f"the input of {who} has no rate: {error}; {_SMOOTH}") from None
+    return found
+
+
+def _read(graph: Graph, who: str, relay: SlidingInput, rate: Expr, motion: Motion) -> _Rate:
+    """Return u' as a + b v, or in such pieces, read off an expression."""
     if any(e.op == "solve" and _reads(e, OUTPUTS) for e in needed([rate])):
         raise CompileError(
             f"the input of {who} has a rate in which the output of an ideal relay is in an "
             f"algebraic loop: put a state into the loop, or {_SMOOTH}"
         )
-    if not _is_affine(rate, relay.leaf):
+    slope = slope_of(graph, relay.leaf, motion.solutions)
+    gain = slope(rate) or graph.const(0.0)  # what is called as it stands has none: refused
+    beyond = None if _acts(gain) else _second(graph, relay, rate, motion, slope)
+    if beyond is not None:
+        return _Rate(
+            whole=graph.joined([(e, 1) for e in (*beyond.line, *beyond.piece)]),
+            line=beyond.line,
+            piece=beyond.piece,
+        )
+    if affine(rate, relay.leaf):
+        (drift,) = replaced_parts(graph, [rate], {relay.leaf: graph.const(0.0)})
+        return _Rate(whole=rate, line=(drift, gain), piece=(drift, gain))
+    why = unreadable(graph, rate, relay.leaf, slope)
+    if why:
         raise CompileError(
             f"the output v of {who} does not enter the rate u' of its input as a + b v that can be "
-            f"read off: what slides depends on how the jump is made; {_SMOOTH}"
+            f"read off, nor in such pieces (min, max, clip, abs) that u' only falls or only rises "
+            f"with v, but {why}: what slides depends on how the jump is made; {_SMOOTH}"
         )
-    return rate, gain or graph.const(0.0)
+    breaks = bend_places(graph, rate, relay.leaf, slope)
+    line, piece = zero_between(graph, rate, relay.leaf, relay.limits.height, breaks)
+    return _Rate(whole=rate, line=line, piece=piece)
 
 
-def _is_affine(expr: Expr, leaf: Expr) -> bool:
-    """Whether an expression is a + b v for all values, as it is written."""
-    depends: set[Expr] = {leaf}
-    for node in needed([expr]):
-        by = [arg in depends for arg in node.args]
-        if not any(by):
-            continue
-        linear = (
-            node.op in _LINEAR
-            or (node.op == "mul" and sum(by) == 1)
-            or (node.op == "div" and not by[1])
-            or (node.op == "select" and not by[0])
-        )
-        if not linear:
-            return False
-        depends.add(node)
-    return True
+def _acts(gain: Expr) -> bool:
+    """Whether a relay's output has a gain in the rate of its input that is not 0 as written."""
+    return not (gain.op == "const" and gain.data == 0.0)
+
+
+def _second(
+    graph: Graph, relay: SlidingInput, rate: Expr, motion: Motion, slope: LeafDerivative
+) -> SecondOrder | None:
+    """Return the second-order sliding of one relay alone, without what nobody knows the rate of."""
+    (rate,) = replaced_parts(graph, [rate], {relay.leaf: graph.const(0.0)})
+    found = second_order(
+        graph, relay.given, rate, relay.leaf, relay.limits, _along(graph, motion), slope
+    )
+    if found is None:
+        return None
+    parts = needed([*found.line, *found.piece])
+    known = not any(
+        (e.op == "leaf" and e.data[0] == OUTPUTS)
+        or e.op in ("call", "solve")
+        or (_is_delayed(e, motion.inputs) and e.data[1] < motion.behind)
+        for e in parts
+    )
+    return found if known else None
 
 
 def _check_input(who: str, relay: SlidingInput, motion: Motion) -> None:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 from ...blocks import slides
 from ...expressions.arrays import Tracer, concatenated, scalar
 from ...expressions.graph import Expr, Graph
 from ..codegen.program import memory
+from ..codegen.trace import traced_parameters
 from .rates import OUTPUTS, Motion, SlidingInput, sliding_rates
+from .second import Limits
 
 if TYPE_CHECKING:
-    from ..codegen.blocks import Reader
     from ..diagram.schedule import Node, Schedule
+    from ..equations.reader import Reader
 
 
 def relay_places(blocks: Sequence[Node]) -> list[int]:
@@ -43,7 +45,12 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
     )
     first.read(schedule)
     relays = [
-        SlidingInput(name=blocks[i].path, leaf=leaf, given=first.wired(blocks[i].inputs)[0].only)
+        SlidingInput(
+            name=blocks[i].path,
+            leaf=leaf,
+            given=first.wired(blocks[i].inputs)[0].only,
+            limits=_limits(first, i),
+        )
         for i, leaf in zip(places, leaves, strict=True)
     ]
 
@@ -64,6 +71,13 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
 
 def _array(graph: Graph, parts: Sequence[Expr]) -> Tracer:
     return concatenated(graph, [scalar(graph, part).reshape(1) for part in parts])
+
+
+def _limits(reader: Reader, i: int) -> Limits:
+    """Return the parameters of a relay, as expressions."""
+    given = traced_parameters(reader.graph, reader.blocks[i].system, reader.layout[i], reader.p)
+    names = (f.name for f in fields(Limits))
+    return Limits(**{name: reader.graph.number(getattr(given, name).only) for name in names})
 
 
 def _rates(reader: Reader) -> list[Expr]:

@@ -10,9 +10,9 @@ import numpy as np
 
 from ...errors import ParameterError
 from ...upstream.numba_internals import is_jit_disabled
-from ..codegen.blocks import equations
 from ..codegen.lower import Lowered, planned, stores_of
 from ..codegen.rewrite import rewritten
+from ..equations.blocks import equations
 from ..integrate.memory import zeros
 from ..machine.finish import finished
 from ..machine.routine import Routine
@@ -87,7 +87,8 @@ def _made(compiled: Compiled, p: np.ndarray, width: int) -> Series:
     if not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
         found = equations(compiled.schedule, compiled.program.layout, p[:, 0])
     lowered, wanted = _lowered(compiled, found, width)
-    layout, switching = _layout(lowered), compiled.program.switching
+    layout = _layout(lowered)
+    switching = compiled.program.switching  # of conditions it knows the sides
     if is_jit_disabled():
         prepare, *functions = plain_series(lowered, wanted, switching, layout)
     else:
@@ -119,9 +120,13 @@ def _layout(lowered: Lowered) -> SeriesLayout:
 
 def _lowered(compiled: Compiled, found: Any, width: int) -> tuple[Lowered, Recurrences]:
     program, n, m = compiled.program, compiled.system.nstates or 0, compiled.schedule.ninputs
-    stores, exact, graph = rewritten(found.graph, stores_of(found, ("dx", "g")))
+    asked = stores_of(found, ("dx", "g"))
+    asked["g"] = [s for s in asked["g"] if s.row < program.switching]
+    stores, exact, graph = rewritten(found.graph, asked)
     try:
-        wanted = recurrences(graph, stores, {"x": n, "g": program.events}, packed=width == 1)
+        wanted = recurrences(
+            graph, stores, {"x": n, "g": program.events + found.conditions.rows}, packed=width == 1
+        )
     except NoSeriesError as error:
         raise ParameterError(
             f"'{compiled.system.name}' cannot be integrated with method='taylor': {error}; use "

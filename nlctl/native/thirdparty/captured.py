@@ -6,9 +6,12 @@ looks whether they are still what they were.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import functools
+from array import array
+from collections import deque
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from types import CellType
+from types import CellType, CodeType, FunctionType, MethodType
 from typing import Any
 
 import numpy as np
@@ -16,6 +19,8 @@ import numpy as np
 from .values import PLAIN
 
 GONE = object()
+_SEQUENCES = (list, tuple, deque, bytearray, array)
+_OF_PARTIALS = ("func", "args", "keywords")
 
 
 @dataclass(frozen=True)
@@ -48,41 +53,93 @@ class Captured:
             return self.holder.get(self.name, GONE)
         return getattr(self.holder, self.name, GONE)
 
+    @property
+    def title(self) -> str:
+        """What a message calls it."""
+        owner = self.holder if self.name.startswith("__") or self.name in _OF_PARTIALS else None
+        if isinstance(owner, functools.partial):
+            owner = owner.func
+        name = getattr(owner, "__qualname__", "")
+        return f"{name}.{self.name}" if name else self.name
+
 
 def noted(holder: Any, name: str, value: Any) -> Captured:
     """Return the note of a value that has just been read."""
-    return Captured(holder, name, _snapshot(value))
+    return Captured(holder, name, recorded(value))
+
+
+def noted_function(function: FunctionType) -> Iterator[Captured]:
+    """Yield notes of what a function is made of: reloading a module writes it into the old one."""
+    for name in ("__code__", "__defaults__", "__kwdefaults__"):
+        yield noted(function, name, getattr(function, name))
+
+
+def noted_partial(given: functools.partial[Any]) -> Iterator[Captured]:
+    """Yield notes of the arguments that a `functools.partial` has."""
+    for name in _OF_PARTIALS:
+        yield noted(given, name, getattr(given, name))
 
 
 def changed(values: Iterable[Captured]) -> Captured | None:
     """Return the first value that is not what it was."""
-    return next((v for v in values if not _same(v.now, v.then)), None)
+    return next((v for v in values if not same(v.now, v.then)), None)
 
 
-def _snapshot(value: Any) -> Any:
+def recorded(value: Any) -> Any:
     """Return what a value is compared with: copies of arrays and containers, else itself."""
-    if type(value) is np.ndarray:
+    if isinstance(value, np.ndarray):
         return value.copy()
-    if type(value) in (list, tuple, set):
-        return type(value)(map(_snapshot, value))
-    if type(value) is dict:
-        return {k: _snapshot(v) for k, v in value.items()}
+    if isinstance(value, dict):
+        return _Kept(type(value), tuple((k, recorded(v)) for k, v in value.items()))
+    if isinstance(value, _SEQUENCES):
+        return _Kept(type(value), tuple(map(recorded, value)))
+    if isinstance(value, set | frozenset):
+        return _Kept(type(value), frozenset(value))
     return value
 
 
-def _same(now: Any, then: Any) -> bool:
-    if now is then:
-        return True
+@dataclass(frozen=True)
+class _Kept:
+    """What a container held; printed as it was."""
+
+    kind: type
+    held: Any
+
+    def __repr__(self) -> str:
+        if issubclass(self.kind, dict):
+            return repr(dict(self.held))
+        return repr(list(self.held) if self.kind is list else self.held)
+
+
+def same(now: Any, then: Any) -> bool:
+    """Whether a value is what was recorded."""
+    if isinstance(then, _Kept):
+        return type(now) is then.kind and _same_held(now, then.held)
     if type(now) is not type(then):
         return False
-    if type(now) is np.ndarray:
+    if isinstance(now, np.ndarray):
         alike = now.dtype == then.dtype and now.shape == then.shape
-        return alike and np.array_equal(_bits(now), _bits(then))
-    if type(now) in (list, tuple):
-        return len(now) == len(then) and all(map(_same, now, then))
-    if type(now) is dict:
-        return now.keys() == then.keys() and all(_same(now[k], then[k]) for k in now)
+        masks = [np.ma.getmaskarray(v) for v in (now, then) if isinstance(v, np.ma.MaskedArray)]
+        alike = alike and (not masks or np.array_equal(*masks))
+        return alike and np.array_equal(_bits(np.asarray(now)), _bits(np.asarray(then)))
+    if isinstance(now, MethodType):  # made anew each time it is read
+        return now.__func__ is then.__func__ and now.__self__ is then.__self__
+    if now is then:
+        return True
+    if isinstance(now, CodeType):
+        return now == then
     return isinstance(now, PLAIN) and bool(now == then or (now != now and then != then))
+
+
+def _same_held(now: Any, held: Any) -> bool:
+    """Whether a container holds what it held."""
+    if isinstance(now, dict):
+        if len(now) != len(held):
+            return False
+        return all(k in now and same(now[k], v) for k, v in held)
+    if isinstance(now, set | frozenset):
+        return frozenset(now) == held
+    return len(now) == len(held) and all(map(same, now, held))
 
 
 def _bits(array: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import functools
 import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from types import FunctionType, MethodType, ModuleType
+from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -250,6 +250,7 @@ class Expressions(ast.NodeVisitor):
             return forgotten(base)
         found = inspect.getattr_static(type(thing), name, None)
         if isinstance(found, property | functools.cached_property) and library(type(thing)) is None:
+            self.walk.captured(type(thing), name, found)
             getter = found.fget if isinstance(found, property) else found.func
             result = self.walk.call(captured(getter), [base], {})
             return result if not result.own else FRESH
@@ -257,8 +258,6 @@ class Expressions(ast.NodeVisitor):
             value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):
                 return OUTSIDE
-            if isinstance(value, MethodType) or isinstance(thing, super):
-                return captured(value)  # made anew each time
             return self.walk.captured(thing, name, value)
         raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import builtins
 import functools
-from types import FunctionType, ModuleType
+from types import FunctionType, MethodType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -96,7 +96,7 @@ def call(
         If it changes something, differs from call to call, or cannot be read.
     """
     if isinstance(thing, functools._lru_cache_wrapper):
-        return walk.call(captured(thing.__wrapped__), given, named)
+        return walk.call(walk.captured(thing, "__wrapped__", thing.__wrapped__), given, named)
     if thing in (np.errstate,) or (isinstance(thing, type) and issubclass(thing, BaseException)):
         return FRESH
     owner = getattr(thing, "__self__", None)
@@ -119,6 +119,8 @@ def call(
         raise Impure(f"calls {text}, whose code cannot be read", "write the formula out")
     if isinstance(thing, FunctionType) or thing.__class__.__name__ == "CPUDispatcher":
         return walk.function(function, given, named)
+    if not isinstance(thing, MethodType):
+        walk.captured(type(thing), "__call__", function)
     return walk.function(function, [captured(owner if owner is not None else thing), *given], named)
 
 

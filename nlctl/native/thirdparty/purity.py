@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import ast
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from types import FunctionType
 from typing import Any
 
 from . import known_calls
-from .captured import Captured, noted
+from .captured import Captured, noted, noted_function, noted_partial
 from .expressions import Frame
 from .source import Definition, Unreadable, definition
 from .statements import CallWalker
@@ -91,6 +91,11 @@ class Walk:
             self.read[id(holder), name] = noted(holder, name, value)
         return captured(value)
 
+    def note(self, notes: Iterable[Captured]) -> None:
+        """Keep notes of what a function or an object consists of."""
+        for made in notes:
+            self.read.setdefault((id(made.holder), made.name), made)
+
     def call(
         self, function: KnownValue, given: list[KnownValue], named: dict[str, KnownValue]
     ) -> KnownValue:
@@ -103,6 +108,7 @@ class Walk:
         if isinstance(thing, Local):
             return self.body(thing.node, thing.frame.function, thing.frame, given, named)
         if isinstance(thing, functools.partial):
+            self.note(noted_partial(thing))
             first = [captured(v) for v in thing.args]
             more = {k: captured(v) for k, v in thing.keywords.items()}
             return self.call(captured(thing.func), first + given, more | named)
@@ -112,6 +118,7 @@ class Walk:
         self, thing: FunctionType, given: list[KnownValue], named: dict[str, KnownValue]
     ) -> KnownValue:
         """Return what is known of the result of somebody's Python function."""
+        self.note(noted_function(thing))
         try:
             return self.body(definition(thing), thing, None, given, named)
         except Unreadable as error:

@@ -32,6 +32,20 @@ WIRES = {
     "law.Y_d": "filtered_error.Y_d",
 }
 OUTPUTS = {"r": "filtered_error.r", "u": "law.u", "x1": "plant.x1"}
+KNOWN_SIGN = PARTS, WIRES
+SLIDING = (
+    {
+        **{k: PARTS[k] for k in ("reference", "plant", "filtered_error")},
+        "actuator": lambda: nlctl.Gain(),
+        "law": lambda: nlctl.SlidingModeLaw(K=25.0, phi=0.1),
+    },
+    {
+        k: v
+        for k, v in WIRES.items()
+        if k.partition(".")[0] in ("plant", "actuator", "filtered_error")
+    }
+    | {"law.r": "filtered_error.r"},
+)
 
 
 def system(thing, name):
@@ -39,13 +53,13 @@ def system(thing, name):
     return thing if isinstance(thing, ct.InputOutputSystem) else nlctl.block(thing, name)
 
 
-def wired(wires=None, *, inputs=None, outputs=None, params=None, more=(), **parts):
-    """The certified loop, flat, by explicit connections, with some of them changed.
+def wired(wires=None, *, inputs=None, outputs=None, params=None, more=(), of=KNOWN_SIGN, **parts):
+    """A certified loop, flat, by explicit connections, with some of them changed.
 
     `wires` maps an input to a source, or to a list of sources that are added, with gains as
     python-control writes them: ``"-actuator.v"``, ``("actuator", "v", 0.05)``, None for none.
     """
-    blocks = [system(parts.get(k, make()), k) for k, make in PARTS.items()] + list(more)
+    blocks = [system(parts.get(k, make()), k) for k, make in of[0].items()] + list(more)
     places = {block.name: block for block in blocks}
 
     def full(signal):  # brackets mean more than one signal in python-control's text
@@ -61,7 +75,7 @@ def wired(wires=None, *, inputs=None, outputs=None, params=None, more=(), **part
         return [list(places).index(name), labels.index(label), *gain]
 
     connections = []
-    for target, sources in {**WIRES, **(wires or {})}.items():
+    for target, sources in {**of[1], **(wires or {})}.items():
         listed = [] if sources is None else sources if isinstance(sources, list) else [sources]
         if listed:
             into = tuple(numbered(target, "input")[:2])

@@ -73,7 +73,7 @@ def computed(compiled: nlctl.Compiled, at: Points) -> tuple[np.ndarray, np.ndarr
     system, lanes = compiled.system, at.t.size
     p = np.repeat(compiled.parameter_vector()[:, None], lanes, axis=1)
     code = machine(compiled, p, lanes)
-    sizes = (code.rows, system.nstates, compiled.program.events, system.noutputs)
+    sizes = (code.rows, system.nstates, code.lowered.rows["g"], system.noutputs)
     c, dx, g, y = (np.full((n or 0, lanes), np.nan) for n in sizes)
     code.prepare(p, c)
     given = [np.ascontiguousarray(a) for a in (at.t, at.x, at.u)]

@@ -33,7 +33,7 @@ def evaluated(system, lanes, t, x, u, params=None, *, native=False, given=None):
     prepare, rhs, out = lowered_code(lowered) if native else plain_functions(lowered)
     c = np.full((lowered.size, lanes), np.nan)
     found = [np.full((n or 0, lanes), np.nan) for n in
-             (system.nstates, compiled.program.events, system.noutputs)]  # fmt: skip
+             (system.nstates, lowered.rows["g"], system.noutputs)]  # fmt: skip
     with np.errstate(all="ignore"):
         prepare(p, c)
         rhs(t, x, u, c, found[0], found[1])

@@ -73,6 +73,38 @@ def test_coverage_is_at_least_the_confidence(n, p, side):
     assert stats.binom.pmf(k, n, p)[covered].sum() >= 0.9 - 1e-12
 
 
+NUMBER = r"(\d[\d.]*(?:e-\d+)?)"
+
+
+def holds_for(words, p):
+    """Whether each bound that a sentence prints holds for a probability, in their order."""
+    found = re.findall(rf"(at most|at least|between|and) {NUMBER}", words)
+    return [p <= float(x) if word in ("at most", "and") else p >= float(x) for word, x in found]
+
+
+@pytest.mark.parametrize("side", ["upper", "lower", "both"])
+@pytest.mark.parametrize("confidence", [0.7, 0.9, 0.99])
+def test_what_a_sentence_says_has_the_confidence_that_it_says(side, confidence):
+    """Read from its words: the first bound, and all of them, summed over all outcomes."""
+    n = 24
+    design = independent(SPACE, n, entropy=1)
+    said = [
+        violation_probability(design, [-1.0] * k + [1.0] * (n - k), confidence, side).bounds
+        for k in range(n + 1)
+    ]
+    for p in (0.001, 0.02, 0.2, 0.5, 0.8, 0.98):
+        weights = stats.binom.pmf(np.arange(n + 1), n, p)
+        holds = [holds_for(words, p) for words in said]
+        is_range = ["between" in words for words in said]
+        first = [all(h) if r else h[0] for h, r in zip(holds, is_range, strict=True)]
+        every = [all(h) for h in holds]
+        assert weights[first].sum() >= confidence - 1e-12
+        assert weights[every].sum() >= 2 * confidence - 1 - 1e-12
+    two = [words for words in said if "with the same confidence" in words]
+    assert all(f"(both together: {200 * confidence - 100:.10g} %)" in words for words in two)
+    assert bool(two) == (side != "both")
+
+
 @pytest.mark.parametrize(("violations", "wanted"), list(enumerate([59, 93, 124, 153, 181])))
 def test_plans_are_wilks_numbers(violations, wanted):
     """95 % / 95 %, one-sided: the sample sizes of Wilks' formula."""

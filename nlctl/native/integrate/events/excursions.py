@@ -47,7 +47,10 @@ def look_between(rhs, task, lanes, w, found):
     for j in range(lanes.size):
         w.resolved[j] = np.inf
         wanted[j] = (
-            found[j] > AGAIN and lanes[j].step > shortest and _suspected(task, lanes[j], w, j)
+            found[j] > AGAIN
+            and not lanes[j].across
+            and lanes[j].step > shortest
+            and _suspected(task, lanes[j], w, j)
         )
         any_wanted |= wanted[j]
     if not any_wanted:

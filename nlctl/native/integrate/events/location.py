@@ -18,6 +18,7 @@ import numpy as np
 
 from ..state import INNER
 
+_SMALL = 0.01  # of the absolute tolerance
 STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
 REFUSED, AGAIN, CLEAR, EVENT = -1, 0, 1, 2  # what became of the step just tried
 TRIES = 30
@@ -44,13 +45,20 @@ def behind_event(rtol):
 
 
 @numba.njit(**INNER)
-def first_root(lane, switching, e_start, e_low, e_high, behind, j):
+def first_root(lane, task, every, e_start, e_low, e_high, behind, j):
     """Return where the first event between the lengths low and high lies, -1 if there is none.
 
-    And whether it is a memory's.
+    And whether it is a memory's.  Conditions at which something may jump, and guards, are for
+    `crossing`, unless `every` event is asked for.
     """
     first, is_memory = -1.0, False
+    bending, switching, small = task.bending, task.switching, _SMALL * task.atol
+    declared = switching if every else task.declared
     for i in range(e_start.shape[0]):
+        if declared <= i < switching:
+            continue
+        if bending <= i < task.declared and abs(e_start[i, j]) + abs(e_high[i, j]) <= small:
+            continue  # rounding of what is 0: a kink that small is seen by nobody
         if triggered(e_start[i, j], e_high[i, j], i >= switching, behind[i, j] != 0.0):
             low, high = e_low[i, j], e_high[i, j]
             if not low * high < 0.0:
@@ -63,7 +71,7 @@ def first_root(lane, switching, e_start, e_low, e_high, behind, j):
 
 
 @numba.njit(**INNER)
-def locate(lane, switching, rtol, e_start, e_low, e_high, e, behind, j):
+def locate(lane, task, e_start, e_low, e_high, e, behind, j):
     """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT.
 
     With AGAIN, ``lane.step`` is the next length to try.
@@ -72,12 +80,12 @@ def locate(lane, switching, rtol, e_start, e_low, e_high, e, behind, j):
         lane.low, lane.high = 0.0, lane.step
         for i in range(e.shape[0]):
             e_low[i, j], e_high[i, j] = e_start[i, j], e[i, j]
-    root, memory = _narrowed(lane, switching, e_start, e_low, e_high, e, behind, j)
+    root, memory = _narrowed(lane, task, e_start, e_low, e_high, e, behind, j)
     if root < 0.0:
         return CLEAR
     lane.tries += 1
     # behind a break point stages are wrong by the rest; what a memory misses is quadratic in it
-    tolerance = lane.high * (0.3 * np.sqrt(rtol) if memory else behind_event(rtol))
+    tolerance = lane.high * (0.3 * np.sqrt(task.rtol) if memory else behind_event(task.rtol))
     is_behind = lane.high == lane.step
     if is_behind and (lane.high - root <= tolerance or lane.tries > TRIES):
         return EVENT
@@ -95,12 +103,12 @@ def locate(lane, switching, rtol, e_start, e_low, e_high, e, behind, j):
 
 
 @numba.njit(**INNER)
-def _narrowed(lane, switching, e_start, e_low, e_high, e, behind, j):
+def _narrowed(lane, task, e_start, e_low, e_high, e, behind, j):
     """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
     before = lane.high
     if lane.tries > 0:
         lane.high = lane.step
-        inside = first_root(lane, switching, e_start, e_low, e, behind, j)[0] >= 0.0
+        inside = first_root(lane, task, False, e_start, e_low, e, behind, j)[0] >= 0.0
         if not inside:
             lane.low, lane.high = lane.step, before
             lane.same_side = min(lane.same_side, 0) - 1
@@ -114,7 +122,7 @@ def _narrowed(lane, switching, e_start, e_low, e_high, e, behind, j):
                 e_low[i, j], e_high[i, j] = e[i, j], e_high[i, j] * weight
     else:
         lane.same_side = 0
-    return first_root(lane, switching, e_start, e_low, e_high, behind, j)
+    return first_root(lane, task, False, e_start, e_low, e_high, behind, j)
 
 
 @numba.njit(**INNER)
@@ -133,7 +141,7 @@ def jumped(task, lane, w, j):
             for n in range(3):
                 changed |= _apart(task, before, w.g_inside[n, row, j])
         if changed:
-            own = first_root(lane, task.switching, w.e_start, w.e_start, w.e, w.behind, j)[0]
+            own = first_root(lane, task, True, w.e_start, w.e_start, w.e, w.behind, j)[0]
             return lane.seeks > 0 or own < 0.0
     return False
 
@@ -170,7 +178,9 @@ def step_accepted(lane, event):
     lane.last = lane.step
     lane.tries = lane.seeks = 0
     lane.quiet = max(0, lane.quiet - 1)
-    if event:
+    if event and lane.across:
+        lane.events += 1
+    elif event:
         lane.events += 1
         lane.short = lane.short + 1 if lane.step < SHORT * lane.h else 0
         if lane.short >= PATIENCE:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...machine.address import call_rhs
 from ..state import INNER
-from ..workspace import inputs_at
+from ..workspace import inputs_at, on_this_side
 
 
 @numba.njit(**INNER)
@@ -27,6 +27,8 @@ def explicit_attempt(rhs, task, lanes, w):
     for s in range(1, last + 1):
         for j in range(count):
             w.t[j] = lanes[j].t + task.C[s] * w.h[j]
+        if task.jumps.shape[1]:
+            on_this_side(lanes, w)
         if w.u.shape[0]:
             inputs_at(task, lanes, w)
         if s < last:

@@ -41,7 +41,7 @@ def expand(task, lanes, w):
     """
     stale, series = False, task.series
     for j in range(lanes.size):
-        w.t[j] = lanes[j].t
+        w.t[j] = max(lanes[j].t, lanes[j].right)
         stale |= lanes[j].status == RUNNING and w.expanded[j] == 0
     if not stale:
         return
@@ -102,7 +102,7 @@ def taylor_attempt(rhs, task, lanes, w):
         _aim(task, lanes, w)
     for j in range(lanes.size):
         w.h[j], w.hh[j] = lanes[j].step, lanes[j].step
-        w.t[j] = lanes[j].t + w.h[j]
+        w.t[j] = min(lanes[j].t + w.h[j], lanes[j].left)
     call_step(series[_STEP], w.h, task.c_series, w.terms, w.x_new, w.dx_ahead)
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
@@ -318,7 +318,7 @@ def _look_across(rhs, task, lanes, w):
     dx, p = w.x_stage, task.highest
     for j in range(lanes.size):
         if w.looked[j] > 0.0:
-            w.t[j] = lanes[j].t + w.looked[j] * w.h[j]
+            w.t[j] = min(lanes[j].t + w.looked[j] * w.h[j], lanes[j].left)
             interpolate(w.looked[j], w.h[j], p, w.terms, j, w.x_ahead)
         else:  # anything finite
             w.t[j] = lanes[j].t

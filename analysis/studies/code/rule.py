@@ -1,9 +1,16 @@
-"""Which code a study may name: what is read, imported and called when somebody opens a study file.
+"""Which code a file may name: one rule for every function, wherever a file names it.
 
-A study file names functions, and reading it runs the code around them, as a Makefile does.  So
-before anything is imported, everything that it names is looked at: files in the study's folder and
-installed packages are taken, anything else only from who says that he trusts it.  Whatever is
-trusted, a function is called only if it can be one that returns a diagram: `check_loop_function`.
+A study file names functions, and reading it runs the code around them, as a Makefile does.  What
+may run without being asked is what makes loops of nlctl's blocks:
+
+* modules of nlctl that do, `MADE_OF`;
+* files in the study's own folder, where somebody has pointed at the study;
+* installed packages that are built on nlctl or python-control, likewise.
+
+Anything else needs the trust of this user, see `record`; so does all but the first of these in a
+folder of results, which is data that somebody may have sent.  It is looked at twice: what is named,
+before anything is imported, and where it was defined, before anything is called.  Whatever is
+trusted, a loop's function is called only if it can be one that returns a diagram.
 """
 
 from __future__ import annotations
@@ -12,34 +19,52 @@ import functools
 import importlib.util
 import inspect
 import json
+import os
 import re
 import sys
 import sysconfig
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from types import CellType, CodeType, FunctionType, ModuleType
-from typing import Any
+from typing import Any, Literal
 from urllib.parse import unquote, urlparse
 
 import control as ct
 
-from nlctl import errors
 from nlctl.errors import ParameterError
 
-from .errors import KeyPath, Problem
-from .schema import Study
+from ..file.errors import KeyPath, Problem
+from ..file.schema import Study
+from .loading import loaded_with
+from .record import remember, remembered, statement
 
 __all__ = [
+    "Grant",
+    "Reach",
+    "check_defined",
     "check_function",
     "check_loop_function",
     "check_place",
+    "named_in",
+    "remember_code",
     "untrusted",
-    "untrusted_names",
 ]
 
-_OWN = (Path(errors.__file__).parent, Path(__file__).parents[2])  # nlctl, analysis
+Reach = Literal["nlctl", "study", "all"]
+"""What may run unasked: nlctl's own code, the study's folder and packages as well, or anything."""
+
 MAKERS = ("control", "nlctl")  # whoever makes a diagram calls one of these
+_OURS = ("nlctl", "analysis")
+MADE_OF = tuple(
+    f"nlctl.{room}"
+    for room in ("actuators", "blocks", "controllers", "delays", "diagrams", "faults", "functions")
+) + (
+    *(f"nlctl.{room}" for room in ("paper", "plants", "references", "sampling", "sliding")),
+    *(f"analysis.paper.{part}" for part in ("controllers", "loops", "rivals")),
+    *("analysis.metrics", "analysis.lyapunov.nussbaum.forecast", "analysis.studies.kinds"),
+)
 NO_DIAGRAMS = {"None", "bool", "int", "float", "complex", "str", "bytes", "list", "tuple", "dict"}
 SITES = ("site-packages", "dist-packages")
 _LONGEST = 500  # characters of a function's name
@@ -51,26 +76,125 @@ DIAGRAMS = {
 } | {"Block"}
 
 
-def untrusted(study: Study, folder: Path) -> list[Problem]:
-    """Return what a study names outside of its folder and of installed packages.
+@dataclass(frozen=True, kw_only=True)
+class Grant:
+    """What code of one study may run.
+
+    Attributes
+    ----------
+    reach : Reach
+    folder : Path
+        What paths in the study are relative to.
+    study : str
+        A key of the study, see `record.study_digest`.
+    """
+
+    reach: Reach
+    folder: Path
+    study: str
+
+    def admits(self, path: Path) -> str:
+        """Return why a file may not be run; nothing if it may."""
+        path, home = path.resolve(), self.folder.resolve()
+        name = os.path.relpath(path, home)
+        if self.reach == "all" or (self.reach == "study" and _is_own(path, home)):
+            return ""
+        if self._is_recorded(name, path):
+            return ""
+        if self.reach == "study":
+            return f"'{name}' is outside of the study's folder"
+        return f"'{name}' is code that this user has neither run nor trusted as it is"
+
+    def refuses(self, path: Path) -> str:
+        """Return why a file may not be run, and what to do; nothing if it may."""
+        reason = self.admits(path)
+        return f"{reason}: {self.remedy}" if reason else ""
+
+    def admits_module(self, name: str) -> str:
+        """Return why a module may not be imported; nothing if it may, or if there is none."""
+        if name.partition(".")[0] in _OURS:
+            fits = name in _OURS or name.startswith(MADE_OF)
+            return "" if fits or self.reach == "all" else f"'{name}' makes nothing of a loop"
+        try:
+            places = _module_places(name)
+        except (ParameterError, OSError):  # said when it is looked for
+            return ""
+        if self.reach == "all" or self._is_recorded(f"module {name}", _source(places[0])):
+            return ""
+        if self.reach == "nlctl":
+            return f"'{name}' is a module that this user has neither run nor trusted for it"
+        home, top = self.folder.resolve(), name.partition(".")[0]
+        homes = [*_installed(top), home]
+        outside = [p for p in places if not any(p.resolve().is_relative_to(h) for h in homes)]
+        if outside:
+            return f"'{name}' is '{outside[0]}', and no installed package"
+        if all(_is_own(p.resolve(), home) for p in places) or top in _built_on():
+            return ""
+        return f"'{top}' is not built on nlctl or python-control"
+
+    def _is_recorded(self, name: str, path: Path) -> bool:
+        try:
+            return statement(self.study, name, path.read_bytes()) in remembered()
+        except OSError:
+            return False
+
+    @property
+    def remedy(self) -> str:
+        """What to do about what is refused."""
+        here = ", or put it into the study's folder" if self.reach == "study" else ""
+        return f"reading this study would run it. Trust it with --trust{here}"
+
+
+def _is_own(path: Path, home: Path) -> bool:
+    """Whether a file is of a study's folder, and not of packages that are installed in there."""
+    return path.is_relative_to(home) and not set(SITES) & set(path.relative_to(home).parts)
+
+
+def untrusted(named: Iterable[tuple[KeyPath, str]], grant: Grant) -> list[Problem]:
+    """Return which of these functions and kinds need trust, each with its place in the file.
 
     Nothing is imported to find that out.
     """
-    return untrusted_names(_named(study), folder)
-
-
-def untrusted_names(named: Iterable[tuple[KeyPath, str]], folder: Path) -> list[Problem]:
-    """Return which of these functions and kinds, each with its place in the file, need trust."""
     return [
-        Problem(place=place, message=f"{reason}: reading this study would run it. Trust it with "
-                "--trust, or put it into the study's folder")
+        Problem(place=place, message=f"{reason}: {grant.remedy}", needs_trust=True)
         for place, name in named
-        if (reason := _reason(name, folder))
-    ]  # fmt: skip
+        if (reason := _reason(name, grant))
+    ]
 
 
-def _named(study: Study) -> Iterator[tuple[KeyPath, str]]:
-    """Yield every function that a study names, with its place."""
+def _reason(name: str, grant: Grant) -> str:
+    """Return why a function's file or module needs trust; nothing if it needs none."""
+    source = name.rpartition(":")[0]
+    try:
+        check_place(name)
+    except ParameterError:  # said when it is looked for
+        return ""
+    if not source.endswith(".py"):
+        return grant.admits_module(source)
+    path = (grant.folder / source).resolve()  # of "no-such/../file.py", too
+    return grant.admits(path) if path.is_file() else ""
+
+
+def check_defined(function: Any, name: str, grant: Grant) -> None:
+    """Refuse a function that another module defines than one that may run.
+
+    A file may have the names of others: ``from pandas import read_pickle``.
+
+    Raises
+    ------
+    ParameterError
+        With the rule and what to do.
+    """
+    module = getattr(_plain(function), "__module__", None) or ""
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if file is None or not grant.admits(Path(file)):  # none: made by text that a file has run
+        return
+    if reason := grant.admits_module(module):
+        raise ParameterError(f"'{name}' is a function of '{module}', and {reason}: {grant.remedy}")
+
+
+def named_in(study: Study) -> Iterator[tuple[KeyPath, str]]:
+    """Yield every function that a study names, with its place; its kinds not among them."""
     if ":" in study.loop:
         yield ("loop",), study.loop
     yield from _inside(study.options, ("options",))
@@ -93,21 +217,33 @@ def _inside(value: Any, place: KeyPath) -> Iterator[tuple[KeyPath, str]]:
             yield from _inside(part, (*place, i))
 
 
-def _reason(name: str, folder: Path) -> str:
-    """Return why a function's file or module needs trust; nothing if it needs none."""
-    source = name.rpartition(":")[0]
-    try:
-        check_place(name)
+def remember_code(study: Study, key: str, folder: Path) -> None:
+    """Record that this user has run the code of a study.
+
+    Parameters
+    ----------
+    study : Study
+    key : str
+        Of `record.study_digest`.
+    folder : Path
+        What paths in it are relative to.
+    """
+    kinds = [asked.kind for asked in study.analysis if ":" in asked.kind]
+    remember(_statements([*(name for _, name in named_in(study)), *kinds], key, folder))
+
+
+def _statements(names: Iterable[str], key: str, folder: Path) -> Iterator[str]:
+    home = folder.resolve()
+    for name in dict.fromkeys(names):
+        source = name.rpartition(":")[0]
         if source.endswith(".py"):
-            path, home = (folder / source).resolve(), folder.resolve()
-            inside = path.is_relative_to(home)
-            return "" if inside else f"'{source}' is outside of the study's folder"
-        places = _module_places(source)
-    except (ParameterError, OSError):  # there is none such: said when it is looked for
-        return ""
-    homes = [*_OWN, *_installed(source.partition(".")[0]), folder.resolve()]
-    outside = [p for p in places if not any(p.resolve().is_relative_to(home) for home in homes)]
-    return f"'{source}' is '{outside[0]}', and no installed package" if outside else ""
+            run = loaded_with(folder / source)
+            contents = {os.path.relpath(path, home): content for path, content in run.items()}
+        elif source.partition(".")[0] in _OURS:
+            continue
+        else:
+            contents = {f"module {source}": _source(_module_places(source)[0]).read_bytes()}
+        yield from (statement(key, told, content) for told, content in contents.items())
 
 
 def check_place(name: str) -> None:
@@ -154,6 +290,23 @@ def _module_places(name: str) -> list[Path]:
         raise ParameterError(f"there is no module '{top}'")
     folders = list(found.submodule_search_locations or ())
     return [Path(p) for p in folders] or [Path(found.origin or top)]
+
+
+def _source(place: Path) -> Path:
+    """Return the file of a top-level module that stands for it."""
+    return place / "__init__.py" if place.is_dir() else place
+
+
+@functools.cache
+def _built_on() -> frozenset[str]:
+    """Return the top-level modules of python-control, and of packages that need it or nlctl."""
+    found = {"control"}
+    for name, packages in metadata.packages_distributions().items():
+        needed = (need for p in packages for need in metadata.distribution(p).requires or ())
+        plain = {re.split(r"[^\w.-]", need)[0].lower() for need in needed if "extra ==" not in need}
+        if plain & set(MAKERS):
+            found.add(name)
+    return frozenset(found)
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""A schedule as expressions: blocks traced, wired, loops solved, what cannot be traced called."""
+"""Reads the blocks of a schedule as expressions: traced, wired, loops solved, the opaque called."""
 
 from __future__ import annotations
 
@@ -19,146 +19,14 @@ from ...expressions.stage import Stage
 from ...expressions.trace import trace
 from ...sampling.system import Happening, Sampled, oldest, rounded
 from ...wording import counted
+from ..codegen.calls import Call
+from ..codegen.newton import inside, solver
+from ..codegen.program import check_continuous, count_guards, count_switching_functions, memory
+from ..codegen.solver import Solver
+from ..codegen.trace import time, traced_parameters
 from ..diagram.feedthrough import feedthrough
-from ..diagram.schedule import (
-    AlgebraicLoop,
-    Combination,
-    Node,
-    Schedule,
-    Signal,
-    during,
-    signal_name,
-)
+from ..diagram.schedule import AlgebraicLoop, Combination, Node, Schedule, Signal, signal_name
 from ..machine.called import call_of
-from ..parameters import length
-from ..sliding.reading import with_sliding
-from .calls import Call
-from .newton import inside, solver
-from .program import check_continuous, count_switching_functions, memory
-from .solver import Solver
-from .trace import time, traced_parameters
-
-
-@dataclass(frozen=True, kw_only=True)
-class Equations:
-    """What a diagram computes.
-
-    Attributes
-    ----------
-    graph : Graph
-    results : dict
-        For ``"dx"``, ``"g"`` and ``"y"`` pairs of a row and the array that is to be written there.
-        For ``"sample0"`` and so on those of sampled blocks' next states, at each meeting.
-    calls : dict
-        Opaque functions by name.
-    solvers : dict
-        Searches for the signals of algebraic loops, by name.
-    fixed_points : dict
-        By the same names: what the blocks of a loop make of the signals found, in their
-        expressions; they are equal to these.
-    """
-
-    graph: Graph
-    results: dict[str, list[tuple[int, Tracer]]]
-    calls: dict[str, Call]
-    solvers: dict[str, Solver]
-    fixed_points: dict[str, list[Expr]]
-
-    def pieces(self, name: str) -> list[tuple[Expr, int]]:
-        """Return the expressions of some results, row by row, each with its length."""
-        return [piece for _, array in self.results[name] for piece in array.pieces()]
-
-
-def equations(
-    schedule: Schedule,
-    layout: Any,
-    p: np.ndarray | None = None,
-    meetings: Sequence[Happening] = (),
-) -> Equations:
-    """Write a schedule as expressions.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    layout : mapping
-        Places of the parameters, as in `Program.layout`.
-    p : ndarray, optional
-        The parameter vector whose integers steer what is computed; by default those that the
-        blocks have now.
-    meetings : sequence of frozenset, optional
-        What happens to sampled blocks, as in `Program.meetings`.
-
-    Returns
-    -------
-    Equations
-
-    Raises
-    ------
-    CompileError
-        If a function means one thing in Python and another in expressions, or one in an algebraic
-        loop is opaque.
-    """
-    system = schedule.system
-    sizes = {"t": 1, "x": system.nstates or 0, "u": schedule.ninputs, "p": length(layout)}
-    reader = Reader(
-        graph=Graph(sizes), layout=layout, blocks=schedule.nodes, p=p,
-        samplings={id(h.system): i for i, h in enumerate(schedule.holders)},
-        lines={line: (system.ninputs or 0) + k for k, line in enumerate(schedule.lines)},
-    )  # fmt: skip
-    with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
-        reader = with_sliding(reader, schedule)
-        reader.read(schedule)
-        results = {
-            "dx": [(n.state_offset, reader.derivatives(i)) for i, n in enumerate(schedule.nodes)],
-            "g": _events(reader),
-            "y": [(0, reader.wired(schedule.outputs))],
-        }
-        results = reader.all_known(results)
-        for k, what in enumerate(meetings):
-            at_instant = during(schedule, what)
-            then = replace(reader, blocks=at_instant.nodes, what=what, signals={}, solved=[])
-            then.read(at_instant)
-            results |= then.all_known({f"sample{k}": _next(then)})
-    return Equations(
-        graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers,
-        fixed_points=reader.fixed_points,
-    )  # fmt: skip
-
-
-def _next(reader: Reader) -> list[tuple[int, Tracer]]:
-    """Return the next states of sampled blocks to which something happens, with their rows."""
-    found, row = [], 0
-    for i, node in enumerate(reader.blocks):
-        if node.sampled:
-            if node.sampled.acts(reader.what):
-                found.append((row, reader.next_states(i)))
-            row += node.size
-    return found
-
-
-def _results(graph: Graph, op: str, name: str, given: Sequence[Tracer], count: int) -> Tracer:
-    """Return what a call or a search with these arguments results in."""
-    pieces = [piece for g in given for piece in g.pieces()]
-    args, sizes = [e for e, _ in pieces], tuple(n for _, n in pieces)
-    if not count:
-        return traced(graph, 0.0).reshape(1)[:0]
-    node = graph.node(op, *args, data=(name, sizes), size=count, varies=True)
-    if count > SMALL:
-        return Tracer(graph, as_array(node), 0, count)
-    items = [scalar(graph, graph.item(node, k)).reshape(1) for k in range(count)]
-    return concatenated(graph, items)
-
-
-def _events(reader: Reader) -> list[tuple[int, Tracer]]:
-    """Return switching functions of all blocks, then what memories are committed to."""
-    counts = [(count_switching_functions(node), len(memory(node))) for node in reader.blocks]
-    at, behind, found = 0, sum(count for count, _ in counts), []
-    for i, (own, committed) in enumerate(counts):
-        if own or committed:
-            events = reader.events(i)
-            found += [(at, events[:own]), (behind, events[own:])]
-            at, behind = at + own, behind + committed
-    return found
 
 
 def _labels(blocks: Sequence[Node]) -> list[str]:
@@ -387,6 +255,18 @@ class Reader:
             check_continuous(node, found, inputs)
         return found
 
+    def guards(self, i: int) -> Tracer:
+        """Return the guards of a block."""
+        node = self.blocks[i]
+        given = [node.system.spec.guard], self.wired(node.inputs), count_guards(node)
+        return self._function(i, "guard", *given)
+
+    def resets(self, i: int) -> Tracer:
+        """Return the states of a block with guards after a jump."""
+        node = self.blocks[i]
+        given = [node.system.spec.reset], self.wired(node.inputs), node.size
+        return self._function(i, "reset", *given)
+
     def wired(self, combinations: Sequence[Combination | None]) -> Tracer:
         """Return linear combinations of signals, NaN for None; neighbours become vectors."""
         parts, at = [traced(self.graph, 0.0).reshape(1)[:0]], 0
@@ -489,3 +369,16 @@ def _is_next(one: Combination | None, other: Combination | None) -> bool:
         return one is other
     shifted = {Signal(s.block, s.index + 1): gain for s, gain in one.items()}
     return bool(one) and shifted == other
+
+
+def _results(graph: Graph, op: str, name: str, given: Sequence[Tracer], count: int) -> Tracer:
+    """Return what a call or a search with these arguments results in."""
+    pieces = [piece for g in given for piece in g.pieces()]
+    args, sizes = [e for e, _ in pieces], tuple(n for _, n in pieces)
+    if not count:
+        return traced(graph, 0.0).reshape(1)[:0]
+    node = graph.node(op, *args, data=(name, sizes), size=count, varies=True)
+    if count > SMALL:
+        return Tracer(graph, as_array(node), 0, count)
+    items = [scalar(graph, graph.item(node, k)).reshape(1) for k in range(count)]
+    return concatenated(graph, items)

@@ -1,0 +1,230 @@
+"""What NumPy finds in balls, difference quotients and sums: the functions of the catalogue.
+
+Each kind of number has ``apply(name)`` for the functions of one argument of the table
+`nlctl.expressions.functions`, ``pair(name, other)`` for those of two, ``minimum`` and ``maximum``,
+and ``table(xp, fp)`` for a linear interpolation.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import operator
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from nlctl.expressions.functions import FUNCTIONS
+
+from .pairs import FUNCTIONS_OF_TWO
+
+__all__ = ["NumPyFunctions", "checked_table"]
+
+_SINGLE = {name: row for name, row in FUNCTIONS.items() if row.enclosure and row.count == 1}
+JUMPS = ("floor", "ceil", "sign", "trunc", "rint")
+
+
+def _function(name: str) -> Callable[[Any], Any]:
+    def method(self: Any) -> Any:
+        return self.apply(name)
+
+    method.__doc__ = f"NumPy calls this for np.{name}(x)."
+    return method
+
+
+def _function_of_two(name: str) -> Callable[[Any, Any], Any]:
+    def method(self: Any, other: Any) -> Any:
+        return self.pair(name, other)
+
+    method.__doc__ = f"NumPy calls this for np.{name}(x, y)."
+    return method
+
+
+class NumPyFunctions:
+    """What balls, difference quotients and sums share: what NumPy looks for."""
+
+    __slots__ = ()
+    __hash__ = None  # type: ignore[assignment]  # equality may be undecided
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
+        return getattr(_of_objects(ufunc), method)(*map(_objects, inputs), **kwargs)
+
+    def __array_function__(self, function: Any, types: Any, given: Any, named: Any) -> Any:
+        if function in _ARRAY_FUNCTIONS:
+            return _ARRAY_FUNCTIONS[function](*given, **named)
+        return function._implementation(*given, **named)
+
+    def pair(self, name: str, other: Any) -> Any:
+        """Return a function of two arguments, of this and another number."""
+        raise NotImplementedError
+
+    def apply(self, name: str) -> Any:
+        """Return a function of one argument."""
+        raise NotImplementedError
+
+    def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Any:
+        """Return the linear interpolation of a table."""
+        raise NotImplementedError
+
+    def __mod__(self, other: Any) -> Any:
+        return self.pair("remainder", other)
+
+    def __floordiv__(self, other: Any) -> Any:
+        return (self / other).apply("floor")  # type: ignore[operator]
+
+    def __rfloordiv__(self, other: Any) -> Any:
+        return (other / self).apply("floor")
+
+    def __divmod__(self, other: Any) -> Any:
+        return self // other, self % other
+
+    def __rmod__(self, other: Any) -> Any:
+        if isinstance(other, str):
+            return NotImplemented
+        return _lifted(self, other).pair("remainder", self)
+
+    def __rpow__(self, other: Any) -> Any:
+        return _lifted(self, other) ** self
+
+    def __round__(self, digits: int | None = None) -> Any:
+        if digits:
+            return NotImplemented
+        return self.apply("rint")
+
+    def __trunc__(self) -> Any:
+        return self.apply("trunc")
+
+    def __floor__(self) -> Any:
+        return self.apply("floor")
+
+    def __ceil__(self) -> Any:
+        return self.apply("ceil")
+
+
+for _name in _SINGLE:
+    setattr(NumPyFunctions, _name, _function(_name))
+for _name in FUNCTIONS_OF_TWO:
+    setattr(NumPyFunctions, _name, _function_of_two(_name))
+
+
+def _lifted(self: Any, number: Any) -> Any:
+    """Return a number as one of the kind of self."""
+    return self.lifted(number)
+
+
+def _pairwise(name: str, a: Any, b: Any) -> Any:
+    """Ask the operand that knows both: a ball knows numbers, a difference quotient balls, too."""
+    kinds = [getattr(type(x), "rank", -1) for x in (a, b)]
+    if max(kinds) < 0:
+        return getattr(np, name)(a, b)
+    if name in ("minimum", "maximum"):
+        first, second = (a, b) if kinds[0] >= kinds[1] else (b, a)
+        return getattr(first, name)(second)
+    return (a if kinds[0] == max(kinds) else _lifted(b, a)).pair(name, b)
+
+
+def _single(name: str, function: Any, x: Any) -> Any:
+    return x.apply(name) if isinstance(x, NumPyFunctions) else function(x)
+
+
+@functools.cache
+def _of_objects(ufunc: Any) -> Any:
+    """Return a ufunc that asks objects what NumPy's own would compare, or refuse."""
+    name = {"divmod": "", "float_power": "power"}.get(ufunc.__name__, ufunc.__name__)
+    if name in _SINGLE and name != "absolute":
+        return np.frompyfunc(functools.partial(_single, name, ufunc), 1, 1)
+    if name == "fabs":
+        return np.frompyfunc(abs, 1, 1)
+    if name in ("deg2rad", "radians", "rad2deg", "degrees"):
+        factor = math.pi / 180 if name in ("deg2rad", "radians") else 180 / math.pi
+        return np.frompyfunc(lambda x: x * factor, 1, 1)
+    if name == "power":
+        return np.frompyfunc(operator.pow, 2, 1)
+    if name == "logaddexp2":
+        return np.frompyfunc(lambda a, b: _pairwise("logaddexp", a * _LN2, b * _LN2) / _LN2, 2, 1)
+    if name in (*FUNCTIONS_OF_TWO, "minimum", "maximum", "fmin", "fmax"):
+        name = {"fmin": "minimum", "fmax": "maximum"}.get(name, name)
+        return np.frompyfunc(functools.partial(_pairwise, name), 2, 1)
+    return ufunc
+
+
+_LN2 = math.log(2)
+
+
+def _objects(x: Any) -> np.ndarray:
+    """Return an array of plain objects: NumPy's own numbers would ask the ball in turn."""
+    plain = x.item() if isinstance(x, np.generic) else x
+    array = np.asarray(plain, dtype=object)
+    if isinstance(x, np.ndarray) and x.dtype != object:
+        array[...] = np.reshape(np.array(x.tolist(), dtype=object), x.shape)
+    return array
+
+
+def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None):
+    """Return np.interp of objects."""
+    if left is not None or right is not None or period is not None:
+        raise TypeError("np.interp with left, right or period has no enclosure")
+    points = checked_table(xp, fp)
+    if isinstance(x, NumPyFunctions):
+        return x.table(*points)
+    one = lambda v: v.table(*points) if isinstance(v, NumPyFunctions) else np.interp(v, *points)  # noqa: E731
+    return np.frompyfunc(one, 1, 1)(x)
+
+
+def checked_table(xp: Any, fp: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return break points and values of a table.
+
+    Raises
+    ------
+    TypeError
+        If they are not numbers of one size with increasing break points.
+    """
+    x, f = (tuple(map(float, np.ravel(a))) for a in (xp, fp))
+    if len(x) != len(f) or not x or any(not a < b for a, b in pairwise(x)):
+        raise TypeError("np.interp needs increasing break points, and as many values, of numbers")
+    return x, f
+
+
+def _sinc(x: Any) -> Any:
+    """Return np.sinc of objects."""
+    if isinstance(x, NumPyFunctions):
+        return x.apply("sinc")
+    return np.frompyfunc(lambda v: _single("sinc", np.sinc, v), 1, 1)(x)
+
+
+_ARRAY_FUNCTIONS: dict[Any, Callable[..., Any]] = {np.interp: _interp, np.sinc: _sinc}
+
+
+def enclosed_table(x: arb, xp: tuple[float, ...], fp: tuple[float, ...]) -> tuple[arb, arb]:
+    """Return the value and the slopes of a linear interpolation on an interval."""
+    if x.is_nan():
+        return arb.nan(), arb.nan()
+    low = x.lower() if x.is_finite() else arb(xp[0]) - 1
+    high = x.upper() if x.is_finite() else arb(xp[-1]) + 1
+    values = [_at(low, xp, fp), _at(high, xp, fp)]
+    values += [arb(f) for a, f in zip(xp, fp, strict=True) if low <= a <= high]
+    slopes = [
+        (arb(f1) - f0) / (arb(x1) - x0)
+        for x0, x1, f0, f1 in zip(xp, xp[1:], fp, fp[1:], strict=False)
+        if low <= x1 and high >= x0
+    ]
+    slopes += [arb(0)] if low <= xp[0] or high >= xp[-1] else []
+    value, slope = values[0], slopes[0]
+    for other in values:
+        value = value.union(other)
+    for other in slopes:
+        slope = slope.union(other)
+    return value, slope
+
+
+def _at(x: arb, xp: tuple[float, ...], fp: tuple[float, ...]) -> arb:
+    """Return the interpolation at an end, which has no width."""
+    if x <= xp[0]:
+        return arb(fp[0])
+    for x0, x1, f0, f1 in zip(xp, xp[1:], fp, fp[1:], strict=False):
+        if x <= x1:
+            return f0 + (x - x0) * (arb(f1) - f0) / (arb(x1) - x0)
+    return arb(fp[-1])

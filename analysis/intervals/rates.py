@@ -1,0 +1,182 @@
+"""The rate V' = dV/dx . f along a direction: exact derivatives of a function that is enclosed.
+
+A `Rate` carries a quantity q and q' through a function, each a `Ball`, so that the derivative is
+that of the function itself and of nobody's formula.  At a corner of min, max or abs it encloses
+both sides; where the function jumps, or compares what a box leaves open, there is none.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flint import arb
+
+from nlctl.expressions.functions import FUNCTIONS
+
+from .arithmetic import Ball, as_ball
+from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table
+from .pairs import FUNCTIONS_OF_TWO
+from .paths import undecided
+
+__all__ = ["Rate"]
+
+
+class Rate(NumPyFunctions):
+    """A quantity and its rate.
+
+    Attributes
+    ----------
+    here, rate : Ball
+    """
+
+    __slots__ = ("here", "rate")
+    rank = 1
+
+    def __init__(self, here: Ball, rate: Ball) -> None:
+        self.here = here
+        self.rate = rate
+
+    def __neg__(self) -> Rate:
+        return Rate(-self.here, -self.rate)
+
+    def __pos__(self) -> Rate:
+        return self
+
+    def __add__(self, other: Any) -> Any:
+        other = as_rate(other)
+        if other is NotImplemented:
+            return other
+        return Rate(self.here + other.here, self.rate + other.rate)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        return self + -as_rate(other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return -self + other
+
+    def __mul__(self, other: Any) -> Any:
+        if other is self:
+            return self**2
+        other = as_rate(other)
+        if other is NotImplemented:
+            return other
+        return Rate(self.here * other.here, self.here * other.rate + other.here * self.rate)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        other = as_rate(other)
+        if other is NotImplemented:
+            return other
+        value = self.here / other.here
+        return Rate(value, (self.rate - value * other.rate) / other.here)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return as_rate(other) / self
+
+    def __pow__(self, n: Any) -> Any:
+        if isinstance(n, NumPyFunctions) or n != int(n):
+            return self.pair("power", n)
+        if n < 0:
+            return 1 / self**-n
+        slope = int(n) * self.here ** max(int(n) - 1, 0)
+        return Rate(self.here**n, slope * self.rate)
+
+    def __abs__(self) -> Rate:
+        return self._chosen(-self, abs(self.here))
+
+    def minimum(self, other: Any) -> Rate:
+        """Smaller one; where that is open the rate is one or the other."""
+        other = as_rate(other)
+        return self._chosen(other, self.here.minimum(other.here))
+
+    def maximum(self, other: Any) -> Rate:
+        """Larger one; where that is open the rate is one or the other."""
+        other = as_rate(other)
+        return self._chosen(other, self.here.maximum(other.here))
+
+    def _chosen(self, other: Rate, value: Ball) -> Rate:
+        for one in (self, other):
+            if value is one.here:
+                return Rate(value, one.rate)
+        a, b = self.rate, other.rate
+        n = max(len(a.gradient), len(b.gradient))
+        both = (x.gradient or (arb(0),) * n for x in (a, b))
+        gradient = tuple(arb(0, "inf") for _ in zip(*both, strict=True))  # it may jump from a to b
+        return Rate(value, Ball(a.value.union(b.value), gradient))
+
+    def apply(self, name: str) -> Rate:
+        """Return phi of the quantity for the NumPy function of that name."""
+        here = self.here.apply(name)
+        if name in JUMPS or name == "sinc":
+            slope = Ball(self.here.value, (arb(1),)).apply(name).gradient[0]
+            return Rate(here, _unknown(slope, self.here) * self.rate)
+        return Rate(here, as_ball(FUNCTIONS[name].derivative[0](self.here)) * self.rate)
+
+    def pair(self, name: str, other: Any) -> Any:
+        """Return phi of this and another quantity for the NumPy function of that name."""
+        other = as_rate(other)
+        if other is NotImplemented:
+            return other
+        _, by_self, by_other = FUNCTIONS_OF_TWO[name](self.here.value, other.here.value)
+        rate = Ball(arb(0))
+        for one, slope in ((self, by_self), (other, by_other)):
+            if not one.rate.value.is_zero():
+                rate = rate + _unknown(slope, one.here) * one.rate
+        return Rate(self.here.pair(name, other.here), rate)
+
+    def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Rate:
+        """Return the linear interpolation of a table."""
+        _, slope = enclosed_table(self.here.value, xp, fp)
+        return Rate(self.here.table(xp, fp), _unknown(slope, self.here) * self.rate)
+
+    @staticmethod
+    def lifted(number: Any) -> Any:
+        """Return a number as a quantity that does not change."""
+        return as_rate(number)
+
+    def _decided(self, compare: str, other: Any) -> Any:
+        """A choice between formulas may jump: only what the whole box decides is followed."""
+        other = as_rate(other)
+        if other is NotImplemented:
+            return other
+        with undecided():
+            return getattr(self.here, compare)(other.here)
+
+    def __lt__(self, other: Any) -> bool:
+        return self._decided("__lt__", other)
+
+    def __le__(self, other: Any) -> bool:
+        return self._decided("__le__", other)
+
+    def __gt__(self, other: Any) -> bool:
+        return self._decided("__gt__", other)
+
+    def __ge__(self, other: Any) -> bool:
+        return self._decided("__ge__", other)
+
+    def __eq__(self, other: object) -> bool:
+        return self._decided("__eq__", other)
+
+    def __ne__(self, other: object) -> bool:
+        return self._decided("__ne__", other)
+
+    def __bool__(self) -> bool:
+        return self != 0
+
+
+def _unknown(value: arb, like: Ball) -> Ball:
+    """Return a factor whose own derivatives are not known."""
+    if value.is_exact():
+        return Ball(value)
+    return Ball(value, (arb(0, "inf"),) * len(like.gradient))
+
+
+def as_rate(x: Any) -> Any:
+    """Return a number as a quantity that does not change; NotImplemented for what is none."""
+    if isinstance(x, Rate):
+        return x
+    ball = as_ball(x)
+    return ball if ball is NotImplemented else Rate(ball, Ball(arb(0)))

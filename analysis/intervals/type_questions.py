@@ -1,0 +1,217 @@
+"""What a function may not ask of its arguments: their type, text, identity, attributes.
+
+A run gives it floats, a proof balls, the compiler symbols.  A function that asks which of these it
+got may do one thing in a run and another in a proof, at points that no comparison looks at.  So
+its code is read before it is called, with all that it calls, and the question is named.
+"""
+
+from __future__ import annotations
+
+import builtins
+import dis
+import functools
+import types
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import control as ct
+import flint
+import numba
+import numpy as np
+import scipy
+
+from nlctl import wording
+
+__all__ = ["is_of_library", "type_question"]
+
+_BUILTINS = ("isinstance", "issubclass", "type", "hasattr", "getattr", "setattr", "delattr",
+             "vars", "dir", "callable", "repr", "str", "format", "ascii", "bytes", "memoryview",
+             "hash", "id", "print", "eval", "exec", "compile", "globals", "locals", "open",
+             "input", "super", "__import__", "__builtins__")  # fmt: skip
+_NUMPY = ("isscalar", "issubdtype", "result_type", "common_type", "min_scalar_type", "can_cast",
+          "promote_types", "iscomplexobj", "isrealobj", "typename", "mintypecode", "array2string",
+          "array_repr", "array_str", "format_float_positional", "format_float_scientific",
+          "may_share_memory", "shares_memory", "array_equiv")  # fmt: skip
+_OPERATOR = ("is_", "is_not", "attrgetter", "methodcaller")
+_CALLS = {*_BUILTINS, *_NUMPY, *_OPERATOR}
+_MODULES = {"sys", "inspect", "gc", "traceback", "ctypes", "pickle", "json", "numbers", "types",
+            "typing", "abc", "pprint", "reprlib", "weakref", "contextlib", "builtins", "importlib",
+            "copyreg", "marshal", "dis", "ast", "_ctypes", "_pickle"}  # fmt: skip
+# what numbers have and balls do not, or arrays of both have with another value
+_ATTRIBUTES = {"dtype", "itemsize", "nbytes", "strides", "flags", "ctypes", "data", "tobytes",
+               "newbyteorder", "setflags", "real", "imag", "conjugate", "hex", "fromhex",
+               "is_integer", "as_integer_ratio", "bit_length", "mro"}  # fmt: skip
+_OPERATORS = {f"__{name}__" for name in (
+    "call", "getitem", "getattr", "getattribute", "add", "radd", "sub", "rsub", "mul", "rmul",
+    "pow", "rpow", "truediv", "rtruediv", "matmul", "rmatmul", "neg", "pos", "abs", "lt", "le",
+    "gt", "ge", "array_ufunc", "array_function", "array", "float")}  # fmt: skip
+_KNOWN_DUNDERS = {"__name__", "__doc__", "__version__"}
+_LIBRARIES = tuple(
+    str(Path(module.__file__ or "").parent) for module in (np, scipy, numba, ct, flint, wording)
+) + (str(Path(__file__).parent.parent),)
+_OF_BUILTINS = {id(getattr(builtins, name)): name for name in _BUILTINS if hasattr(builtins, name)}
+_MOST = 2_000
+
+
+def type_question(function: Any) -> str | None:
+    """Return what a function, or one that it calls, asks of its arguments; None for nothing.
+
+    Parameters
+    ----------
+    function : callable
+        Functions of nlctl and of libraries are not read, but those that they close over are.
+
+    Returns
+    -------
+    str or None
+        In words: function, line, and what it does.
+
+    Examples
+    --------
+    >>> from analysis.intervals.type_questions import type_question
+    >>> print(type_question(lambda v: v if isinstance(v, float) else 2 * v).partition(" in ")[0])
+    asks isinstance
+    >>> print(type_question(lambda v: 2 * v))
+    None
+    """
+    waiting, seen = [function], {}
+    while waiting and len(seen) < _MOST:
+        thing = waiting.pop()
+        if id(thing) in seen:
+            continue
+        seen[id(thing)] = thing  # kept, so that no other one gets its identity
+        found = _question_of(thing)
+        if found:
+            return found
+        waiting += _reached(thing)
+    return None
+
+
+def _question_of(thing: Any) -> str | None:
+    if id(thing) in _OF_BUILTINS:
+        return f"asks {_OF_BUILTINS[id(thing)]} under another name"
+    if isinstance(thing, types.CodeType):
+        return _question_in(thing)
+    module = thing.__name__ if isinstance(thing, types.ModuleType) else _module_of(thing)
+    return f"uses {module}, which tells types and objects apart" if module in _MODULES else None
+
+
+def _module_of(thing: Any) -> str:
+    """Return the module of a function or class, without what is inside of it."""
+    named = isinstance(thing, type | types.FunctionType | types.BuiltinFunctionType)
+    return str(getattr(thing, "__module__", "")).partition(".")[0] if named else ""
+
+
+def _reached(thing: Any) -> Iterator[Any]:
+    """Yield the functions, and what else it reads, that a thing is made of."""
+    if isinstance(thing, staticmethod | classmethod):
+        yield thing.__func__
+    elif isinstance(thing, types.MethodType):
+        yield thing.__func__
+        code = getattr(thing.__func__, "__code__", None)
+        yield from _of_object(thing.__self__, set(_names(code)) if code else set())
+    elif isinstance(thing, property):
+        yield thing.fget
+    elif isinstance(thing, functools.partial):
+        yield from (thing.func, *thing.args, *thing.keywords.values())
+    elif isinstance(thing, types.FunctionType):
+        yield from _of_function(thing)
+    elif isinstance(thing, types.CodeType):
+        yield from (part for part in thing.co_consts if isinstance(part, types.CodeType))
+    elif isinstance(thing, tuple | list | dict) and len(thing) < 50:
+        parts = thing.values() if isinstance(thing, dict) else thing
+        yield from (part for part in parts if callable(part))
+    else:
+        yield from _of_object(thing, set())
+
+
+def _of_function(function: types.FunctionType) -> Iterator[Any]:
+    """Yield its code, what it closes over and, of a user's, what it names."""
+    yield getattr(function, "__wrapped__", None)
+    held = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
+    for cell in function.__closure__ or ():
+        try:
+            held.append(cell.cell_contents)
+        except ValueError:  # it has no value yet
+            continue
+    if is_of_library(function):
+        yield from held
+        return
+    yield function.__code__
+    names = set(_names(function.__code__))
+    held += [function.__globals__[name] for name in names & set(function.__globals__)]
+    for thing in held:
+        yield thing
+        yield from _of_object(thing, names)
+
+
+def _of_object(thing: Any, names: set[str]) -> Iterator[Any]:
+    """Yield what is called of an object, a class or a module: by name, or by operators."""
+    if isinstance(thing, types.ModuleType) and _is_of_library(thing.__name__):
+        return
+    if not isinstance(thing, type | types.FunctionType | types.ModuleType):
+        yield getattr(thing, "py_func", None)  # numba's
+        yield getattr(thing, "__wrapped__", None)
+        yield getattr(thing, "pyfunc", None)  # of np.vectorize
+    own = {} if isinstance(thing, type) else getattr(thing, "__dict__", {})
+    members: dict[str, Any] = {}
+    for kind in reversed(thing.__mro__ if isinstance(thing, type) else type(thing).__mro__):
+        members |= {} if _is_of_library(kind.__module__) else vars(kind)
+    members |= own
+    waiting, done = (names | _OPERATORS) & set(members), set()
+    while waiting:
+        name = waiting.pop()
+        done.add(name)
+        yield members[name]
+        if name in own:
+            yield from _of_object(own[name], names - {name})
+        function = getattr(members[name], "fget", getattr(members[name], "__func__", members[name]))
+        if isinstance(function, types.FunctionType):  # what it calls of its own object
+            waiting |= (set(_names(function.__code__)) & set(members)) - done
+
+
+def _names(code: types.CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for part in code.co_consts:
+        if isinstance(part, types.CodeType):
+            yield from _names(part)
+
+
+def _question_in(code: types.CodeType) -> str | None:
+    """Return what one body of code asks."""
+    line, last, caught, entered = code.co_firstlineno, None, 0, 0
+    for step in dis.get_instructions(code):
+        line = step.starts_line if type(step.starts_line) is int else line
+        name, op = step.argval, step.opname
+        asked = None
+        if op in ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_DEREF") and name in _CALLS:
+            asked = name
+        elif op in ("LOAD_ATTR", "LOAD_METHOD", "LOAD_FROM_DICT_OR_GLOBALS", "IMPORT_FROM"):
+            dunder = str(name).startswith("__") and name not in _KNOWN_DUNDERS
+            asked = f".{name}" if dunder or name in _CALLS | _ATTRIBUTES else None
+        elif op == "IMPORT_NAME" and str(name).partition(".")[0] in _MODULES:
+            asked = f"the module {name}"
+        elif op == "IS_OP" and not (last is not None and last.argval is None):
+            asked = "whether it is an object ('is')"
+        elif op in ("FORMAT_VALUE", "FORMAT_SIMPLE", "FORMAT_WITH_SPEC", "CONVERT_VALUE"):
+            asked = "for a text ('f\"{...}\"')"
+        elif op in ("MATCH_CLASS", "MATCH_MAPPING", "MATCH_SEQUENCE"):
+            asked = "for a class ('match')"
+        entered += op == "WITH_EXCEPT_START"
+        caught += op == "PUSH_EXC_INFO"
+        if asked:
+            return f"asks {asked} in {code.co_qualname}, line {line}"
+        last = step
+    return f"catches exceptions in {code.co_qualname} ('try')" if caught > entered else None
+
+
+def is_of_library(function: Any) -> bool:
+    """Whether a function is one of nlctl or of a library, whatever it closes over."""
+    code = getattr(getattr(function, "py_func", function), "__code__", None)
+    return code is not None and code.co_filename.startswith(_LIBRARIES)
+
+
+def _is_of_library(module: str) -> bool:
+    known = ("numpy", "scipy", "numba", "control", "flint", "nlctl", "analysis", "builtins", "math")
+    return module.partition(".")[0] in known

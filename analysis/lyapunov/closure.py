@@ -1,0 +1,322 @@
+r"""Whether the compact set of (19) closes: \|r\| <= C_0 keeps x in a box that C_0 holds on.
+
+A bound C of \|r\| lets x reach a box, the box has constants, and these give C_0: a map of boxes.
+It grows with the box.  So every box that it maps into itself holds all that it makes of the point
+x(0), one after the other; where these grow beyond any size, no box closes.  They are made here with
+less than the true constants, from values that are attained at points of a box, and with Q = 0, so
+that what they say of all boxes is right.  A box that does close is found with the proved constants.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import control as ct
+import numpy as np
+from flint import arb
+from scipy.optimize import minimize_scalar
+
+from nlctl.errors import ParameterError
+from nlctl.params import equation_arguments
+from nlctl.plants import coordinate_names
+from nlctl.references import SumOfSines
+
+from ..intervals.box import Box
+from .bounds.constants import constants_of
+from .bounds.decomposition import Decomposition
+from .bounds.error_bounds import error_bounds, reference_bounds
+from .bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
+from .bounds.premises import Premises, premises
+from .bounds.provenance import Constants
+from .bounds.sector import plant_terms
+from .bounds.weights import network_on_grid
+from .inequalities import terms
+from .lines import Line
+from .loop.roles import Parts
+from .loop.simulation import MemberRun
+
+__all__ = ["FARTHEST", "Closure", "StateReach", "closed_set", "closure", "least_bound"]
+
+FARTHEST = 1_000.0  # of |x_i|: boxes that are larger are not looked at
+STATEMENT = "|r| <= C_0 keeps x in a box that C_0 holds on"
+NOT_CLOSED = (
+    "that x stays in Omega, which (19) needs, is supposed and not shown: (36) holds only as far as "
+    "the runs were seen in the box."
+)
+_GROWTH = 1e-3  # relative; less than that, and the boxes do not grow any more
+_ROOM = (1.001, 1.01, 1.05, 1.2)  # by so much the least box is enlarged, to find one that closes
+_STEPS = 200
+_V = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)  # of |v|, where the box has no end
+_TIMES = np.linspace(0.0, 200.0, 97)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StateReach:
+    """How far x gets while \\|r\\| keeps a bound.
+
+    Attributes
+    ----------
+    lambdas : tuple of float
+        Of the filtered error (14).
+    e0 : tuple of n balls
+        Initial errors.
+    reference : SumOfSines
+        What the plant shall follow.
+    """
+
+    lambdas: tuple[float, ...]
+    e0: tuple[arb, ...]
+    reference: SumOfSines
+
+    def __call__(self, C: float) -> tuple[float, ...]:
+        """Return bounds of \\|x1\\|, ..., \\|xn\\| for \\|r\\| <= C.
+
+        Raises
+        ------
+        ParameterError
+            If the filter has roots that are not real and negative.
+        """
+        errors = error_bounds(self.lambdas, self.e0, arb(C))
+        wanted = reference_bounds(self.reference)
+        return tuple(float(e.upper()) + y for e, y in zip(errors, wanted, strict=False))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Closure:
+    """What is known of boxes that close.
+
+    Attributes
+    ----------
+    status : {"closes", "none closes", "undecided"}
+    box : tuple of float
+        Bounds of \\|x1\\|, ..., \\|xn\\|: of the box that closes; otherwise of the largest
+        box found that is a part of every one that does.
+    C_0 : float
+        The bound on that box; where none closes, less than it.
+    room : float
+        Least distance between the box and what its C_0 lets x reach; negative if none closes.
+    """
+
+    status: Literal["closes", "none closes", "undecided"]
+    box: tuple[float, ...]
+    C_0: float
+    room: float
+
+
+def closure(loop: ct.InterconnectedSystem, run: MemberRun, found: Constants) -> Line:
+    """Return the line that tells whether \\|r\\| <= C_0 keeps the state in a box."""
+    given = premises(found, run.gains)
+    C_0 = given.C_0(float(terms(run.signals, given).V[0]), float(np.max(run.signals["I"])))
+    reach = _reach(run, given)
+    if reach is None or not np.isfinite(C_0):
+        why = "C_0 is infinite" if not np.isfinite(C_0) else "no bound of the reference is known"
+        return Line(key="closure", statement=STATEMENT, status="undecided", evidence=why)
+    try:
+        own = reach(C_0)
+    except ParameterError as error:
+        return Line(key="closure", statement=STATEMENT, status="undecided", evidence=str(error))
+    names = coordinate_names(len(own))
+    sides = [found.box[x] for x in names]
+    room = min(min(high, -low) - a for (low, high), a in zip(sides, own, strict=True))
+    here = f"C_0 = {C_0:.5g} gives {_told(own)}"
+    if room >= 0:
+        return _line("computed", room, f"on this box {here}")
+    other = closed_set(found, run.gains, reach, Q=float(np.max(run.signals["I"])))
+    if other.status == "closes":
+        v = "v in [{:.4g}, {:.4g}]".format(*found.box["v"])
+        told = f"not on this box, where {here}, but on {_told(other.box)}, {v}, where C_0 = "
+        return _line("computed", other.room, f"{told}{other.C_0:.5g}")
+    if other.status == "none closes":
+        told = (
+            f"none up to |x_i| <= {FARTHEST:g} closes, whatever Q{_weights(found)}: each would "
+            f"hold {_told(other.box)}, where C_0 is {other.C_0:.4g} at least; on this box {here}"
+        )
+        return _line("violated", other.room, told)
+    return _line("undecided", room, f"does not close on this box: {here}; of others it is open")
+
+
+def _line(status: Any, room: float, evidence: str) -> Line:
+    return Line(
+        key="closure",
+        statement=STATEMENT,
+        status=status,
+        least=room,
+        evidence=evidence,
+        follows="" if status == "computed" else NOT_CLOSED,
+        reading="paper",
+    )
+
+
+def _told(reach: Sequence[float]) -> str:
+    names = coordinate_names(len(reach))
+    return ", ".join(f"|{x}| <= {a:.4g}" for x, a in zip(names, reach, strict=True))
+
+
+def _weights(found: Constants) -> str:
+    return "" if _given(found) is not None else " and W"
+
+
+def _given(found: Constants) -> Any:
+    """Return the weights, if they were asked for and not chosen for the box."""
+    chosen = next(entry for entry in found.entries if entry.symbol == "|W|")
+    return found.W if chosen.provenance == "given" else None
+
+
+def _reach(run: MemberRun, given: Premises) -> StateReach | None:
+    """Return how far the loop's state gets; None where the reference has no bound."""
+    spec: Any = run.parts.roles.spec("reference")
+    if not isinstance(spec, SumOfSines):
+        return None
+    s, names = run.signals, coordinate_names(len(given.lambdas) + 1)
+    yd = spec.output(float(s.t[0]), (), (), equation_arguments(spec))
+    e0 = [arb(float(s[x][0])) - arb(float(y), 1e-12) for x, y in zip(names, yd, strict=False)]
+    return StateReach(lambdas=given.lambdas, e0=tuple(e0), reference=spec)
+
+
+def closed_set(found: Constants, gains: Gains, reach: StateReach, *, Q: float = 0.0) -> Closure:
+    """Look for a box that closes, and for a reason why none does.
+
+    Parameters
+    ----------
+    found : Constants
+        Of the loop on some box, for its parts, the split of its actuator and the side v.  Weights
+        that were given count; otherwise each box has its own.
+    gains : Gains
+        Of the controller.
+    reach : StateReach
+    Q : float, optional
+        Supremum of I(t), (33).
+
+    Returns
+    -------
+    Closure
+    """
+    W = _given(found)
+    least, C_0, sides = 0.0, abs(float(gains.r_0)), reach(abs(float(gains.r_0)))
+    for _ in range(_STEPS):
+        C_0 = max(least_bound(found.parts, found.split, gains, sides, found.box["v"], W), C_0)
+        wider = reach(C_0)
+        least = min(a - b for a, b in zip(sides, wider, strict=True))
+        if not max(wider) <= FARTHEST:
+            return Closure(status="none closes", box=sides, C_0=C_0, room=least)
+        grown = max(b / a if a > 0 else np.inf for a, b in zip(sides, wider, strict=True))
+        sides = wider
+        if grown <= 1 + _GROWTH:
+            break
+    for candidate in _candidates(sides, found, gains, reach, W, Q):
+        if candidate.room >= 0:
+            return candidate
+    return Closure(status="undecided", box=sides, C_0=C_0, room=least)
+
+
+def _candidates(
+    sides: tuple[float, ...], found: Constants, gains: Gains, reach: StateReach, W: Any, Q: float
+) -> Iterator[Closure]:
+    """Yield boxes around the least one that could close, with their proved constants."""
+    names = coordinate_names(len(sides))
+    for factor in _ROOM:
+        ends = tuple(factor * a for a in sides)
+        box = Box(names=names, low=tuple(-a for a in ends), high=ends, how="closure")
+        on_it = _constants(found, box.times("v", *found.box["v"]), W)
+        given = premises(on_it, gains)
+        error = given.W - np.array(gains.W_hat_0)
+        C_0 = given.C_0(float(initial_V(gains, given.delta, float(error @ error))), Q)
+        own = reach(C_0) if np.isfinite(C_0) else (np.inf,) * len(ends)
+        room = min(a - b for a, b in zip(ends, own, strict=True))
+        yield Closure(status="closes", box=ends, C_0=C_0, room=room)
+
+
+def _constants(found: Constants, box: Box, W: Any) -> Constants:
+    """Return the constants on a box, with the weights that suit it or, where none are found, 0."""
+    try:
+        return constants_of(found.parts, found.split, box, W)
+    except ParameterError:
+        return constants_of(found.parts, found.split, box, np.zeros(len(found.W)))
+
+
+def least_bound(
+    parts: Parts,
+    split: Decomposition,
+    gains: Gains,
+    sides: Sequence[float],
+    v: tuple[float, float],
+    W: Any = None,
+) -> float:
+    """Return what C_0 of (36) is at least on a box, for Q = 0.
+
+    G_max, d* and g are taken at points of the box.  Without `W` it is so for every W: by
+    \\|W^T psi\\| <= \\|W\\| \\|psi\\| the error at a point is at least \\|g\\| - \\|psi\\| \\|W\\|;
+    the least value of a convex function of \\|W\\| is left.
+
+    Parameters
+    ----------
+    parts : Parts
+        Of the loop.
+    split : Decomposition
+        Of the actuator.
+    gains : Gains
+        Of the controller.
+    sides : sequence of n floats
+        Bounds of \\|x1\\|, ..., \\|xn\\|.
+    v : (float, float)
+        Ends of v.
+    W : array_like of shape (l,), optional
+        Weights that were chosen.
+
+    Returns
+    -------
+    float
+        In the unit of r.
+    """
+    g, psi, points = _at_points(parts, sides)
+    f, d = plant_terms(parts.plant)
+    corners = [x for x in points if all(abs(a) in (0.0, b) for a, b in zip(x, sides, strict=True))]
+    d_star = max(abs(float(d(x, t))) for x in corners for t in _TIMES)
+    gain = max((float(f(x, b)) - float(f(x, 0.0))) / b for x in corners for b in _some(v))
+    rest = total_error(gain, split.eps_star, d_star, 0.0)
+    weights, start = np.asarray(() if W is None else W), np.array(gains.W_hat_0)
+
+    def bound(norm: float, error: float, distance: float) -> float:
+        delta = rest + error
+        V_0 = initial_V(gains, max(delta, gains.delta_hat_0), distance**2)
+        return float(final_bound(alpha_0(gains, delta, norm**2), alpha_1(gains), V_0, 0.0))
+
+    if W is not None or not start.size:
+        error = float(np.max(np.abs(g - psi @ weights))) if weights.size else float(np.max(abs(g)))
+        apart = float(np.linalg.norm(weights - start)) if weights.size else 0.0
+        return bound(float(np.linalg.norm(weights)), error, apart)
+    size, from_0 = np.linalg.norm(psi, axis=1), float(np.linalg.norm(start))
+
+    def of_norm(w: float) -> float:
+        error = max(float(np.max(np.abs(g) - size * w)), 0.0)
+        return bound(w, error, max(w - from_0, 0.0))
+
+    far = of_norm(0.0) * np.sqrt(alpha_1(gains) / gains.sigma_1)  # |W| alone makes it larger beyond
+    found: Any = minimize_scalar(
+        of_norm, bounds=(0.0, far), method="bounded", options={"xatol": 1e-9}
+    )
+    return min(float(found.fun), of_norm(0.0)) * (1 - 1e-6)
+
+
+def _at_points(parts: Parts, sides: Sequence[float]) -> tuple[np.ndarray, np.ndarray, Any]:
+    """Return g and psi at points of a box, its corners and centre among them."""
+    names, ends = coordinate_names(len(sides)), tuple(sides)
+    box = Box(names=names, low=tuple(-a for a in ends), high=ends)
+    count = {1: 41, 2: 9}.get(len(ends), 5)
+    if parts.gains.W_hat_0:
+        network = network_on_grid(parts.plant, parts.basis, box, count)
+        return network.g, network.psi, network.points
+    f, _ = plant_terms(parts.plant)
+    points = list(itertools.product(*(np.linspace(-a, a, count) for a in ends)))
+    return np.array([float(f(x, 0.0)) for x in points]), np.zeros((len(points), 0)), points
+
+
+def _some(v: tuple[float, float]) -> list[float]:
+    """Return some v other than 0 of an interval."""
+    low, high = v
+    ends = [b for b in (low, high) if np.isfinite(b)]
+    inside = [s * b for b in _V for s in (-1.0, 1.0) if low <= s * b <= high]
+    return [b for b in (*ends, *inside) if b != 0] or [1e-3]

@@ -1,0 +1,43 @@
+"""Functions of samples: plain Python that machine code calls, too, and that says what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+from numba.extending import overload
+
+from nlctl.annotations import reporting
+from nlctl.equations import equation
+
+__all__ = ["of_samples"]
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def of_samples(function: _F) -> _F:
+    """Mark a function of samples as an equation that says which argument is not as annotated.
+
+    Parameters
+    ----------
+    function : callable
+        With annotations of its arguments.
+
+    Returns
+    -------
+    callable
+        Of which compiled code takes the function itself.
+    """
+    plain = equation(function)
+    called = reporting(plain, function.__name__, _lengths)
+    overload(called, strict=False)(lambda *_, **__: plain)
+    return called
+
+
+def _lengths(given: Mapping[str, Any]) -> str | None:
+    """Say that samples are in a row, one for each time."""
+    shapes = {name: np.shape(given[name]) for name in ("t", "y") if name in given}
+    if len(set(shapes.values())) == 1 and all(len(shape) == 1 for shape in shapes.values()):
+        return None
+    return f"samples in a row, one for each time, got shapes {', '.join(map(str, shapes.values()))}"

@@ -1,0 +1,174 @@
+"""What the names mean that parameters are overridden by: one law for every block and entry point.
+
+"P.k" is block P's own k, also where P is a third-party block and python-control has one flat dict.
+A name without a block means what python-control means by it: every third-party block that reads
+it; in a diagram of `nlctl.interconnect`, where each has a value of its own, it must mean one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..blocks import Block, within
+from ..errors import AmbiguousNameError, ParameterError
+from ..names import Parameters, base_name, unknown
+from ..params import declared_params
+from .places import leaves
+from .reads import may_read, texts_of
+from .third_party import Named, declared_keys, is_third_party
+
+_NUMBERS = (int, float, np.number, np.ndarray)
+
+
+@dataclass(kw_only=True)
+class Divided:
+    """Overrides, divided between python-control and single blocks.
+
+    Attributes
+    ----------
+    given : dict
+        What python-control is given.
+    alone : dict
+        What a third-party block alone is to read: by its identity, and by the names it reads.
+    """
+
+    given: dict[str, Any] = field(default_factory=dict)
+    alone: dict[int, dict[str, Any]] = field(default_factory=dict)
+
+
+def divided(system: Any, params: Mapping[str, Any] | None) -> Divided:
+    """Divide a user's overrides.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram or a block.
+    params : mapping or None
+        Overrides by name.
+
+    Returns
+    -------
+    Divided
+
+    Raises
+    ------
+    UnknownNameError, AmbiguousNameError
+        If nobody reads a parameter of that name, or more than one block is meant.
+    ParameterError
+        If a name is not text.
+    """
+    found = Divided()
+    if not params:
+        return found
+    law = _Law(system)
+    for name, value in params.items():
+        if not isinstance(name, str):
+            raise ParameterError(f"params needs names of parameters, got {name!r}")
+        block, key = law.meant(name)
+        law.check(name, value)
+        if block is None:
+            found.given[key] = value
+        else:
+            found.alone.setdefault(id(block), {})[key] = value
+    return found
+
+
+class _Law:
+    """Knows the blocks of a diagram by their paths."""
+
+    def __init__(self, system: Any) -> None:
+        self.params = system.params or {}
+        self.theirs: list[tuple[str, set[str], Any]] = []  # third-party blocks with their paths
+        self.others: list[str] = []  # names of parameters of nlctl's blocks
+        self.open = False  # whether there is something whose parameters nobody knows
+        for leaf in leaves(system):
+            block = within(leaf.system)
+            if is_third_party(block):
+                paths = {leaf.parameter_path or block.name, leaf.path or block.name}
+                self.theirs.append((leaf.parameter_path or block.name, paths, block))
+            elif isinstance(block, Block):
+                self.others += [f"{block.name}.{key}" for key in declared_params(block.spec)]
+            elif not isinstance(block, ct.StateSpace | ct.TransferFunction):
+                self.open = True
+        if isinstance(self.params, Parameters):
+            self.others = [k for k in self.params if "." in k]
+
+    def meant(self, name: str) -> tuple[Any, str]:
+        """Return the one third-party block that is meant, and the name there; None for others."""
+        base = base_name(name)
+        path, dot, key = base.rpartition(".")
+        if not dot:
+            return None, self._bare(name, base)
+        blocks = self._blocks(path)
+        ours = [k for k in self.others if k == base or k.endswith(f".{base}")]
+        if not blocks:
+            if not (ours or isinstance(self.params, Parameters) or self.open):
+                self._refuse(name, base)
+            return None, name
+        others = [k for k in ours if k.rpartition(".")[0] not in blocks]
+        if len(blocks) > 1 or (others and base not in ours):
+            names = sorted({*(f"{p}.{key}" for p in blocks), *ours})
+            raise AmbiguousNameError(f"parameter '{name}' could be {' or '.join(names)}")
+        ((path, block),) = blocks.items()
+        if ours and (isinstance(block, Named) or others):
+            return None, name  # python-control knows it by this name
+        if not may_read(block, key):
+            names = [f"{path}.{k}" for k in declared_keys(block)] or self.names()
+            raise unknown("parameter", name, names, f"of block '{path}'")
+        return block, key + name[len(base) :]
+
+    def check(self, name: str, value: Any) -> None:
+        """Refuse text, or nothing, for a number of a third-party block."""
+        if not isinstance(value, str | bytes | None):
+            return
+        path, _, key = base_name(name).rpartition(".")
+        blocks = self._blocks(path) if path else {p: b for p, _, b in self.theirs}
+        for shown, block in blocks.items():
+            values = block.nlctl_own if isinstance(block, Named) else block.params
+            if isinstance(values.get(key), _NUMBERS):
+                raise ParameterError(
+                    f"block '{shown}' needs a number for {key}, as it declares, got {value!r}"
+                )
+
+    def _blocks(self, path: str) -> dict[str, Any]:
+        """Return third-party blocks of that path, or else those whose path ends in it."""
+        exact = [(shown, block) for shown, paths, block in self.theirs if path in paths]
+        if not exact:
+            end = f".{path}"
+            exact = [(s, b) for s, paths, b in self.theirs if any(p.endswith(end) for p in paths)]
+        found = {id(block): (shown, block) for shown, block in exact}
+        twins = len({shown for shown, _ in found.values()}) < len(found)
+        return {f"{s}#{i}" if twins else s: b for i, (s, b) in enumerate(found.values())}
+
+    def _bare(self, name: str, base: str) -> str:
+        """Return what python-control calls a parameter that is named without its block.
+
+        Refuse one that nobody reads, or that means more than one block.
+        """
+        own = [f"{p}.{base}" for p, _, b in self.theirs if isinstance(b, Named) and
+               base in b.nlctl_own]  # fmt: skip
+        if len(own) > 1:
+            raise AmbiguousNameError(f"parameter '{name}' could be {' or '.join(own)}")
+        is_read = any(may_read(block, base) for _, _, block in self.theirs)
+        if not (own or self.open or base in self.params or is_read):
+            self._refuse(name, base)
+        others = [b for _, _, b in self.theirs if base not in declared_keys(b)]
+        if own and not any(base in texts_of(f) for b in others for f in (b.updfcn, b.outfcn)):
+            return own[0] + name[len(base) :]
+        return name
+
+    def names(self) -> list[str]:
+        """Return all names that are known."""
+        qualified = [f"{p}.{key}" for p, _, block in self.theirs for key in declared_keys(block)]
+        bare = [k for k in self.params if isinstance(k, str) and "." not in k]
+        return list(dict.fromkeys([*bare, *qualified, *self.others]))
+
+    def _refuse(self, name: str, base: str) -> None:
+        twins = [k for k in self.others if k.endswith(f".{base}")]
+        if not twins:  # else python-control's own way says that names carry their block's
+            raise unknown("parameter", name, self.names())

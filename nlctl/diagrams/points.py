@@ -1,0 +1,148 @@
+"""What a diagram computes at points, and whether two descriptions of it agree there.
+
+A compiled program, what a proof has read, a response and a record of an earlier run are second
+descriptions of a diagram, and second descriptions can be wrong.  Each is compared with
+python-control's own rates and outputs, here and nowhere else.  The values are those of a copy of
+the diagram, so that nobody else who evaluates it is disturbed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import control as ct
+import numpy as np
+import numpy.typing as npt
+
+from ..upstream.control_internals import outputs_now, rates_now
+from .parameters import overridden
+
+SAME_FUNCTIONS = 1e-10
+"""Relative difference that rounding explains without a closer look."""
+OF_RESPONSES = 1e-6
+"""What a response may differ by, relative to the largest sample: engines interpolate."""
+OTHER_VERSIONS = 1e-6, 1e-9
+"""What processors and versions of libraries may differ by, relative and absolute."""
+SHAKEN = 1e-13
+"""Relative change of states and inputs that shows what rounding does to a value."""
+_TIMES = 100  # as many times as far as states and inputs are shaken
+
+Point = tuple[float, np.ndarray, np.ndarray]  # time (s), states, inputs
+PointValues = tuple[np.ndarray, ...]  # rates, outputs, and more where there are more
+PointFunction = Callable[[float, np.ndarray, np.ndarray], PointValues]
+
+
+def values_now(system: Any, point: Point) -> tuple[np.ndarray, np.ndarray]:
+    """Return rates and outputs at a point, with the parameters that a system has now.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+    point : tuple
+        Time (s), states, inputs.
+    """
+    if isinstance(system, ct.StateSpace):  # connected linear systems have one matrix for all
+        rates, outputs = system.dynamics(*point), system.output(*point)
+    else:
+        rates = rates_now(system, *point) if system.nstates else np.empty(0)
+        outputs = outputs_now(system, *point) if system.noutputs else np.empty(0)
+    return np.reshape(rates, -1).astype(float), np.reshape(outputs, -1).astype(float)
+
+
+def rates_and_outputs(system: Any, params: Mapping[str, Any] | None = None) -> PointFunction:
+    """Return what computes python-control's rates and outputs, with parameters of its own.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        It stays as it is; a copy of it is evaluated.
+    params : mapping, optional
+        Overrides by name.
+
+    Returns
+    -------
+    callable
+        ``function(t, x, u)`` returns rates and outputs.
+
+    Raises
+    ------
+    UnknownNameError, AmbiguousNameError, ParameterError
+        If a name or a value is refused.
+    """
+    own = overridden(system, params)
+    return lambda t, x, u: values_now(own, (t, x, u))
+
+
+def agree(
+    a: npt.ArrayLike, b: npt.ArrayLike, absolute: Any = 0.0, relative: float = SAME_FUNCTIONS
+) -> np.ndarray:
+    """Return where values are equal to rounding; NaN equals nothing.
+
+    Parameters
+    ----------
+    a, b : array_like of shape (m,)
+    absolute : array_like, optional
+        What may be added to a relative difference, see `explained`.
+    relative : float, optional
+        Of the larger one.
+    """
+    a, b = np.asarray(a), np.asarray(b)
+    with np.errstate(invalid="ignore"):
+        allowed = relative * np.maximum(np.abs(a), np.abs(b)) + absolute
+        return np.asarray((a == b) | (np.abs(a - b) <= allowed))
+
+
+def rounded_points(point: Point, later: float = 0.0) -> Iterator[Point]:
+    """Yield points as far as rounding may move one.
+
+    Sums may cancel: any two numbers are moved apart at one of the points, all alike at another.
+
+    Parameters
+    ----------
+    point : tuple
+        Time (s), states, inputs.
+    later : float, optional
+        By how much time is moved (s); never earlier, since what begins at t has begun.
+    """
+    t, x, u = point
+    places = np.arange(x.size + u.size)
+    for bit in range(int(places.size).bit_length() + 1):
+        factors = 1 + SHAKEN * (1 - 2 * (places >> bit & 1))
+        yield t + later, x * factors[: x.size], u * factors[x.size :]
+
+
+def explained(
+    function: PointFunction, point: Point, base: PointValues, later: float = 0.0
+) -> PointValues:
+    """Return by how much rounded states and inputs explain that values are not `base`.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(t, x, u)`` returns the values.
+    point : tuple
+        Time (s), states, inputs.
+    base : tuple of ndarray
+        The values there.
+    later : float, optional
+        As for `rounded_points`.
+    """
+    moved = [np.zeros_like(values) for values in base]
+    for near in rounded_points(point, later):
+        for place in (near, _opposite(near, point)):
+            try:
+                found = function(*place)
+                break
+            except Exception:  # past the end of what the blocks' functions are defined on
+                found = base
+        for total, a, b in zip(moved, base, found, strict=True):
+            np.fmax(total, _TIMES * np.abs(a - b), out=total)
+    return tuple(moved)
+
+
+def _opposite(near: Point, point: Point) -> Point:
+    """Return a point as far on the other side, at the same time."""
+    (t, *moved), (_, *here) = near, point
+    x, u = (2 * a - b for a, b in zip(here, moved, strict=True))
+    return t, x, u

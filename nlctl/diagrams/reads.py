@@ -1,0 +1,177 @@
+"""Which parameters the functions of a third-party block may read, declared or not."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from types import CodeType, FunctionType, MethodType
+from typing import Any
+
+import numpy as np
+
+from ..upstream.control_internals import current_parameters
+from .third_party import declared_keys
+
+_MOST = 2000  # objects that are looked at
+_VALUES = (0.0, 0.25, 1.0)  # of states and inputs at which it is called
+_CONTAINERS = (tuple, list, set, frozenset)
+
+
+def may_read(block: Any, key: str) -> bool:
+    """Whether the functions of a third-party block may read a parameter of that name.
+
+    Parameters
+    ----------
+    block : control.NonlinearIOSystem
+    key : str
+        Name of the parameter in the block.
+
+    Returns
+    -------
+    bool
+        True if the block declares it, its text stands in the code of its functions or of what
+        they reach, or they read it when they are called.  False is said only of functions that
+        were called, and did not look at all names.
+    """
+    functions = [f for f in (block.updfcn, block.outfcn) if f is not None]
+    if key in declared_keys(block) or any(key in texts_of(f) for f in functions):
+        return True
+    return any(_reads(f, block, key) for f in functions)
+
+
+def texts_of(function: Any) -> frozenset[str]:
+    """Return all text constants that a function reaches: in code, in what it reads around it."""
+    found: set[str] = set()
+    waiting, seen = [function], set()
+    while waiting and len(seen) < _MOST:
+        thing = waiting.pop()
+        if isinstance(thing, str):
+            found.add(thing)
+        elif id(thing) not in seen:
+            seen.add(id(thing))
+            waiting.extend(_reached(thing))
+    return frozenset(found)
+
+
+def _reached(thing: Any) -> Iterator[Any]:
+    """Yield what one thing leads to."""
+    if isinstance(thing, CodeType):
+        yield from thing.co_consts
+    elif isinstance(thing, FunctionType):
+        yield from _of_function(thing)
+    elif isinstance(thing, MethodType):
+        yield from (thing.__func__, thing.__self__)
+    elif isinstance(thing, functools.partial):
+        yield from (thing.func, *thing.args, *thing.keywords.values())
+    elif isinstance(thing, _CONTAINERS):
+        yield from thing
+    elif isinstance(thing, dict):
+        yield from (*thing, *thing.values())
+    elif _is_users(thing):
+        yield from vars(thing).values()
+        for kind in type(thing).__mro__[:-1]:
+            yield from (f for f in vars(kind).values() if isinstance(f, FunctionType | str))
+
+
+def _of_function(function: FunctionType) -> Iterator[Any]:
+    yield function.__code__
+    yield from function.__defaults__ or ()
+    yield from (function.__kwdefaults__ or {}).values()
+    yield getattr(function, "__wrapped__", None)
+    for cell in function.__closure__ or ():
+        try:
+            yield cell.cell_contents
+        except ValueError:  # nothing in it yet
+            continue
+    for name in _names(function.__code__):
+        yield function.__globals__.get(name)
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for const in code.co_consts:
+        if isinstance(const, CodeType):
+            yield from _names(const)
+
+
+def _is_users(thing: Any) -> bool:
+    """Whether a thing may be an object of somebody's own class, which has attributes."""
+    if isinstance(thing, type) or not hasattr(thing, "__dict__"):
+        return False
+    return type(thing).__module__.partition(".")[0] not in ("builtins", "numpy", "control")
+
+
+class _Watched(dict):  # type: ignore[type-arg]
+    """A dict that notes which of its keys are asked for, and whether all of them are."""
+
+    def __init__(self, values: Any) -> None:
+        super().__init__(values)
+        self.asked: set[Any] = set()
+        self.every = False
+
+    def __getitem__(self, key: Any) -> Any:
+        self.asked.add(key)
+        return super().__getitem__(key)
+
+    def get(self, key: Any, default: Any = None) -> Any:
+        """Return a value, and note the key."""
+        self.asked.add(key)
+        return super().get(key, default)
+
+    def __contains__(self, key: Any) -> bool:
+        self.asked.add(key)
+        return super().__contains__(key)
+
+    def pop(self, key: Any, *default: Any) -> Any:  # type: ignore[override]
+        """Take a value out, and note the key."""
+        self.asked.add(key)
+        return super().pop(key, *default)
+
+    def __iter__(self) -> Iterator[Any]:
+        self.every = True
+        return super().__iter__()
+
+    def keys(self) -> Any:
+        """Return all keys."""
+        self.every = True
+        return super().keys()
+
+    def values(self) -> Any:
+        """Return all values."""
+        self.every = True
+        return super().values()
+
+    def items(self) -> Any:
+        """Return all pairs."""
+        self.every = True
+        return super().items()
+
+    def copy(self) -> Any:
+        """Return a plain copy: what is asked of that is not seen."""
+        self.every = True
+        return dict(super().items())
+
+    def __or__(self, other: Any) -> Any:
+        self.every = True
+        return super().__or__(other)
+
+    def __ror__(self, other: Any) -> Any:
+        self.every = True
+        return dict(other) | dict(super().items())
+
+
+def _reads(function: Any, block: Any, key: str) -> bool:
+    """Whether a function asks for a name that is not in its code, where it is called."""
+    called = False
+    for value in _VALUES:
+        watched = _Watched(dict(current_parameters(block)))
+        x, u = np.full(block.nstates or 0, value), np.full(block.ninputs or 0, value)
+        try:
+            with np.errstate(all="ignore"):
+                function(0.0, x, u, watched)
+            called = True
+        except Exception:  # whatever a function of others raises at a place that was chosen here
+            pass
+        if watched.every or key in watched.asked:
+            return True
+    return not called

@@ -1,0 +1,288 @@
+"""Third-party blocks whose parameters go by qualified names, as those of nlctl's blocks do.
+
+python-control has one flat dict of parameters for a diagram: of equal names the last one wins for
+every block, and wins over each block's own values.  `with_own_values` gives the blocks of a diagram
+values of their own, and `apart` gives a run a diagram of its own.
+"""
+
+from __future__ import annotations
+
+import copy
+import functools
+import operator
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..blocks import Block, sampling_of, within
+from ..names import Parameters, base_name
+from ..upstream.control_internals import (
+    RESOLVED,
+    OwnParameters,
+    current_parameters,
+    set_parameters,
+    takes_a_dict,
+)
+from .places import leaves
+
+
+def is_third_party(system: Any) -> bool:
+    """Whether a block has functions of others, which read their parameters from a dict."""
+    linear = isinstance(system, ct.StateSpace | ct.InterconnectedSystem)
+    is_nonlinear = isinstance(system, ct.NonlinearIOSystem) and not linear
+    return is_nonlinear and not isinstance(system, Block) and takes_a_dict(system)
+
+
+def declared_keys(block: Any) -> list[str]:
+    """Return the parameters that a third-party block declares, by the names that it reads."""
+    return list(block.nlctl_own if isinstance(block, Named) else block.params)
+
+
+class _TakesADict(OwnParameters):
+    """A third-party block that takes its parameters in another way than python-control has it."""
+
+    reads_a_dict = True
+    nlctl_base: type
+    nlctl_kind: type
+    nlctl_overrides: dict[str, Any]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, (type(self).nlctl_kind, type(self).nlctl_base), self.__dict__
+
+
+class Named(_TakesADict):
+    """A third-party block in a diagram of `interconnect`: "P.k" is its own k, and no one else's.
+
+    Attributes
+    ----------
+    nlctl_own : dict
+        Its parameters, by the names that its functions read.
+    """
+
+    nlctl_own: dict[str, Any]
+
+    @property
+    def params(self) -> Parameters:
+        """Parameters by qualified name.  Assign a dict to change the block's own values."""
+        return Parameters({f"{self.name}.{k}": v for k, v in self.nlctl_own.items()}, block=self)
+
+    @params.setter
+    def params(self, values: Mapping[str, Any]) -> None:
+        self.nlctl_own = self.taken(values or {})
+        set_parameters(self, None)
+
+    def taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what its functions read: its own values, overridden."""
+        found, prefix = dict(self.nlctl_own), f"{self.name}."
+        for name, value in [*params.items(), *vars(self).get("nlctl_overrides", {}).items()]:
+            set_key(found, str(name).removeprefix(prefix), value)
+        return found
+
+
+class Overridden(_TakesADict):
+    """A third-party block of a run of its own, see `apart`.
+
+    Attributes
+    ----------
+    nlctl_overrides : dict
+        What it alone reads in place of what python-control gives it.
+    """
+
+    def taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what its functions read."""
+        found = {**self.params, **params}
+        for name, value in self.nlctl_overrides.items():
+            set_key(found, name, value)
+        return found
+
+
+def set_key(values: dict[str, Any], name: str, value: Any) -> None:
+    """Set a parameter, or an element of one, in a dict."""
+    base = base_name(name)
+    if base == name or name in values or base not in values:
+        values[name] = value
+        return
+    old = values[base]
+    array = np.array(old, dtype=np.result_type(np.asarray(old), np.asarray(value)))
+    array[tuple(int(k) for k in re.findall(r"\d+", name[len(base) :]))] = value
+    values[base] = array if isinstance(old, np.ndarray) else type(old)(array.tolist())
+
+
+@functools.cache
+def _with(kind: type, base: type) -> type:
+    """Return a class of systems of another one that take their parameters in another way."""
+    names = {"__module__": base.__module__, "nlctl_kind": kind, "nlctl_base": base}
+    made = type(base.__name__, (kind, base), names)
+    made.__qualname__ = base.__qualname__
+    return made
+
+
+def _again(kind: type, base: type) -> Any:
+    made = _with(kind, base)
+    return object.__new__(made)
+
+
+# -- values of their own ---------------------------------------------------------------------------
+
+
+def with_own_values(system: Any) -> Any:
+    """Return a system whose third-party blocks have values of their own; itself if all have.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        It stays as it is.  What a diagram of plain python-control gives its blocks, they keep.
+    """
+    if not any(_lacks_own(within(leaf.system)) for leaf in leaves(system)):
+        return system
+    given = apart(system)
+    set_parameters(given.system, None)
+    return _named(system, given)
+
+
+def _lacks_own(block: Any) -> bool:
+    if not is_third_party(block) or isinstance(block, Named) or "params" not in vars(block):
+        return False
+    return bool(block.params) and all(isinstance(k, str) and "." not in k for k in block.params)
+
+
+def _named(system: Any, given: Apart) -> Any:
+    if isinstance(system, ct.InterconnectedSystem):
+        return _named_diagram(system, [_named(part, given) for part in system.syslist])
+    block = within(system)
+    if not _lacks_own(block):
+        return system
+    made, values = copy.copy(block), current_parameters(given.of(block))
+    own = {key: values[key] for key in block.params}
+    del made.params
+    made.__class__ = _with(Named, type(block))
+    made.nlctl_own = own
+    set_parameters(made, None)
+    if block is system:
+        return made
+    around = copy.copy(system)
+    around.inner = made
+    return around
+
+
+def _named_diagram(diagram: Any, parts: list[Any]) -> Any:
+    """Return a diagram of other parts, with the values that its parameters have."""
+    if all(new is old for new, old in zip(parts, diagram.syslist, strict=True)):
+        return diagram
+    made = copy.copy(diagram)
+    made.syslist = parts
+    params: Any = functools.reduce(operator.or_, (part.params for part in parts), {})
+    keys = {base_name(name).rpartition(".")[2] for name in params}
+    for name, value in diagram.params.items():
+        if name in params or ("." not in name and name not in keys):
+            dict.__setitem__(params, name, value)
+    if isinstance(diagram.params, Parameters) and diagram.params.scope is not None:
+        params.scope = made
+    made.params = params
+    return made
+
+
+# -- a diagram of one's own ------------------------------------------------------------------------
+
+
+@dataclass(kw_only=True, eq=False)
+class Apart:
+    """A copy of a diagram in which a run may write its parameters.
+
+    Attributes
+    ----------
+    system : control.InputOutputSystem
+    pairs : dict
+        Blocks and diagrams with their copies, by identity.  Linear systems are not copied: they
+        have no parameters.
+    """
+
+    system: Any
+    pairs: dict[int, tuple[Any, Any]]
+
+    def of(self, thing: Any) -> Any:
+        """Return the copy of a block or diagram; anything else as it is."""
+        return self.pairs.get(id(thing), (thing, thing))[1]
+
+    def refreshed(self) -> bool:
+        """Take over what was changed in the original; whether it still has the same parts."""
+        for old, new in self.pairs.values():
+            if any(self.of(part) is not copied for part, copied in _parts(old, new)):
+                return False
+            kept, state = _kept(old), vars(old)
+            for name in [k for k in vars(new) if k not in state and k not in kept]:
+                del new.__dict__[name]
+            new.__dict__.update({k: v for k, v in state.items() if k not in kept})
+            self.connect(old, new)
+        return True
+
+    def connect(self, old: Any, new: Any) -> None:
+        """Give a diagram's copy the parameters of the diagram, of the copies of its blocks."""
+        params = getattr(old, "params", None)
+        if not isinstance(old, ct.InterconnectedSystem) or not isinstance(params, Parameters):
+            return
+        new.params = copy.copy(params)
+        new.params.owners = {name: self.of(owner) for name, owner in params.owners.items()}
+        new.params.scope = self.of(params.scope)
+
+
+def apart(system: Any) -> Apart:
+    """Return a copy of a diagram, with copies of its blocks.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        A diagram or a block; its functions, matrices and records are those of the copy.
+
+    Returns
+    -------
+    Apart
+        The copy, and which block stands for which.
+    """
+    found = Apart(system=None, pairs={})
+
+    def copied(old: Any) -> Any:
+        if not isinstance(old, ct.NonlinearIOSystem) or isinstance(old, ct.StateSpace):
+            return old
+        if id(old) in found.pairs:
+            return found.pairs[id(old)][1]
+        new: Any = copy.copy(old)
+        found.pairs[id(old)] = old, new
+        if isinstance(old, ct.InterconnectedSystem):
+            new.syslist = [copied(part) for part in old.syslist]
+        elif within(old) is not old:
+            new.inner, new.sampling = copied(within(old)), copied(sampling_of(old))
+        elif is_third_party(old) and not isinstance(old, _TakesADict):
+            new.__class__ = _with(Overridden, type(old))
+        if isinstance(new, _TakesADict):
+            new.nlctl_overrides = {}
+        return new
+
+    found.system = copied(system)
+    for old, new in list(found.pairs.values()):
+        found.connect(old, new)
+    return found
+
+
+def _kept(old: Any) -> set[str]:
+    """Return the attributes that a copy has of its own."""
+    kept = {*RESOLVED, "nlctl_overrides"}
+    if isinstance(old, Block):
+        return kept | {"current_spec"}
+    if isinstance(old, ct.InterconnectedSystem):
+        return kept | {"syslist"}
+    return kept if within(old) is old else kept | {"inner", "sampling"}
+
+
+def _parts(old: Any, new: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield parts of a diagram or of a sampled block with those of its copy."""
+    if isinstance(old, ct.InterconnectedSystem):
+        yield from zip_longest(old.syslist, new.syslist)
+    elif within(old) is not old:
+        yield within(old), within(new)
+        yield sampling_of(old), sampling_of(new)

@@ -1,0 +1,108 @@
+"""Where expressions switch: for each comparison, `floor`, `abs`, `max`, what is 0 there.
+
+A condition that an expression depends on divides what it is made of in two.  On each side the
+expression is smooth; where the switching function changes its sign it may jump, or have a kink.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable
+
+from .graph import Expr, Graph, needed
+
+__all__ = ["conditions", "switching_function"]
+
+_ORDERS = ("lt", "le", "gt", "ge")
+_OF_DIFFERENCES = (*_ORDERS, "minimum", "maximum")
+_OF_SIGNS = ("absolute", "sign", "heaviside")
+_OF_SECONDS = ("copysign",)
+_OF_FIRSTS = ("arctan2",)
+_OF_INTEGERS = {"floor": 0.0, "ceil": 0.0, "trunc": 0.0, "rint": 0.5}
+_OF_QUOTIENTS = ("remainder", "fmod")
+
+
+def conditions(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
+    """Return all that expressions switch at, parts first.
+
+    Parameters
+    ----------
+    exprs : iterable of Expr
+    known : collection of Expr, optional
+        What is not looked into.
+
+    Returns
+    -------
+    tuple of Expr
+        Operations whose value or slope jumps.  Those that are equal or not equal are none: what
+        differs at one point only is never seen by an integral.
+    """
+    nodes = needed(exprs, known)
+    return tuple(node for node in nodes if node.varies and node not in known and _switches(node))
+
+
+def _switches(node: Expr) -> bool:
+    if node.op in _OF_DIFFERENCES:
+        return any(arg.varies for arg in node.args) and not _of_truths(node)
+    return (
+        node.op in _OF_SIGNS
+        or node.op in _OF_FIRSTS
+        or node.op in _OF_INTEGERS
+        or node.op in _OF_QUOTIENTS
+        or (node.op in _OF_SECONDS and node.args[1].varies)
+    )
+
+
+def _of_truths(node: Expr) -> bool:
+    return all(arg.kind == "b" for arg in node.args)
+
+
+def switching_function(graph: Graph, condition: Expr) -> Expr:
+    """Return what changes its sign where a condition switches.
+
+    Parameters
+    ----------
+    graph : Graph
+        Where it is kept.
+    condition : Expr
+        One of `conditions`.
+
+    Returns
+    -------
+    Expr
+        A number, or a vector of as many as the condition has elements.  Of `floor` and its
+        relatives a sine that is 0 at the integers.
+    """
+    op, args = condition.op, [graph.number(arg) for arg in condition.args]
+    if op in _OF_DIFFERENCES:
+        return _difference(graph, *args)
+    if op in _OF_SIGNS or op in _OF_FIRSTS:
+        return args[0]
+    if op in _OF_SECONDS:
+        return args[1]
+    counted = args[0]
+    if op in _OF_QUOTIENTS:
+        counted = graph.op("div", *args)
+    return _at_integers(graph, counted, _OF_INTEGERS.get(op, 0.0))
+
+
+def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
+    """Return a - b; of what is compared with 0 itself, so that no rounding comes in."""
+    if a.op == "const" and a.data == 0.0:
+        return b
+    return graph.op("sub", a, b)
+
+
+def _at_integers(graph: Graph, counted: Expr, shift: float) -> Expr:
+    """Return what has a simple root where `counted` + shift is an integer.
+
+    sin(pi z) = (-1)^n sin(pi (z - n)) with the nearest integer n: rounding of pi z does not move
+    the roots.
+    """
+    z = graph.op("add", counted, graph.const(shift)) if shift else counted
+    nearest = graph.op("rint", z)
+    half = graph.op("mul", nearest, graph.const(0.5))
+    odd = graph.op("sub", half, graph.op("floor", half))  # 0 or 1/2
+    sign = graph.op("sub", graph.const(1.0), graph.op("mul", graph.const(4.0), odd))
+    rest = graph.op("mul", graph.const(math.pi), graph.op("sub", z, nearest))
+    return graph.op("mul", sign, graph.op("sin", rest))

@@ -1,0 +1,129 @@
+"""Steps that a run has tried, as they are looked at: where they went, and a jump on their way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+__all__ = ["Attempt", "Crowd", "Jump", "LaneEquations", "parameters_of"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crowd:
+    """Switches that come ever closer together.
+
+    Attributes
+    ----------
+    row : int
+        Which switching function or condition, in the order of the program.
+    period : float
+        From one switch to the next but one, at last (s).
+    ratio : float
+        Of two such periods in a row.
+    more : float
+        Switches that there would be until the end of the run, at that pace.
+    """
+
+    row: int
+    period: float
+    ratio: float
+    more: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jump:
+    """A jump at which a run chatters.
+
+    Attributes
+    ----------
+    times : tuple of float
+        On both sides of the jump (s); the same, or neighbouring ones.
+    before, after : ndarray of shape (nstates,)
+        Neighbouring states on both sides.
+    inputs : ndarray
+        Inputs of the program there.
+    crowd : Crowd or None
+        How the switches accumulate, if they do.
+    """
+
+    times: tuple[float, float]
+    before: np.ndarray
+    after: np.ndarray
+    inputs: np.ndarray
+    crowd: Crowd | None = None
+
+    @property
+    def time(self) -> float:
+        """Time of the jump (s)."""
+        return self.times[1]
+
+    def sides(self, wider: float = 0.0) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Return times, states and inputs on both sides, further apart by so many distances."""
+        (t, t_2), (x, x_2) = self.times, (self.before, self.after)
+        apart, later = wider * (x_2 - x), wider * (t_2 - t)
+        return [(t - later, x - apart, self.inputs), (t_2 + later, x_2 + apart, self.inputs)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attempt:
+    """One step tried in every lane, as it was before and after; arrays as in `workspace`."""
+
+    t: np.ndarray
+    x: np.ndarray
+    first: np.ndarray
+    x_new: np.ndarray
+    h: np.ndarray
+    k: np.ndarray
+    u: np.ndarray
+    stiff: bool
+    free: np.ndarray  # whether it did not get to a stop that was known before the run
+
+
+def parameters_of(run: Any, j: int) -> np.ndarray:
+    """Return the parameters of lane `j`, in every lane."""
+    return np.ascontiguousarray(np.repeat(run.task.p[:, j : j + 1], run.machine.width, axis=1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LaneEquations:
+    """The right-hand side of one lane, with what its memories would become behind it."""
+
+    run: Any
+    j: int
+    c: np.ndarray  # its parameters, in every lane
+
+    def __call__(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        dx, g = self._at(t, x, u)
+        return np.concatenate([dx, g[self.run.task.switching :]])
+
+    def switching(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the switching functions and conditions, also those that another method finds."""
+        task = self.run.task
+        g = self._at(t, x, u)[1]
+        return g[: g.size - task.memory.size - task.owned.shape[0]]
+
+    def _at(self, t: float, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        width = self.run.machine.width
+        tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), width, axis=1) for v in (t, x, u))
+        dx, g = np.empty_like(xx), np.empty((self.run.work.g.shape[0], width))
+        self.run.machine.rhs(tt[0].copy(), xx, uu, self.c, dx, g)
+        dx[self.run.task.memory] = 0.0
+        return dx[:, 0], g[:, 0]
+
+    def points(self, attempt: Attempt) -> Iterator[tuple[float, np.ndarray]]:
+        """Yield where a step has been: at its ends and, of an explicit pair, at its stages."""
+        j, h = self.j, attempt.h[self.j]
+        t, x, A, C = attempt.t[j], attempt.x[:, j], self.run.task.A, self.run.task.C
+        yield t, x
+        if attempt.stiff:
+            yield t, attempt.x_new[:, j]
+            return
+        if self.run.task.highest:
+            yield t + h, attempt.x_new[:, j]
+            return
+        slopes = np.vstack([attempt.first[None, :, j], attempt.k[1:, :, j]])
+        for s in range(1, C.size):
+            yield t + C[s] * h, x + h * (A[s, :s] @ slopes[:s])

@@ -1,0 +1,196 @@
+"""A schedule as expressions: blocks traced, wired, loops solved, what cannot be traced called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ...expressions.arrays import Tracer, as_array, scalar
+from ...expressions.graph import Expr, Graph
+from ...sampling.system import Happening
+from ..codegen.calls import Call
+from ..codegen.program import count_guards, count_switching_functions, memory
+from ..codegen.solver import Solver
+from ..diagram.schedule import Schedule, during
+from ..parameters import length
+from ..sliding.reading import with_sliding
+from .located import Conditions, found_conditions
+from .reader import Reader
+from .watched import watched_conditions
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equations:
+    """What a diagram computes.
+
+    Attributes
+    ----------
+    graph : Graph
+    results : dict
+        For ``"dx"``, ``"g"`` and ``"y"`` pairs of a row and the array that is to be written there.
+        For ``"sample0"`` and so on those of sampled blocks' next states, at each meeting, and
+        for ``"reset"`` the states after jumps of all blocks with guards, if there are any.
+    calls : dict
+        Opaque functions by name.
+    solvers : dict
+        Searches for the signals of algebraic loops, by name.
+    fixed_points : dict
+        By the same names: what the blocks of a loop make of the signals found, in their
+        expressions; they are equal to these.
+    conditions : Conditions
+        What the equations switch at, and no block declares.
+    """
+
+    graph: Graph
+    results: dict[str, list[tuple[int, Tracer]]]
+    calls: dict[str, Call]
+    solvers: dict[str, Solver]
+    fixed_points: dict[str, list[Expr]]
+    conditions: Conditions = field(default_factory=Conditions)
+
+    def pieces(self, name: str) -> list[tuple[Expr, int]]:
+        """Return the expressions of some results, row by row, each with its length."""
+        return [piece for _, array in self.results[name] for piece in array.pieces()]
+
+
+def equations(
+    schedule: Schedule,
+    layout: Any,
+    p: np.ndarray | None = None,
+    meetings: Sequence[Happening] = (),
+) -> Equations:
+    """Write a schedule as expressions.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    layout : mapping
+        Places of the parameters, as in `Program.layout`.
+    p : ndarray, optional
+        The parameter vector whose integers steer what is computed; by default those that the
+        blocks have now.
+    meetings : sequence of frozenset, optional
+        What happens to sampled blocks, as in `Program.meetings`.
+
+    Returns
+    -------
+    Equations
+
+    Raises
+    ------
+    CompileError
+        If a function means one thing in Python and another in expressions, or one in an algebraic
+        loop is opaque.
+    """
+    system = schedule.system
+    sizes = {"t": 1, "x": system.nstates or 0, "u": schedule.ninputs, "p": length(layout)}
+    reader = Reader(
+        graph=Graph(sizes), layout=layout, blocks=schedule.nodes, p=p,
+        samplings={id(h.system): i for i, h in enumerate(schedule.holders)},
+        lines={line: (system.ninputs or 0) + k for k, line in enumerate(schedule.lines)},
+    )  # fmt: skip
+    with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
+        reader = with_sliding(reader, schedule)
+        reader.read(schedule)
+        rates = [reader.derivatives(i) for i in range(len(schedule.nodes))]
+        y = reader.wired(schedule.outputs)
+        declared, committed = _events(reader)
+        found = _conditions(schedule.system, reader, rates, [each for _, each in declared], y)
+        found = replace(found, located=(*found.located, *watched_conditions(reader, schedule)))
+        results = {
+            "dx": [(n.state_offset, rates[i]) for i, n in enumerate(schedule.nodes)],
+            "g": declared
+            + _located(reader, found)
+            + _guards(reader, found.rows)
+            + [(row + found.rows, a) for row, a in committed],
+            "y": [(0, y)],
+        }
+        if any(count_guards(node) for node in reader.blocks):
+            results["reset"] = _resets(reader)
+        results = reader.all_known(results)
+        for k, what in enumerate(meetings):
+            at_instant = during(schedule, what)
+            then = replace(reader, blocks=at_instant.nodes, what=what, signals={}, solved=[])
+            then.read(at_instant)
+            results |= then.all_known({f"sample{k}": _next(then)})
+    return Equations(
+        graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers,
+        fixed_points=reader.fixed_points, conditions=found,
+    )  # fmt: skip
+
+
+def _conditions(
+    system: Any, reader: Reader, rates: Sequence[Tracer], declared: Sequence[Tracer], y: Tracer
+) -> Conditions:
+    """Return what a diagram in continuous time switches at without saying so."""
+    if not ct.isctime(system):
+        return Conditions()
+    arriving = y[system.noutputs or 0 :]
+    roots = [e for array in (*rates, arriving) for e, _ in array.pieces()]
+    return found_conditions(reader, rates, declared, roots)
+
+
+def _located(reader: Reader, found: Conditions) -> list[tuple[int, Tracer]]:
+    """Return the switching functions of conditions with their rows, behind those declared."""
+    row = sum(count_switching_functions(node) for node in reader.blocks)
+    made = []
+    for function in (each.function for each in found.located):
+        size = function.size or 1
+        array = (
+            Tracer(reader.graph, as_array(function), 0, size)
+            if function.size
+            else scalar(reader.graph, function).reshape(1)
+        )
+        made.append((row, array))
+        row += size
+    return made
+
+
+def _guards(reader: Reader, located: int) -> list[tuple[int, Tracer]]:
+    """Return the guards of all blocks with their rows, behind so many of conditions."""
+    row = located + sum(count_switching_functions(node) for node in reader.blocks)
+    made = []
+    for i, node in enumerate(reader.blocks):
+        if count_guards(node):
+            made.append((row, reader.guards(i)))
+            row += count_guards(node)
+    return made
+
+
+def _resets(reader: Reader) -> list[tuple[int, Tracer]]:
+    """Return the states after jumps of all blocks with guards, with their rows."""
+    found, row = [], 0
+    for i, node in enumerate(reader.blocks):
+        if count_guards(node):
+            found.append((row, reader.resets(i)))
+            row += node.size
+    return found
+
+
+def _next(reader: Reader) -> list[tuple[int, Tracer]]:
+    """Return the next states of sampled blocks to which something happens, with their rows."""
+    found, row = [], 0
+    for i, node in enumerate(reader.blocks):
+        if node.sampled:
+            if node.sampled.acts(reader.what):
+                found.append((row, reader.next_states(i)))
+            row += node.size
+    return found
+
+
+def _events(reader: Reader) -> tuple[list[tuple[int, Tracer]], list[tuple[int, Tracer]]]:
+    """Return switching functions of all blocks, and what memories are committed to."""
+    counts = [(count_switching_functions(node), len(memory(node))) for node in reader.blocks]
+    at, behind, declared, committed = 0, sum(count for count, _ in counts), [], []
+    behind += sum(count_guards(node) for node in reader.blocks)
+    for i, (own, kept) in enumerate(counts):
+        if own or kept:
+            events = reader.events(i)
+            declared.append((at, events[:own]))
+            committed.append((behind, events[own:]))
+            at, behind = at + own, behind + kept
+    return declared, committed

@@ -1,0 +1,253 @@
+"""What switches in the equations of a diagram, and what is a function of time alone there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from ...blocks import Block, memory_states
+from ...expressions.arrays import Tracer
+from ...expressions.conditions import conditions, switching_function
+from ...expressions.derivatives import tangents
+from ...expressions.graph import Expr, Graph, needed
+from ..codegen.program import count_switching_functions, memory
+from ..diagram.schedule import Node
+
+if TYPE_CHECKING:
+    from .reader import Reader
+
+_MOST = 256  # switching functions of one diagram; more cost more than they tell
+_BENDS = ("absolute", "minimum", "maximum")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Located:
+    """One condition of the equations that is located.
+
+    Attributes
+    ----------
+    function : Expr
+        Its switching function: a change of sign is an event.
+    block : str
+        The block in whose equations it stands.
+    what : str
+        The operation.
+    bends : bool
+        Whether nothing jumps there: the equations have a kink, of `abs`, `min` and `max`.
+    """
+
+    function: Expr
+    block: str
+    what: str
+    bends: bool
+
+    @property
+    def rows(self) -> int:
+        """Numbers that the switching function is."""
+        return self.function.size or 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conditions:
+    """What the right-hand side of a diagram switches at, beyond what its blocks declare.
+
+    Attributes
+    ----------
+    located : tuple of Located
+        First those that only bend, then those at which something may jump.
+    of_time : tuple of Expr
+        Conditions of t alone, which are solved before a run.
+    waves : tuple of tuple
+        Of products of sines of t the angular frequencies of the factors.
+    pulses : tuple of Expr
+        Other functions of t alone that drive the equations.
+    beyond : int
+        Conditions that are too many to be located.
+    """
+
+    located: tuple[Located, ...] = ()
+    of_time: tuple[Expr, ...] = ()
+    waves: tuple[tuple[Expr, ...], ...] = ()
+    pulses: tuple[Expr, ...] = ()
+    beyond: int = 0
+
+    @property
+    def rows(self) -> int:
+        """Numbers that the switching functions are."""
+        return sum(each.rows for each in self.located)
+
+    @property
+    def bending(self) -> int:
+        """How many of these are of conditions that only bend."""
+        return sum(each.rows for each in self.located if each.bends)
+
+
+def found_conditions(
+    reader: Reader, rates: Sequence[Tracer], declared: Iterable[Tracer], roots: Iterable[Expr]
+) -> Conditions:
+    """Return what switches in a diagram whose blocks have been read.
+
+    Parameters
+    ----------
+    reader : Reader
+    rates : sequence of Tracer
+        The derivatives of each block's states.
+    declared : iterable of Tracer
+        Switching functions that the blocks declare.
+    roots : iterable of Expr
+        What is integrated, and what arrives at delays.
+    """
+    nodes = needed([*roots, *(e for found in reader.fixed_points.values() for e in found)])
+    timed, wanted = _of_time(nodes), set(nodes)
+    known = {_key(e) for array in declared for e, _ in array.pieces()}
+    found: dict[object, Located] = {}
+    of_time: dict[Expr, None] = {}
+    rows = beyond = 0
+    for condition, node in _undeclared(reader, rates):
+        if condition not in wanted:
+            continue
+        if condition in timed:
+            of_time[condition] = None
+            continue
+        function = switching_function(reader.graph, condition)
+        key, size, bends = _key(function), function.size or 1, condition.op in _BENDS
+        if key in found:
+            bends &= found[key].bends
+            found[key] = replace(found[key], bends=bends)
+            continue
+        if key in known or not function.varies or _remembers(function, node):
+            continue
+        if rows + size > _MOST:
+            beyond += size
+            continue
+        found[key] = Located(function=function, block=node.path, what=condition.op, bends=bends)
+        rows += size
+    waves, pulses = _moving(reader.graph, _terms(nodes, timed), timed)
+    return Conditions(
+        located=tuple(sorted(found.values(), key=lambda each: not each.bends)),
+        of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
+    )  # fmt: skip
+
+
+def _undeclared(reader: Reader, rates: Sequence[Tracer]) -> Iterable[tuple[Expr, Node]]:
+    """Yield the conditions of blocks that do not declare theirs, each with its block."""
+    for i, node in enumerate(reader.blocks):
+        if node.sampled or _declares(node):
+            continue
+        given = {expr for expr, _ in reader.wired(node.inputs).pieces()}
+        made = [reader.signals[i], rates[i]]
+        for each in conditions([e for array in made for e, _ in array.pieces()], given):
+            yield each, node
+
+
+def _remembers(function: Expr, node: Node) -> bool:
+    """Whether a condition asks for a memory of its own block, which stands aside within a step."""
+    own = set(memory(node))
+    if not own:
+        return False
+    leaves = (e for e in needed([function]) if e.op == "leaf" and e.data[0] == "x")
+    return any(own & set(_places(leaf)) for leaf in leaves)
+
+
+def _places(leaf: Expr) -> range:
+    _, start, step = leaf.data
+    return (
+        range(start, start + 1)
+        if leaf.size is None
+        else range(start, start + step * leaf.size, step)
+    )
+
+
+def _declares(node: Node) -> bool:
+    """Whether a block is one of nlctl's that say where they switch: their tests hold that."""
+    system = node.system
+    if not isinstance(system, Block) or not type(system.spec).__module__.startswith("nlctl."):
+        return False
+    return bool(count_switching_functions(node) or memory_states(system.spec))
+
+
+def _key(function: Expr) -> object:
+    """Return what is the same for functions that change their signs together."""
+    while function.op == "neg":
+        function = function.args[0]
+    if function.op == "sub":
+        return frozenset(function.args)
+    return function
+
+
+def _of_time(nodes: Sequence[Expr]) -> set[Expr]:
+    """Return which expressions vary with t and with nothing else."""
+    moved: set[Expr] = set()  # by states, inputs, or what nobody knows
+    timed: set[Expr] = set()
+    for node in nodes:
+        if node.op == "leaf" and node.varies:
+            (timed if node.data[0] == "t" else moved).add(node)
+        elif node.op in ("call", "solve") or any(arg in moved for arg in node.args):
+            moved.add(node)
+        elif any(arg in timed for arg in node.args):
+            timed.add(node)
+    return timed
+
+
+def _terms(nodes: Sequence[Expr], timed: set[Expr]) -> list[Expr]:
+    """Return the largest functions of t alone, sums of them divided into what they add."""
+    inner = {arg for node in nodes if node in timed for arg in node.args}
+    used = {arg for node in nodes if node not in timed for arg in node.args if arg in timed}
+    outer = [node for node in nodes if node in timed and (node in used or node not in inner)]
+    found: dict[Expr, None] = {}
+    while outer:
+        node = outer.pop()
+        if node.op in ("add", "sub", "neg", "concat") and node in timed:
+            outer += [arg for arg in node.args if arg in timed]
+        elif node.kind == "f" and node.op != "leaf":
+            found[node] = None
+    return list(found)
+
+
+def _moving(
+    graph: Graph, terms: Sequence[Expr], timed: set[Expr]
+) -> tuple[tuple[tuple[Expr, ...], ...], tuple[Expr, ...]]:
+    """Return the angular frequencies of products of sines, and the terms that are none."""
+    waves: dict[tuple[Expr, ...], None] = {}
+    pulses = []
+    for term in terms:
+        own = _frequencies(graph, term, timed, {})
+        if own is None:
+            pulses.append(term)
+        elif own:
+            waves[own] = None
+    return tuple(waves), tuple(pulses)
+
+
+def _frequencies(
+    graph: Graph, node: Expr, timed: set[Expr], known: dict[Expr, tuple[Expr, ...] | None]
+) -> tuple[Expr, ...] | None:
+    """Return the angular frequencies in a function of t; None if it has no highest one.
+
+    Of pieces that are put together at conditions those of the pieces: where one switches, a step
+    ends anyway.
+    """
+    if node not in timed or node.op == "leaf" or node.kind == "b":
+        return ()
+    if node not in known:
+        known[node] = None
+        if node.op in ("sin", "cos"):
+            (slope,) = tangents(graph, node.args, lambda leaf: _time_slope(graph, leaf))
+            known[node] = None if slope is None or slope.varies else (slope,)
+        elif node.op in _PRODUCTS or (node.op == "div" and node.args[1] not in timed):
+            parts = [_frequencies(graph, arg, timed, known) for arg in node.args]
+            if not any(part is None for part in parts):
+                known[node] = tuple(slope for part in parts for slope in part or ())
+    return known[node]
+
+
+def _time_slope(graph: Graph, leaf: Expr) -> Expr | None:
+    return graph.const(1.0) if leaf.data[0] == "t" else None
+
+
+_PRODUCTS = (
+    *("mul", "add", "sub", "neg", "select", "item", "slice", "concat", "sum"),
+    *("minimum", "maximum", "absolute", "sign", "floor", "ceil", "trunc", "rint"),
+    *("remainder", "fmod", "heaviside", "copysign"),
+)

@@ -1,0 +1,53 @@
+"""Functions that a run watches, as conditions that are located like those of the equations."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from ...errors import CompileError
+from ...expressions.arrays import leaf_vector
+from ...expressions.graph import Ambiguous, Untraceable
+from ...expressions.trace import trace
+from ..codegen.trace import time
+from ..diagram.schedule import Schedule
+from .located import Located
+
+if TYPE_CHECKING:
+    from .reader import Reader
+
+
+def watched_conditions(reader: Reader, schedule: Schedule) -> list[Located]:
+    """Return the functions of a run as conditions.
+
+    Parameters
+    ----------
+    reader : Reader
+    schedule : Schedule
+
+    Raises
+    ------
+    CompileError
+        If one cannot be written as an expression: it would have to be called as it stands.
+    """
+    graph, system = reader.graph, schedule.system
+    sizes = (system.nstates or 0, system.ninputs or 0)
+    found = []
+    for each in schedule.watched:
+
+        def arguments() -> tuple:
+            x, u = (leaf_vector(graph, k, 0, (n,)) for k, n in zip("xu", sizes, strict=True))
+            return time(graph), x, u, dict(schedule.overrides)
+
+        try:
+            value = trace(graph, partial(each.function), arguments)
+            if value.size != 1:
+                raise Untraceable(f"it returns {value.size} numbers, not one")
+        except (Untraceable, Ambiguous) as error:
+            raise CompileError(
+                f"event function '{each.name}' cannot be compiled: {error}; "
+                "engine='python-control' calls it as it stands"
+            ) from None
+        function = graph.number(value.reshape(-1)[0].only)
+        found.append(Located(function=function, block="", what=each.name, bends=False))
+    return found

@@ -1,0 +1,211 @@
+"""Conditions of the equations: a step ends right before one, and a very short step leads across.
+
+Behind a condition the right-hand side may have jumped.  A stage that looks behind it makes a step
+wrong by as much as the jump, however little of the step lies there; so no step that counts has one.
+What is tried is shortened until it ends before the condition, by less than a small part of a local
+error, with all stages on the near side.  The step across is so short that what it is wrong by is
+no more than that, whichever side its stages see.
+
+A guard is found in the same way, but only where it falls; behind it comes its jump.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from ..control import shorten
+from ..state import INNER
+from .location import AGAIN, CLEAR, EVENT, REFUSED
+
+NOTHING = -2  # no condition lies in the step just tried
+_SHARE = 0.01  # of the relative tolerance, of a step: how close to a condition steps end
+_TRIES = 60
+_CLEARLY, _GAP, _MOST = (
+    3.0,
+    1e-4,
+    0.05,
+)  # of a step with a stage behind a condition: how much is left out
+_NOTICED = 0.02  # the same where the step ends at a stop: a little less would be taken for it
+_LEAST = 1e-12  # of the time: shorter steps are taken whatever their stages see
+
+
+@numba.njit(**INNER)
+def crossing(task, lane, w, j):
+    """Look for conditions in the step just tried: what becomes of it, or NOTHING.
+
+    With AGAIN, ``lane.step`` is the next length to try; with REFUSED a shorter one is proposed;
+    with CLEAR a step across follows.
+    """
+    if lane.across:
+        return _across(task, lane, w, j)
+    if lane.tries > 0 and lane.traces == 0:
+        return NOTHING  # a break point that a block declares is being located
+    inside = _is_behind(task, lane, w, j)
+    beyond = 0.0 if inside else _beyond(task, lane, w, j)
+    if beyond > 0.0:
+        least = _NOTICED if lane.ends else _GAP
+        shorten(lane, 1.0 - min(max(_CLEARLY * beyond, least), _MOST))
+        return REFUSED
+    if not inside and lane.traces == 0:
+        return NOTHING
+    # a step that is wrong has seen a jump at a stage, whatever it says of its end
+    bad = inside or (task.fixed == 0.0 and not w.error[j] <= 1.0)
+    _bracket(task, lane, w, bad, j)
+    return _next_try(task, lane, w, bad, j)
+
+
+@numba.njit(**INNER)
+def _is_behind(task, lane, w, j):
+    """Whether the step just tried ends behind a condition."""
+    for i in range(task.declared, task.switching):
+        if _crossed(task, w, i, w.e[i, j], j) or (_leaves(task, lane, w, i, j) and w.e[i, j] != 0):
+            return True
+    return False
+
+
+@numba.njit(**INNER)
+def _leaves(task, lane, w, i, j):
+    """Whether a step begins where a condition is exactly 0.
+
+    What the right-hand side is at 0 need not be what it is on the side to which the step leads.
+    That counts once in a row: what comes back to 0 and leaves it with every step is rounding.
+    """
+    return i < task.guarded and w.e_start[i, j] == 0.0 and not lane.left_zero
+
+
+@numba.njit(**INNER)
+def _beyond(task, lane, w, j):
+    """Return how far a stage of the step just tried lies behind a condition, as far as kept.
+
+    In parts of what the switching function is at the start; what follows a shorter step begins
+    nearer, and has better stages.
+    """
+    known = task.inside[1 if lane.stiff else 0, 0] != 0.0
+    if not known or task.fixed > 0.0 or lane.step < _LEAST * abs(lane.t):
+        return 0.0
+    farthest = 0.0
+    for i in range(task.declared, task.guarded):
+        start = w.e_start[i, j]
+        for n in range(3):
+            if start * w.g_inside[n, i, j] < 0.0:
+                farthest = max(farthest, -w.g_inside[n, i, j] / start)
+    return farthest
+
+
+@numba.njit(**INNER)
+def _across(task, lane, w, j):
+    """Accept the step across a condition, unless its end is not finite."""
+    if not np.isfinite(w.error[j]):
+        return NOTHING
+    for i in range(task.declared, task.switching):
+        if _crossed(task, w, i, w.e[i, j], j):
+            return EVENT
+    return CLEAR
+
+
+@numba.njit(**INNER)
+def _crossed(task, w, i, end, j):
+    """Whether a condition has changed its sign since the start of the step, or a guard fallen."""
+    if i >= task.guarded:
+        return w.above[i - task.guarded, j] != 0 and end < 0.0
+    return w.e_start[i, j] * end < 0.0
+
+
+@numba.njit(**INNER)
+def _bracket(task, lane, w, bad, j):
+    """Take the step just tried into the bracket of lengths: too long, or all on the near side.
+
+    Of the near side the last two are kept, by which is foreseen where the condition lies: what a
+    step that is wrong says of its end is made of both sides.
+    """
+    first = lane.traces == 0
+    if first:
+        lane.traces, lane.low, lane.low_before, lane.whole = 1, 0.0, 0.0, lane.step
+        lane.same_side = 0
+    if bad or first:
+        lane.high, lane.right_high = lane.step, 1 if w.error[j] <= 1.0 else 0
+        lane.same_side = max(lane.same_side, 0) + 1
+    else:
+        lane.low_before, lane.low = lane.low, lane.step
+        lane.same_side = min(lane.same_side, 0) - 1
+    weight = 0.5 if lane.right_high and abs(lane.same_side) > 1 else 1.0  # Illinois
+    for i in range(task.declared, task.switching):
+        if first:
+            w.e_low[i, j] = w.e_before[i, j] = w.e_start[i, j]
+        if bad or first:
+            w.e_high[i, j], w.e_low[i, j] = w.e[i, j], w.e_low[i, j] * weight
+        else:
+            w.e_before[i, j], w.e_low[i, j] = w.e_low[i, j], w.e[i, j]
+            w.e_high[i, j] *= weight
+
+
+@numba.njit(**INNER)
+def _next_try(task, lane, w, bad, j):
+    """Say what to try next, or take the step just tried, which ends right before a condition."""
+    t_end = max(abs(lane.t), abs(lane.t + lane.high))
+    close = max(_SHARE * task.rtol * lane.whole, 8e-16 * t_end)
+    root = _foreseen(task, lane, w, bad, j)
+    if lane.high <= 2.0 * close and bad:  # right behind the start
+        lane.across, lane.traces, lane.tries = 1, 0, 0
+        return EVENT if np.isfinite(w.error[j]) else NOTHING
+    near = lane.high - lane.step <= 2.0 * close or 0.0 <= root - lane.step <= close
+    if not bad and near:
+        lane.traces = lane.tries = 0
+        cross = lane.high - lane.step if root < 0.0 else root - lane.step + close
+        lane.cross = max(min(cross, lane.high - lane.step), close)
+        return CLEAR
+    if lane.tries > _TRIES:
+        lane.traces = lane.tries = 0
+        return NOTHING
+    lane.tries += 1
+    width = lane.high - lane.low
+    aim = root - 0.5 * close if root > close else 1.5 * close
+    if root < 0.0 or (lane.tries > 6 and lane.tries % 2):
+        aim = lane.low + 0.5 * width
+    rest = min(1e-3 * width, 0.5 * close)
+    lane.step = min(max(aim, lane.low + rest), lane.high - rest)
+    lane.ends = 0
+    return AGAIN
+
+
+@numba.njit(**INNER)
+def _foreseen(task, lane, w, bad, j):
+    """Return where the first condition lies in the bracket, -1 if nothing is known of that.
+
+    Between both ends where the farther one is right; otherwise by what is known of the near side.
+    """
+    first = -1.0
+    for i in range(task.declared, task.switching):
+        root = -1.0
+        if _crossed(task, w, i, w.e_high[i, j], j) and (lane.right_high or lane.low == 0.0):
+            now, end = w.e_low[i, j], w.e_high[i, j]
+            root = lane.low + (lane.high - lane.low) * min(max(now / (now - end), 0.0), 1.0)
+        elif lane.low > 0.0:
+            root = _extrapolated(lane, w, i, j)
+        if 0.0 <= root < lane.high and (first < 0.0 or root < first):
+            first = root
+    if first < 0.0 and lane.low == 0.0 and lane.tries == 0:
+        first = 0.0  # it leaves 0, mostly at once
+    return first
+
+
+@numba.njit(**INNER)
+def _extrapolated(lane, w, i, j):
+    """Return where a function is 0 by its last values on the near side, -1 if it goes elsewhere.
+
+    By a secant, and where there are three values by the parabola through them, one step of Newton's
+    method from there.
+    """
+    before, now, length = w.e_before[i, j], w.e_low[i, j], lane.low - lane.low_before
+    if before * now <= 0.0 or abs(now) >= abs(before):
+        return -1.0
+    slope = (now - before) / length
+    root = lane.low - now / slope
+    if lane.low_before > 0.0:
+        bend = (slope - (before - w.e_start[i, j]) / lane.low_before) / lane.low
+        steeper = slope + bend * (2.0 * root - lane.low - lane.low_before)
+        if steeper * slope > 0.0:
+            nearer = root - bend * (root - lane.low) * (root - lane.low_before) / steeper
+            root = nearer if nearer > lane.low else root
+    return root

@@ -1,0 +1,146 @@
+"""Guards: where one has fallen through 0, its block jumps to what its reset says.
+
+All guards that have fallen at an instant jump together, from the values before; what falls by that
+jumps next, and so on until none falls.  A run in which that has no end, or jumps follow each other
+without progress of time, ends as ZENO.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from ..machine.address import call_out
+from .log import note
+from .restart import restart
+from .state import DIVERGED, INNER, RUNNING, ZENO
+from .workspace import evaluate, inputs_at
+
+_MOST = 100  # jumps at one instant, or without progress of time
+_STILL = 1e-11  # of a time: less is no progress
+_AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
+
+
+@numba.njit(**INNER)
+def begin_guards(task, lanes, w):
+    """See which guards are not negative where a run begins: none of them falls there."""
+    for i in range(task.switching - task.guarded):
+        for j in range(lanes.size):
+            w.above[i, j] = _above(lanes[j], w.e[task.guarded + i, j], i)
+            w.rising[i, j] = np.nan
+
+
+@numba.njit(**INNER)
+def fall(rhs, task, lanes, w, seen):
+    """Let jump what has fallen in the lanes that are seen; these begin again behind that."""
+    fallen = np.zeros((task.switching - task.guarded, lanes.size), np.bool_)
+    any_risen = False
+    for j in range(lanes.size):
+        if seen[j] and lanes[j].status == RUNNING:
+            _check_rising(task, lanes[j], w, j)
+    for again in range(_MOST + 1):
+        chosen, any_fallen = _fallen(task, lanes, w, seen, fallen)
+        if not any_fallen:
+            break
+        if again == _MOST:
+            for j in range(lanes.size):
+                lanes[j].status = ZENO if chosen[j] else lanes[j].status
+            break
+        any_risen = True
+        _jump(task, lanes, w, fallen, chosen)
+        restart(rhs, task, lanes, w, chosen)
+    if any_risen:
+        _rises(rhs, task, lanes, w, fallen)
+
+
+@numba.njit(**INNER)
+def _above(lane, value, i):
+    """Whether a guard is not negative; one that is NaN ends the run."""
+    if value != value and lane.status == RUNNING:
+        lane.status, lane.culprit = DIVERGED, i
+    return 1 if value >= 0.0 else 0
+
+
+@numba.njit(**INNER)
+def _fallen(task, lanes, w, seen, fallen):
+    """Fill which guards have fallen since they were last seen; return the lanes, and if any."""
+    chosen, found = np.zeros(lanes.size, np.bool_), False
+    for i in range(fallen.shape[0]):
+        for j in range(lanes.size):
+            fallen[i, j] = False
+            if not seen[j] or lanes[j].status != RUNNING:
+                continue
+            before = w.above[i, j]
+            w.above[i, j] = _above(lanes[j], w.e[task.guarded + i, j], i)
+            if before and not w.above[i, j] and lanes[j].status == RUNNING:
+                fallen[i, j] = chosen[j] = found = True
+    return chosen, found
+
+
+@numba.njit(**INNER)
+def _jump(task, lanes, w, fallen, chosen):
+    """Make the states of all blocks with a guard that has fallen those behind the jump."""
+    for j in range(lanes.size):
+        w.t[j] = lanes[j].t
+    if w.u.shape[0]:
+        inputs_at(task, lanes, w)
+    call_out(task.resets[0], w.t, w.x, w.u, task.p, w.s)
+    for j in range(lanes.size):
+        if not chosen[j]:
+            continue
+        lane = lanes[j]
+        for i in range(fallen.shape[0]):
+            if not fallen[i, j]:
+                continue
+            note(task, lane, w, task.guarded + i, False, j)
+            lane.culprit = i
+            for m in range(task.jumping.size):
+                if task.owned[i, m]:
+                    w.x[task.jumping[m], j] = w.s[m, j]
+        _counted(lane)
+        lane.jacobian_at = np.nan
+        if task.times[lane.segment] == lane.t:
+            for i in range(w.x.shape[0]):
+                w.samples[lane.segment, i, j] = w.x[i, j]
+        for i in range(w.behind.shape[0]):
+            w.behind[i, j] = 0.0
+
+
+@numba.njit(**INNER)
+def _counted(lane):
+    """Count jumps without progress of time, or in the first step after another.
+
+    Too many have no end.  That they do not end is so from the first of them on.
+    """
+    gone = lane.t - lane.fell_at
+    lane.crowd = lane.crowd + 1 if gone <= max(_STILL * abs(lane.t), 1.5 * lane.last) else 0
+    lane.fell_at = lane.t
+    lane.since = lane.since if lane.crowd else lane.t
+    if lane.crowd > _MOST:
+        lane.status = ZENO
+
+
+@numba.njit(**INNER)
+def _rises(rhs, task, lanes, w, fallen):
+    """Keep the values of guards that are still negative behind their jump, and rise."""
+    for j in range(lanes.size):
+        ahead = max(abs(lanes[j].t) * _AHEAD, _AHEAD)
+        w.t[j] = lanes[j].t + ahead
+        for i in range(w.x.shape[0]):
+            w.x_ahead[i, j] = w.x[i, j] + ahead * w.k[0, i, j]
+    evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
+    for i in range(fallen.shape[0]):
+        for j in range(lanes.size):
+            now, later = w.e[task.guarded + i, j], w.g_ahead[task.guarded + i, j]
+            if lanes[j].fell_at == lanes[j].t and now < 0.0 and later > now:
+                w.rising[i, j] = now
+
+
+@numba.njit(**INNER)
+def _check_rising(task, lane, w, j):
+    """End a run in which a guard that should have risen has not: jumps come faster than steps."""
+    for i in range(w.rising.shape[0]):
+        if w.rising[i, j] == w.rising[i, j] and lane.t > lane.fell_at:
+            if w.e[task.guarded + i, j] < w.rising[i, j]:
+                lane.status, lane.culprit = ZENO, i
+            w.rising[i, j] = np.nan

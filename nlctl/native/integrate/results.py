@@ -1,0 +1,134 @@
+"""What became of a run: statistics, and the times that were reached."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..chattering.detection import Jump
+from ..happened import EventRow
+from .state import Status
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statistics:
+    """What a run took.
+
+    Attributes
+    ----------
+    status : Status
+    time : float
+        Time that was reached (s).
+    accepted, rejected : int
+        Steps of the integrator; steps tried to locate events count as rejected.
+    events : int
+        Break points and turning memories at which a step was ended.
+    stiff : bool
+        Whether the run ended with the stiff method.
+    jump : Jump or None
+        Where it chatters, of a run that ended as CHATTERING.
+    conditions : int
+        Conditions of the equations that were located, guards included.
+    opaque : bool
+        Whether a function was called as it stands: nobody knows of its conditions.
+    """
+
+    status: Status
+    time: float
+    accepted: int
+    rejected: int
+    events: int = 0
+    stiff: bool = False
+    jump: Jump | None = None
+    conditions: int = 0
+    opaque: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trajectory:
+    """One run: times that were reached, outputs (outputs, m), states (states, m), inputs."""
+
+    time: np.ndarray
+    outputs: np.ndarray
+    states: np.ndarray
+    statistics: Statistics
+    inputs: np.ndarray  # what leaves transport delays, and rates: as the program has them
+    happened: tuple[EventRow, ...] = ()  # of a single run
+    culprit: int = -1  # the guard that has fallen last, or has ended it
+    guard: float = 0.0  # and its value
+    since: float = np.nan  # time of the first of the jumps that have ended it
+
+
+def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
+    """Return what became of one member."""
+    lane, times, states, outputs = (
+        run.lanes[j],
+        run.task.times,
+        run.work.samples[:, :, j],
+        outputs[:, :, j],
+    )
+    if lane["resumes"]:  # a run that resumes there takes the sample
+        states = states.copy()
+        states[-1] = run.work.resume[:, j]
+    status, reached = Status(int(lane["status"])), float(lane["t"])
+    done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
+    if status is Status.OK and not np.all(np.isfinite(outputs)):
+        status = Status.DIVERGED
+    statistics = Statistics(
+        status=status,
+        time=reached,
+        accepted=int(lane["accepted"]),
+        rejected=int(lane["rejected"]),
+        events=int(lane["events"]),
+        stiff=bool(lane["stiff"]),
+        jump=run.jumps.get(j),
+        conditions=int(run.task.switching - run.task.bending),
+        opaque=bool(run.task.opaque),
+    )
+    return Trajectory(
+        time=times[:done],
+        outputs=outputs[:done].T,
+        states=states[:done].T,
+        statistics=statistics,
+        inputs=_every_input(run, j, done),
+        culprit=int(lane["culprit"]),
+        since=float(lane["since"]),
+        guard=float(run.work.e[run.task.guarded + lane["culprit"], j])
+        if lane["culprit"] >= 0
+        else 0.0,
+    )
+
+
+def _every_input(run: Any, j: int, done: int) -> np.ndarray:
+    """Return all that the program takes as inputs, at the times that lane `j` has reached."""
+    given, times = run.task.inputs, run.task.times
+    parts = [given[:, :done], run.work.shown[:done, :, j].T]
+    if run.work.u.shape[0] > sum(map(len, parts)):  # the rates of the segment that begins
+        rates = np.diff(given) / np.diff(times)
+        parts.append(rates[:, np.minimum(np.arange(done), times.size - 2)])
+    return np.concatenate(parts)
+
+
+def at_its_end(run: Any, found: Trajectory) -> Trajectory:
+    """Return a single run with the instant at which a function has ended it as its last time.
+
+    Parameters
+    ----------
+    run : Run
+    found : Trajectory
+        Up to the last time of the response before that.
+    """
+    t, x, u = (np.ascontiguousarray(v) for v in (run.lanes["t"][:1], run.work.x, run.work.u))
+    if found.statistics.status is not Status.ENDED or t[0] <= found.time[-1]:
+        return found
+    y = np.empty((run.work.y.shape[1], x.shape[1]))
+    run.machine.out(t, x, u, run.task.p, y)
+    return replace(
+        found,
+        time=np.append(found.time, t),
+        outputs=np.column_stack([found.outputs, y[: run.task.outputs]]),
+        states=np.column_stack([found.states, x]),
+        inputs=np.column_stack([found.inputs, u]),
+    )

@@ -1,0 +1,73 @@
+"""What the graph of a diagram says of its conditions, for a run in python-control."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..errors import CompileError, UsageError
+from ..reference.known import Known
+from . import compiled as engine
+from .compiled import Compiled
+from .diagram.schedule import AlgebraicLoopError
+from .happened import row_labels
+from .timed.ahead import ahead
+
+
+def known_conditions(system: Any, params: Any, times: np.ndarray) -> Known:
+    """Return what is known of the conditions of a diagram; nothing where it cannot be read.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+    params : mapping or None
+        Overrides of the run.
+    times : ndarray
+        Of the run (s).
+    """
+    if not ct.isctime(system):
+        return Known()
+    try:
+        compiled = engine.compile(system, params=params)
+        p = compiled.parameter_vector(params)
+        lowered = compiled.lowered
+    except (CompileError, AlgebraicLoopError, UsageError):
+        return Known()
+    found = {k: v[0] for k, v in ahead(lowered, p[:, None], times, np.inf).items()}
+    jumps = found["jumps"][np.isfinite(found["jumps"])]
+    located = lowered.conditions.rows
+    if not located or compiled.schedule.lines:
+        return Known(stops=jumps, longest=_longest(found, times))
+    first = compiled.program.switching
+    labels = row_labels(compiled, lowered.conditions)[first : first + located]
+    return Known(
+        stops=jumps, longest=_longest(found, times), labels=tuple(labels),
+        crossings=_crossings(compiled, p, slice(first, first + located)),
+    )  # fmt: skip
+
+
+def _longest(found: dict[str, Any], times: np.ndarray) -> Callable[[float], float]:
+    """Return how long steps may be: half a wave, and until where `reach` says."""
+    begin, span, reach = float(times[0]), float(times[-1] - times[0]), found["reach"]
+
+    def longest(t: float) -> float:
+        if not reach.size:
+            return float(found["longest"])
+        cell = min(int((t - begin) / span * reach.size), reach.size - 1)
+        return float(min(found["longest"], max(reach[cell] - t, span / reach.size)))
+
+    return longest
+
+
+def _crossings(compiled: Compiled, p: np.ndarray, rows: slice) -> Callable[..., np.ndarray]:
+    rhs, n = compiled.native[0], compiled.system.nstates or 0
+
+    def crossings(t: float, x: Any, u: Any) -> np.ndarray:
+        dx, g = np.empty(n), np.empty(compiled.lowered.rows["g"])
+        rhs(t, x, u, p, dx, g)
+        return g[rows]
+
+    return crossings

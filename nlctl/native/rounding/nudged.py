@@ -1,0 +1,139 @@
+"""Values of expressions whose every operation is rounded in another way.
+
+Two programs that say the same differ by what each operation rounds, and where large terms cancel
+that is all that is left.  So each intermediate value is nudged, by some units in its last place
+and in random directions, and the results show what such rounding may do: a running error analysis
+by sampling (Parker, Pierce, Eggert 2000, Monte Carlo arithmetic).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...expressions.evaluate import value_of
+from ...expressions.graph import COMPARISONS, LOGIC, Expr, needed
+from .shaken import Shaken, unit
+
+ROUNDINGS = 24  # ways of rounding that are tried; the first is none
+_EXACT = {"leaf", "item", "slice", "concat", "select", "neg", "absolute", "sign", "copysign",
+          "minimum", "maximum", "floor", "ceil", "trunc", "rint", *COMPARISONS, *LOGIC}  # fmt: skip
+Functions = Mapping[str, Callable[[np.ndarray], np.ndarray]]
+
+
+def nudged_values(
+    results: Iterable[Expr],
+    arrays: Mapping[str, np.ndarray],
+    searches: Functions,
+    calls: Functions,
+    fixed_points: Mapping[str, list[Expr]],
+) -> list[np.ndarray]:
+    """Return the values of expressions at one point, in `ROUNDINGS` ways of rounding.
+
+    Parameters
+    ----------
+    results : iterable of Expr
+    arrays : mapping
+        As `evaluate_expressions` takes them, of shape (rows, 1).
+    searches : mapping
+        What finds the signals of algebraic loops, by name.
+    calls : mapping
+        Opaque functions of one array, by name.
+    fixed_points : mapping
+        By the names of searches: what the blocks of a loop make of the signals found.
+
+    Returns
+    -------
+    list of ndarray
+        Of shape (ROUNDINGS,) or (size, ROUNDINGS), or such that they broadcast to it.
+    """
+    results = list(results)
+    given = {name: np.repeat(array, ROUNDINGS, axis=1) for name, array in arrays.items()}
+    reader = _Reader(given, searches, calls)
+    if fixed_points:  # a search is as exact as what it compares
+        again = [expr for exprs in fixed_points.values() for expr in exprs]
+        made = iter(reader.read(again))
+        ends = {name: [next(made) for _ in exprs] for name, exprs in fixed_points.items()}
+        reader = _Reader(given, {k: _moved(v, ends.get(k, ())) for k, v in searches.items()}, calls)
+    return reader.read(results)
+
+
+def _moved(search: Any, made: Iterable[np.ndarray]) -> Any:
+    """Return a search whose results are moved as far as their fixed points were."""
+    far = [np.broadcast_to(v, (ROUNDINGS,)) - np.broadcast_to(v, (ROUNDINGS,))[0] for v in made]
+
+    def search_with_rounding(given: np.ndarray) -> np.ndarray:
+        found = np.broadcast_to(search(given), (len(far), ROUNDINGS)).copy()
+        return found + np.nan_to_num(np.array(far))
+
+    return search_with_rounding
+
+
+class _Reader:
+    """Goes through expressions; a value is rounded anew by each that uses it.
+
+    Of two that use it one may have been computed in another way, as powers are by products.
+    """
+
+    def __init__(self, arrays: Mapping[str, np.ndarray], searches: Functions, calls: Functions):
+        self.arrays = arrays
+        self.drawn = np.random.default_rng(2017)  # the same directions in every comparison
+        shaken = {name: _columns(function, self.drawn) for name, function in calls.items()}
+        self.functions = {**searches, **shaken}
+
+    def read(self, results: list[Expr]) -> list[np.ndarray]:
+        """Return the values of results."""
+        values: dict[Expr, np.ndarray] = {}
+        with np.errstate(all="ignore"):
+            for node in needed(results):
+                parts = [self.rounded(arg, values[arg]) for arg in node.args]
+                values[node] = value_of(node, parts, self.arrays, self.functions)
+                if node.op == "sum":  # relative to its terms: their order is not said
+                    scale = np.broadcast_to(np.abs(parts[0]).sum(axis=0), (ROUNDINGS,))
+                    values[node] = values[node] + scale * self.ways(None)
+            return [self.rounded(expr, values[expr]) for expr in results]
+
+    def rounded(self, node: Expr, value: np.ndarray) -> np.ndarray:
+        """Return a value with other last digits behind its first column."""
+        is_whole = node.op in ("const", "table") and np.all(value == np.trunc(value))
+        if node.op in _EXACT or node.kind != "f" or is_whole:
+            return value
+        return value * (1.0 + self.ways(node.size))
+
+    def ways(self, size: int | None) -> np.ndarray:
+        """Return relative changes."""
+        shape = (size, ROUNDINGS) if size else (ROUNDINGS,)
+        found = unit() * self.drawn.choice((-1.0, 1.0), size=shape)
+        found[..., 0] = 0.0
+        return found
+
+
+def _columns(
+    function: Callable[[np.ndarray], np.ndarray], drawn: np.random.Generator
+) -> Callable[[np.ndarray], np.ndarray]:
+    """Return an opaque function of columns: what it computes inside is rounded in other ways.
+
+    Where it does not take arrays that round otherwise, it is called with plain ones.
+    """
+
+    def called(given: np.ndarray) -> np.ndarray:
+        given = np.broadcast_to(given, (given.shape[0], ROUNDINGS))
+        plain = np.asarray(function(given[:, 0].copy()))
+        follows = _same(function, Shaken.of(given[:, 0], None), plain)
+        found = [plain]
+        for column in given.T[1:]:
+            way = Shaken.of(column, drawn) if follows else column.copy()
+            found.append(np.asarray(function(way)))
+        return np.stack([np.asarray(values, dtype=float) for values in found], axis=1)
+
+    return called
+
+
+def _same(function: Callable[[np.ndarray], np.ndarray], given: Shaken, plain: np.ndarray) -> bool:
+    """Whether a function takes these arrays for what they are."""
+    try:
+        return np.array_equal(np.asarray(function(given)), plain, equal_nan=True)
+    except Exception:  # whatever a function of others raises for a type that it does not know
+        return False

@@ -1,0 +1,95 @@
+"""What a function asks of the world outside when it is called: files, clocks, chance, its frame.
+
+No key of the function changes with the answer, so that whoever keeps results by a key names it.
+"""
+
+from __future__ import annotations
+
+import dis
+import itertools
+import types
+from collections.abc import Callable, Iterator
+from typing import Any
+
+__all__ = ["asked_outside", "imports_in", "outside_of"]
+
+_EVERYTHING = frozenset[str]()
+_MODULES: dict[str, tuple[str, frozenset[str]]] = {  # by module; all of it if nothing is named
+    "time": ("the time", _EVERYTHING),
+    "random": ("chance", _EVERYTHING),
+    "secrets": ("chance", _EVERYTHING),
+    "subprocess": ("other programs", _EVERYTHING),
+    "socket": ("the network", _EVERYTHING),
+    "urllib": ("the network", _EVERYTHING),
+    "sqlite3": ("files", _EVERYTHING),
+    "os": ("the system", frozenset({"popen", "system", "read", "times", "urandom", "getpid"})),
+    "numpy": ("files", frozenset({"load", "fromregex"})),
+    "numpy.random": ("chance", _EVERYTHING),
+    "json": ("files", frozenset({"load"})),
+    "pickle": ("files", frozenset({"load"})),
+    "tomllib": ("files", frozenset({"load"})),
+    "joblib": ("files", frozenset({"load"})),
+}
+_FRAMES = {"_getframe", "currentframe", "__globals__", "__annotations__", "__builtins__"}
+
+
+def asked_outside(function: types.FunctionType) -> Iterator[str]:
+    """Yield what a function asks, with the words that ask, ``time.time``.
+
+    Parameters
+    ----------
+    function : function
+        Of Python; those nested in it count.
+    """
+    every = {**function.__globals__, **_cells(function)}
+    for code in _codes(function.__code__):
+        words = list(dis.get_instructions(code))
+        for word, follower in itertools.pairwise(words):
+            thing = every.get(word.argval) if isinstance(word.argval, str) else None
+            if not isinstance(thing, types.ModuleType) or not isinstance(follower.argval, str):
+                continue
+            if told := outside_of(thing.__name__, follower.argval):
+                yield f"{told} when it is called ('{word.argval}.{follower.argval}'"
+        for name in sorted(_FRAMES & set(code.co_names)):
+            yield f"what '{name}' finds ('{name}'"
+
+
+def outside_of(module: str, name: str) -> str:
+    """Return what a function of a module asks of the world; nothing if it asks nothing."""
+    for place in (module, f"{module}.{name}", module.partition(".")[0]):
+        told, names = _MODULES.get(place, ("", _EVERYTHING))
+        if told and (not names or name in names):
+            return told
+    return ""
+
+
+def imports_in(function: types.FunctionType, is_library: Callable[[str], bool]) -> list[str]:
+    """Return the modules that a function imports when it is called, other than libraries.
+
+    Whether one is imported already, and under which name, changes while a loop is used.
+    """
+    found = {
+        word.argval
+        for code in _codes(function.__code__)
+        for word in dis.get_instructions(code)
+        if word.opname == "IMPORT_NAME" and not is_library(word.argval)
+    }
+    return sorted(found)
+
+
+def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
+    yield code
+    for part in code.co_consts:
+        if isinstance(part, types.CodeType):
+            yield from _codes(part)
+
+
+def _cells(function: types.FunctionType) -> dict[str, Any]:
+    """Return what a function closes over, by name."""
+    found = {}
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        try:
+            found[name] = cell.cell_contents
+        except ValueError:  # not yet filled
+            continue
+    return found

@@ -1,0 +1,94 @@
+"""What is known before a run of the functions of time alone in a program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...expressions.evaluate import evaluate_expressions
+from ...expressions.graph import Expr, needed
+from .breaks import break_points
+from .reach import reach
+
+if TYPE_CHECKING:
+    from ..codegen.lower import Lowered
+
+_KEPT = 256  # parameter vectors
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ahead:
+    """When functions of time alone switch (s), and the longest steps.
+
+    Attributes
+    ----------
+    breaks : ndarray
+        Increasing times.
+    longest : float
+        Half a wave of the fastest sine.
+    reach : ndarray of shape (cells,)
+        See `reach`.
+    """
+
+    breaks: np.ndarray
+    longest: float
+    reach: np.ndarray
+
+
+def ahead(
+    lowered: Lowered, p: np.ndarray, times: np.ndarray, max_step: float
+) -> dict[str, np.ndarray]:
+    """Return what integrators take of that for each column of `p`."""
+    count = p.shape[1]
+    span = float(times[0]), float(times[-1])
+    own = [_of(lowered, p[:, j], span) for j in range(count)]
+    breaks = [one.breaks for one in own]
+    jumps = np.full((count, max(each.size for each in breaks)), np.inf)
+    cells = max(one.reach.size for one in own)
+    limits = np.full((count, cells), np.inf)
+    for j, one in enumerate(own):
+        jumps[j, : breaks[j].size] = breaks[j]
+        if one.reach.size:
+            limits[j] = one.reach
+    longest = np.minimum(max_step, np.array([one.longest for one in own]))
+    return {"jumps": jumps, "longest": longest, "reach": limits}
+
+
+def _of(lowered: Lowered, p: np.ndarray, span: tuple[float, float]) -> Ahead:
+    """Return it for one parameter vector, from what is known of the program already."""
+    found, known = lowered.conditions, lowered.known_ahead
+    key = (span, p[lowered.read_ahead].tobytes())
+    if key not in known:
+        if len(known) >= _KEPT:
+            known.clear()
+        known[key] = _read(found, p, span)
+    return known[key]
+
+
+def _read(found: Any, p: np.ndarray, span: tuple[float, float]) -> Ahead:
+    fastest = _fastest(found.waves, p)
+    pulses = reach(found.pulses, p, span) if found.pulses else np.zeros(0)
+    breaks = break_points(found.of_time, p, span, fastest) if found.of_time else np.zeros(0)
+    return Ahead(breaks=breaks, longest=np.pi / fastest if fastest else np.inf, reach=pulses)
+
+
+def _fastest(waves: tuple[tuple[Expr, ...], ...], p: np.ndarray) -> float:
+    """Return the largest sum of angular frequencies (rad/s)."""
+    slopes = [slope for wave in waves for slope in wave]
+    values = evaluate_expressions(slopes, {"p": p[:, None]})
+    largest = iter(float(np.abs(each).max(initial=0.0)) for each in values)
+    sums = [sum(next(largest) for _ in wave) for wave in waves]
+    return max((each for each in sums if np.isfinite(each)), default=0.0)
+
+
+def read_parameters(found: Any) -> np.ndarray:
+    """Return the places of the parameters that any of it depends on."""
+    exprs = [*found.of_time, *found.pulses, *(slope for wave in found.waves for slope in wave)]
+    places: set[int] = set()
+    for node in needed(exprs):
+        if node.op == "leaf" and node.data[0] == "p":
+            _, start, step = node.data
+            places.update(start + step * i for i in range(node.size or 1))
+    return np.array(sorted(places), dtype=np.int64)

@@ -1,0 +1,282 @@
+"""One driver: simulate to the next stop, jump, go on."""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections import deque
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+
+from ..blocks import past
+from ..errors import ChatteringError, DivergedError
+from ..sampling.system import happening
+from ..upstream.control_internals import outputs_now, parts_now, rates_now
+from .crossings import FEW_PLACES, STEP_PLACES, Event, first_event
+from .jumps import Jumps
+from .past import Past
+from .stops import TIME_ROUNDING, Stops
+
+_STANDSTILL = 200  # steps in a row that do not advance the time
+_CROWD, _CROWDED = 300, 1e-6  # so many events in this part of a run: it is chattering
+_ASIDE = 1e-3  # part of a run: how far behind its end what leaves a delay there is read
+_PLACES = 1024  # of a run: a loop at rest is looked at in as many
+_SHORT = 0.25  # of the longest step so far: an integrator that has begun again
+_REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
+
+
+class Still:
+    """What stands for an integrator where there are no states: it goes from place to place."""
+
+    status = "running"
+
+    def __init__(self, rates: Any, t: float, y: Any, end: float, max_step: float, **_: Any) -> None:
+        self.t, self.t_old, self.y, self._end, self._step = t, t, y, end, max_step
+
+    def step(self) -> None:
+        """Go to the next place."""
+        self.t_old, self.t = self.t, min(self.t + self._step, self._end)
+        self.status = "finished" if self.t >= self._end else "running"
+
+    def dense_output(self) -> Callable[[float], np.ndarray]:
+        """Return the solution, which has no entries."""
+        return lambda t: self.y
+
+
+class Driver:
+    """A run in python-control's equations and one of SciPy's integrators.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+        In continuous time, with the parameters of the run.
+    inputs : callable
+        ``inputs(t)``: those of the diagram.
+    wanted : ndarray of shape (k,), or None
+        Times of the response (s); None for the integrator's own steps.
+    stops, jumps, known : Stops, Jumps, Past
+    method : type
+        A `scipy.integrate.OdeSolver`.
+    settings : mapping
+        Its arguments: rtol, atol, max_step and so on.
+    progress : callable, optional
+        ``progress(t)`` after every accepted step.
+
+    Attributes
+    ----------
+    rows : list of tuple
+        Of each time of the response that was reached: time, outputs, states.
+    reached : float
+        Time of the last accepted step (s).
+    happened : list of tuple
+        Time (s), block, which and direction of each event.
+    """
+
+    def __init__(
+        self, system: Any, inputs: Any, wanted: Any, *, stops: Stops, jumps: Jumps, known: Past,
+        method: Any, settings: Any, progress: Any = None,
+    ) -> None:  # fmt: skip
+        self.system, self.inputs, self.wanted = system, inputs, wanted
+        self.stops, self.jumps, self.known = stops, jumps, known
+        self.method = method if system.nstates else Still
+        self.settings, self.progress = settings, progress
+        self.rows: list[tuple[float, np.ndarray, np.ndarray]] = []
+        self._held = np.zeros(0)
+        self.happened = jumps.happened
+        self._events: deque[tuple[float, int]] = deque(maxlen=_CROWD)
+
+    def run(self, begin: float, end: float, x: np.ndarray) -> None:
+        """Go from the first time to the last; `rows` grow on the way."""
+        self.reached, self._span = begin, end - begin
+        t, sides, what, is_break = begin, None, self.stops.due.get(begin, frozenset()), True
+        with ExitStack() as stack:
+            stack.enter_context(past(self.known.lines))
+            stack.enter_context(happening())
+            while True:
+                self.known.reach(t, is_break)
+                stop = (
+                    self.known.after(t, self.stops.after(t))
+                    if t < end
+                    else t + _ASIDE * (t - begin)
+                )
+                self.known.step = (t, stop)
+                resumes = self.jumps.committed(t, x) if t >= end and what else None
+                x, sides = self.jumps.at(t, x, what, sides)
+                self._record(t, x)
+                if t >= end:
+                    if resumes is not None:  # a run that resumes there takes the sample
+                        self.rows[-1] = (*self.rows[-1][:2], resumes)
+                    return
+                begun = t
+                t, x, sides, pieces, event = self._flow(t, x, stop, sides)
+                if self._ended:
+                    self._record(t, x, ends=True)
+                    return
+                if t in self.stops.changes:
+                    self.happened.append((t, "", "condition of t", ""))
+                self.known.keep(begun, t, lambda s, pieces=pieces: self._arriving(s, pieces))
+                what = self.stops.due.get(t, frozenset())
+                is_break = event is not None or self.stops.is_break(t)
+
+    def _flow(self, t: float, x: np.ndarray, stop: float, sides: np.ndarray) -> Any:
+        """Integrate to a stop, or to where something happens before it."""
+        self._held, self._last = x, float(np.nextafter(stop, -np.inf))
+        if stop - t <= TIME_ROUNDING * max(
+            abs(t), abs(stop), self._span
+        ):  # only rounding sets them apart
+            self._record_within(stop, lambda _: x, closes=True)
+            return stop, x + (stop - t) * self._rates(t, x), sides, [(t, lambda _: x)], None
+        solver = self.method(self._rates, t, x, stop, **self._bounded(t, stop))
+        seen = self.jumps.look(t, x) if self.jumps.any else np.zeros(0)
+        pieces: list[Any] = []
+        while True:
+            message = solver.step()
+            if solver.status == "failed":
+                raise RuntimeError(f"solve_ivp failed: {message}")
+            state = self._solution(solver)
+            if self._slept(solver, state):
+                short = {**self._bounded(t, stop), "max_step": self._span / _PLACES}
+                solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
+                continue
+            event = self._event(solver, state, seen)
+            until = event.time if event else float(solver.t)
+            closes = event is not None or solver.status == "finished"
+            self._watch(until, state(until))
+            self._record_within(until, state, closes)
+            pieces.append((float(solver.t_old), state))
+            x = self._held = self.jumps.committed(min(until, self._last), state(until))
+            if event:
+                seen = self.jumps.look(event.before, state(event.before))
+            elif self.jumps.any:
+                seen = self.jumps.look(min(until, self._last), x)
+            if sides.size:
+                sides = seen[: sides.size] >= 0.0
+                self.jumps.check_resolved(until, seen)
+            if closes:
+                return until, x, sides, pieces, event
+
+    def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
+        """Whether the step just made, from rest, has passed something that moves the state."""
+        begin, end, space = float(solver.t_old), float(solver.t), self._span / _PLACES
+        allowed = self.settings["atol"] + self.settings["rtol"] * np.abs(solver.y)
+        if end - begin <= 1.01 * space or np.any(np.abs(state(end) - self._held) > allowed):
+            return False
+        places = np.linspace(begin, end, math.ceil((end - begin) / space) + 1)[1:-1].tolist()
+        return any(np.any(space * np.abs(self._rates(t, state(t))) > allowed) for t in places)
+
+    def _rates(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Return derivatives: of the side of the next stop that the run comes from."""
+        x = np.array(y, dtype=float)
+        x[self.jumps.still] = self._held[self.jumps.still]
+        t = min(float(t), self._last)
+        dx = rates_now(self.system, t, x, self.inputs(t))
+        dx[self.jumps.memories] = 0.0
+        return dx
+
+    def _bounded(self, t: float, stop: float) -> dict[str, Any]:
+        """Return the integrator's arguments between two stops."""
+        longest = min(self.stops.space(t), self.known.longest_step(t, stop))
+        found = {**self.settings, "max_step": min(self.settings["max_step"], longest)}
+        if found.get("first_step"):
+            found["first_step"] = min(found["first_step"], stop - t)
+        return found
+
+    def _solution(self, solver: Any) -> Callable[[float], np.ndarray]:
+        """Return the state within the step just made, with what stands still as it is held."""
+        found, held, still = solver.dense_output(), self._held, self.jumps.still
+        begin, end, last = float(solver.t_old), float(solver.t), np.array(solver.y, dtype=float)
+
+        def state(t: float) -> np.ndarray:
+            if t == begin:  # exactly the state, not its interpolant
+                return held.copy()
+            x = last.copy() if t == end else np.array(found(t), dtype=float)
+            x[still] = held[still]
+            return x
+
+        return state
+
+    def _event(self, solver: Any, state: Any, seen: np.ndarray) -> Event | None:
+        """Return what happens first within the step just made, if anything does."""
+        if not self.jumps.any or not solver.t > solver.t_old:
+            return None
+        rtol, atol = np.max(self.settings["rtol"]), np.min(self.settings["atol"])
+        length = solver.t - solver.t_old
+        self._longest = max(self._longest, length)
+        event = first_event(
+            lambda t: self.jumps.look(min(t, self._last), state(t)),
+            (float(solver.t_old), float(solver.t)),
+            seen,
+            self.jumps.kinds,
+            lambda size: _REVERSES * (atol + rtol * size),
+            FEW_PLACES if length < _SHORT * self._longest else STEP_PLACES,
+        )
+        if event is not None:
+            self._events.append((event.time, event.number))
+            self._note(event, seen, state)
+            block, which = self.jumps.label(event.number)
+            first = self._events[0][0]
+            if len(self._events) == _CROWD and event.time - first < _CROWDED * self._span:
+                raise ChatteringError(
+                    f"'{self.system.name}' is chattering at t = {event.time:.6g} s: "
+                    + (f"block '{block}'" if block else f"'{which}'")
+                    + " switches over and over again",
+                    event.time,
+                )
+        return event
+
+    def _note(self, event: Event, seen: np.ndarray, state: Any) -> None:
+        """Note a switching function or a condition that has changed its sign."""
+        if self.jumps.kinds[0] <= event.number < sum(self.jumps.kinds):
+            i = event.number
+            behind = self.jumps.look(min(event.time, self._last), state(event.time))[i]
+            rises, changed = behind > seen[i], behind * seen[i] <= 0.0
+            if changed and self.jumps.counts(i, rises):
+                way = "rising" if rises else "falling"
+                self.happened.append((event.time, *self.jumps.label(i), way))
+                self._ended = self.jumps.ends(i, rises)
+
+    def _watch(self, t: float, x: np.ndarray) -> None:
+        """End a run whose state is not finite, or whose time stands still.
+
+        At a finite escape time LSODA repeats a vanishing step for ever.
+        """
+        self._repeated = self._repeated + 1 if t == self.reached else 0
+        if self._repeated > _STANDSTILL or not np.all(np.isfinite(x)):
+            raise DivergedError(
+                f"'{self.system.name}' diverged: no finite state after t = {self.reached:.6g} s; "
+                "simulate up to then to see how",
+                self.reached,
+            )
+        self.reached = float(t)
+        if self.progress is not None:
+            self.progress(self.reached)
+
+    _repeated, _longest, _ended = 0, 0.0, False
+
+    def _record_within(self, until: float, state: Any, closes: bool) -> None:
+        """Record the times of the response that a step has passed, but not what is to jump."""
+        if self.wanted is None:
+            if not closes:
+                self._record(until, self.jumps.committed(until, state(until)))
+            return
+        side = bisect.bisect_left if closes else bisect.bisect_right
+        for t in self.wanted[len(self.rows) : side(self.wanted, until)].tolist():
+            self._record(t, self.jumps.committed(t, state(t)))
+
+    def _record(self, t: float, x: np.ndarray, ends: bool = False) -> None:
+        """Record outputs and states, if they are wanted at this time or the run ends there."""
+        done = len(self.rows)
+        wanted = self.wanted is None or (done < self.wanted.size and self.wanted[done] == t)
+        if wanted or ends:
+            y = outputs_now(self.system, t, x, self.inputs(t)) if self.system.noutputs else []
+            self.rows.append((t, np.asarray(y, dtype=float), x.copy()))
+
+    def _arriving(self, t: float, pieces: list[Any]) -> list[np.ndarray]:
+        """Return what arrives at each transport delay, at a time between the last two stops."""
+        _, state = pieces[max(bisect.bisect_left(pieces, t, key=lambda one: one[0]) - 1, 0)]
+        t = min(t, self._last)
+        found = {id(part): u for part, _, u in parts_now(self.system, t, state(t), self.inputs(t))}
+        return [np.array(found[id(made)]) for made in self.known.lines]

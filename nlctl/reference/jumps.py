@@ -1,0 +1,275 @@
+"""What jumps in a diagram: sampled blocks at clocks, memories, and blocks with guards."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..blocks import Block, memory_states
+from ..diagrams import leaves
+from ..errors import BlockError, DivergedError, ZenoError
+from ..responses.watched import Watched
+from ..sampling.system import Happening, Sampled, happening
+from ..upstream.control_internals import current_parameters, parts_now, rates_now
+from ..wording import counted, numbered
+from .known import Known
+
+_MOST = 100  # jumps without progress of time
+_STILL = 1e-11  # of a time: less is no progress
+_ALIKE, _SHRUNK, _FEW = 0.02, 1e-4, 4  # a geometric sequence: of what ratios, how far, how long
+_AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
+
+
+class _Part(NamedTuple):
+    """A block of the diagram, where it stands among them, and its states' places."""
+
+    number: int
+    path: str
+    block: Any
+    rows: np.ndarray
+
+
+class Jumps:
+    """The jumps of a diagram.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+    inputs : callable
+        ``inputs(t)``: those of the diagram.
+    conditions : Known
+        What changes its sign where conditions of the diagram's equations change.
+    watched : tuple
+        Functions of the run, and the overrides that they get.
+
+    Attributes
+    ----------
+    sampled : dict
+        The sampled block of a state, by the state's place.
+    memories, still : ndarray of int
+        Places of the states that are memories, and of all that no equation moves.
+    """
+
+    def __init__(
+        self, system: Any, inputs: Callable[[float], Any], conditions: Known,
+        watched: tuple[tuple[Watched, ...], Any] = ((), None),
+    ) -> None:  # fmt: skip
+        self.watched, self._overrides = watched
+        self.system, self.inputs, self.conditions = system, inputs, conditions
+        self.crossings = conditions.crossings
+        self.happened: list[tuple[float, str, str, str]] = []
+        parts, self.sampled = [], {}
+        for number, leaf in enumerate(leaves(system)):
+            rows = leaf.state_offset + np.arange(leaf.system.nstates or 0)
+            if isinstance(leaf.system, Sampled):
+                self.sampled.update(dict.fromkeys(rows.tolist(), leaf.system))
+            elif isinstance(leaf.system, Block):
+                path = leaf.path or leaf.system.name
+                parts.append(_Part(number, path, leaf.system, rows))
+        self._guarded = [one for one in parts if hasattr(one.block.spec, "guard")]
+        self._switching = [one for one in parts if hasattr(one.block.spec, "switching")]
+        self._remembering = [one for one in parts if memory_states(one.block.spec)]
+        places = [_memory_rows(one) for one in self._remembering]
+        self.memories = np.concatenate([np.zeros(0, dtype=int), *places])
+        self.still = np.concatenate([self.memories, np.array(list(self.sampled), dtype=int)])
+        self.kinds: tuple[int, int] = (0, 0)
+        self.labels: list[tuple[str, str]] | None = None
+        self.any = bool(self._guarded or self._switching or self._remembering)
+        self.any |= bool(self.watched or self.crossings)
+        self._taken: dict[int, list[float]] = {}
+        self._rising: dict[int, float] = {}
+
+    def look(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Return guards, switching functions and crossings, and what memories would become."""
+        u = self.inputs(t)
+        parts = list(parts_now(self.system, t, x, u))
+        guards = _values("guard", self._guarded, t, parts)
+        signed = _values("switching", self._switching, t, parts)
+        memories = _values("commit", self._remembering, t, parts)
+        found = {"guard": guards, "switching": signed, "commit": memories}
+        seen = [row for _, row in (*guards, *signed)]
+        if self.crossings is not None:
+            seen.append(np.asarray(self.crossings(t, x, u), dtype=float).reshape(-1))
+        seen.append(np.array([one.value(t, x, u, self._overrides) for one in self.watched]))
+        if self.labels is None:
+            self._label(found, sum(row.size for row in seen))
+        return np.concatenate([*seen, *(row for _, row in memories)])
+
+    def _label(self, found: dict[str, list[tuple[str, np.ndarray]]], signed: int) -> None:
+        """Say whose is what `look` returns; its first `signed` rows change their signs."""
+        own = {
+            kind: [(path, name) for path, row in rows for name in numbered(kind, row.size)]
+            for kind, rows in found.items()
+        }
+        watched = [("", one.name) for one in self.watched]
+        before = [*own["guard"], *own["switching"]]
+        conditions = self.conditions.labels or [("", "condition")] * (
+            signed - len(before) - len(watched)
+        )
+        self.labels = [*before, *conditions, *watched, *own["commit"]]
+        self.kinds = (len(own["guard"]), signed - len(own["guard"]))
+
+    def label(self, number: int) -> tuple[str, str]:
+        """Return block and name of a row of what `look` returns."""
+        return self.labels[number] if self.labels else ("", "")
+
+    def ends(self, number: int, rises: bool) -> bool:
+        """Whether a change of sign of a row ends the run."""
+        one = self._watched(number)
+        return one is not None and one.ends and one.counts(rises)
+
+    def counts(self, number: int, rises: bool) -> bool:
+        """Whether a change of sign of a row is an event."""
+        one = self._watched(number)
+        return one is None or one.counts(rises)
+
+    def _watched(self, number: int) -> Watched | None:
+        k = number - (sum(self.kinds) - len(self.watched))
+        return self.watched[k] if 0 <= k < len(self.watched) else None
+
+    def committed(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Return a state whose memories are what they become at an instant."""
+        if self.memories.size:
+            x = x.copy()
+            x[self.memories] = self.look(t, x)[sum(self.kinds) :]
+        return x
+
+    def at(
+        self, t: float, x: np.ndarray, what: Happening, sides: Any
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the state after all that happens at an instant, and what guards are >= 0 then.
+
+        Clocks first, then memories; then all guards that have fallen jump, from the values before,
+        and so on until none falls.
+
+        Parameters
+        ----------
+        t : float
+            The instant (s).
+        x : ndarray of shape (nstates,)
+            The state before.
+        what : frozenset of Moment
+            What clocks do.
+        sides : ndarray of bool, or None
+            Which guards were >= 0 before; None at the first instant, at which none falls.
+
+        Raises
+        ------
+        ZenoError
+            If there is no end of jumps.
+        BlockError
+            If a reset does not return all states of its block.
+        DivergedError
+            If a guard is NaN.
+        """
+        if what:
+            with happening(what):
+                after = rates_now(self.system, t, x, self.inputs(t))
+            rows = [i for i, block in self.sampled.items() if block.acts(what)]
+            x = x.copy()
+            x[rows] = after[rows]
+        for _ in range(_MOST + 1):
+            for _ in range(self.memories.size + 1):  # one that commits may move the next
+                before, x = x, self.committed(t, x)
+                if np.array_equal(before, x, equal_nan=True):
+                    break
+            now = self._sides(t, x)
+            fallen = np.zeros(now.size, dtype=bool) if sides is None else sides & ~now
+            sides = now
+            if not fallen.any():
+                return x, sides
+            x = self._reset(t, x, fallen)
+        raise self._zeno(int(np.argmax(fallen)), t)
+
+    def _sides(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Return which guards are >= 0."""
+        if not self._guarded:
+            return np.zeros(0, dtype=bool)
+        values = self.look(t, x)[: self.kinds[0]]
+        for i in np.flatnonzero(np.isnan(values))[:1]:
+            raise DivergedError(
+                f"block '{self.label(i)[0]}' has a guard that is NaN at t = {t:.6g} s", float(t)
+            )
+        return values >= 0.0
+
+    def _reset(self, t: float, x: np.ndarray, fallen: np.ndarray) -> np.ndarray:
+        """Return the state after the resets of all blocks with a guard that has fallen."""
+        parts = list(parts_now(self.system, t, x, self.inputs(t)))
+        after, first = x.copy(), 0
+        for one in self._guarded:
+            count = sum(self.label(i)[0] == one.path for i in range(self.kinds[0]))
+            if fallen[first : first + count].any():
+                (_, row), *_ = _values("reset", [one], t, parts)
+                if row.size != one.rows.size:
+                    raise BlockError(
+                        f"{type(one.block.spec).__name__} (block '{one.path}') returns "
+                        f"{counted(row.size, 'value')} from reset, needs {one.rows.size}: all "
+                        f"states after the jump, {', '.join(one.block.state_labels)}"
+                    )
+                after[one.rows] = row
+            first += count
+        for i in np.flatnonzero(fallen).tolist():
+            self.happened.append((t, *self.label(i), "falling"))
+            self._taken.setdefault(i, []).append(t)
+            self._check_progress(i, t)
+        self._rising = self._rises(t, after, fallen)
+        return after
+
+    def _rises(self, t: float, x: np.ndarray, fallen: np.ndarray) -> dict[int, float]:
+        """Return guards that have fallen and rise behind the jump, and their values there."""
+        now, ahead = self.look(t, x), max(abs(t) * _AHEAD, _AHEAD)
+        rates = rates_now(self.system, t, x, self.inputs(t))
+        rates[self.still] = 0.0
+        later = self.look(t + ahead, x + ahead * rates)
+        up = fallen & (now[: fallen.size] < 0.0) & (later[: fallen.size] > now[: fallen.size])
+        return {int(i): float(now[i]) for i in np.flatnonzero(up)}
+
+    def check_resolved(self, t: float, seen: np.ndarray) -> None:
+        """Refuse a guard that should have risen behind its jump and has not: it is Zeno's end.
+
+        Jumps have followed each other faster than the tolerance can tell them apart.
+        """
+        for i, start in list(self._rising.items()):
+            if seen[i] >= start:
+                del self._rising[i]
+            else:
+                raise self._zeno(i, t)
+
+    def _check_progress(self, i: int, t: float) -> None:
+        """End a run whose jumps accumulate: without progress of time, or geometrically."""
+        times = self._taken[i]
+        if len(times) > _MOST and t - times[-_MOST - 1] <= _STILL * max(abs(t), 1e-300):
+            raise self._zeno(i, t)
+        apart = np.diff(times[-2000:])
+        if apart.size <= _FEW or not np.all(apart > 0.0):
+            return
+        ratios = apart[1:] / apart[:-1]
+        steady = np.abs(ratios[::-1] - ratios[-1]) < _ALIKE * ratios[-1]
+        length = int(np.argmin(steady)) if not steady.all() else steady.size
+        shrunk = ratios[-1] ** length
+        if ratios[-1] < 1.0 and length >= _FEW - 1 and shrunk < _SHRUNK:
+            raise self._zeno(i, t)
+
+    def _zeno(self, i: int, t: float) -> ZenoError:
+        """Return the error of jumps that accumulate, with the time at which they do."""
+        return ZenoError.of(self.label(i)[0], self._taken.get(i, [t]), t)
+
+
+def _memory_rows(one: _Part) -> np.ndarray:
+    """Return the places of a block's memories among all states."""
+    names = list(one.block.spec.states)
+    return one.rows[[names.index(name) for name in memory_states(one.block.spec)]]
+
+
+def _values(
+    what: str, parts: list[_Part], t: float, signals: list[Any]
+) -> list[tuple[str, np.ndarray]]:
+    """Return what an equation of each block says, with the block's path."""
+    found = []
+    for one in parts:
+        _, x, u = signals[one.number]
+        value = getattr(one.block.spec, what)(t, x, u, current_parameters(one.block))
+        found.append((one.path, np.asarray(value, dtype=float).reshape(-1)))
+    return found

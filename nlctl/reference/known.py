@@ -1,0 +1,38 @@
+"""What is known before a run in python-control of where its equations change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+__all__ = ["Known"]
+
+
+def _unbounded(t: float) -> float:
+    return np.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Known:
+    """Conditions of a diagram's equations, as far as these can be read.
+
+    Attributes
+    ----------
+    stops : ndarray
+        Times (s) at which conditions of t alone change.
+    longest : callable
+        ``longest(t)``: how long a step from there may be (s), so that nothing that is a function
+        of t alone is stepped over.
+    crossings : callable or None
+        ``crossings(t, x, u)``: numbers that change their sign where other conditions change.
+    labels : list of tuple
+        Block and name of each of these.
+    """
+
+    stops: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    longest: Callable[[float], float] = _unbounded
+    crossings: Callable[[float, Any, Any], Any] | None = None
+    labels: tuple[tuple[str, str], ...] = ()

@@ -1,0 +1,168 @@
+"""Conditions that stand in the equations: located by every method, against closed forms."""
+
+import itertools
+
+import control as ct
+import numpy as np
+import pytest
+
+import nlctl
+
+ROOT2 = np.sqrt(2.0)
+
+
+def duty_cycle(t, x, u, p):
+    return [1.0 if t % 0.1 < 0.03 else 0.0]
+
+
+def window(t, x, u, p):
+    return [1.0 + (10.0 if 0.5 < x[0] < 0.6 else 0.0)]
+
+
+def far_away(t, x, u, p):
+    return [np.where(abs(t - 5003.3) < 5, 0.1, 0)]
+
+
+def square_wave(t, x, u, p):
+    return [np.sign(np.sin(2 * np.pi * t)) + (1.0 if x[0] >= 0.25 else 2.0)]
+
+
+def oscillator(t, x, u, p):
+    return [x[1], -np.sign(x[0])]
+
+
+def load(t, x, u, p):
+    return [-x[0] + (1.0 if 50 <= t < 55 else 0.0)]
+
+
+def stairs(t, x, u, p):
+    return [1.0 + np.floor(x[0])]
+
+
+def clipped(t, x, u, p):
+    return [np.clip(2 - abs(x[0] - 1), 0.5, 1.5)]
+
+
+def limited(t, x, u, p):
+    return [0.0 if x[0] >= 1.0 and np.cos(t) > 0 else np.cos(t)]
+
+
+def fast_gaussian(t, x, u, p):
+    return [np.exp(-(((t - 50.0) / 0.1) ** 2))]
+
+
+def oscillator_end(t):
+    """x'' = -sign(x) from rest at 1: arcs of period 4 sqrt(2)."""
+    s = t % (4 * ROOT2)
+    if s < ROOT2:
+        return 1 - s * s / 2
+    return (s - 2 * ROOT2) ** 2 / 2 - 1 if s < 3 * ROOT2 else 1 - (s - 4 * ROOT2) ** 2 / 2
+
+
+def stairs_end(t):
+    """Each stair n takes 1 / (1 + n)."""
+    n = 0
+    while t > 1 / (1 + n):
+        t, n = t - 1 / (1 + n), n + 1
+    return n + t * (1 + n)
+
+
+CASES = {  # equations, initial state, last time, the first state there
+    "duty cycle": (duty_cycle, [0.0], 10.0, 3.0),
+    "window": (window, [0.0], 3.0, 0.6 + 2.5 - 0.1 / 11),
+    "far away": (far_away, [0.0], 10_000.0, 1.0),
+    "square wave": (square_wave, [0.0], 10.0, 0.25 + 2 * (0.5 - 1 / 12) + 9),
+    "oscillator": (oscillator, [1.0, 0.0], 30.0, oscillator_end(30.0)),
+    "load": (load, [0.0], 100.0, (1 - np.exp(-5)) * np.exp(-45)),
+    "stairs": (stairs, [0.0], 3.5, stairs_end(3.5)),
+    "clipped": (clipped, [0.0], 5.5, 2.5 + (5.5 - np.log(4.5) - 1 / 1.5) / 2),
+    "limited": (limited, [0.0], 4.0, 1 + np.sin(4.0) - 1),
+    "gaussian": (fast_gaussian, [0.0], 100.0, 0.1 * np.sqrt(np.pi)),
+}
+HOW = [("tsit5", 1e-6), ("tsit5", 1e-9), ("rodas5p", 1e-6), ("rodas5p", 1e-9)]
+every_case = pytest.mark.parametrize("case", CASES)
+
+
+def plain(equations, start):
+    n = len(start)
+    return ct.nlsys(equations, None, inputs=0, states=n, outputs=n, name="loop")
+
+
+def end(case, **how):
+    equations, start, last, _ = CASES[case]
+    made = nlctl.input_output_response(
+        plain(equations, start), np.linspace(0, last, 21), 0, start, squeeze=False, **how
+    )
+    return float(made.outputs[0, -1]), made
+
+
+@every_case
+@pytest.mark.parametrize(("method", "rtol"), HOW)
+def test_every_method_meets_them(case, method, rtol):
+    found, made = end(case, method=method, rtol=rtol, atol=rtol / 100, engine="native")
+    amplified = 5000 if case == "stairs" else 50  # exp(sum of slopes) of the local errors
+    assert found == pytest.approx(CASES[case][3], abs=amplified * rtol)
+    assert made.statistics.status is nlctl.native.Status.OK
+
+
+@every_case
+def test_the_reference_meets_them(case):
+    found, _ = end(case, engine="python-control")
+    assert found == pytest.approx(CASES[case][3], abs=1e-4 if case == "stairs" else 1e-6)
+
+
+@pytest.mark.parametrize("case", ["window", "oscillator", "clipped", "stairs"])
+def test_members_of_an_ensemble_are_what_they_are_alone(case):
+    equations, start, last, _ = CASES[case]
+    times, starts = np.linspace(0, last, 21), np.linspace(0, 0.3, 11) + start[0]
+    compiled = nlctl.compile(plain(equations, start))
+    names = compiled.system.state_labels
+    first = {names[0]: starts, **dict(zip(names[1:], start[1:], strict=True))}
+    kept = nlctl.ensemble_response(compiled, times, 0, first, keep=("y[0]",)).signals["y[0]"]
+    for row, x in zip(kept, starts, strict=True):
+        alone = nlctl.input_output_response(compiled, times, 0, [x, *start[1:]], squeeze=False)
+        np.testing.assert_allclose(row, alone.outputs[0], rtol=0, atol=1e-6)
+
+
+def test_the_pulse_of_the_table_is_seen():
+    """A kick of 10 for 2 s at 20 on an oscillator at rest, twenty samples in it."""
+    kicked = plain(lambda t, x, u, p: [x[1], -x[0] + (10.0 if 20 <= t < 22 else 0.0)], [0.0, 0.0])
+    times = np.linspace(0, 30, 301)
+    wanted = 10 * (
+        np.where(times >= 20, 1 - np.cos(times - 20), 0)
+        - np.where(times >= 22, 1 - np.cos(times - 22), 0)
+    )
+    for engine in ("native", "python-control"):
+        made = nlctl.input_output_response(kicked, times, 0, 0, engine=engine)
+        np.testing.assert_allclose(made.states[0], wanted, rtol=0, atol=1e-5)
+
+
+def test_events_are_a_table_of_both_engines():
+    """x'' = -sign(x): it goes through 0 at sqrt(2), 3 sqrt(2), ..., down and up in turn."""
+    tables = [
+        end("oscillator", engine=e, rtol=1e-10)[1].events for e in ("native", "python-control")
+    ]
+    wanted = ROOT2 * np.arange(1, 22, 2)
+    for table in tables:
+        assert list(table.columns) == ["time", "block", "which", "direction"]
+        np.testing.assert_allclose(table["time"], wanted[wanted < 30], rtol=0, atol=1e-6)
+        assert set(table["block"]) == {"loop"}
+        for direction, way in zip(table["direction"], itertools.cycle(["falling", "rising"])):
+            assert direction == way
+
+
+def test_print_and_statistics_say_what_is_located():
+    compiled = nlctl.compile(plain(oscillator, [1.0, 0.0]))
+    assert "conditions   1 located" in str(compiled)
+    _, made = end("oscillator", engine="native")
+    assert (made.statistics.conditions, made.statistics.opaque) == (1, False)
+
+
+def test_a_condition_that_is_always_0_is_no_event():
+    """3 x and y + 2 y with x = y: a difference that is only rounding."""
+    loop = plain(
+        lambda t, x, u, p: [1.0, 1.0, np.maximum(x[0] * 3.0, x[1] + 2 * x[1])], [0.0, 0.0, 0.0]
+    )
+    made = nlctl.input_output_response(loop, np.linspace(0, 10, 11), 0, 0, engine="native")
+    np.testing.assert_allclose(made.states[2], 1.5 * np.linspace(0, 10, 11) ** 2, rtol=1e-8)
+    assert made.statistics.accepted + made.statistics.rejected < 500
