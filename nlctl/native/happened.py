@@ -62,8 +62,9 @@ def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
         count = count_switching_functions(node)
         labels += [(node.path, name) for name in numbered("switching", count)]
     for each in conditions.located:
-        what = _WORDS.get(each.what, each.what)
-        labels += [(each.block, name) for name in numbered(what, each.rows)]
+        what: str = each.what
+        names = numbered(_WORDS.get(what, what), each.rows)
+        labels += [(each.block, name) for name in names]
     for node in nodes:
         count = count_guards(node)
         labels += [(node.path, name) for name in numbered("guard", count)]
