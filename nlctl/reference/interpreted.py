@@ -169,8 +169,11 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
 
 def _linear(times: np.ndarray, inputs: np.ndarray) -> Callable[[float], np.ndarray]:
     """Return inputs that are linear between their times, as python-control has them."""
+    nothing = np.zeros(0)
 
     def at(t: float) -> np.ndarray:
+        if not inputs.shape[0]:
+            return nothing
         i = min(max(int(np.searchsorted(times, t)), 1), times.size - 1)
         part = (t - times[i - 1]) / (times[i] - times[i - 1])
         return inputs[:, i - 1] * (1.0 - part) + inputs[:, i] * part
