@@ -131,6 +131,7 @@ class Driver:
             return stop, x + (stop - t) * self._rates(t, x), sides, [(t, lambda _: x)], None
         solver = self.method(self._rates, t, x, stop, **self._bounded(t, stop))
         seen = self.jumps.look(t, x) if self.jumps.any else np.zeros(0)
+        self.jumps.check_watched(t, seen)
         pieces: list[Any] = []
         while True:
             message = solver.step()
@@ -227,11 +228,13 @@ class Driver:
         self._switches.note(i, event.time)
         if not self.jumps.kinds[0] <= i < sum(self.jumps.kinds):
             return
-        behind = self._looked(event.time, x)[i]
+        after = self._looked(event.time, x)
+        self.jumps.check_watched(event.time, after)
+        behind = after[i]
         rises, changed = behind > seen[i], behind * seen[i] <= 0.0
         if changed and self.jumps.counts(i, rises):
             way = "rising" if rises else "falling"
-            self.happened.append((event.time, *self.jumps.label(i), way))
+            self.happened.append((float(event.time), *self.jumps.label(i), way))
             self._ended = self.jumps.ends(i, rises)
         rates = self._rates(event.time, x)
         self._switches.switched(i, event.time, lambda t, x: self._looked(t, x)[i], x, rates)

@@ -10,7 +10,7 @@ import numpy as np
 from ..blocks import Block, memory_states
 from ..diagrams import leaves
 from ..errors import BlockError, DivergedError, ZenoError
-from ..responses.watched import Watched
+from ..responses.watched import Watched, nan_error
 from ..sampling.system import Happening, Sampled, happening
 from ..upstream.control_internals import current_parameters, parts_now, rates_now
 from ..wording import counted, numbered
@@ -119,6 +119,13 @@ class Jumps:
     def label(self, number: int) -> tuple[str, str]:
         """Return block and name of a row of what `look` returns."""
         return self.labels[number] if self.labels else ("", "")
+
+    def check_watched(self, t: float, seen: np.ndarray) -> None:
+        """End a run in which a function that it watches is NaN."""
+        signed = sum(self.kinds)
+        for one, value in zip(self.watched, seen[signed - len(self.watched) : signed], strict=True):
+            if np.isnan(value):
+                raise nan_error(one.name, t)
 
     def ends(self, number: int, rises: bool) -> bool:
         """Whether a change of sign of a row ends the run."""
