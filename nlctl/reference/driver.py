@@ -223,21 +223,23 @@ class Driver:
         return self.jumps.look(min(t, self._last), x)
 
     def _note(self, event: Event, seen: np.ndarray, state: Any) -> None:
-        """Note what happens; of a switching function or a condition, how its sign has changed."""
-        i, x = event.number, state(event.time)
-        self._switches.note(i, event.time)
-        if not self.jumps.kinds[0] <= i < sum(self.jumps.kinds):
-            return
+        """Note what happens, and all switching functions and conditions that change their signs."""
+        x, (guards, others) = state(event.time), self.jumps.kinds
+        self._switches.note(event.number, event.time)
         after = self._looked(event.time, x)
         self.jumps.check_watched(event.time, after)
-        behind = after[i]
-        rises, changed = behind > seen[i], behind * seen[i] <= 0.0
-        if changed and self.jumps.counts(i, rises):
+        rows = np.arange(guards, guards + others)
+        changed = rows[(seen[rows] != 0.0) & (seen[rows] * after[rows] <= 0.0)]
+        for i in changed.tolist():
+            self._note_change(i, event.time, bool(after[i] > seen[i]), x)
+
+    def _note_change(self, i: int, t: float, rises: bool, x: np.ndarray) -> None:
+        """Note a change of sign, whether it ends the run, and whether there is an end of them."""
+        if self.jumps.counts(i, rises):
             way = "rising" if rises else "falling"
-            self.happened.append((float(event.time), *self.jumps.label(i), way))
-            self._ended = self.jumps.ends(i, rises)
-        rates = self._rates(event.time, x)
-        self._switches.switched(i, event.time, lambda t, x: self._looked(t, x)[i], x, rates)
+            self.happened.append((float(t), *self.jumps.label(i), way))
+            self._ended |= self.jumps.ends(i, rises)
+        self._switches.switched(i, t, lambda t, x: self._looked(t, x)[i], x, self._rates(t, x))
 
     def _watch(self, t: float, x: np.ndarray) -> None:
         """End a run whose state is not finite, or whose time stands still.
