@@ -42,7 +42,7 @@ def known_conditions(system: Any, params: Any, times: np.ndarray) -> Known:
     found = {k: v[0] for k, v in ahead(lowered, p[:, None], times, np.inf).items()}
     jumps = found["jumps"][np.isfinite(found["jumps"])]
     located = lowered.conditions.rows
-    if not located or compiled.schedule.lines:
+    if not located:
         return Known(stops=jumps, longest=_longest(found, times))
     first = compiled.program.switching
     labels = row_labels(compiled, lowered.conditions)[first : first + located]
@@ -67,7 +67,7 @@ def _longest(found: dict[str, Any], times: np.ndarray) -> Callable[[float], floa
 
 def _crossings(compiled: Compiled, p: np.ndarray, rows: slice) -> Callable[..., np.ndarray]:
     code, c = prepared_parameters(compiled, p)
-    sizes = compiled.system.nstates or 0, compiled.system.ninputs or 0, code.lowered.rows["g"]
+    sizes = compiled.system.nstates or 0, compiled.schedule.ninputs, code.lowered.rows["g"]
     now, (x_now, u_now, g) = np.empty(1), (np.empty((n, 1)) for n in sizes)
     given = now, x_now, u_now, c, np.empty_like(x_now), g
     rhs = code.rhs.bound(*given) if isinstance(code.rhs, Routine) else partial(code.rhs, *given)

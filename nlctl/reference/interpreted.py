@@ -129,12 +129,16 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
     system, times, (inputs, x0, wanted), (method, settings) = run.system, run.times, given, how
     begin, end, at = float(times[0]), float(times[-1]), _linear(times, inputs)
     conditions = Known() if known is None else known(system, run.params, times)
-    jumps = Jumps(system, at, conditions, (run.watched, dict(run.params or {})))
+    past = Past(delayed_blocks(system), begin, end, (settings["rtol"], settings["atol"]))
+    jumps = Jumps(
+        system, at, conditions, (run.watched, dict(run.params or {})),
+        past.leaving if past.lines else None,
+    )  # fmt: skip
     grid = times if wanted is None else np.union1d(times, wanted)
     driver = Driver(
         system, at, wanted, jumps=jumps, method=method, settings=settings, progress=run.progress,
         stops=Stops(grid, times, inputs, jumps.sampled.values(), conditions),
-        known=Past(delayed_blocks(system), begin, end, (settings["rtol"], settings["atol"])),
+        known=past,
     )  # fmt: skip
     message = None
     try:

@@ -44,6 +44,8 @@ class Jumps:
         What changes its sign where conditions of the diagram's equations change.
     watched : tuple
         Functions of the run, and the overrides that they get.
+    leaving : callable, optional
+        ``leaving(t)``: what leaves transport delays.
 
     Attributes
     ----------
@@ -55,11 +57,11 @@ class Jumps:
 
     def __init__(
         self, system: Any, inputs: Callable[[float], Any], conditions: Known,
-        watched: tuple[tuple[Watched, ...], Any] = ((), None),
+        watched: tuple[tuple[Watched, ...], Any] = ((), None), leaving: Any = None,
     ) -> None:  # fmt: skip
         self.watched, self._overrides = watched
         self.system, self.inputs, self.conditions = system, inputs, conditions
-        self.crossings = conditions.crossings
+        self.crossings, self._leaving = conditions.crossings, leaving
         self.happened: list[tuple[float, str, str, str]] = []
         parts, self.sampled = [], {}
         for number, leaf in enumerate(leaves(system)):
@@ -95,7 +97,8 @@ class Jumps:
             found = {what: _values(what, own, t, parts) for what, own in self._blocks.items()}
             seen = [row for what in ("guard", "switching") for _, row in found[what]]
         if self.crossings is not None:
-            seen.append(np.asarray(self.crossings(t, x, u), dtype=float).reshape(-1))
+            given = u if self._leaving is None else np.concatenate([u, self._leaving(t)])
+            seen.append(np.asarray(self.crossings(t, x, given), dtype=float).reshape(-1))
         if self.watched:
             seen.append(np.array([one.value(t, x, u, self._overrides) for one in self.watched]))
         if self.labels is None:
