@@ -71,6 +71,12 @@ def below(level, name_in="u", name_out="v"):
                     outputs=[name_out], name="below")  # fmt: skip
 
 
+def narrow(name_in, name_out):
+    """1 within 0.001 of 0, by a user's own function."""
+    return ct.nlsys(None, lambda t, x, u, p: np.where(abs(u) < 1e-3, 1.0, 0.0), inputs=[name_in],
+                    outputs=[name_out], name="narrow")  # fmt: skip
+
+
 def integral(name_in, name_out):
     return ct.ss(0, 1, 1, 0, inputs=name_in, outputs=name_out, name="plant")
 
@@ -143,6 +149,11 @@ PAIRS = {  # blocks, an output, what it is at t > 0
     "a delay moves a relay, which moves what is delayed": (
         {"d": late("x", "u", 0.4), "v": relay(on=0.2, off=-0.2, v0=1.0), "x": ct.ss(
             0, -1, 1, 0, inputs="v", outputs="x", name="plant")}, "x", triangle,
+    ),
+    "a delay moves a narrow condition": (
+        {"s": signal(np.cos), "d": late("u", "w", DELAYED), "n": narrow("w", "v"),
+         "p": integral("v", "z")}, "z",
+        lambda t: np.minimum(t, DELAYED) + 2 * np.arcsin(1e-3) * (t > np.pi / 2 + DELAYED),
     ),
     "a clock moves a play": (
         {"s": signal(lambda t: t), "h": through("u", "r", 0.25), "p": play("r", "v")}, "v",
