@@ -130,15 +130,11 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
     begin, end, at = float(times[0]), float(times[-1]), _linear(times, inputs)
     conditions = Known() if known is None else known(system, run.params, times)
     past = Past(delayed_blocks(system), begin, end, (settings["rtol"], settings["atol"]))
-    jumps = Jumps(
-        system, at, conditions, (run.watched, dict(run.params or {})),
-        past.leaving if past.lines else None,
-    )  # fmt: skip
+    jumps = Jumps(system, at, conditions, (run.watched, dict(run.params or {})), past.leaving)
     grid = times if wanted is None else np.union1d(times, wanted)
     driver = Driver(
         system, at, wanted, jumps=jumps, method=method, settings=settings, progress=run.progress,
-        stops=Stops(grid, times, inputs, jumps.sampled.values(), conditions),
-        known=past,
+        stops=Stops(grid, times, inputs, jumps.sampled.values(), conditions), known=past,
     )  # fmt: skip
     message = None
     try:

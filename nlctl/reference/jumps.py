@@ -44,7 +44,7 @@ class Jumps:
         What changes its sign where conditions of the diagram's equations change.
     watched : tuple
         Functions of the run, and the overrides that they get.
-    leaving : callable, optional
+    leaving : callable
         ``leaving(t)``: what leaves transport delays.
 
     Attributes
@@ -57,7 +57,7 @@ class Jumps:
 
     def __init__(
         self, system: Any, inputs: Callable[[float], Any], conditions: Known,
-        watched: tuple[tuple[Watched, ...], Any] = ((), None), leaving: Any = None,
+        watched: tuple[tuple[Watched, ...], Any], leaving: Callable[[float], np.ndarray],
     ) -> None:  # fmt: skip
         self.watched, self._overrides = watched
         self.system, self.inputs, self.conditions = system, inputs, conditions
@@ -97,7 +97,7 @@ class Jumps:
             found = {what: _values(what, own, t, parts) for what, own in self._blocks.items()}
             seen = [row for what in ("guard", "switching") for _, row in found[what]]
         if self.crossings is not None:
-            given = u if self._leaving is None else np.concatenate([u, self._leaving(t)])
+            given = np.concatenate([u, self._leaving(t)])
             seen.append(np.asarray(self.crossings(t, x, given), dtype=float).reshape(-1))
         if self.watched:
             seen.append(np.array([one.value(t, x, u, self._overrides) for one in self.watched]))
@@ -226,7 +226,7 @@ class Jumps:
                 after[one.rows] = row
             first += count
         for i in np.flatnonzero(fallen).tolist():
-            self.happened.append((t, *self.label(i), "falling"))
+            self.happened.append((float(t), *self.label(i), "falling"))
             self._taken.setdefault(i, []).append(t)
             self._check_progress(i, t)
         self._rising = self._rises(t, after, fallen)

@@ -73,7 +73,8 @@ class Past:
 
     def leaving(self, t: float) -> np.ndarray:
         """Return what leaves all blocks, one after the other."""
-        return np.concatenate([np.zeros(0), *(line.leaving(t) for line in self.lines.values())])
+        found = [line.leaving(t) for line in self.lines.values()]
+        return np.concatenate(found) if found else np.zeros(0)
 
     def _leaving(self, number: int, t: float) -> np.ndarray:
         """Return what leaves a block: of the side of a break that the step lies on."""
