@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dis
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from .arrays import Tracer, concatenated, scalar, traced
 from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, OpenCondition, Untraceable
+from .library.python import Namespace
 from .operators import elementwise
 from .stage import Stage
 
@@ -44,7 +46,10 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
         stage = Stage(graph)
         copy = stage.copied(function)
         run = lambda: copy(*map(stage.instead, arguments()))  # noqa: E731
-        return _followed(graph, lambda: _flat(graph, run()), {}, [PATHS])
+        found = _followed(graph, lambda: _flat(graph, run()), {}, [PATHS])
+        if found is None:
+            raise Untraceable("it raises an error on every way")
+        return found
     except Ambiguous:
         raise
     except Exception as error:  # a traced function may raise whatever it likes
@@ -57,25 +62,54 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
 
 def _followed(
     graph: Graph, run: Callable[[], Tracer], decisions: dict[Expr, bool], left: list[int]
-) -> Tracer:
-    """Follow a function from where the decisions have led."""
+) -> Tracer | None:
+    """Follow a function from where the decisions have led; None where it raises an error."""
     graph.decisions, graph.guards = decisions, []
     try:
         result = _guarded(graph, run())
     except OpenCondition as question:
         condition = question.condition
+    except Exception as error:
+        if not decisions or not _is_raised(error):
+            raise
+        return _counted(left, None)
     else:
-        left[0] -= 1
-        if left[0] < 0:
-            raise Untraceable(f"more than {PATHS} ways through it")
-        return result
+        return _counted(left, result)
     if len(decisions) >= PATHS:
         raise Untraceable("a loop whose end depends on what is computed")
     yes = _followed(graph, run, {**decisions, condition: True}, left)
     no = _followed(graph, run, {**decisions, condition: False}, left)
+    if yes is None or no is None:
+        found = no if yes is None else yes
+        if found is None:
+            return None
+        nan = elementwise(graph, "mul", np.nan, found)
+        yes, no = (nan, found) if yes is None else (found, nan)
     if yes.shape != no.shape:
         raise Untraceable("results of different sizes")
     return elementwise(graph, "select", scalar(graph, condition), yes, no)
+
+
+def _counted(left: list[int], result: Tracer | None) -> Tracer | None:
+    """Return the result of a way; there are so many left."""
+    left[0] -= 1
+    if left[0] < 0:
+        raise Untraceable(f"more than {PATHS} ways through it")
+    return result
+
+
+def _is_raised(error: Exception) -> bool:
+    """Whether an error is one that a traced function raises itself, by ``raise`` or ``assert``."""
+    if isinstance(error, Untraceable | Ambiguous):
+        return False
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    if place is None or place.tb_frame.f_globals.get("__builtins__") is None:
+        return False
+    code = place.tb_frame.f_code
+    own = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
+    return own and code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
 
 
 def _guarded(graph: Graph, result: Tracer) -> Tracer:
