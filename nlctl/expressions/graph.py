@@ -116,6 +116,8 @@ class Graph:
         Largest number of expressions for now.
     decisions : dict
         What is taken to hold on the path through a function that is being traced.
+    implied : dict
+        What follows from that.
     assumptions : dict
         Integer parameters that steer what is computed: place in `p`, and value.
     lengths : dict
@@ -130,6 +132,7 @@ class Graph:
         self.lengths = dict(lengths or {})
         self.guards: list[Expr] = []
         self.decisions: dict[Expr, bool] = {}
+        self.implied: dict[Expr, bool] = {}
         self.assumptions: dict[int, int] = {}
         self._known: dict[Any, Expr] = {}
 
@@ -137,6 +140,8 @@ class Graph:
         """Return whether a condition holds on this path; ask whoever traces if that is open."""
         if condition.op == "const":
             return bool(condition.data)
+        if condition in self.implied:
+            return self.implied[condition]
         if condition not in self.decisions:
             raise OpenCondition(condition)
         return self.decisions[condition]

@@ -12,7 +12,7 @@ import numpy as np
 from .arrays import Tracer, as_array, concatenated, full, full_index, holds_arrays, mapped, traced
 from .graph import Graph, Untraceable
 from .integers import integer_range
-from .masked import Masked
+from .masked import Masked, Places
 from .operators import elementwise
 
 GATHERED = 64  # places among which an integer may choose
@@ -23,12 +23,24 @@ def _item(self: Tracer, key: Any) -> Any:
     key = _settled(key)
     if _is_mask(key):
         return Masked(self, key)
+    if isinstance(key, Tracer) and key.shape:
+        return _each(self, key)
     place = _open_place(key)
     return self.item_at(key) if place is None else _gathered(self, key, place)
 
 
+def _each(self: Tracer, places: Tracer) -> Tracer:
+    """Return elements at places that the state decides, one after the other."""
+    found = [_item(self, k) for k in places.short().reshape(-1)]
+    return traced(self.graph, found).reshape(places.shape + self.shape[1:])
+
+
 def _settled(key: Any) -> Any:
     """Return an index with numbers for what is known."""
+    if isinstance(key, Places):
+        return _settled(key.mask)
+    if isinstance(key, tuple) and len(key) == 1 and isinstance(key[0], Places):
+        return _settled(key[0].mask)
     if isinstance(key, tuple):
         return tuple(map(_settled, key))
     if isinstance(key, list) and any(isinstance(k, Tracer) for k in key):
@@ -122,6 +134,11 @@ def _assign(self: Tracer, key: Any, value: Any) -> None:
     key = _settled(key)
     if _is_mask(key):
         return _masked(self, key, value)
+    if isinstance(key, Tracer) and key.shape:
+        value = traced(self.graph, value)
+        for i, k in enumerate(key):
+            _assign(self, k, value[i] if value.shape else value)
+        return None
     place = _open_place(key)
     if place is not None:
         return _scattered(self, key, place, value)

@@ -59,6 +59,7 @@ def _magnitude(a: Range) -> Range:
 
 
 _RULES = {
+    "sign": lambda a: (-1.0, 1.0),
     "add": lambda a, b: (a[0] + b[0], a[1] + b[1]),
     "sub": lambda a, b: (a[0] - b[1], a[1] - b[0]),
     "neg": lambda a: (-a[1], -a[0]),

@@ -66,6 +66,13 @@ class Masked(Special):
     __hash__ = None  # type: ignore[assignment]
 
 
+class Places(Special):
+    """``np.where(x > 0)[0]``: the places that a mask chooses, for use as an index."""
+
+    def __init__(self, mask: Tracer) -> None:
+        self.mask = mask
+
+
 def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
     def method(self: Masked, *other: Any) -> Any:
         operands = (*other, self) if turned else (self, *other)

@@ -133,10 +133,18 @@ def _integer(self: Tracer) -> int:
     low, high = integer_range(self.only)
     if high - low >= FOLLOWED:
         raise Untraceable("an integer that may have too many values")
-    for k in range(int(low), int(high)):
-        if self.graph.decided(self.graph.op("eq", self.only, self.graph.const(k))):
-            return k
-    return int(high)
+    values = range(int(low), int(high) + 1)
+    equal = {k: self.graph.op("eq", self.only, self.graph.const(k)) for k in values}
+    found = next((k for k in values[:-1] if self.graph.decided(equal[k])), values[-1])
+    self.graph.implied.update({equal[k]: k == found for k in values})
+    return found
+
+
+def _hash(self: Tracer) -> int:
+    """Return the hash of a constant, or of the value of an integer that is followed."""
+    if not self.shape and self.only.op == "const":
+        return hash(self.only.data)
+    return hash(_integer(self))
 
 
 def _floor_division(self: Tracer, other: Any) -> Any:
@@ -222,6 +230,7 @@ for _name, _method in {
     "int": _integer,
     "pow": _power,
     "rpow": lambda self, other: _power(other, self),
+    "hash": _hash,
     "floordiv": _floor_division,
     "rfloordiv": lambda self, other: floor_quotient(self.graph, other, self),
     "divmod": lambda self, other: (self // other, self % other),

@@ -26,7 +26,8 @@ from .library.creation import Joined
 from .library.python import Builtins, guard_of_math
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
-from .library.table import MAKING, OPERATIONS, OWN, plain
+from .library.splines import called_object, enter_splines
+from .library.table import MAKING, OPERATIONS, OWN, Kind, plain
 from .operators import elementwise
 from .staged import (
     StagedModule,
@@ -99,8 +100,6 @@ class Stage:
         raise Untraceable(f"{thing!r} is not a plain function")
 
     def _call_of_a_library(self, thing: Any) -> Any:
-        from .library.tables import called_object
-
         of_numbers = self.for_numbers(thing)
 
         def function(*arguments: Any, **options: Any) -> Any:
@@ -139,6 +138,8 @@ class Stage:
         foreign = isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is not value
         if foreign or module.startswith(("scipy.special", "scipy.linalg")):
             enter_scipy()
+        if module.startswith("scipy.interpolate"):
+            enter_splines()
         try:
             return value in OWN
         except TypeError:  # it has no hash
@@ -222,7 +223,10 @@ class Stage:
         def function(*arguments: Any, **options: Any) -> Any:
             every, named = settled(arguments), {k: settled(v) for k, v in options.items()}
             if holds_tracers([*every, *named.values()]):
-                raise Untraceable(f"{_title(real)} is not known here")
+                written = _in_python(real)
+                if written is None:
+                    raise Untraceable(f"{_title(real)} is not known here")
+                return self.copied(written)(*arguments, **options)
             return self.fresh(real(*every, **named))
 
         return function
@@ -263,6 +267,8 @@ class Stage:
 
     def _type(self, cls: type) -> Any:
         """Return a class: of somebody a copy whose methods lead here, of a library what makes."""
+        if cls is np.float64:
+            return Kind(np.float64, self._builtins["float"].make)
         raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc, np.errstate)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
@@ -301,6 +307,13 @@ class Stage:
             made.__set_name__(made, value.attrname or value.func.__name__)
             return made
         return self.instead(value) if callable(value) or type(value) is np.ndarray else value
+
+
+def _in_python(real: Any) -> FunctionType | None:
+    """Return the source of a function of a library if that is plain Python: it is traced, too."""
+    function = inspect.unwrap(real) if callable(real) else real
+    plain = isinstance(function, FunctionType) and is_of_a_library(function)
+    return function if plain else None
 
 
 def _has_code(value: Any) -> bool:

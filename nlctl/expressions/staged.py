@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import itertools
 from collections.abc import Callable
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ import numpy as np
 from .arrays import Special, Tracer, traced
 from .graph import Graph, Untraceable
 from .library.rotations import enter_rotations
-from .library.table import OPERATIONS, OWN, applied, of_ufunc, plain
+from .library.table import OPERATIONS, OWN, applied, constant, of_ufunc, plain
 from .operators import elementwise
 
 if TYPE_CHECKING:
@@ -34,26 +35,10 @@ def holds_tracers(value: Any) -> bool:
 def settled(value: Any) -> Any:
     """Return a value with arrays and numbers for what is constant."""
     if isinstance(value, Tracer):
-        return _constant(value)
+        return constant(value)
     if type(value) in (list, tuple):
         return type(value)(map(settled, value))
     return value.__dict__["_real"] if type(value) in (StagedObject, StagedType) else plain(value)
-
-
-def _constant(value: Tracer) -> Any:
-    elements = value.values.flat
-    if any(e.op not in ("const", "table") for e in elements):
-        return value
-    kinds = {e.kind for e in value.values.flat}
-    as_number = {"b": bool, "i": int}.get(kinds.pop() if len(kinds) == 1 else "f", float)
-    if not value.shape:
-        return as_number(value.only.data)
-    if value.axis is not None and any(e.op != "table" for e in value.values.flat):
-        rows = [np.full(value.length, e.data) if e.op == "const" else np.array(e.data)
-                for e in value.values.flat]  # fmt: skip
-        whole = np.array(rows).reshape(*value.values.shape, value.length)
-        return np.moveaxis(whole, -1, value.axis)
-    return np.array([as_number(e.data) for e in value.elements().flat]).reshape(value.shape)
 
 
 def is_of_a_library(thing: Any) -> bool:
@@ -212,14 +197,27 @@ class Ufunc:
     def reduce(self, values: Any, axis: Any = 0, **options: Any) -> Any:
         """Return what is left of an array when two elements become one."""
         if not holds_tracers(values):
-            return self.real.reduce(values, axis, **options)
-        return applied(self.graph, _REDUCING[self.real.__name__], values, axis, **options)
+            return self.plain_method("reduce", values, axis, **options)
+        if self.real.__name__ in _REDUCING:
+            return applied(self.graph, _REDUCING[self.real.__name__], values, axis, **options)
+        if options or axis != 0:
+            raise Untraceable(f"{self.real.__name__}.reduce with other arguments")
+        return functools.reduce(self, list(traced(self.graph, values)))
+
+    def plain_method(self, name: str, *values: Any, **options: Any) -> Any:
+        """Return what a method of NumPy's makes of constants."""
+        return getattr(self.real, name)(*map(settled, values), **options)
 
     def accumulate(self, values: Any, axis: Any = 0) -> Any:
         """Return all that is left on the way."""
         if not holds_tracers(values):
-            return self.real.accumulate(values, axis)
-        return applied(self.graph, _ACCUMULATING[self.real.__name__], values, axis)
+            return self.plain_method("accumulate", values, axis)
+        array = traced(self.graph, values)
+        if self.real.__name__ in _ACCUMULATING:
+            return applied(self.graph, _ACCUMULATING[self.real.__name__], array, axis)
+        if axis != 0:
+            raise Untraceable(f"{self.real.__name__}.accumulate along another axis")
+        return traced(self.graph, list(itertools.accumulate(array, self)))
 
     def outer(self, a: Any, b: Any) -> Any:
         """Return all results of an element of one and of the other."""

@@ -56,7 +56,7 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
         graph.assumptions = assumptions
         raise Untraceable(str(error)) from error
     finally:
-        graph.decisions, graph.guards = {}, []
+        graph.decisions, graph.implied, graph.guards = {}, {}, []
         graph.limit = UNLIMITED
 
 
@@ -64,7 +64,7 @@ def _followed(
     graph: Graph, run: Callable[[], Tracer], decisions: dict[Expr, bool], left: list[int]
 ) -> Tracer | None:
     """Follow a function from where the decisions have led; None where it raises an error."""
-    graph.decisions, graph.guards = decisions, []
+    graph.decisions, graph.implied, graph.guards = decisions, {}, []
     try:
         result = _guarded(graph, run())
     except OpenCondition as question:

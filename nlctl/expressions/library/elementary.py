@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
+from ..masked import Places
 from ..operators import elementwise, floor_quotient
 from .complex_numbers import Pair
 from .table import METHODS, Facade, formula, of
@@ -189,9 +190,24 @@ def unwrap(np: Facade, x: Any) -> Any:
 @of(np.where)
 def where(graph: Graph, condition: Any, *values: Any) -> Any:
     """Return one or the other."""
-    if len(values) != 2:
-        raise Untraceable("the places where a condition holds")
+    if not values:
+        return (flatnonzero(graph, condition),)
     return elementwise(graph, "select", condition, *values)
+
+
+@of(np.nonzero)
+def nonzero(graph: Graph, condition: Any) -> tuple[Places]:
+    """Return where a condition holds."""
+    return (flatnonzero(graph, condition),)
+
+
+@of(np.flatnonzero)
+def flatnonzero(graph: Graph, condition: Any) -> Places:
+    """Return where a condition holds."""
+    mask = elementwise(graph, "ne", traced(graph, condition), 0.0)
+    if mask.ndim != 1:
+        raise Untraceable("the places in a matrix where a condition holds")
+    return Places(mask)
 
 
 @of(np.clip)

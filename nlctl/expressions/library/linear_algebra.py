@@ -10,8 +10,8 @@ import numpy as np
 from ..arrays import Tracer, traced
 from ..elimination import eliminated, substituted
 from ..graph import Graph, Untraceable
-from ..operators import elementwise
-from .table import Facade, of
+from ..operators import elementwise, product
+from .table import Facade, constant, of
 
 __all__: list[str] = []
 
@@ -90,6 +90,18 @@ def _any_is_zero(np_: Facade, pivots: Sequence[Any]) -> Any:
     for pivot in pivots[1:]:
         found = np_.logical_or(found, np_.equal(pivot, 0.0))
     return found
+
+
+@of(np.linalg.lstsq)
+def lstsq(graph: Graph, a: Any, b: Any, rcond: Any = None) -> tuple[Any, ...]:
+    """Return the least squares solution for a matrix that is constant."""
+    matrix = constant(traced(graph, a))
+    if not isinstance(matrix, np.ndarray):
+        raise Untraceable("least squares with a matrix that depends on the state")
+    rows = min(matrix.shape)
+    found = product(traced(graph, np.linalg.pinv(matrix)), traced(graph, b))
+    singular = np.linalg.svd(matrix, compute_uv=False)
+    return found, traced(graph, np.zeros(0)), rows, traced(graph, singular)
 
 
 @of(np.linalg.cholesky)

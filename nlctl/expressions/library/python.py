@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import copy
 import functools
 import math
 import sys
@@ -106,7 +107,7 @@ class Builtins:
         if not isinstance(value, Tracer):
             return round(value) if digits is None else round(value, digits)
         if value.shape or value.only.kind != "f":
-            raise Untraceable("round of what is no float")
+            raise Untraceable("round of something else than a float")
         if digits is None:
             return self._whole("rint", value)
         if not is_of_arrays(value.only):
@@ -193,6 +194,18 @@ def is_of_arrays(expr: Expr) -> bool:
     return False
 
 
+@of(copy.copy, copy.deepcopy)
+def copied(graph: Graph, value: Any, memo: Any = None) -> Any:
+    """Return a copy."""
+    if isinstance(value, Tracer):
+        return value.copy()
+    if type(value) in (list, tuple):
+        return type(value)(copied(graph, v) for v in value)
+    if type(value) is dict:
+        return {k: copied(graph, v) for k, v in value.items()}
+    raise Untraceable(f"a copy of {type(value).__name__}")
+
+
 @of(np.vectorize)
 def vectorize(graph: Graph, function: Any, otypes: Any = None) -> Any:
     """Return a function that is called for each element."""
@@ -206,7 +219,7 @@ def vectorize(graph: Graph, function: Any, otypes: Any = None) -> Any:
             traced(graph, function(*(a[index] for a in arrays))) for index in np.ndindex(shape)
         ]
         if any(f.shape or f.only.kind != "f" for f in found):
-            raise Untraceable("np.vectorize of what is no float")
+            raise Untraceable("np.vectorize of something else than floats")
         return traced(graph, found).reshape(shape) if shape else found[0]
 
     return each
@@ -217,7 +230,7 @@ def apply_along_axis(graph: Graph, function: Any, axis: int, values: Any) -> Tra
     """Return what a function makes of each row or column."""
     array = traced(graph, values)
     if array.ndim != 2:
-        raise Untraceable("apply_along_axis of what is no matrix")
+        raise Untraceable("apply_along_axis of something else than a matrix")
     rows = array if axis in (1, -1) else array.T
     found = traced(graph, [function(row) for row in rows])
     return found if found.ndim == 1 or axis in (1, -1) else found.T

@@ -15,7 +15,7 @@ from ..graph import Expr, Graph, Untraceable
 from ..masked import Masked
 from ..operators import counted, elementwise, total
 from .complex_numbers import Pair
-from .table import METHODS, Facade, formula, of
+from .table import METHODS, Facade, constant, formula, of
 
 __all__: list[str] = []
 
@@ -305,6 +305,71 @@ def median(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
         return graph.op("select", graph.op("ne", last, last), last, middle)
 
     return folded(graph, values, axis, False, of_row)
+
+
+def _quantile(graph: Graph, row: Sequence[Expr], q: float) -> Expr:
+    """Return the value below which a part lies: between two of the ordered ones."""
+    ordered, _ = in_order(graph, row)
+    at = (len(ordered) - 1) * q
+    low = min(int(at), len(ordered) - 2) if len(ordered) > 1 else 0
+    part, high = at - low, min(low + 1, len(ordered) - 1)
+    a, b = ordered[low], ordered[high]
+    rise = graph.op("sub", b, a)
+    if part >= 0.5:
+        found = graph.op("sub", b, graph.op("mul", rise, graph.const(1.0 - part)))
+    else:
+        found = graph.op("add", a, graph.op("mul", rise, graph.const(part)))
+    last = ordered[-1]
+    return graph.op("select", graph.op("ne", last, last), last, found)
+
+
+@of(np.quantile)
+def quantile(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
+    """Return the value below which a part q lies."""
+    parts = np.asarray(constant(traced(graph, q)))
+    if parts.dtype != float and parts.dtype.kind != "i":
+        raise Untraceable("a quantile whose part depends on the state")
+    found = [folded(graph, values, axis, False, functools.partial(_quantile, graph, q=float(p)))
+             for p in parts.reshape(-1)]  # fmt: skip
+    return found[0] if not parts.shape else traced(graph, found)
+
+
+@of(np.percentile)
+def percentile(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
+    """Return the value below which q per cent lie."""
+    return quantile(graph, values, elementwise(graph, "div", q, 100.0), axis)
+
+
+@of(np.nanmean)
+def nanmean(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+    """Return a mean of what is not NaN."""
+    array = traced(graph, values)
+    known = elementwise(graph, "eq", array, array)
+    return elementwise(graph, "div", nansum(graph, array, axis), total(known, axis))
+
+
+@of(np.cov)
+def cov(graph: Graph, m: Any, y: Any = None, *, bias: bool = False, ddof: Any = None) -> Tracer:
+    """Return the covariances of rows."""
+    rows = [traced(graph, v) for v in (m, y) if v is not None]
+    flat = [row for r in rows for row in (r if r.ndim == 2 else [r])]
+    away = [elementwise(graph, "sub", r, mean(graph, r)) for r in flat]
+    count = float(flat[0].size - (ddof if ddof is not None else 0 if bias else 1))
+    found = [[elementwise(graph, "div", total(elementwise(graph, "mul", a, b)), count)
+              for b in away] for a in away]  # fmt: skip
+    return traced(graph, found if len(away) > 1 else found[0][0])
+
+
+@of(np.corrcoef)
+def corrcoef(graph: Graph, x: Any, y: Any = None) -> Tracer:
+    """Return the correlations of rows."""
+    c = cov(graph, x, y)
+    sizes = [elementwise(graph, "sqrt", c[i, i]) for i in range(len(c))]
+    found = [[elementwise(graph, "div", elementwise(graph, "div", c[i, j], sizes[i]), sizes[j])
+              for j in range(len(c))] for i in range(len(c))]  # fmt: skip
+    low, high = -1.0, 1.0
+    whole = elementwise(graph, "maximum", traced(graph, found), low)
+    return elementwise(graph, "minimum", whole, high)
 
 
 def sorted_in_place(graph: Graph, values: Tracer, axis: int = -1) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Tracer, concatenated, scalar, traced
 from ..graph import Expr, Graph, Untraceable
+from ..masked import Masked
 from ..operators import elementwise, product
 from .cells import by_numpy
 from .table import METHODS, enter, of
@@ -218,11 +219,29 @@ def put(graph: Graph, target: Any, places: Any, values: Any) -> None:
     target[np.asarray(places)] = values
 
 
+@of(np.extract)
+def extract(graph: Graph, condition: Any, values: Any) -> Masked:
+    """Return the elements where a condition holds."""
+    mask, array = traced(graph, condition), traced(graph, values)
+    return Masked(array, elementwise(graph, "ne", mask, 0.0))
+
+
+@of(np.place, np.putmask)
+def place(graph: Graph, target: Any, mask: Any, values: Any) -> None:
+    """Assign where a condition holds: one value, or the elements of the same condition."""
+    mask = elementwise(graph, "ne", traced(graph, mask), 0.0)
+    if isinstance(values, Masked):
+        values = values.whole_for(mask)
+    elif traced(graph, values).size != 1:
+        raise Untraceable("several values in the places of a mask")
+    target[...] = elementwise(graph, "select", mask, values, target)
+
+
 @of(np.fill_diagonal)
 def fill_diagonal(graph: Graph, target: Any, value: Any) -> None:
     """Assign to the diagonal of a matrix."""
     if target.ndim != 2:
-        raise Untraceable("the diagonal of what is no matrix")
+        raise Untraceable("the diagonal of something else than a matrix")
     for k in range(min(target.shape)):
         target[k, k] = value if not getattr(value, "shape", ()) else value[k]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Special, Tracer
+from ..arrays import Special, Tracer, traced
 from ..functions import FUNCTIONS
 from ..graph import NUMPY, Graph, Untraceable
 from ..operators import elementwise
@@ -37,7 +37,11 @@ def formula(*functions: Any) -> Callable[[Any], Any]:
     """Enter a function that is a formula of others, which it takes from its first argument."""
 
     def entered(own: Any) -> Any:
-        enter(functions, lambda graph, *rest, **named: own(Facade(graph), *rest, **named))
+        def of_graph(graph: Graph, *rest: Any, **named: Any) -> Any:
+            arrays = [traced(graph, v) if isinstance(v, list) else v for v in rest]
+            return own(Facade(graph), *arrays, **named)
+
+        enter(functions, of_graph)
         return own
 
     return entered
@@ -67,6 +71,23 @@ class Kind:
 def plain(value: Any) -> Any:
     """Return the type that stands behind a value, any other value as it is."""
     return value.real if isinstance(value, Kind) else value
+
+
+def constant(value: Tracer) -> Any:
+    """Return an array of constants as numbers, any other as it is."""
+    elements = value.values.flat
+    if any(e.op not in ("const", "table") for e in elements):
+        return value
+    kinds = {e.kind for e in value.values.flat}
+    as_number = {"b": bool, "i": int}.get(kinds.pop() if len(kinds) == 1 else "f", float)
+    if not value.shape:
+        return as_number(value.only.data)
+    if value.axis is not None and any(e.op != "table" for e in value.values.flat):
+        rows = [np.full(value.length, e.data) if e.op == "const" else np.array(e.data)
+                for e in value.values.flat]  # fmt: skip
+        whole = np.array(rows).reshape(*value.values.shape, value.length)
+        return np.moveaxis(whole, -1, value.axis)
+    return np.array([as_number(e.data) for e in value.elements().flat]).reshape(value.shape)
 
 
 class Facade:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import builtins
+import dataclasses
 import enum
 import functools
-from collections import Counter, OrderedDict, deque
+from collections import Counter, OrderedDict, defaultdict, deque
+from dataclasses import replace
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -88,7 +90,7 @@ CONTAINERS = (
     | complex
     | range
 )
-HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace)
+HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict)
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
 _PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float", "format",
           "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord", "pow", "range",
@@ -115,6 +117,10 @@ def call(
     if thing is functools.partial:
         rest = tuple(named.items())
         return KnownValue(True, True, known=Bound(given[0], tuple(given[1:]), rest))
+    if thing is dataclasses.replace and given:
+        return made.replaced(walk, given[0], named)
+    if thing in (dataclasses.astuple, dataclasses.asdict, dataclasses.fields):
+        return OUTSIDE
     if isinstance(thing, BuiltinFunctionType) and isinstance(owner, CONTAINERS):
         bound = method(walk, captured(owner), thing.__name__, given, named)
         return OUTSIDE if bound is None else bound
@@ -123,6 +129,9 @@ def call(
         return _library(walk, thing, module, given, named)
     if isinstance(thing, type):
         parts = [*given, *named.values()]
+        if thing in HOLDERS:
+            _call_functions(walk, parts)
+            parts = [v for v in parts if not isinstance(v.known, type)]
         if thing in HOLDERS or (issubclass(thing, tuple) and hasattr(thing, "_fields")):
             return KnownValue(True, all(v.own and v.inside for v in parts), True)
         return made.instance(walk, thing, given, named)
@@ -183,7 +192,9 @@ def _read(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
         key = given[0].known
         if isinstance(base.known, dict) and isinstance(key, str) and key in base.known:
             return captured(base.known[key])
-        return least_upper_bound([element(base), *given[1:]])
+        parts = [captured(v) for v in base.known.values()] if isinstance(base.known, dict) else []
+        known = function_choice([*parts, *given[1:]])
+        return replace(least_upper_bound([element(base), *given[1:]]), known=known)
     if isinstance(base.known, dict) and name in ("values", "items"):
         parts = tuple(getattr(base.known, name)())
         return KnownValue(True, base.inside, True, known=parts)

@@ -105,8 +105,24 @@ def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
     found = inspect.getattr_static(own.cls, name, None)
     if found is None:
         return OUTSIDE  # it raises where it runs
-    walk.captured(own.cls, name, found)
+    walk.captured(own.cls, name, getattr(own.cls, name))
     return of_class(walk, base, found)
+
+
+def replaced(walk: Walk, base: KnownValue, named: dict[str, KnownValue]) -> KnownValue:
+    """Return what is known of what `dataclasses.replace` makes of an object."""
+    thing = base.known
+    known = isinstance(thing, Instance)
+    cls = thing.cls if known else type(thing)
+    if isinstance(thing, Unknown) or not dataclasses.is_dataclass(cls):
+        raise Impure("replaces fields of what is only known when it runs", "name the class")
+    before = {
+        each.name: attribute(walk, base, each.name)
+        if known
+        else captured(getattr(thing, each.name))
+        for each in dataclasses.fields(cls)
+    }
+    return instance(walk, cls, [], before | named)
 
 
 def of_parent(walk: Walk, parent: Parent, name: str) -> KnownValue:
@@ -116,7 +132,7 @@ def of_parent(walk: Walk, parent: Parent, name: str) -> KnownValue:
         if name in vars(cls):
             if cls is object:
                 return KnownValue(True, True, known=Pure())  # object.__init__ does nothing
-            walk.captured(cls, name, vars(cls)[name])
+            walk.captured(cls, name, getattr(cls, name))
             return of_class(walk, parent.own, vars(cls)[name])
     return OUTSIDE
 
