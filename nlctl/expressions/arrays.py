@@ -12,6 +12,7 @@ import numpy as np
 from .graph import SMALL, Expr, Graph, Untraceable
 
 MOST = 2048  # elements of an array that are kept one by one
+TABLED = 256  # elements of a constant matrix beyond which each row is a table
 
 
 class Special:
@@ -249,9 +250,9 @@ class Tracer:
 
     def _as_long_if_many(self) -> Tracer:
         many = self.axis is None and self.ndim == 1 and self.size > SMALL
-        return self._as_long() if many else self
+        return self.as_long() if many else self
 
-    def _as_long(self) -> Tracer:
+    def as_long(self) -> Tracer:
         """Return elements of a small matrix as a long array of one dimension."""
         pieces = [(e, 1) for e in self.cells.flat]
         made = Tracer(self.graph, as_array(self.graph.joined(pieces)), 0, self.size)
@@ -341,15 +342,17 @@ def traced(graph: Graph, value: Any) -> Tracer:
 
 def _constants(graph: Graph, array: np.ndarray) -> Tracer:
     long = [i for i, n in enumerate(array.shape) if n > SMALL]
-    if not long or len(long) > 1 or array.ndim > 2 or array.dtype != float:
+    is_large = array.size > TABLED and array.shape[0] <= TABLED
+    by_rows = len(long) == 1 or is_large
+    if not long or not by_rows or array.ndim > 2 or array.dtype != float:
         if array.size > MOST:
             raise Untraceable("a large matrix")
         return Tracer(graph, mapped(graph.const, array.astype(object)))
-    moved = np.moveaxis(array, long[0], -1)
+    moved = np.moveaxis(array, long[-1], -1)
     cells = np.empty(moved.shape[:-1], dtype=object)
     for index in np.ndindex(cells.shape):
         cells[index] = graph.table(list(moved[index]))
-    return Tracer(graph, cells, long[0], array.shape[long[0]])
+    return Tracer(graph, cells, long[-1], array.shape[long[-1]])
 
 
 def leaf_vector(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Special, Tracer, as_array, is_complex, mapped, traced
-from .graph import Ambiguous, Expr, Graph, Untraceable
+from .graph import SMALL, Ambiguous, Expr, Graph, Untraceable
 from .integers import integer_range
 
 FOLLOWED = 16  # values of an integer, each a way through a function
@@ -81,6 +81,8 @@ def product(a: Tracer, b: Tracer) -> Tracer:
         return _batched(a, b)
     if a.shape[-1] != b.shape[0]:
         raise Untraceable(f"a product of shapes {a.shape} and {b.shape}")
+    if b.ndim == 1 and b.axis is None and b.size > SMALL and a.axis == a.ndim - 1:
+        b = b.as_long()
     if b.ndim == 2:
         a = a[..., None]
         return total(elementwise(a.graph, "mul", a, b), -2)

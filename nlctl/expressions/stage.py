@@ -30,6 +30,7 @@ from .library.splines import called_object, enter_splines
 from .library.table import MAKING, OPERATIONS, OWN, Kind, plain
 from .operators import elementwise
 from .staged import (
+    LIBRARIES,
     StagedModule,
     StagedObject,
     StagedParent,
@@ -40,11 +41,10 @@ from .staged import (
     settled,
 )
 
-_LIBRARIES = ("numpy", "scipy", "numba")
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice)
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
 _KEPT = ("__dict__", "__weakref__", "__slots__")  # of a class: what Python makes itself
-_LARGE = 4096  # elements of an array that stays as it is
+_LARGE = 65536  # elements of an array that stays as it is
 
 
 class Stage:
@@ -115,7 +115,7 @@ class Stage:
         if value is np or value is math or value is cmath:
             return self.numpy if value is np else self.math if value is math else self.cmath
         if isinstance(value, ModuleType):
-            inside = value.__name__.partition(".")[0] in _LIBRARIES
+            inside = value.__name__.partition(".")[0] in LIBRARIES
             return StagedModule(value, self._library if inside else lambda _, v: self.instead(v))
         if type(value) is np.ndarray:
             return self.fresh(value)
@@ -226,10 +226,17 @@ class Stage:
                 written = _in_python(real)
                 if written is None:
                     raise Untraceable(f"{_title(real)} is not known here")
-                return self.copied(written)(*arguments, **options)
+                return self._traced_library(real, written, arguments, options)
             return self.fresh(real(*every, **named))
 
         return function
+
+    def _traced_library(self, real: Any, written: FunctionType, given: Any, named: Any) -> Any:
+        """Trace a function of a library that is plain Python as if it were somebody's."""
+        try:
+            return self.copied(written)(*given, **named)
+        except Exception as error:  # whatever it does not expect of tracers
+            raise Untraceable(f"{_title(real)} is not known here") from error
 
     def fresh(self, value: Any) -> Any:
         """Return constants that a library has made: arrays as those of expressions."""

@@ -20,7 +20,7 @@ from .operators import elementwise
 if TYPE_CHECKING:
     from .stage import Stage
 
-_LIBRARIES = ("numpy", "scipy", "numba")
+LIBRARIES = ("numpy", "scipy", "numba")
 
 
 def holds_tracers(value: Any) -> bool:
@@ -44,7 +44,7 @@ def settled(value: Any) -> Any:
 def is_of_a_library(thing: Any) -> bool:
     """Whether a function, or an object's class, is one of a well-known library."""
     module = getattr(thing, "__module__", None) or type(thing).__module__
-    return module.partition(".")[0] in _LIBRARIES
+    return module.partition(".")[0] in LIBRARIES
 
 
 class StagedModule:

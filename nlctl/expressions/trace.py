@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dis
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, OpenCondition, Unt
 from .library.python import Namespace
 from .operators import elementwise
 from .stage import Stage
+from .staged import LIBRARIES
 
 PATHS = 32  # ways through one function that are followed
 
@@ -54,7 +56,7 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
         raise
     except Exception as error:  # a traced function may raise whatever it likes
         graph.assumptions = assumptions
-        raise Untraceable(str(error)) from error
+        raise Untraceable(f"{error}{_place(error)}") from error
     finally:
         graph.decisions, graph.implied, graph.guards = {}, {}, []
         graph.limit = UNLIMITED
@@ -110,6 +112,18 @@ def _is_raised(error: Exception) -> bool:
     code = place.tb_frame.f_code
     own = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
     return own and code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
+
+
+def _place(error: BaseException) -> str:
+    """Return at which line of somebody's function an error was raised, in brackets."""
+    where, frame = "", error.__traceback__
+    while frame is not None:
+        code, names = frame.tb_frame.f_code, frame.tb_frame.f_globals
+        module = str(names.get("__name__")).partition(".")[0]
+        if isinstance(names.get("__builtins__"), Namespace) and module not in LIBRARIES:
+            where = f" ({Path(code.co_filename).name}, line {frame.tb_lineno})"
+        frame = frame.tb_next
+    return where
 
 
 def _guarded(graph: Graph, result: Tracer) -> Tracer:

@@ -21,6 +21,7 @@ from .compiled import Compiled
 from .integrate.driver import Settings, trajectory
 from .integrate.results import Statistics, Trajectory
 from .integrate.state import Status
+from .own_errors import own_error
 
 
 def respond(
@@ -78,7 +79,8 @@ def respond(
     ended = run.status is Status.ENDED
     fine = ended or run.status is Status.OK
     if not fine and not ignore_errors:
-        raise _error(compiled, made, p, params)
+        raised = own_error(compiled, made, params) if run.status is Status.DIVERGED else None
+        raise raised or _error(compiled, made, p, params)
     shown = np.isin(made.time, wanted)
     shown[-1:] |= ended
     message = None if fine else str(_error(compiled, made, p, params))
