@@ -57,8 +57,8 @@ class Compiled(StandIn):
     linearizes it with exact derivatives, and so do `nlctl.linearize` and ``ct.linearize``.  Every
     other function of python-control takes ``compiled.system``.
 
-    The stiff method's Jacobian is exact too.  Where a function is opaque it is taken by
-    differences; the printed form says so, and why.
+    The stiff method's Jacobian is exact too.  An opaque function has differences in it, and all
+    else is exact; the printed form says so, and why.
 
     Examples
     --------
@@ -260,9 +260,14 @@ class Compiled(StandIn):
         Raises
         ------
         CompileError
-            If a function is called as it stands.
+            If there are transport delays, or the rates of inputs enter.
         ParameterError, UnknownKeywordError, UsageError
             If an argument is refused.
+
+        Warns
+        -----
+        InexactWarning
+            If a function is called as it stands: its derivatives are differences.
 
         Notes
         -----
@@ -380,8 +385,8 @@ def compile(  # noqa: A001 (what it does)
     Functions are read before they are called.  One that remembers something outside of states,
     changes what it was given, draws random numbers, or has ``try ... except`` is refused.
 
-    A function that cannot be written out as expressions (it has a loop that the state ends, reads
-    a table of SciPy) is called as it stands: as machine code that numba makes of it, otherwise
+    A function that cannot be written out as expressions (it has a loop that the state ends, or a
+    quadrature) is called as it stands: as machine code that numba makes of it, otherwise
     back in Python, which is right and as slow as python-control.  ``print(compiled)`` says which.
 
     Examples
@@ -454,11 +459,16 @@ def linearize(
     AlgebraicLoopError
         If signals depend on each other without a state in between.
     CompileError
-        If the diagram cannot be compiled, or a function is called as it stands.
+        If the diagram cannot be compiled.
     ParameterError
         If an argument is refused, or the clocks have no common period.
     UnknownKeywordError, UsageError
         If there is no such keyword; if signals are delayed, whose past is not a state.
+
+    Warns
+    -----
+    InexactWarning
+        If a function is called as it stands: its derivatives are differences, all others exact.
 
     Examples
     --------

@@ -21,6 +21,7 @@ from .compiled import Compiled
 from .integrate.driver import Settings, trajectory
 from .integrate.results import Statistics, Trajectory
 from .integrate.state import Status
+from .own_errors import own_error
 
 
 def respond(
@@ -79,7 +80,8 @@ def respond(
     ended = run.status is Status.ENDED
     failed = _error(compiled, made, p, params)
     if failed is not None and not ignore_errors:
-        raise failed
+        raised = own_error(compiled, made, params) if run.status is Status.DIVERGED else None
+        raise raised or failed
     shown = np.isin(made.time, wanted)
     shown[-1:] |= ended
     message = None if failed is None else str(failed)
