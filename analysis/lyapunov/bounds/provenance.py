@@ -224,9 +224,11 @@ class Shown:
 
     @property
     def claim(self) -> str:
-        """What is proved, with the starts and inputs that it is about."""
+        """What is proved, with the starts and inputs that it is about; or that nothing is."""
         added = f", whatever external inputs add up to {self.disturbance:.6g} to v"
-        return f"{self.bound} from {self.starts}{added if self.disturbance else ''}"
+        about = f"from {self.starts}{added if self.disturbance else ''}"
+        lost = f"no bound is proved {about}, and none is refuted; undecided"
+        return f"{self.bound} {about}" if self.holds else lost
 
     @property
     def constants(self) -> tuple[Constant, ...]:
@@ -236,8 +238,7 @@ class Shown:
     @property
     def verdict(self) -> str:
         """What is proved, in a sentence."""
-        lost = f"no bound is proved from {self.starts}, and none is refuted; undecided"
-        return f"{self.claim if self.holds else lost}: {self.reason}"
+        return f"{self.claim}: {self.reason}"
 
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Write the proof so that others can check it: rationals, boxes and the claim, as JSON.
