@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 from nlctl.host.notebook import table_html
 from nlctl.names import unknown
@@ -240,6 +241,7 @@ class Shown:
         """What is proved, in a sentence."""
         return f"{self.claim}: {self.reason}"
 
+    @as_annotated
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Write the proof so that others can check it: rationals, boxes and the claim, as JSON.
 
@@ -266,9 +268,9 @@ class Shown:
             raise UsageError(
                 f"nothing is proved of '{self.name}' that could be saved: {self.reason}"
             )
-        return self._saved(file)
+        return self._saved(Path(file))
 
-    def _saved(self, file: str | os.PathLike[str]) -> Path:
+    def _saved(self, file: Path) -> Path:
         raise NotImplementedError
 
     def _repr_html_(self) -> str:
