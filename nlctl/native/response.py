@@ -122,7 +122,7 @@ def _falls(compiled: Compiled, made: Trajectory) -> list[float]:
     own = [k for k, block in enumerate(guards) if block == guards[made.culprit]]
     path = compiled.schedule.nodes[guards[made.culprit]].path
     name = "guard" if len(own) == 1 else f"guard {own.index(made.culprit) + 1}"
-    return [t for t, block, which, _ in made.happened if (block, which) == (path, name)]
+    return made.happened.times(path, name).tolist()
 
 
 def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ from ..responses.arguments import (
     interpolated,
     state_array,
 )
+from ..responses.event_log import event_log
 from ..responses.time_response import Response, as_response, response_of
 from ..sampling.system import happening
 from ..sliding.blocks import sliding_blocks
@@ -163,7 +164,7 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
     response = response_of(
         system, (reached, y, x, interpolated(inputs, times, reached)), run.params, run.form, **form
     )
-    response.happened = tuple(driver.happened)
+    response.happened = event_log(driver.happened)
     return response
 
 
