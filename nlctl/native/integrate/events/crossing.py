@@ -21,11 +21,8 @@ from .location import AGAIN, CLEAR, EVENT, REFUSED
 NOTHING = -2  # no condition lies in the step just tried
 _SHARE = 0.01  # of the relative tolerance, of a step: how close to a condition steps end
 _TRIES = 60
-_CLEARLY, _GAP, _MOST = (
-    3.0,
-    1e-4,
-    0.05,
-)  # of a step with a stage behind a condition: how much is left out
+# of a step with a stage behind a condition: how much is left out
+_CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
 _NOTICED = 0.02  # the same where the step ends at a stop: a little less would be taken for it
 _LEAST = 1e-12  # of the time: shorter steps are taken whatever their stages see
 
@@ -45,7 +42,8 @@ def crossing(task, lane, w, j):
     beyond = 0.0 if inside else _beyond(task, lane, w, j)
     if beyond > 0.0:
         least = _NOTICED if lane.ends else _GAP
-        shorten(lane, 1.0 - min(max(_CLEARLY * beyond, least), _MOST))
+        kept = 1.0 - min(max(_CLEARLY * beyond, least), _MOST)
+        shorten(lane, min(kept, 1.0 / (1.0 + beyond)))  # far behind: to where it is crossed
         return REFUSED
     if not inside and lane.traces == 0:
         return NOTHING
