@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import control as ct
@@ -24,6 +21,7 @@ from .params import (
     record_rows,
     with_overrides,
 )
+from .supplied import Supplied, supplied_now
 from .upstream.control_internals import (
     Around,
     OwnParameters,
@@ -78,12 +76,9 @@ class Spec(Protocol):
         ``check(self)`` raises `nlctl.ParameterError` where several fields contradict each other.
     plant_order : int, optional
         Of a controller: the order of the plants that it is made for.
-    delayed : bool, optional
-        True of `nlctl.TransportDelay`, whose outputs are its inputs at earlier times: they follow
-        from a run, not from `output`.
-    sliding : bool, optional
-        True of `nlctl.IdealRelay`, whose equations get two more numbers behind the input: a and b
-        of the rate u' = a + b v that the whole diagram gives its input with an output v.
+    supplied : Supplied, optional
+        Of `nlctl.TransportDelay` and `nlctl.IdealRelay`, whose outputs follow from a run, and not
+        from `output` alone: see `nlctl.supplied`.
 
     Notes
     -----
@@ -114,51 +109,6 @@ class Spec(Protocol):
     def output(self) -> Any:
         """The equation of the outputs, ``output(t, x, u, p)``."""
         ...
-
-
-@dataclass(kw_only=True)
-class DelayLine:
-    """What leaves a block at an instant that it alone does not know, and what arrives there then.
-
-    Attributes
-    ----------
-    leaving : callable
-        What leaves at a time, of shape (signals,).
-    arriving : ndarray of shape (signals,)
-        What has arrived when it was last asked.
-    """
-
-    leaving: Callable[[float], np.ndarray]
-    arriving: np.ndarray
-
-
-_PAST: ContextVar[Mapping[int, DelayLine] | None] = ContextVar("nlctl_past", default=None)
-
-
-@contextmanager
-def past(lines: Mapping[Any, DelayLine]) -> Iterator[None]:
-    """Say what leaves transport delays and ideal relays where a diagram is evaluated.
-
-    Python-control then finds the signals of the present, and what arrives at these blocks is left
-    in `lines`, which goes by block.
-    """
-    token = _PAST.set({id(made): line for made, line in lines.items()})
-    try:
-        yield
-    finally:
-        _PAST.reset(token)
-
-
-_DELAYS = (
-    "delays its signals, and python-control does not keep the past: use "
-    "nlctl.input_output_response (engine='python-control' is the reference); to linearize, put "
-    "ct.ss(ct.tf(*ct.pade(delay, n))) in its place"
-)
-SLIDES = (
-    "is an ideal relay, whose output while it slides follows from the rates of the whole diagram, "
-    "and python-control does not look at these: use nlctl.input_output_response(diagram, ...) in "
-    "machine code and nlctl.compile(diagram).linearize, or nlctl.Relay, which has hysteresis"
-)
 
 
 class Block(OwnParameters):
@@ -204,7 +154,7 @@ class Block(OwnParameters):
             set_parameters(self, None)
 
     def answer(self, t: float, x: Any, u: Any) -> Any:
-        """Return its outputs; of transport delays and ideal relays what `past` says, see there.
+        """Return its outputs; if these are supplied, see `nlctl.supplied`, what is supplied now.
 
         Parameters
         ----------
@@ -223,15 +173,17 @@ class Block(OwnParameters):
         Raises
         ------
         UsageError
-            If it is a transport delay or an ideal relay, which python-control would run wrongly.
+            If nothing is: it is a transport delay, for example, which python-control would run
+            wrongly.
         """
-        if not (is_delayed(self) or slides(self)):
+        supplied = supplied_of(self)
+        if supplied is None:
             return super().answer(t, x, u)
-        line = (_PAST.get() or {}).get(id(self))
-        if line is None:
-            raise UsageError(f"block '{self.name}' {SLIDES if slides(self) else _DELAYS}")
-        line.arriving = np.array(u, dtype=float).reshape(-1)
-        return line.leaving(float(t))
+        now = supplied_now(self)
+        if now is None:
+            raise UsageError(f"block '{self.name}' {supplied.why}")
+        now.arriving = np.array(u, dtype=float).reshape(-1)
+        return now.leaving(float(t))
 
     def _own(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return the overrides among `params` that are this block's, by field name."""
@@ -376,11 +328,9 @@ def _check_timebase(spec: Any, name: str, dt: Any) -> None:
     is_number = isinstance(dt, int | float | np.number)
     if not (dt is None or dt is True or (is_number and 0 <= dt < np.inf and dt is not False)):
         raise ParameterError(f"{who} needs dt >= 0 in s, True or None, got {dt!r}")
-    if getattr(spec, "delayed", False) and dt not in (None, 0):
-        raise ParameterError(
-            f"{who} is in continuous time, got dt={dt}: in discrete time k samples late is "
-            "ct.tf(1, [1] + [0] * k, dt), and nlctl.sampled has delay=..."
-        )
+    supplied = getattr(spec, "supplied", None)
+    if supplied is not None and supplied.discrete and dt not in (None, 0):
+        raise ParameterError(f"{who} is in continuous time, got dt={dt}: {supplied.discrete}")
     if not spec.states:
         return
     is_discrete, sampled = bool(getattr(spec, "discrete", False)), dt is True or bool(dt)
@@ -415,14 +365,9 @@ def within(system: Any) -> Any:
     return system.inner if isinstance(system, Around) else system
 
 
-def is_delayed(system: Any) -> bool:
-    """Whether a block's outputs are its inputs at earlier times."""
-    return isinstance(system, Block) and bool(getattr(system.spec, "delayed", False))
-
-
-def slides(system: Any) -> bool:
-    """Whether a block's equations ask for the rate that the diagram gives its input."""
-    return isinstance(system, Block) and bool(getattr(system.spec, "sliding", False))
+def supplied_of(system: Any) -> Supplied | None:
+    """Return how a block's outputs are supplied, None if they are its own."""
+    return getattr(system.spec, "supplied", None) if isinstance(system, Block) else None
 
 
 def sampling_of(system: Any) -> Any:
@@ -449,7 +394,9 @@ def _count(made: Block, what: str) -> int:
     """Return how many numbers an equation of a block returns, 0 if there is none."""
     if not hasattr(made.spec, what):
         return 0
-    u = np.full((made.ninputs or 0) + 2 * slides(made), 0.25)
+    supplied = supplied_of(made)
+    further = 0 if supplied is None else supplied.rates
+    u = np.full((made.ninputs or 0) + further, 0.25)
     found = getattr(made.spec, what)(0.0, default_state(made), u, current_parameters(made))
     return int(np.size(found))
 
@@ -457,7 +404,7 @@ def _count(made: Block, what: str) -> int:
 def _probe(made: Block) -> None:
     """Call the equations once: sizes must match, and feedthrough must be declared truly."""
     spec, who = made.spec, f"{type(made.spec).__name__} (block '{made.name}')"
-    if is_delayed(made) or slides(made):
+    if supplied_of(made) is not None:
         return
     x, u, p = default_state(made), np.full(made.ninputs or 0, 0.25), current_parameters(made)
     with np.errstate(all="ignore"):

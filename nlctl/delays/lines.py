@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..blocks import Block, is_delayed
+from ..blocks import Block, supplied_of
 from ..diagrams import continuous_blocks
+from .transport import PAST
 
-_WHY = (
-    "needs continuous time: in discrete time k samples late is ct.tf(1, [1] + [0] * k, dt), and "
-    "nlctl.sampled has delay=..."
-)
+
+def is_delayed(system: Any) -> bool:
+    """Whether a block's outputs are its inputs at earlier times."""
+    return supplied_of(system) is PAST
 
 
 def delayed_blocks(system: Any) -> list[Block]:
@@ -21,4 +22,4 @@ def delayed_blocks(system: Any) -> list[Block]:
     DiagramError
         If one is in discrete time, is sampled, or stands in the diagram twice.
     """
-    return continuous_blocks(system, is_delayed, _WHY, "past")
+    return continuous_blocks(system, is_delayed, f"needs continuous time: {PAST.discrete}", "past")

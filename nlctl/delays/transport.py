@@ -10,7 +10,16 @@ import numpy as np
 from ..arguments import pairs
 from ..errors import ParameterError, UsageError
 from ..params import param, record
+from ..supplied import Supplied
 from ..wording import counted
+
+PAST = Supplied(
+    why="delays its signals, and python-control does not keep the past: use "
+    "nlctl.input_output_response (engine='python-control' is the reference); to linearize, put "
+    "ct.ss(ct.tf(*ct.pade(delay, n))) in its place",
+    discrete="in discrete time k samples late is ct.tf(1, [1] + [0] * k, dt), and nlctl.sampled "
+    "has delay=...",
+)
 
 
 @record
@@ -57,7 +66,7 @@ class TransportDelay:
 
     states = ()
     feedthrough = False
-    delayed = True
+    supplied = PAST
 
     def check(self) -> None:
         """Signals come in pairs; a history and a variation are functions."""

@@ -16,12 +16,13 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from ..blocks import DelayLine, is_delayed, past, slides
-from ..delays.lines import delayed_blocks
+from ..blocks import supplied_of
+from ..delays.lines import delayed_blocks, is_delayed
 from ..diagrams import Apart, apart, override
 from ..diagrams.points import SHAKEN, PointValues, agree, explained, values_now
 from ..errors import ParameterError, UsageError
 from ..sampling.system import Happening, happening
+from ..supplied import SuppliedOutput, supplying
 from ..upstream.control_internals import outputs_now, rates_now, set_parameters
 from .codegen.lower import lower
 from .codegen.program import instants_of
@@ -232,15 +233,15 @@ def _compare_beyond_rounding(
 def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> PointValues:
     system = trial.of(compiled.schedule.system)
     lines, point = _lines(compiled, trial, point)
-    with past(lines), happening():
+    with supplying(lines), happening():
         rates, outputs = values_now(system, point)
     arriving = [line.arriving for made, line in lines.items() if is_delayed(made)]
     after, rows = [], list(compiled.program.sampled)
     for what in trial.meetings:
         now = frozenset(moment._replace(owner=trial.of(moment.owner)) for moment in what)
-        with past(lines), happening(now):
+        with supplying(lines), happening(now):
             after.append(rates_now(system, *point)[rows])
-    with past(lines), happening():
+    with supplying(lines), happening():
         declared = declared_now(compiled.schedule, system, point)
     return rates, np.concatenate([outputs, *arriving]), *after, *declared
 
@@ -298,12 +299,12 @@ def _rates_of_input(compiled: Compiled, trial: Trial, i: int, point: Any) -> np.
 def _arriving(compiled: Compiled, trial: Trial, i: int, point: Any) -> float:
     """Return what python-control finds at the input of an ideal relay."""
     lines, point = _lines(compiled, trial, point)
-    with past(lines), happening():
+    with supplying(lines), happening():
         rates_now(trial.of(compiled.schedule.system), *point)
     return float(lines[trial.of(compiled.schedule.nodes[i].system)].arriving[0])
 
 
-def _lines(compiled: Compiled, trial: Trial, point: Any) -> tuple[dict[Any, DelayLine], Any]:
+def _lines(compiled: Compiled, trial: Trial, point: Any) -> tuple[dict[Any, SuppliedOutput], Any]:
     """Return what leaves transport delays and relays, and the point with the diagram's inputs."""
     t, x, u = point
     own = compiled.system.ninputs or 0
@@ -318,8 +319,8 @@ def _lines(compiled: Compiled, trial: Trial, point: Any) -> tuple[dict[Any, Dela
     return lines, (t, x, u[:own])
 
 
-def _line(values: np.ndarray) -> DelayLine:
-    return DelayLine(leaving=lambda t: values, arriving=np.full(values.size, np.nan))
+def _line(values: np.ndarray) -> SuppliedOutput:
+    return SuppliedOutput(leaving=lambda t: values, arriving=np.full(values.size, np.nan))
 
 
 def _later(point: Any, trial: Trial) -> float:
@@ -347,7 +348,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: PointValues, point: 
     given = list(block_inputs(system, u[: system.ninputs or 0], outputs))
     for i in dict.fromkeys((*compiled.schedule.order, *range(len(nodes)))):
         node, (block, inputs) = nodes[i], given[i]
-        if is_delayed(block) or slides(block):
+        if supplied_of(block) is not None:
             continue
         own = slice(node.state_offset, node.state_offset + (block.nstates or 0))
         pairs = [(outputs[i], every[counts[i] : counts[i + 1]], outputs_now, block.output_labels)]

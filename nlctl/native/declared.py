@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..blocks import slides
+from ..sliding.blocks import slides
 from ..upstream.control_internals import current_parameters, parts_now
 from ..wording import numbered
 from .codegen.program import Program, count_guards, count_switching_functions, memory

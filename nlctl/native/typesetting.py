@@ -17,13 +17,14 @@ import control as ct
 import numpy as np
 
 from ..annotations import as_annotated
-from ..blocks import Block, slides
+from ..blocks import Block
 from ..diagrams import apart, known_system, override
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
 from ..expressions.graph import Expr, Graph, needed
 from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol, with_index
 from ..params import declared_params
+from ..sliding.blocks import slides
 from .diagram.feedthrough import feedthrough
 from .diagram.schedule import Node, Schedule, Signal, schedule
 from .equations.reader import Reader

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..blocks import past
 from ..errors import DivergedError
 from ..sampling.system import happening
+from ..supplied import supplying
 from ..upstream.control_internals import outputs_now, parts_now, rates_now
 from .crossings import FEW_PLACES, STEP_PLACES, Event, first_event
 from .jumps import Jumps
@@ -93,7 +93,7 @@ class Driver:
         self._switches = Switches(self.system.name, self.jumps.label, (begin, end), tolerances)
         t, sides, what, is_break = begin, None, self.stops.due.get(begin, frozenset()), True
         with ExitStack() as stack:
-            stack.enter_context(past(self.known.lines))
+            stack.enter_context(supplying(self.known.lines))
             stack.enter_context(happening())
             while True:
                 self.known.reach(t, is_break)

@@ -10,7 +10,6 @@ import control as ct
 import numpy as np
 from scipy import integrate
 
-from ..blocks import SLIDES
 from ..delays.lines import delayed_blocks
 from ..diagrams import apart, override
 from ..errors import DivergedError, ParameterError, UsageError
@@ -25,7 +24,7 @@ from ..responses.arguments import (
 from ..responses.event_log import event_log
 from ..responses.time_response import Response, as_response, response_of
 from ..sampling.system import happening
-from ..sliding.blocks import sliding_blocks
+from ..sliding.blocks import SLIDING, sliding_blocks
 from ..upstream.control_internals import rates_now
 from .driver import Driver
 from .jumps import Jumps
@@ -72,7 +71,7 @@ def python_control_response(
     params = override(system, run.params)
     run = replace(run, system=system, params=params)  # from here on this run's own copy
     for made in sliding_blocks(system):
-        raise UsageError(f"block '{made.name}' {SLIDES}")
+        raise UsageError(f"block '{made.name}' {SLIDING.why}")
     # a function that declares no numbers of inputs or states gets what it is given
     inputs = run.inputs if system.ninputs is None else input_array(system, run.inputs, times)
     whole = system.nstates is None and run.initial_state is not None

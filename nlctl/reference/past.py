@@ -16,9 +16,10 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.optimize import brentq
 
-from ..blocks import Block, DelayLine
+from ..blocks import Block
 from ..delays.pieces import PLACES
 from ..delays.variation import check_positive, variation
+from ..supplied import SuppliedOutput
 from .stops import TIME_ROUNDING
 
 _DEGREE = 12
@@ -61,12 +62,12 @@ class Past:
         self.begin, self.end, self._tolerances = begin, end, tolerances
         self.step, self.breaks = (begin, begin), []
         self._starts, self._ends, self._pieces = [], [], []
-        self.lines: dict[Any, DelayLine] = {}
+        self.lines: dict[Any, SuppliedOutput] = {}
         for number, made in enumerate(blocks):
             spec: Any = made.current_spec
             varied = variation(spec, begin, end, str(made.name))
             check_positive(varied, np.array([spec.delay]), str(made.name))
-            self.lines[made] = DelayLine(
+            self.lines[made] = SuppliedOutput(
                 leaving=lambda t, number=number: self._leaving(number, t),
                 arriving=np.full(made.noutputs or 0, np.nan),
             )

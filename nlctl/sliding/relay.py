@@ -8,6 +8,15 @@ import numpy as np
 
 from ..equations import equation
 from ..params import param, record
+from ..supplied import Supplied
+
+SLIDING = Supplied(
+    why="is an ideal relay, whose output while it slides follows from the rates of the whole "
+    "diagram, and python-control does not look at these: use nlctl.input_output_response(diagram, "
+    "...) in machine code and nlctl.compile(diagram).linearize, or nlctl.Relay, which has "
+    "hysteresis",
+    rates=2,  # a and b of the rate u' = a + b v that the whole diagram gives its input
+)
 
 
 @equation
@@ -99,7 +108,7 @@ class IdealRelay:
     states = ("mode",)
     memory = ("mode",)
     feedthrough = False
-    sliding = True
+    supplied = SLIDING
     no_split = "its output jumps at u = 0: |v| = height for all u, so |v| <= k u + eps has no k"
 
     @staticmethod

@@ -11,7 +11,14 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl._version", "nlctl.host", "nlctl.upstream"],
     ["nlctl.errors", "nlctl.wording", "nlctl.names", "nlctl.arguments", "nlctl.params"]
     + ["nlctl.equations", "nlctl.annotations"],
-    ["nlctl.blocks", "nlctl.diagrams", "nlctl.functions", "nlctl.drawing", "nlctl.responses"]
+    [
+        "nlctl.supplied",
+        "nlctl.blocks",
+        "nlctl.diagrams",
+        "nlctl.functions",
+        "nlctl.drawing",
+        "nlctl.responses",
+    ]
     + ["nlctl.accumulation", "nlctl.sampling", "nlctl.delays", "nlctl.sliding", "nlctl.reference"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers", "nlctl.faults"],
     ["nlctl.paper"],

@@ -16,12 +16,12 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...blocks import is_delayed, slides, within
-from ...delays.lines import delayed_blocks
+from ...blocks import within
+from ...delays.lines import delayed_blocks, is_delayed
 from ...diagrams import places, samplings
 from ...responses.watched import Watched
 from ...sampling.system import Happening, Sampled
-from ...sliding.blocks import sliding_blocks
+from ...sliding.blocks import slides, sliding_blocks
 from ..thirdparty.captured import Captured, noted
 from ..thirdparty.checks import check_functions
 from .feedthrough import closer_feedthrough, feedthrough

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
-from ...blocks import slides
 from ...expressions.arrays import Tracer, concatenated, scalar
 from ...expressions.graph import Expr, Graph
+from ...sliding.blocks import slides
 from ..codegen.program import memory
 from ..codegen.trace import traced_parameters
 from .rates import OUTPUTS, Motion, SlidingInput, sliding_rates

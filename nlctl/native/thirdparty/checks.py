@@ -8,7 +8,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...blocks import Block, is_delayed
+from ...blocks import Block
+from ...delays.lines import is_delayed
 from ...errors import CompileError
 from ...params import as_numbers
 from ...upstream.control_internals import current_parameters, outputs_now, rates_now, set_parameters

@@ -128,13 +128,7 @@ def call(
     if module is not None and module.partition(".")[0] != "control":
         return _library(walk, thing, module, given, named)
     if isinstance(thing, type):
-        parts = [*given, *named.values()]
-        if thing in HOLDERS:
-            _call_functions(walk, parts)
-            parts = [v for v in parts if not isinstance(v.known, type)]
-        if thing in HOLDERS or (issubclass(thing, tuple) and hasattr(thing, "_fields")):
-            return KnownValue(True, all(v.own and v.inside for v in parts), True)
-        return made.instance(walk, thing, given, named)
+        return _instance(walk, thing, given, named)
     function = python_function(thing)
     if type(owner).__module__.startswith(VARYING):
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
@@ -148,6 +142,19 @@ def call(
     if not isinstance(thing, MethodType):
         walk.captured(type(thing), "__call__", function)
     return walk.function(function, [captured(owner if owner is not None else thing), *given], named)
+
+
+def _instance(
+    walk: Walk, thing: type, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue:
+    """Return what is known of an object that a class makes."""
+    parts = [*given, *named.values()]
+    if thing in HOLDERS:
+        _call_functions(walk, parts)
+        parts = [v for v in parts if not isinstance(v.known, type)]
+    if thing in HOLDERS or (issubclass(thing, tuple) and hasattr(thing, "_fields")):
+        return KnownValue(True, all(v.own and v.inside for v in parts), True)
+    return made.instance(walk, thing, given, named)
 
 
 def method(

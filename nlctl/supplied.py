@@ -1,0 +1,73 @@
+"""Outputs that are supplied to a block from outside: it alone cannot compute them.
+
+What leaves a transport delay has entered it earlier; what an ideal relay outputs while it slides
+follows from the rates of the whole diagram.  Where such a diagram is evaluated at an instant,
+`supplying` says what leaves these blocks, and keeps what arrives at them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True, kw_only=True)
+class Supplied:
+    """How a record's outputs are supplied, as its class says in `supplied`.
+
+    Attributes
+    ----------
+    why : str
+        Of whom, as the end of a sentence: python-control alone would run it wrongly.
+    rates : int
+        How many numbers its equations get behind the inputs, about the rate of these.
+    discrete : str
+        What takes its place in discrete time, if nothing else says that.
+    """
+
+    why: str
+    rates: int = 0
+    discrete: str = ""
+
+
+@dataclass(kw_only=True)
+class SuppliedOutput:
+    """What leaves a block at an instant that it alone does not know, and what arrives there then.
+
+    Attributes
+    ----------
+    leaving : callable
+        What leaves at a time, of shape (signals,).
+    arriving : ndarray of shape (signals,)
+        What has arrived when it was last asked.
+    """
+
+    leaving: Callable[[float], np.ndarray]
+    arriving: np.ndarray
+
+
+_NOW: ContextVar[Mapping[int, SuppliedOutput] | None] = ContextVar("nlctl_supplied", default=None)
+
+
+@contextmanager
+def supplying(outputs: Mapping[Any, SuppliedOutput]) -> Iterator[None]:
+    """Say what leaves blocks whose outputs are supplied, where a diagram is evaluated.
+
+    Python-control then finds the signals of the present, and what arrives at these blocks is left
+    in `outputs`, which goes by block.
+    """
+    token = _NOW.set({id(made): output for made, output in outputs.items()})
+    try:
+        yield
+    finally:
+        _NOW.reset(token)
+
+
+def supplied_now(made: Any) -> SuppliedOutput | None:
+    """Return what is supplied to a block now, None if nothing is."""
+    return (_NOW.get() or {}).get(id(made))
