@@ -275,13 +275,23 @@ def _counts(task, lane, i, end):
 
 @numba.njit(**INNER)
 def _note_events(task, lanes, w, found, done):
-    """Note the switching functions that have changed their signs in accepted steps."""
-    for j in range(lanes.size if task.alone else 0):
+    """Note the switching functions that have changed their signs in accepted steps.
+
+    Guards are noted where they fall.  Where none has changed its sign it was a memory.
+    """
+    for j in range(lanes.size):
         if not done[j] or found[j] != EVENT:
             continue
+        turns = 1 if task.memory.size else 0
         for i in range(task.guarded):
-            if w.e_start[i, j] * w.e[i, j] < 0.0 and _counts(task, lanes[j], i, w.e[i, j]):
-                note(task, lanes[j], w, i, w.e[i, j] > 0.0, j)
+            if w.e_start[i, j] * w.e[i, j] < 0.0:
+                turns = 0
+                if _counts(task, lanes[j], i, w.e[i, j]):
+                    note(task, lanes[j], w, i, w.e[i, j] > 0.0, j)
+        for i in range(task.guarded, task.switching):
+            if w.above[i - task.guarded, j] != 0 and w.e[i, j] < 0.0:
+                turns = 0
+        lanes[j].turns += turns
 
 
 @numba.njit(**INNER)

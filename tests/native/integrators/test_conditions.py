@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 import nlctl
+from nlctl.native.integrate.driver import Settings, begin, finish, go_on, prepared
+from nlctl.native.integrate.results import made as result
+from nlctl.native.integrate.state import RUNNING
 
 ROOT2 = np.sqrt(2.0)
 
@@ -156,6 +159,40 @@ def test_print_and_statistics_say_what_is_located():
     assert "conditions   1 located" in str(compiled)
     _, made = end("oscillator", engine="native")
     assert (made.statistics.conditions, made.statistics.opaque) == (1, False)
+
+
+@pytest.mark.parametrize("case", ["duty cycle", "oscillator", "square wave", "clipped"])
+def test_statistics_count_the_rows_of_the_table(case):
+    """Of a single run; members of an ensemble count the same."""
+    equations, start, last, _ = CASES[case]
+    times, compiled = np.linspace(0, last, 21), nlctl.compile(plain(equations, start))
+    made = nlctl.input_output_response(compiled, times, 0, start, rtol=1e-6, atol=1e-8)
+    assert made.statistics.events == len(made.events) > 0
+    assert f", {len(made.events)} events" in repr(made)
+    x0, p = np.tile(np.array(start)[:, None], 8), compiled.parameter_vector()[:, None]
+    settings, none = Settings(rtol=1e-6, atol=1e-8), np.zeros((0, times.size))
+    run = prepared(compiled, times, none, x0, np.tile(p, 8), settings, [])
+    begin(run)
+    while np.any(run.lanes["status"] == RUNNING):
+        run = go_on(run)
+    assert {result(run, finish(run), j).statistics.events for j in range(8)} == {len(made.events)}
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+def test_steps_of_an_ensemble_are_bounded(method):
+    """x' = -x over 1 s with steps of 1 / 64 s at most, and no bound: the least number of steps."""
+    compiled = nlctl.compile(plain(lambda t, x, u, p: [-x[0]], [1.0]))
+    members = {compiled.system.state_labels[0]: [1.0, 2.0, 3.0]}
+
+    def steps(**bound):
+        made = nlctl.ensemble_response(compiled, [0, 1], 0, members, method=method, **bound)
+        assert (made.table["status"] == "OK").all()
+        return made.table["steps"]
+
+    assert (steps(max_step=1 / 64) >= 64).all()
+    assert (steps() < 32).all()
+    with pytest.raises(nlctl.ParameterError, match="ensemble_response.*max_step"):
+        steps(max_step=0.0)
 
 
 def test_a_condition_that_is_always_0_is_no_event():
