@@ -13,7 +13,7 @@ import control as ct
 import numpy as np
 
 from ..annotations import as_annotated
-from ..arguments import number
+from ..arguments import number as checked_number
 from ..delays.variation import Variation
 from ..errors import ParameterError
 from ..host.notebook import table_html
@@ -200,7 +200,7 @@ def ensemble_response(
     """
     times = checked_times(timepts)
     if max_step is not None:
-        number("ensemble_response", "max_step", max_step, above=0)
+        checked_number("ensemble_response", "max_step", max_step, above=0)
     if not isinstance(compiled, Compiled):
         compiled = compile_diagram(compiled)
     if threads is not None:

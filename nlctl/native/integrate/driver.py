@@ -274,7 +274,7 @@ def prepared(
         times=times,
         inputs=inputs,
         p=c,
-        **_rows(program, code, method, read.watched),
+        **_rows(program, code, read.watched),
         rtol=float(settings.rtol),
         atol=float(settings.atol),
         fixed=float(settings.step),
@@ -304,17 +304,15 @@ def prepared(
     return Run(machine=code, task=task, work=work)
 
 
-def _rows(
-    program: Program, code: Machine, method: str | Tableau, watched: tuple[Watched, ...]
-) -> dict[str, Any]:
-    """Return how many rows are whose: declared, located, memories; Taylor has its own sides."""
+def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> dict[str, Any]:
+    """Return how many rows are whose: declared, located, memories."""
     located = code.lowered.rows["g"] - len(program.memory)
     bending = code.lowered.conditions.bending
     return {
         "bending": program.switching,
-        "declared": program.switching + (0 if method == "taylor" else bending),
-        "guarded": program.switching if method == "taylor" else located - len(program.guards),
-        "switching": program.switching if method == "taylor" else located,
+        "declared": program.switching + bending,
+        "guarded": located - len(program.guards),
+        "switching": located,
         "watched": located - len(program.guards) - len(watched),
         "ways": np.array([each.direction for each in watched], dtype=np.int64),
         "ending": np.array([each.ends for each in watched], dtype=np.int64),
@@ -324,12 +322,6 @@ def _rows(
 
 def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
     """Return the method of a run; what has delays is for the explicit one."""
-    located = compiled.program.guards or compiled.schedule.watched
-    if located and settings.method == "taylor":
-        raise ParameterError(
-            f"'{compiled.system.name}' has guards or events, which method='auto', 'tsit5' and "
-            "'rodas5p' locate, got method='taylor'"
-        )
     if not compiled.schedule.lines:
         return settings.method
     if settings.method not in ("auto", "tsit5"):

@@ -54,6 +54,18 @@ def fast_gaussian(t, x, u, p):
     return [np.exp(-(((t - 50.0) / 0.1) ** 2))]
 
 
+def sawtooth(t, x, u, p):
+    return [1.0 + 0.5 * ((2.0 * x[0] + 0.3) % 1.0)]
+
+
+def rounded(t, x, u, p):
+    return [-1.0 - abs(np.rint(x[0]))]
+
+
+def truncated(t, x, u, p):
+    return [-1.0 - np.ceil(x[0]) + np.trunc(x[0])]
+
+
 def oscillator_end(t):
     """x'' = -sign(x) from rest at 1: arcs of period 4 sqrt(2)."""
     s = t % (4 * ROOT2)
@@ -70,6 +82,17 @@ def stairs_end(t):
     return n + t * (1 + n)
 
 
+def sawtooth_end(t):
+    """x' = 1 + (2 x + 0.3 - n) / 2 = x + 1.15 - n / 2, up to each z = 2 x + 0.3 = n + 1."""
+    x, n = 0.0, 0
+    while True:
+        rate, end = x + 1.15 - n / 2, (n + 0.7) / 2
+        needed = np.log((end + 1.15 - n / 2) / rate)
+        if needed >= t:
+            return rate * np.exp(t) - 1.15 + n / 2
+        x, t, n = end, t - needed, n + 1
+
+
 CASES = {  # equations, initial state, last time, the first state there
     "duty cycle": (duty_cycle, [0.0], 10.0, 3.0),
     "window": (window, [0.0], 3.0, 0.6 + 2.5 - 0.1 / 11),
@@ -78,11 +101,15 @@ CASES = {  # equations, initial state, last time, the first state there
     "oscillator": (oscillator, [1.0, 0.0], 30.0, oscillator_end(30.0)),
     "load": (load, [0.0], 100.0, (1 - np.exp(-5)) * np.exp(-45)),
     "stairs": (stairs, [0.0], 3.5, stairs_end(3.5)),
+    "sawtooth": (sawtooth, [0.0], 3.5, sawtooth_end(3.5)),
+    "rounded": (rounded, [2.2], 2.0, -0.5 - 2.0 * (2.0 - 0.7 / 3 - 0.5 - 1.0)),
+    "truncated": (truncated, [1.5], 2.0, -(2.0 - 1.5 / 2)),
     "clipped": (clipped, [0.0], 5.5, 2.5 + (5.5 - np.log(4.5) - 1 / 1.5) / 2),
     "limited": (limited, [0.0], 4.0, 1 + np.sin(4.0) - 1),
     "gaussian": (fast_gaussian, [0.0], 100.0, 0.1 * np.sqrt(np.pi)),
 }
-HOW = [("tsit5", 1e-6), ("tsit5", 1e-9), ("rodas5p", 1e-6), ("rodas5p", 1e-9)]
+METHODS = ("tsit5", "rodas5p", "taylor")
+HOW = [(method, rtol) for method in METHODS for rtol in (1e-6, 1e-9)]
 every_case = pytest.mark.parametrize("case", CASES)
 
 
@@ -191,7 +218,7 @@ def test_steps_of_an_ensemble_are_bounded(method):
 
     assert (steps(max_step=1 / 64) >= 64).all()
     assert (steps() < 32).all()
-    with pytest.raises(nlctl.ParameterError, match="ensemble_response.*max_step"):
+    with pytest.raises(nlctl.ParameterError, match=r"ensemble_response.*max_step"):
         steps(max_step=0.0)
 
 

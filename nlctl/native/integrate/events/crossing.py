@@ -19,7 +19,7 @@ from ..state import INNER
 from .location import AGAIN, CLEAR, EVENT, REFUSED
 
 NOTHING = -2  # no condition lies in the step just tried
-_SHARE = 0.01  # of the relative tolerance, of a step: how close to a condition steps end
+CLOSE = 0.01  # of the relative tolerance, of a step: how close to a condition steps end
 _TRIES = 60
 _CLEARLY, _GAP, _MOST = (
     3.0,
@@ -144,7 +144,7 @@ def _bracket(task, lane, w, bad, j):
 def _next_try(task, lane, w, bad, j):
     """Say what to try next, or take the step just tried, which ends right before a condition."""
     t_end = max(abs(lane.t), abs(lane.t + lane.high))
-    close = max(_SHARE * task.rtol * lane.whole, 8e-16 * t_end)
+    close = max(CLOSE * task.rtol * lane.whole, 8e-16 * t_end)
     root = _foreseen(task, lane, w, bad, j)
     if lane.high <= 2.0 * close and bad:  # right behind the start
         lane.across, lane.traces, lane.tries = 1, 0, 0
