@@ -416,7 +416,6 @@ class _Reader:
         self.distances[distance] = now
         return now
 
-
     # -- where factors lie
 
     def _folds(self, packed: bool) -> list[Fold]:

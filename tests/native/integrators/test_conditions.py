@@ -181,6 +181,28 @@ def test_events_are_a_table_of_both_engines():
             assert direction == way
 
 
+def test_functions_that_a_run_watches_end_it_by_every_method():
+    """cos t: x = 1/2 at pi/3, and the run ends where x' = -1/2 next, at 5 pi / 6 from below."""
+
+    def half(t, x, u, params):
+        return x[0] - 0.5
+
+    def slope(t, x, u, params):
+        return x[1] + 0.5
+
+    slope.direction = 1
+    swing = plain(lambda t, x, u, p: [x[1], -x[0]], [1.0, 0.0])
+    for method in METHODS:
+        made = nlctl.input_output_response(
+            swing, [0, 10], 0, [1.0, 0.0], engine="native", method=method, events={"half": half},
+            stop_when=slope,
+        )  # fmt: skip
+        assert made.time[-1] == pytest.approx(5 * np.pi / 6, abs=1e-7)
+        assert list(made.events["which"]) == ["half", "stop_when"]
+        np.testing.assert_allclose(made.events["time"], np.pi * np.array([1 / 3, 5 / 6]), atol=1e-7)
+        assert made.statistics.conditions == 2
+
+
 def test_print_and_statistics_say_what_is_located():
     compiled = nlctl.compile(plain(oscillator, [1.0, 0.0]))
     assert "conditions   1 located" in str(compiled)

@@ -27,7 +27,7 @@ from ..workspace import input_rates, inputs_at
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
 _LOOKS = 16  # parts of a step
-_BRIEF = 0.01  # part of a step: a nearer event is located by trying
+_BRIEF = 0.01  # part of a step: a nearer break point is located by trying
 _PLACES = 4  # at 0.9, 0.99, ... of a step that ends at an event
 _BEFORE = 3.0  # times as far before an event as a step may end behind it
 _SHORTEST = 1e-12  # of the times: a step in which nothing is compared
@@ -151,8 +151,10 @@ def _aim(task, lanes, w):
         lane, first = lanes[j], 1.0
         for i in range(task.switching if lane.tries == 0 and lane.across == 0 else 0):
             if _meets(task, w, i, w.g_ahead[i, j], j):
-                first = min(first, _root(task, w, i, lane.step, j) * (1.0 + _rest(task, i)))
-        if _BRIEF < first < 1.0:
+                part = _behind(task, lane, i, _root(task, w, i, lane.step, j))
+                if part > _BRIEF or i >= task.declared:
+                    first = min(first, part)
+        if 0.0 < first < 1.0:
             lane.step *= first
             lane.ends = 0
 
@@ -166,6 +168,15 @@ def _meets(task, w, i, end, j):
     if task.bending <= i < task.declared and small:
         return False  # see `first_root`
     return triggered(w.e_start[i, j], end, False, w.behind[i, j] != 0.0)
+
+
+@numba.njit(**INNER)
+def _behind(task, lane, i, root):
+    """Return the part of a step that ends right behind an event, by what can be told from none."""
+    part = root * (1.0 + _rest(task, i))
+    if i < task.declared:
+        return part
+    return max(part, root + 4e-16 * abs(lane.t + root * lane.step) / lane.step)
 
 
 @numba.njit(**INNER)
@@ -189,7 +200,7 @@ def _root(task, w, i, h, j):
             low, f_low = middle, f
         else:
             high, f_high = middle, f
-        if high - low < 0.1 * _rest(task, i):
+        if high - low < 0.1 * _rest(task, i) * high:
             break
     return high
 
