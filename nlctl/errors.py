@@ -180,6 +180,26 @@ class ZenoError(DivergedError):
         )
 
 
+class InexactWarning(UserWarning):
+    """Derivatives hold differences, of a function that is called as it stands: it says which.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import control as ct
+    >>> import scipy.special
+    >>> system = ct.nlsys(
+    ...     lambda t, x, u, params: [u[0] - scipy.special.j0(x[0])],
+    ...     None, states=1, inputs=1, outputs=1, name="plant",
+    ... )
+    >>> with warnings.catch_warnings(record=True) as told:
+    ...     warnings.simplefilter("always")
+    ...     linear = nlctl.linearize(system, [1.0])
+    >>> print(told[0].category.__name__, linear.A.round(6))  # J_0' = -J_1
+    InexactWarning [[0.440051]]
+    """
+
+
 class CompileError(UsageError):
     """A block that cannot be compiled: the message names it and says why.
 

@@ -5,12 +5,31 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from .graph import SMALL, Expr, Graph, Untraceable
+
+MOST = 2048  # elements of an array that are kept one by one
+TABLED = 256  # elements of a constant matrix beyond which each row is a table
+
+
+class Special:
+    """What stands for an array in a traced function and has operators of its own."""
+
+    of_complex: ClassVar[Callable[..., Any] | None] = None  # what takes NumPy's complex numbers
+
+    def operation(self, graph: Graph, name: str, operands: Sequence[Any]) -> Any:
+        """Return an operation by its name, on operands of which one is this."""
+        raise Untraceable(f"{name} of {type(self).__name__}")
+
+
+def is_complex(value: Any) -> bool:
+    """Whether a value is a complex number or an array of them."""
+    return isinstance(value, complex | np.complexfloating) or (
+        isinstance(value, np.ndarray) and value.dtype.kind == "c"
+    )
 
 
 @dataclass(eq=False, repr=False)
@@ -51,6 +70,14 @@ class Tracer:
     watched: tuple[np.ndarray, tuple[Expr, ...]] | None = None
 
     __array_ufunc__ = None  # NumPy's arrays leave arithmetic with tracers to these
+    methods: ClassVar[Callable[[Tracer, str], Any] | None] = None  # what finds those of arrays
+
+    def __getattr__(self, name: str) -> Any:
+        found = None if name.startswith("__") else Tracer.methods
+        if found is None:
+            raise AttributeError(name)
+        return found(self, name)  # pyright: ignore[reportCallIssue]
+
     __hash__ = None  # type: ignore[assignment]
 
     @property
@@ -88,6 +115,17 @@ class Tracer:
         return np.dtype(float)
 
     @property
+    def real(self) -> Tracer:
+        """The array: its numbers are real."""
+        return self
+
+    @property
+    def imag(self) -> Tracer:
+        """Zeros."""
+        return Tracer(self.graph, mapped(lambda _: self.graph.const(0.0), self.values), self.axis,
+                      self.length)  # fmt: skip
+
+    @property
     def T(self) -> Tracer:  # noqa: N802 (NumPy's name)
         """The transpose."""
         if self.ndim < 2:
@@ -113,11 +151,12 @@ class Tracer:
         return self.shape[0]
 
     def __iter__(self) -> Iterator[Tracer]:
-        return (self[i] for i in range(len(self)))
+        return (self.item_at(i) for i in range(len(self)))
 
-    def __getitem__(self, key: Any) -> Tracer:
-        if isinstance(key, np.ndarray | list) and np.ndim(key):
-            return self._taken(np.asarray(key))
+    def item_at(self, key: Any) -> Tracer:
+        """Return the elements at places that are known: a view where NumPy's is one."""
+        if holds_arrays(key):
+            return self._at(key)
         keys = full_index(key, self.ndim)
         if self.axis is None:
             cells = as_array(self.cells[tuple(keys)])
@@ -149,20 +188,31 @@ class Tracer:
         is_part = known and isinstance(key, slice) and self.ndim == 1
         return whole[key] if is_part and whole is not None else None
 
-    def _taken(self, places: np.ndarray) -> Tracer:
-        """Return copies of the elements at fixed places; many only where these are equally far."""
-        if self.ndim != 1 or places.ndim != 1 or places.dtype.kind not in "iu":
-            raise Untraceable("indexing by such an array")
-        indices = [int(i) for i in np.arange(self.size)[places]]
+    def _at(self, key: Any) -> Tracer:
+        """Return copies of the elements at places that are fixed, as NumPy finds them."""
+        places = np.arange(self.size).reshape(self.shape)[key]
+        indices = places.reshape(-1)
+        if self.axis is None or indices.size <= SMALL or self.ndim > 1:
+            return Tracer(self.graph, as_array(self.elements()[key]))
+        steps = np.unique(np.diff(indices))
+        if places.ndim > 1 or steps.size != 1 or steps[0] == 0:
+            return Tracer(self.graph, as_array(self.elements()[key]))
+        part = self.graph.part(self.only, int(indices[0]), int(steps[0]), indices.size)
+        return Tracer(self.graph, as_array(part), 0, indices.size)
+
+    def elements(self) -> np.ndarray:
+        """Return all elements, each an expression of its own, in the array's shape."""
         if self.axis is None:
-            return Tracer(self.graph, self.cells[indices])
-        if len(indices) <= SMALL:
-            return traced(self.graph, [self[i] for i in indices])
-        start, step = indices[0], indices[1] - indices[0]
-        if step == 0 or any(b - a != step for a, b in pairwise(indices)):
-            raise Untraceable("many elements at irregular places")
-        part = self.graph.part(self.only, start, step, len(indices))
-        return Tracer(self.graph, as_array(part), 0, len(indices))
+            return self.cells
+        if self.size > MOST:
+            raise Untraceable("too many elements to be written out")
+        parts = [mapped(lambda e, k=k: self.graph.item(e, k), self.cells)
+                 for k in range(self.length)]  # fmt: skip
+        return np.stack(parts, axis=self.axis)
+
+    def short(self) -> Tracer:
+        """Return the array without a long axis."""
+        return self if self.axis is None else Tracer(self.graph, self.elements())
 
     def copy(self) -> Tracer:
         """Return a copy."""
@@ -178,28 +228,32 @@ class Tracer:
 
     def reshape(self, *shape: Any) -> Tracer:
         """Return the array in another shape."""
-        wanted = shape[0] if len(shape) == 1 and not isinstance(shape[0], int) else shape
-        wanted = tuple(operator.index(n) for n in wanted)
+        several = len(shape) == 1 and isinstance(shape[0], tuple | list)
+        wanted = tuple(operator.index(n) for n in (shape[0] if several else shape))
         if self.ndim == 1 and wanted in ((-1,), (self.size,)):
             return self
+        if self.axis is not None and self.ndim > 1:
+            return self._part(self.elements().reshape(wanted), None, 1)._as_long_if_many()
         if self.axis is not None:
             return self._in_rows(wanted)
         place = self.place if self.ndim == len(wanted) == 1 else None
         found = self._part(self.cells.reshape(wanted), None, 1, place)
-        return found._as_long() if max(found.shape, default=0) > SMALL else found
+        return found._as_long_if_many()
 
     def _in_rows(self, shape: tuple[int, ...]) -> Tracer:
         """Return a long array as a small matrix."""
         places = np.arange(self.size).reshape(shape)
-        if self.ndim != 1 or max(places.shape, default=0) > SMALL:
+        if self.size > MOST:
             raise Untraceable("reshaping a long array")
         cells = mapped(lambda k: self.graph.item(self.only, int(k)), places)
         return self._part(cells, None, 1)
 
-    def _as_long(self) -> Tracer:
+    def _as_long_if_many(self) -> Tracer:
+        many = self.axis is None and self.ndim == 1 and self.size > SMALL
+        return self.as_long() if many else self
+
+    def as_long(self) -> Tracer:
         """Return elements of a small matrix as a long array of one dimension."""
-        if self.ndim != 1:
-            raise Untraceable("a large matrix")
         pieces = [(e, 1) for e in self.cells.flat]
         made = Tracer(self.graph, as_array(self.graph.joined(pieces)), 0, self.size)
         made.watched = (self.values, tuple(self.values.flat))
@@ -236,6 +290,12 @@ def _stacked(parts: Sequence[np.ndarray], axis: int, shape: tuple[int, ...]) -> 
     return np.empty((*shape[:axis], 0, *shape[axis:]), dtype=object)
 
 
+def holds_arrays(key: Any) -> bool:
+    """Whether there are lists or arrays in an index."""
+    keys = key if isinstance(key, tuple) else (key,)
+    return any(isinstance(k, list | bool) or np.ndim(k) for k in keys if not isinstance(k, Tracer))
+
+
 def full_index(key: Any, ndim: int) -> list[Any]:
     """Return an index as a list with an entry for every axis."""
     keys = list(key) if isinstance(key, tuple) else [key]
@@ -258,13 +318,15 @@ def traced(graph: Graph, value: Any) -> Tracer:
     """Return numbers, tracers and nested lists of them as a tracer."""
     if isinstance(value, Tracer):
         return value
+    if isinstance(value, Special):
+        raise Untraceable(f"{type(value).__name__} in the place of an array")
     if isinstance(value, list | tuple):
         parts = [traced(graph, v) for v in value]
         if any(p.shape != parts[0].shape for p in parts):
             raise Untraceable("rows of different lengths")
         if parts and any(p.axis is not None for p in parts):
             if any(p.axis != 0 or p.ndim != 1 for p in parts) or len(parts) > SMALL:
-                raise Untraceable("a large matrix")
+                return Tracer(graph, np.stack([p.elements() for p in parts]))
             rows = _stacked([p.cells for p in parts], 0, ())
             return Tracer(graph, rows, 1, parts[0].length)
         if len(parts) > SMALL and parts[0].ndim == 0:
@@ -280,15 +342,17 @@ def traced(graph: Graph, value: Any) -> Tracer:
 
 def _constants(graph: Graph, array: np.ndarray) -> Tracer:
     long = [i for i, n in enumerate(array.shape) if n > SMALL]
-    if len(long) > 1 or array.ndim > 2:
-        raise Untraceable("a large matrix")
-    if not long:
+    is_large = array.size > TABLED and array.shape[0] <= TABLED
+    by_rows = len(long) == 1 or is_large
+    if not long or not by_rows or array.ndim > 2 or array.dtype != float:
+        if array.size > MOST:
+            raise Untraceable("a large matrix")
         return Tracer(graph, mapped(graph.const, array.astype(object)))
-    moved = np.moveaxis(array, long[0], -1)
+    moved = np.moveaxis(array, long[-1], -1)
     cells = np.empty(moved.shape[:-1], dtype=object)
     for index in np.ndindex(cells.shape):
         cells[index] = graph.table(list(moved[index]))
-    return Tracer(graph, cells, long[0], array.shape[long[0]])
+    return Tracer(graph, cells, long[-1], array.shape[long[-1]])
 
 
 def leaf_vector(
@@ -297,9 +361,9 @@ def leaf_vector(
     """Return part of an argument of the program as an array of the given shape."""
     numbers = np.arange(start, start + int(np.prod(shape))).reshape(shape)
     long = [i for i, n in enumerate(shape) if n > SMALL]
-    if len(long) > 1 or len(shape) > 2:
-        raise Untraceable("a large matrix")
-    if not long:
+    if not long or len(long) > 1 or len(shape) > 2:
+        if numbers.size > MOST:
+            raise Untraceable("a large matrix")
         return Tracer(graph, mapped(lambda i: graph.leaf(array, int(i), None, kind), numbers))
     moved = np.moveaxis(numbers, long[0], -1)
     step = int(moved.reshape(-1)[1] - moved.reshape(-1)[0]) if moved.ndim == 1 else int(
@@ -323,8 +387,12 @@ def full(graph: Graph, shape: Any, value: Any) -> Tracer:
     if number.size != 1 or number.only.kind != "f":
         raise Untraceable("an array that is filled with something else than one float")
     long = [i for i, n in enumerate(shape) if n > SMALL]
-    if len(long) > 1:
-        raise Untraceable("a large matrix")
+    if len(long) > 1 or len(shape) > 2:
+        if np.prod(shape) > MOST:
+            raise Untraceable("a large matrix")
+        cells = np.empty(shape, dtype=object)
+        cells.fill(number.only)
+        return Tracer(graph, cells)
     cells = np.empty([n for n in shape if n <= SMALL], dtype=object)
     cells.fill(number.only)
     return Tracer(graph, cells, *([long[0], shape[long[0]]] if long else []))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import scalar
+from .differences import difference
 from .elimination import linear_solution
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
@@ -22,6 +23,7 @@ def tangents(
     results: Iterable[Expr],
     seed: Callable[[Expr], Expr | None],
     fixed_points: Mapping[str, Sequence[Expr]] | None = None,
+    differences: bool = False,
 ) -> list[Expr | None]:
     """Return the derivatives of expressions along a direction in what they are made of.
 
@@ -36,6 +38,8 @@ def tangents(
     fixed_points : mapping, optional
         For what is searched for, by the name of the search: the numbers F(z), as expressions of
         the solution z, that are equal to it.  Its derivative is that of the implicit function.
+    differences : bool, optional
+        Whether opaque functions are differentiated by `difference`, or refused.
 
     Returns
     -------
@@ -48,7 +52,8 @@ def tangents(
     Untraceable
         If an opaque function, which has no expressions, is among what results are made of.
     """
-    return _Reader(graph, seed, fixed_points or {}).read(list(results))
+    reader = _Reader(graph, seed, fixed_points or {}, differences=differences)
+    return reader.read(list(results))
 
 
 def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
@@ -71,7 +76,9 @@ class _Reader:
         seed: Callable[[Expr], Expr | None],
         fixed_points: Mapping[str, Sequence[Expr]],
         known: Mapping[Expr, Expr | None] | None = None,
+        differences: bool = False,
     ) -> None:
+        self.differences = differences
         self.graph, self.seed, self.fixed_points = graph, seed, fixed_points
         self.known: dict[Expr, Expr | None] = dict(known or {})
         self._partials: dict[tuple[str, int], Any] = {}
@@ -93,6 +100,8 @@ class _Reader:
         parts = [self.known[arg] for arg in node.args]
         if node.op == "solve" and node.data[0] in self.fixed_points:
             return self._of_solution(node) if any(parts) else None
+        if node.op == "call" and self.differences:
+            return difference(self.graph, node, parts) if any(parts) else None
         if node.op in ("call", "solve"):
             raise Untraceable(f"{node.data[0]} is not an expression: it has no derivative")
         if all(part is None for part in parts) or node.op in COMPARISONS or node.op in LOGIC:
@@ -106,7 +115,8 @@ class _Reader:
         found, n = list(self.fixed_points[node.data[0]]), node.size or 1
 
         def read(seed: Callable[[Expr], Expr | None], of_solution: Expr | None) -> list[Any]:
-            reader = _Reader(self.graph, seed, self.fixed_points, {node: of_solution})
+            known = {node: of_solution}
+            reader = _Reader(self.graph, seed, self.fixed_points, known, self.differences)
             return [scalar(self.graph, self._zero_if_none(e)) for e in reader.read(found)]
 
         units = [self.graph.table(row) for row in np.eye(n).tolist()]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["SINGULAR", "largest_magnitude", "linear_solution"]
+__all__ = ["SINGULAR", "eliminated", "largest_magnitude", "linear_solution", "substituted"]
 
 SINGULAR = 1e-7  # relative to the largest entry: a solution would have lost half of its digits
 
@@ -47,3 +47,60 @@ def linear_solution(matrix: Sequence[Sequence[Any]], b: Sequence[Any]) -> tuple[
             rest = rest - rows[i][j] * x[j]
         x[i] = rest / rows[i][i]
     return x, is_regular
+
+
+def eliminated(
+    np: Any, rows: list[list[Any]], exchanges: list[Any] | None = None
+) -> tuple[list[list[Any]], list[Any]]:
+    """Return an augmented matrix in upper triangular form, and its pivots, as LAPACK has them.
+
+    Partial pivoting: of each column the first of the largest entries comes up, by choosing
+    numbers where the state decides.  Conditions under which rows were exchanged are added to
+    `exchanges`.
+    """
+    n = len(rows)
+    for i in range(n):
+        _bring_up(np, rows, i, exchanges)
+        for k in range(i + 1, n):
+            if _is_zero(rows[k][i]):
+                continue
+            factor = rows[k][i] / rows[i][i]
+            below = [
+                b if _is_zero(a) else b - factor * a
+                for a, b in zip(rows[i][i + 1 :], rows[k][i + 1 :], strict=True)
+            ]
+            rows[k] = [*rows[k][: i + 1], *below]
+    return rows, [rows[i][i] for i in range(n)]
+
+
+def _bring_up(np: Any, rows: list[list[Any]], i: int, exchanges: list[Any] | None) -> None:
+    """Exchange row i with the one that has the first of the largest entries in column i."""
+    for k in range(i + 1, len(rows)):
+        if _is_zero(rows[k][i]):
+            continue
+        larger = np.abs(rows[k][i]) > np.abs(rows[i][i])
+        pairs = list(zip(rows[i][i:], rows[k][i:], strict=True))
+        upper = [np.where(larger, b, a) for a, b in pairs]
+        lower = [np.where(larger, a, b) for a, b in pairs]
+        rows[i], rows[k] = [*rows[i][:i], *upper], [*rows[k][:i], *lower]
+        if exchanges is not None:
+            exchanges.append(larger)
+
+
+def _is_zero(value: Any) -> bool:
+    """Whether an entry is known to be 0."""
+    known = getattr(value, "only", None)
+    return known is not None and known.op == "const" and known.data == 0.0
+
+
+def substituted(rows: list[list[Any]]) -> list[list[Any]]:
+    """Return the solution, a column for each right-hand side, of a matrix in triangular form."""
+    n = len(rows)
+    x: list[list[Any]] = [[] for _ in range(n)]
+    for i in range(n - 1, -1, -1):
+        rest = rows[i][n:]
+        for j in range(i + 1, n):
+            if not _is_zero(rows[i][j]):
+                rest = [r - rows[i][j] * v for r, v in zip(rest, x[j], strict=True)]
+        x[i] = [r / rows[i][i] for r in rest]
+    return x

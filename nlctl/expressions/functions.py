@@ -21,7 +21,7 @@ class RealFunction:
     Attributes
     ----------
     name : str
-        NumPy's name.
+        NumPy's name, or that of `scipy.special`.
     code : str
         Its machine code: ``"own"`` for what `nlctl.native.codegen.ir.functions` writes out, in
         its table ``INLINE`` or ``CALLED``, an intrinsic of LLVM
@@ -173,6 +173,10 @@ _ROWS = (
          series="steady"),
     _row("cbrt", "cbrt", r"\sqrt[3]{{{0}}}", lambda x: 1.0 / (3.0 * np.cbrt(x) ** 2),
          ball=_cube_root),
+    _row("erf", "erf", r"\operatorname{{erf}} {0}",
+         lambda x: 2.0 / np.sqrt(np.pi) * np.exp(-(x * x)), ball=lambda x: x.erf()),
+    _row("erfc", "erfc", r"\operatorname{{erfc}} {0}",
+         lambda x: -2.0 / np.sqrt(np.pi) * np.exp(-(x * x)), ball=lambda x: x.erfc()),
     _row("arctan2", "atan2", r"\operatorname{{atan2}}\left({0}, {1}\right)",
          lambda y, x: x / (x * x + y * y), lambda y, x: -y / (x * x + y * y), math="atan2"),
     _row("hypot", "hypot", r"\sqrt{{{0}^2 + {1}^2}}",

@@ -24,7 +24,11 @@ _ARITHMETIC = {"add": "add", "sub": "subtract", "mul": "multiply", "div": "true_
 NUMPY = COMPARISONS | LOGIC | _ARITHMETIC
 BOOLEAN = {"mul": "and", "maximum": "or", "minimum": "and", "absolute": "",
            "add": None, "sub": None, "neg": None}  # fmt: skip  # of truth values alone
-INTEGER = ("add", "sub", "mul", "neg")  # of integers they are integers
+INTEGER = ("add", "sub", "mul", "neg", "minimum", "maximum", "absolute", "remainder")
+"""Operations that make integers of integers."""
+
+SPECIAL = ("erf", "erfc")
+"""Functions of `scipy.special` that are in the table of functions."""
 
 
 class Untraceable(Exception):  # noqa: N818 (it ends a trace; nobody else sees it)
@@ -60,7 +64,8 @@ class Expr:
     varies : bool
         Whether it depends on more than parameters.
     value : int or None
-        Of an integer: what it is for the parameter values of the trace.
+        Of an integer: what it is for the parameter values of the trace; None if it depends on
+        more than parameters.
     """
 
     op: str
@@ -74,7 +79,11 @@ class Expr:
 
 
 def numpy_function(op: str) -> Any:
-    """Return NumPy's function of an operation."""
+    """Return NumPy's function of an operation, SciPy's of what NumPy lacks."""
+    if op in SPECIAL:
+        from scipy import special
+
+        return getattr(special, op)
     return getattr(np, NUMPY.get(op, op))
 
 
@@ -107,6 +116,8 @@ class Graph:
         Largest number of expressions for now.
     decisions : dict
         What is taken to hold on the path through a function that is being traced.
+    implied : dict
+        What follows from that.
     assumptions : dict
         Integer parameters that steer what is computed: place in `p`, and value.
     lengths : dict
@@ -121,6 +132,7 @@ class Graph:
         self.lengths = dict(lengths or {})
         self.guards: list[Expr] = []
         self.decisions: dict[Expr, bool] = {}
+        self.implied: dict[Expr, bool] = {}
         self.assumptions: dict[int, int] = {}
         self._known: dict[Any, Expr] = {}
 
@@ -128,6 +140,8 @@ class Graph:
         """Return whether a condition holds on this path; ask whoever traces if that is open."""
         if condition.op == "const":
             return bool(condition.data)
+        if condition in self.implied:
+            return self.implied[condition]
         if condition not in self.decisions:
             raise OpenCondition(condition)
         return self.decisions[condition]
@@ -204,10 +218,7 @@ class Graph:
     def op(self, name: str, *args: Expr) -> Expr:
         """Return an operation on numbers, or on the elements of vectors."""
         if name in INTEGER and all(a.kind == "i" for a in args):
-            value = int(numpy_function(name)(*(a.value for a in args)))
-            if all(a.op == "const" for a in args):
-                return self.const(value)
-            return self.node(name, *args, kind="i", value=value)
+            return self._of_integers(name, *args)
         if args and all(a.kind == "b" for a in args) and name in BOOLEAN:
             return self._of_truth_values(name, *args)
         kind, args = self._kinds(name, args)
@@ -215,6 +226,8 @@ class Graph:
         if len(sizes) > 1:
             raise Untraceable(f"{name} of vectors of sizes {sizes}")
         if all(a.op == "const" for a in args):
+            if name == "select":
+                return args[1] if args[0].data else args[2]
             with np.errstate(all="ignore"):
                 return self.const(numpy_function(name)(*(a.data for a in args))[()])
         simple = self._simplified(name, *args)
@@ -227,11 +240,35 @@ class Graph:
                 a if a.kind == "b" else self.op("ne", a, self.const(0.0)) for a in args
             )
         if name == "select":
-            truth = all(a.kind == "b" for a in args[1:])
+            kinds = {a.kind for a in args[1:]}
+            kind = kinds.pop() if len(kinds) == 1 else "f"
             condition = args[0] if args[0].kind == "b" else self.op("ne", args[0], self.const(0.0))
-            rest = args[1:] if truth else tuple(self.number(a) for a in args[1:])
-            return "b" if truth else "f", (condition, *rest)
+            rest = args[1:] if kind in "bi" else tuple(self.number(a) for a in args[1:])
+            return kind, (condition, *rest)
         return "b" if name in COMPARISONS else "f", tuple(self.number(a) for a in args)
+
+    def _of_integers(self, name: str, *args: Expr) -> Expr:
+        """Return an integer that is made of integers."""
+        values = [a.value for a in args]
+        if name == "remainder" and values[1] in (0, None):
+            raise Untraceable("a remainder by 0, or by an integer that depends on the state")
+        known = None not in values
+        value = int(numpy_function(name)(*values)) if known else None
+        if all(a.op == "const" for a in args):
+            return self.const(value)
+        simple = None if known else self._simplified(name, *args)
+        sizes = {a.size for a in args if a.size is not None}
+        return simple or self.node(
+            name, *args, size=max(sizes, default=None), kind="i", value=value
+        )
+
+    def integer(self, a: Expr) -> Expr:
+        """Return a number that is whole as an integer, a truth value as 0 or 1."""
+        if a.kind == "b":
+            return self.op("select", a, self.const(1), self.const(0))
+        if a.op == "const":
+            return a if a.kind == "i" else self.const(int(a.data))
+        return a if a.kind == "i" else self.node(a.op, *a.args, data=a.data, size=a.size, kind="i")
 
     def _of_truth_values(self, name: str, *args: Expr) -> Expr:
         """Return what NumPy makes of truth values alone.

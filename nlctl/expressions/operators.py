@@ -5,22 +5,32 @@ These are the operators and methods of `Tracer`.
 
 from __future__ import annotations
 
+import functools
 import operator
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from .arrays import Tracer, as_array, concatenated, full, full_index, mapped, traced
-from .graph import Ambiguous, Expr, Graph, Untraceable
+from .arrays import Special, Tracer, as_array, is_complex, mapped, traced
+from .graph import SMALL, Ambiguous, Expr, Graph, Untraceable
+from .integers import integer_range
+
+FOLLOWED = 16  # values of an integer, each a way through a function
 
 
 def elementwise(graph: Graph, name: str, *operands: Any) -> Tracer:
     """Return an operation on arrays, element by element, with NumPy's broadcasting."""
+    special = next((v for v in operands if isinstance(v, Special)), None)
+    if special is None and Special.of_complex and any(map(is_complex, operands)):
+        operands = tuple(Special.of_complex(graph, v) if is_complex(v) else v for v in operands)
+        special = next(v for v in operands if isinstance(v, Special))
+    if special is not None:
+        return special.operation(graph, name, operands)
     arrays = [traced(graph, v) for v in operands]
     longs = {(a.ndim - a.axis, a.length) for a in arrays if a.axis is not None}
-    if len(longs) > 1:
-        raise Untraceable(f"{name} of arrays that are long in different ways")
+    if len(longs) > 1 or (longs and _is_mixed(arrays, *longs)):
+        arrays, longs = [a.short() for a in arrays], set()
     ndim = len(np.broadcast_shapes(*(a.shape for a in arrays)))
     if not longs:
         return Tracer(graph, mapped(lambda *e: graph.op(name, *e), *(a.cells for a in arrays)))
@@ -32,8 +42,22 @@ def elementwise(graph: Graph, name: str, *operands: Any) -> Tracer:
     return Tracer(graph, mapped(lambda *e: graph.op(name, *e), *cells), ndim - place, length)
 
 
+def _is_mixed(arrays: list[Tracer], long: tuple[int, int]) -> bool:
+    """Whether one array is long along an axis, and another has elements of its own there."""
+    place = long[0]
+    return any(a.axis is None and a.ndim >= place and a.shape[-place] > 1 for a in arrays)
+
+
+def counted(array: Tracer) -> Tracer:
+    """Return an array with 0 and 1 for truth values, as NumPy's sums take them."""
+    if all(e.kind != "b" for e in array.values.flat):
+        return array
+    return Tracer(array.graph, mapped(array.graph.integer, array.cells), array.axis, array.length)
+
+
 def total(array: Tracer, axis: Any = None) -> Tracer:
     """Return the sum of all elements, or along an axis, from left to right."""
+    array = counted(array)
     graph, cells, long = array.graph, array.cells, array.axis
     along = range(array.ndim) if axis is None else [operator.index(axis) % array.ndim]
     if long in along:
@@ -51,76 +75,28 @@ def total(array: Tracer, axis: Any = None) -> Tracer:
 
 def product(a: Tracer, b: Tracer) -> Tracer:
     """Return the matrix product of vectors and matrices."""
-    if a.ndim == 0 or b.ndim == 0 or b.ndim > 2 or a.ndim > 2:
-        raise Untraceable("a product of these shapes")
+    if a.ndim == 0 or b.ndim == 0:
+        raise Untraceable("a product of a matrix and a number")
+    if a.ndim > 2 or b.ndim > 2:
+        return _batched(a, b)
     if a.shape[-1] != b.shape[0]:
         raise Untraceable(f"a product of shapes {a.shape} and {b.shape}")
+    if b.ndim == 1 and b.axis is None and b.size > SMALL and a.axis == a.ndim - 1:
+        b = b.as_long()
     if b.ndim == 2:
         a = a[..., None]
         return total(elementwise(a.graph, "mul", a, b), -2)
     return total(elementwise(a.graph, "mul", a, b), -1)
 
 
-def _assign(self: Tracer, key: Any, value: Any) -> None:
-    """Assign to items; what is assigned to a part of a long array goes into that."""
-    value = traced(self.graph, value)
-    _check_kinds(self, value)
-    if self.watched is not None:
-        raise Untraceable("assignment to another shape of an array")
-    if self.origin is not None:
-        _assign_to_part(self, key, value)
-    elif self.axis is None:
-        if value.axis is not None:
-            raise Untraceable("a long array assigned to a short one")
-        if isinstance(key, np.ndarray | list | Tracer):
-            raise Untraceable("assignment to places in an array")
-        self.cells[tuple(full_index(key, self.ndim))] = value.cells if value.shape else value.only
-    else:
-        if self.ndim > 1:
-            raise Untraceable("assignment to a part of a large matrix")
-        (along,) = full_index(key, 1)
-        whole = range(self.length)
-        k = None if isinstance(along, slice) else whole[along]
-        _write(self, whole[along] if k is None else range(k, k + 1), value)
-
-
-def _check_kinds(self: Tracer, value: Tracer) -> None:
-    """Check that an assignment rounds nothing: arrays of truth values take no others."""
-    kinds = {e.kind for e in self.values.flat}
-    if kinds and "f" not in kinds and {e.kind for e in value.cells.flat} != kinds:
-        raise Untraceable("assignment to an array of integers or truth values")
-
-
-def _assign_to_part(self: Tracer, key: Any, value: Tracer) -> None:
-    assert self.origin is not None
-    _ = self.cells  # is it still what the whole has there?
-    (along,) = full_index(key, self.ndim) if self.ndim == 1 else (None,)
-    if self.place is None or self.place.step != 1 or along is None:
-        raise Untraceable("assignment to a part of a long array")
-    k = None if isinstance(along, slice) else self.place[along]
-    root = self.origin[0]
-    _write(root, self.place[along] if k is None else range(k, k + 1), value)
-    start, stop = self.place.start, self.place.stop
-    renewed = root[start:stop]
-    self.values, self.origin = renewed.values, renewed.origin
-
-
-def _write(whole: Tracer, places: range, value: Tracer) -> None:
-    """Assign to consecutive elements of a long array of one dimension."""
-    if places.step != 1 or value.ndim > 1:
-        raise Untraceable("assignment with a step, or of another shape")
-    if not value.shape or value.shape == (1,):
-        middle = full(whole.graph, (len(places),), value.reshape(1)[0])
-    elif value.size == len(places):
-        middle = value
-    else:
-        raise Untraceable("assignment of another shape")
-    before, after = whole[: places.start], whole[places.stop :]
-    parts = [p for p in (before, middle, after) if p.size]
-    joined = concatenated(whole.graph, parts)
-    if joined.shape != whole.shape:
-        raise Untraceable("assignment of another shape")
-    whole.values, whole.version = joined.cells, whole.version + 1
+def _batched(a: Tracer, b: Tracer) -> Tracer:
+    """Return the products of many matrices."""
+    if a.ndim == 1 or b.ndim == 1:
+        column = b.ndim == 1
+        found = _batched(a, b.reshape(-1, 1)) if column else _batched(a.reshape(1, -1), b)
+        return found[..., 0] if column else found[..., 0, :]
+    a, b = a.short()[..., :, :, None], b.short()[..., None, :, :]
+    return total(elementwise(a.graph, "mul", a, b), -2)
 
 
 def _truth(self: Tracer) -> bool:
@@ -151,9 +127,49 @@ def _is_of_arrays(condition: Expr) -> bool:
 
 
 def _integer(self: Tracer) -> int:
+    """Return an integer; one that the state decides is followed to each of its values."""
     if not _is_integer(self):
         raise Untraceable("an integer that depends on the state")
-    return self.graph.assumed(self.only)
+    if self.only.value is not None:
+        return self.graph.assumed(self.only)
+    low, high = integer_range(self.only)
+    if high - low >= FOLLOWED:
+        raise Untraceable("an integer that may have too many values")
+    values = range(int(low), int(high) + 1)
+    equal = {k: self.graph.op("eq", self.only, self.graph.const(k)) for k in values}
+    found = next((k for k in values[:-1] if self.graph.decided(equal[k])), values[-1])
+    self.graph.implied.update({equal[k]: k == found for k in values})
+    return found
+
+
+def _hash(self: Tracer) -> int:
+    """Return the hash of a constant, or of the value of an integer that is followed."""
+    if not self.shape and self.only.op == "const":
+        return hash(self.only.data)
+    return hash(_integer(self))
+
+
+def _floor_division(self: Tracer, other: Any) -> Any:
+    if _is_integer(self) and self.only.value is not None and isinstance(other, int):
+        return operator.floordiv(_integer(self), other)
+    return floor_quotient(self.graph, self, other)
+
+
+def floor_quotient(graph: Graph, a: Any, b: Any) -> Tracer:
+    """Return NumPy's floor_divide of floats, which starts from the exact remainder."""
+    both = [traced(graph, v) for v in (a, b)]
+    if all(e.kind == "i" for array in both for e in array.values.flat):
+        raise Untraceable("floor division of integers that depend on the state")
+    op = functools.partial(elementwise, graph)
+    rest = op("fmod", a, b)
+    quotient = op("div", op("sub", a, rest), b)
+    turned = op("xor", op("lt", b, 0.0), op("lt", rest, 0.0))
+    down = op("and", op("ne", rest, 0.0), turned)
+    quotient = op("select", down, op("sub", quotient, 1.0), quotient)
+    whole = op("floor", quotient)
+    up = op("gt", op("sub", quotient, whole), 0.5)
+    whole = op("select", up, op("add", whole, 1.0), whole)
+    return op("select", op("eq", b, 0.0), op("div", a, b), whole)
 
 
 def _is_integer(value: Any) -> bool:
@@ -162,7 +178,8 @@ def _is_integer(value: Any) -> bool:
 
 def _power(base: Any, exponent: Any) -> Any:
     """Return a power: with a whole exponent, known or assumed, as products."""
-    exponent = _integer(exponent) if _is_integer(exponent) else exponent
+    if _is_integer(exponent) and exponent.only.value is not None:
+        exponent = _integer(exponent)
     if isinstance(exponent, float) and exponent.is_integer():
         exponent = int(exponent)
     if isinstance(exponent, Tracer):
@@ -177,7 +194,7 @@ def _power(base: Any, exponent: Any) -> Any:
 
 def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: Any) -> Any:
-        if not isinstance(other, Tracer | np.ndarray | float | int | bool | np.generic):
+        if not isinstance(other, Tracer | np.ndarray | float | int | bool | complex | np.generic):
             if name in ("eq", "ne"):
                 raise Untraceable("comparison with what is not a number")  # Python would say False
             return NotImplemented  # a tuple is not an array
@@ -193,7 +210,7 @@ def _in_place(name: str) -> Callable[[Any, Any], Any]:
             return result  # a number is not changed but replaced
         if result.shape != self.shape:
             raise Untraceable("assignment of another shape")
-        _assign(self, slice(None), result)
+        self[...] = result
         return self
 
     return method
@@ -209,16 +226,18 @@ for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
 for _name, _op in {"neg": "neg", "abs": "absolute"}.items():
     setattr(Tracer, f"__{_name}__", lambda self, op=_op: elementwise(self.graph, op, self))
 for _name, _method in {
-    "setitem": _assign,
     "invert": _invert,
     "bool": _truth,
     "index": _integer,
     "int": _integer,
     "pow": _power,
     "rpow": lambda self, other: _power(other, self),
-    "floordiv": lambda self, other: operator.floordiv(_integer(self), other),
+    "hash": _hash,
+    "floordiv": _floor_division,
+    "rfloordiv": lambda self, other: floor_quotient(self.graph, other, self),
+    "divmod": lambda self, other: (self // other, self % other),
+    "pos": lambda self: self,
     "matmul": lambda self, other: product(self, traced(self.graph, other)),
     "rmatmul": lambda self, other: product(traced(self.graph, other), self),
 }.items():
     setattr(Tracer, f"__{_name}__", _method)
-Tracer.sum, Tracer.dot = total, Tracer.__matmul__  # type: ignore[attr-defined]

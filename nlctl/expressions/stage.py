@@ -7,6 +7,8 @@ place here refuses tracers, and the function is then called instead of traced.
 from __future__ import annotations
 
 import builtins
+import cmath
+import enum
 import functools
 import inspect
 import math
@@ -17,26 +19,32 @@ from typing import Any
 import numpy as np
 
 from ..upstream.numba_internals import CPUDispatcher
-from .arrays import Tracer, concatenated, full, traced
-from .functions import FUNCTIONS, MATH
-from .graph import NUMPY, Graph, Untraceable
-from .operators import elementwise, product, total
+from .arrays import Special, Tracer, traced
+from .functions import MATH
+from .graph import Graph, Untraceable, numpy_function
+from .library.creation import Joined
+from .library.python import Builtins, guard_of_math
+from .library.rotations import enter_rotations, turn_of
+from .library.special import enter_scipy
+from .library.splines import called_object, enter_splines
+from .library.table import MAKING, OPERATIONS, OWN, Kind, plain
+from .operators import elementwise
+from .staged import (
+    LIBRARIES,
+    StagedModule,
+    StagedObject,
+    StagedParent,
+    StagedType,
+    Ufunc,
+    holds_tracers,
+    is_of_a_library,
+    settled,
+)
 
-_OPERATIONS = {name: op for op, name in NUMPY.items()} | {name: name for name in FUNCTIONS}
-_LIBRARIES = ("numpy", "scipy", "numba")
-_RAW = (bool, int, float, complex, str, bytes, type(None), np.ndarray, np.generic, range, slice)
-_SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "int", "iter", "len",
-         "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sorted", "sum",
-         "tuple", "zip")  # fmt: skip  # these ask their arguments, as they do of arrays
-
-
-def holds_tracers(value: Any) -> bool:
-    """Whether there are tracers in a value, or in a list, tuple or dict."""
-    if isinstance(value, dict):
-        return any(map(holds_tracers, value.values()))
-    if isinstance(value, list | tuple | set):
-        return any(map(holds_tracers, value))
-    return isinstance(value, Tracer)
+_RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice)
+_OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
+_KEPT = ("__dict__", "__weakref__", "__slots__")  # of a class: what Python makes itself
+_LARGE = 65536  # elements of an array that stays as it is
 
 
 class Stage:
@@ -45,18 +53,22 @@ class Stage:
     def __init__(self, graph: Graph) -> None:
         self.graph = graph
         self._copies: dict[int, tuple[Any, Any]] = {}
-        self.numpy = _Module(np, self._numpy_function)
-        self.math = _Module(math, self._math_function)
-        self._builtins = {name: self._builtin(name, v) for name, v in vars(builtins).items()}
+        self.classes: dict[type, type] = {}
+        self._objects: dict[int, tuple[Any, Any]] = {}
+        self.numpy = StagedModule(np, self._library)
+        self.math = StagedModule(math, self._math_function)
+        self.cmath = StagedModule(cmath, self._library)
+        self._builtins = Builtins(self).namespace(self._import)
 
     def copied(self, function: Any) -> Any:
         """Return a copy of a function whose global names and closure lead to the stage."""
         function = getattr(function, "py_func", function)
         if not isinstance(function, FunctionType):
-            return self._called_object(function)
+            return self.called_object(function)
         if id(function) not in self._copies:
             names: dict[str, Any] = {"__builtins__": self._builtins}
             names["__package__"] = function.__globals__.get("__package__")
+            names["__name__"] = function.__module__  # of classes that are defined inside
             cells = tuple(CellType() for _ in function.__closure__ or ())
             defaults = tuple(map(self.instead, function.__defaults__ or ()))
             copy = FunctionType(function.__code__, names, function.__name__, defaults, cells)
@@ -70,209 +82,256 @@ class Stage:
                 cell.cell_contents = self.instead(given.cell_contents)
         return self._copies[id(function)][1]
 
-    def _called_object(self, thing: Any) -> Any:
+    def called_object(self, thing: Any) -> Any:
         """Return what calls a method, a `functools.partial`, or an object."""
         if isinstance(thing, MethodType):
+            if is_of_a_library(thing.__func__):
+                return self.for_numbers(thing)
             return functools.partial(self.copied(thing.__func__), self.instead(thing.__self__))
         if isinstance(thing, functools.partial):
             keywords = {k: self.instead(v) for k, v in thing.keywords.items()}
             first = map(self.instead, thing.args)
             return functools.partial(self.instead(thing.func), *first, **keywords)
-        call = vars(type(thing)).get("__call__")
-        if isinstance(call, FunctionType) and not _is_of_a_library(thing):
+        call = inspect.getattr_static(type(thing), "__call__", None)
+        if is_of_a_library(thing) and callable(thing):
+            return self._call_of_a_library(thing)
+        if isinstance(call, FunctionType):
             return functools.partial(self.copied(call), self.instead(thing))
         raise Untraceable(f"{thing!r} is not a plain function")
 
+    def _call_of_a_library(self, thing: Any) -> Any:
+        of_numbers = self.for_numbers(thing)
+
+        def function(*arguments: Any, **options: Any) -> Any:
+            given = settled(arguments)
+            if not holds_tracers([*given, *options.values()]):
+                return of_numbers(*given, **options)
+            return called_object(self.graph, thing, *arguments, **options)
+
+        return function
+
     def instead(self, value: Any) -> Any:
         """Return what stands for a value that was there before."""
-        if value is np or value is math:
-            return self.numpy if value is np else self.math
+        if value is np or value is math or value is cmath:
+            return self.numpy if value is np else self.math if value is math else self.cmath
         if isinstance(value, ModuleType):
-            inside = value.__name__.partition(".")[0] in _LIBRARIES
-            return _Module(value, _constant if inside else lambda _, real: self.instead(real))
-        if type(value) in _RAW or isinstance(value, type | np.generic | Tracer):
+            inside = value.__name__.partition(".")[0] in LIBRARIES
+            return StagedModule(value, self._library if inside else lambda _, v: self.instead(v))
+        if type(value) is np.ndarray:
+            return self.fresh(value)
+        if type(value) in _RAW or isinstance(value, np.generic | Tracer | Special | enum.Enum):
             return value
+        if isinstance(value, type):
+            return self._type(value)
         if type(value) in (list, tuple):
             return type(value)(map(self.instead, value))
         if type(value) is dict:
             return {k: self.instead(v) for k, v in value.items()}
-        name = getattr(value, "__name__", "")
-        if isinstance(value, np.ufunc) or (callable(value) and getattr(np, name, None) is value):
-            return getattr(self.numpy, name)
         if isinstance(value, BuiltinFunctionType):
-            return self._instead_of_builtin(value, name)
+            return self._instead_of_builtin(value)
+        if isinstance(value, np.ufunc) or (callable(value) and self._is_known(value)):
+            return self._library("", value)
         return self._instead_of_object(value)
 
-    def _instead_of_builtin(self, value: Any, name: str) -> Any:
-        owner = getattr(value, "__self__", None)
+    def _is_known(self, value: Any) -> bool:
+        module = getattr(value, "__module__", None) or ""
+        foreign = isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is not value
+        if foreign or module.startswith(("scipy.special", "scipy.linalg")):
+            enter_scipy()
+        if module.startswith("scipy.interpolate"):
+            enter_splines()
+        try:
+            return value in OWN
+        except TypeError:  # it has no hash
+            return False
+
+    def _instead_of_builtin(self, value: Any) -> Any:
+        owner, name = getattr(value, "__self__", None), value.__name__
         if owner is math:
             return getattr(self.math, name)
-        return self._builtins[name] if owner is builtins else _for_numbers(value)
+        if owner is builtins:
+            return self._builtins[name]
+        if self._is_known(value):
+            return self._library(name, value)
+        if isinstance(owner, ModuleType) and owner.__name__ in _OPERATORS:
+            return value  # they use operators, as what they are given has them
+        return self.for_numbers(value)
 
     def _instead_of_object(self, value: Any) -> Any:
         if isinstance(value, functools.partial | MethodType):
-            return self._called_object(value)
+            return self.called_object(value)
         if isinstance(value, CPUDispatcher | FunctionType):
-            return _for_numbers(value) if _is_of_a_library(value) else self.copied(value)
+            return self.for_numbers(value) if is_of_a_library(value) else self.copied(value)
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
             return type(value)(*map(self.instead, value))
-        return _Object(value, self)
+        if type(value).__module__ in _OPERATORS:
+            return value  # itemgetter and its kind
+        if is_of_a_library(value) and callable(value) and hasattr(value, "__wrapped__"):
+            return self.for_numbers(value)  # a function of NumPy
+        if type(value).__module__.startswith("scipy.spatial.transform") and (
+            type(value) is enter_rotations()
+        ):
+            return turn_of(self.graph, value)
+        if id(value) not in self._objects:  # one and the same: it may be asked with `is`
+            self._objects[id(value)] = (value, StagedObject(value, self))
+        return self._objects[id(value)][1]
+
+    def parent(self, thing: Any, cls: type) -> Any:
+        """Return what ``super()`` is in a method of somebody's object."""
+        return StagedParent(thing, self, cls)
 
     def _import(self, name: str, *rest: Any) -> Any:
         return self.instead(builtins.__import__(name, *rest))
 
-    def _ufunc(self, operation: str, real: Callable[..., Any]) -> Callable[..., Any]:
-        count = getattr(np, operation if operation in FUNCTIONS else NUMPY[operation]).nin
+    # -- libraries ---------------------------------------------------------------------------------
+
+    def _library(self, name: str, real: Any) -> Any:
+        """Return a function or module of a library: its own version here, or for constants."""
+        if isinstance(real, ModuleType):
+            return StagedModule(real, self._library)
+        if isinstance(real, type):
+            return self._type(real)
+        if real is np.r_ or real is np.c_:
+            return Joined(self.graph, real)
+        if not callable(real):
+            return real
+        if isinstance(real, np.ufunc):
+            self._is_known(real)
+            known = real in OWN or real.__name__ in OPERATIONS
+            return Ufunc(self.graph, real, self.for_numbers(real)) if known else (
+                self.for_numbers(real)
+            )  # fmt: skip
+        return self._own(real) if self._is_known(real) else self.for_numbers(real)
+
+    def _own(self, real: Any) -> Callable[..., Any]:
+        """Return a function of the table."""
+        own, of_numbers, makes = OWN[real], self.for_numbers(real), real in MAKING
 
         def function(*arguments: Any, **options: Any) -> Any:
-            if not any(map(holds_tracers, arguments)):
-                return real(*arguments, **options)
-            if options or len(arguments) != count:
-                raise Untraceable(f"{operation} with other arguments")
-            if operation == "power":
-                return traced(self.graph, arguments[0]) ** arguments[1]
-            return elementwise(self.graph, operation, *arguments)
+            if makes or holds_tracers([*arguments, *options.values()]):
+                options = {k: plain(v) for k, v in options.items()}
+                return own(self.graph, *map(plain, arguments), **options)
+            return of_numbers(*arguments, **options)
 
         return function
 
-    def _numpy_function(self, name: str, real: Any) -> Any:
-        own = getattr(_Numpy, name, None)
-        if own is not None:
-            return lambda *arguments, **options: own(self.graph, *arguments, **options)
-        operation = _OPERATIONS.get(getattr(real, "__name__", name))
-        if isinstance(real, np.ufunc) and operation:
-            return self._ufunc(operation, real)
-        if isinstance(real, ModuleType):
-            return _Module(real, _constant)
-        return _for_numbers(real)
+    def for_numbers(self, real: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a function that takes constants, and refuses tracers."""
+
+        def function(*arguments: Any, **options: Any) -> Any:
+            every, named = settled(arguments), {k: settled(v) for k, v in options.items()}
+            if holds_tracers([*every, *named.values()]):
+                written = _in_python(real)
+                if written is None:
+                    raise Untraceable(f"{_title(real)} is not known here")
+                return self._traced_library(real, written, arguments, options)
+            return self.fresh(real(*every, **named))
+
+        return function
+
+    def _traced_library(self, real: Any, written: FunctionType, given: Any, named: Any) -> Any:
+        """Trace a function of a library that is plain Python as if it were somebody's."""
+        try:
+            return self.copied(written)(*given, **named)
+        except Exception as error:  # whatever it does not expect of tracers
+            raise Untraceable(f"{_title(real)} is not known here") from error
+
+    def fresh(self, value: Any) -> Any:
+        """Return constants that a library has made: arrays as those of expressions."""
+        if type(value) is np.ndarray and value.dtype == float and value.ndim:
+            try:
+                return traced(self.graph, value) if value.size <= _LARGE else value
+            except Untraceable:
+                return value
+        if type(value) in (list, tuple):
+            return type(value)(map(self.fresh, value))
+        known = isinstance(value, (*_RAW, np.ndarray, type)) or not is_of_a_library(value)
+        return value if known else self._instead_of_object(value)
 
     def _math_function(self, name: str, real: Any) -> Any:
         if name not in MATH:
-            return _for_numbers(real)
-        known = self._ufunc(MATH[name], real)
+            return self._library(name, real)
+        operation, of_numbers = MATH[name], self.for_numbers(real)
+        count = numpy_function(operation).nin
 
         def function(*arguments: Any) -> Any:
-            result = known(*arguments)
-            if isinstance(result, Tracer):
-                self._guard(result, arguments)
+            if not holds_tracers(arguments):
+                return of_numbers(*arguments)
+            if len(arguments) != count:
+                raise Untraceable(f"{operation} with other arguments")
+            if operation == "power":
+                result = traced(self.graph, arguments[0]) ** arguments[1]
+            else:
+                result = elementwise(self.graph, operation, *arguments)
+            guard_of_math(self.graph, result, arguments)
             return result
 
         return function
 
-    def _guard(self, result: Tracer, arguments: Any) -> None:
-        """Note when Python's function raises an error where NumPy's gives NaN or infinity."""
-        graph = self.graph
-        if result.shape:
-            raise Untraceable("a function of math of an array")
-        finite = _Numpy.isfinite(graph, result)
-        for value in arguments:
-            given = traced(graph, value)
-            nan = elementwise(graph, "ne", given, given)
-            infinite = elementwise(graph, "eq", elementwise(graph, "absolute", given), np.inf)
-            passed = elementwise(graph, "and", infinite, elementwise(graph, "eq", result, result))
-            finite = elementwise(graph, "or", finite, elementwise(graph, "or", nan, passed))
-        if finite.only.op != "const" or not finite.only.data:
-            graph.guards.append(finite.only)
+    # -- classes -----------------------------------------------------------------------------------
 
-    def _builtin(self, name: str, real: Any) -> Any:
-        if name == "float":
-            return lambda value=0.0: value if isinstance(value, Tracer) else float(value)
-        if name in ("min", "max"):
-            return lambda *values, **options: self._extreme(name, values, options)
-        if name == "__import__":
-            return self._import
-        if name in ("getattr", "hasattr"):
-            checked = _for_numbers(real)
-            return lambda thing, *rest: (
-                real(thing, *rest) if type(thing) is _Object else checked(thing, *rest)
-            )
-        if name == "isinstance":
-            return lambda thing, kind: _for_numbers(real)(_real(thing), kind)
-        if name == "type":
-            return lambda thing: _for_numbers(real)(_real(thing))
-        is_error = isinstance(real, type) and issubclass(real, BaseException)
-        plain = name in _SAFE or is_error or not callable(real) or name == "__build_class__"
-        return real if plain else _for_numbers(real)
+    def _type(self, cls: type) -> Any:
+        """Return a class: of somebody a copy whose methods lead here, of a library what makes."""
+        if cls is np.float64:
+            return Kind(np.float64, self._builtins["float"].make)
+        raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc, np.errstate)
+        if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
+            return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
+        if is_of_a_library(cls):
+            return StagedType(cls, self)
+        if cls.__module__.partition(".")[0] in ("collections", "types", "decimal", "functools",
+                                                "itertools", "operator", "_operator", "numbers",
+                                                "control", "nlctl"):  # fmt: skip
+            return cls
+        if issubclass(cls, tuple) or not any(map(_has_code, vars(cls).values())):
+            return cls
+        return self.copied_class(cls)
 
-    def _extreme(self, name: str, values: Any, options: Any) -> Any:
-        """Python's min and max: the first of those that no other is beyond."""
-        values = list(values[0]) if len(values) == 1 else list(values)
-        if not holds_tracers(values):
-            return getattr(builtins, name)(values, **options)
-        if options or any(isinstance(v, Tracer) and v.shape for v in values):
-            raise Untraceable(f"{name} of arrays, or with {', '.join(options)}")
-        found = traced(self.graph, values[0])
-        for value in values[1:]:
-            beyond = elementwise(self.graph, "lt" if name == "min" else "gt", value, found)
-            found = elementwise(self.graph, "select", beyond, value, found)
-        return found
+    def copied_class(self, cls: type) -> type:
+        """Return a copy of a class whose methods lead to the stage."""
+        if cls not in self.classes:
+            bases = tuple(self._type(b) for b in cls.__bases__)
+            made = type(cls)(cls.__name__, bases, {"__module__": cls.__module__})
+            self.classes[cls] = made
+            slots = vars(cls).get("__slots__", ())
+            for name, value in vars(cls).items():
+                if name not in (*_KEPT, *((slots,) if isinstance(slots, str) else slots)):
+                    type.__setattr__(made, name, self._member(value))
+        return self.classes[cls]
+
+    def _member(self, value: Any) -> Any:
+        if isinstance(value, FunctionType):
+            return self.copied(value)
+        if isinstance(value, staticmethod | classmethod):
+            return type(value)(self._member(value.__func__))
+        if isinstance(value, property):
+            parts = (value.fget, value.fset, value.fdel)
+            return property(*(None if p is None else self._member(p) for p in parts))
+        if isinstance(value, functools.cached_property):
+            made = functools.cached_property(self._member(value.func))
+            made.__set_name__(made, value.attrname or value.func.__name__)
+            return made
+        return self.instead(value) if callable(value) or type(value) is np.ndarray else value
 
 
-class _Module:
-    """A module whose functions are replaced."""
-
-    def __init__(self, real: Any, function: Callable[[str, Any], Any]) -> None:
-        self._real, self._function = real, function
-
-    def __getattr__(self, name: str) -> Any:
-        real = getattr(self._real, name)
-        is_type = isinstance(real, type)
-        plain = is_type or not (callable(real) or isinstance(real, ModuleType))
-        return real if plain else self._function(name, real)
+def _in_python(real: Any) -> FunctionType | None:
+    """Return the source of a function of a library if that is plain Python: it is traced, too."""
+    function = inspect.unwrap(real) if callable(real) else real
+    plain = isinstance(function, FunctionType) and is_of_a_library(function)
+    return function if plain else None
 
 
-class _Object:
-    """An object of somebody's class: what its methods read is replaced as well."""
-
-    def __init__(self, real: Any, stage: Stage) -> None:
-        self.__dict__.update(_real=real, _stage=stage)
-
-    def __getattr__(self, name: str) -> Any:
-        real, stage = self.__dict__["_real"], self.__dict__["_stage"]
-        found = inspect.getattr_static(type(real), name, None)
-        if name in getattr(real, "__dict__", {}) and not isinstance(found, property):
-            return stage.instead(getattr(real, name))  # its own is what Python finds first
-        if isinstance(found, property | functools.cached_property) and not _is_of_a_library(real):
-            getter = found.fget if isinstance(found, property) else found.func
-            return stage.copied(getter)(self)
-        if isinstance(found, FunctionType) and not _is_of_a_library(real):
-            return functools.partial(stage.copied(found), self)
-        return stage.instead(getattr(real, name))
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        raise Untraceable("a function that changes an object")
-
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
-        return self._stage._called_object(self._real)(*arguments, **options)
+def _has_code(value: Any) -> bool:
+    return isinstance(value, FunctionType | staticmethod | classmethod | property)
 
 
-def _real(thing: Any) -> Any:
-    return thing.__dict__["_real"] if type(thing) is _Object else thing
-
-
-def _is_of_a_library(thing: Any) -> bool:
-    """Whether a function, or an object's class, is one of a well-known library."""
-    module = getattr(thing, "__module__", None) or type(thing).__module__
-    return module.partition(".")[0] in _LIBRARIES
-
-
-def _constant(name: str, real: Any) -> Any:
-    """Return a function or module of a library, for constants alone."""
-    return _Module(real, _constant) if isinstance(real, ModuleType) else _for_numbers(real)
-
-
-def _for_numbers(real: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that refuses tracers."""
-
-    def function(*arguments: Any, **options: Any) -> Any:
-        every = (*arguments, *options.values())
-        if any(map(holds_tracers, every)) or any(type(v) is _Object for v in every):
-            raise Untraceable(f"{real!r} is not known here")
-        return real(*arguments, **options)
-
-    return function
+def _title(real: Any) -> str:
+    """Return a function's name as it is written."""
+    module = (getattr(real, "__module__", None) or "").replace("numpy", "np")
+    name = getattr(real, "__qualname__", None) or getattr(real, "__name__", repr(real))
+    return f"{module}.{name}" if module and module != "builtins" else name
 
 
 def _names(code: CodeType) -> Iterator[str]:
@@ -281,131 +340,3 @@ def _names(code: CodeType) -> Iterator[str]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from _names(constant)
-
-
-def _only_floats(dtype: Any) -> None:
-    if dtype not in (None, float, np.float64):
-        raise Untraceable(f"arrays of {dtype}")
-
-
-class _Numpy:
-    """Functions of NumPy that are no ufuncs."""
-
-    @staticmethod
-    def zeros(graph, shape, dtype=float):
-        _only_floats(dtype)
-        return full(graph, shape, 0.0)
-
-    empty = zeros
-
-    @staticmethod
-    def ones(graph, shape, dtype=float):
-        _only_floats(dtype)
-        return full(graph, shape, 1.0)
-
-    @staticmethod
-    def full(graph, shape, value):
-        return full(graph, shape, value)
-
-    @staticmethod
-    def zeros_like(graph, array):
-        if not holds_tracers(array):
-            return np.zeros_like(array)
-        array = traced(graph, array)
-        _ = array.dtype  # which refuses all but floats
-        return full(graph, array.shape, 0.0)
-
-    empty_like = zeros_like
-
-    @staticmethod
-    def ones_like(graph, array):
-        return elementwise(graph, "add", _Numpy.zeros_like(graph, array), 1.0)
-
-    @staticmethod
-    def array(graph, values, dtype=None):
-        if not holds_tracers(values) and np.array(values, dtype).dtype != float:
-            return np.array(values, dtype)  # an array of integers rounds what it is assigned
-        _only_floats(dtype)
-        made = traced(graph, values).copy()
-        if not made.shape or all(e.kind != "f" for e in made.cells.flat):
-            raise Untraceable("an array without axes, or of integers or truth values")
-        return made
-
-    @staticmethod
-    def asarray(graph, values, dtype=None):
-        if not isinstance(values, Tracer) or not values.shape:
-            return _Numpy.array(graph, values, dtype)
-        if dtype is not None:
-            _only_floats(dtype)
-            _ = values.dtype  # which refuses all but floats
-        return values
-
-    @staticmethod
-    def copy(graph, values):
-        return traced(graph, values).copy()
-
-    @staticmethod
-    def sum(graph, values, axis=None):
-        return total(traced(graph, values), axis)
-
-    @staticmethod
-    def dot(graph, a, b):
-        return product(traced(graph, a), traced(graph, b))
-
-    matmul = dot
-
-    @staticmethod
-    def concatenate(graph, parts, axis=0):
-        if axis not in (0, -1):
-            raise Untraceable("arrays that are concatenated along another axis")
-        return concatenated(graph, [traced(graph, p) for p in parts])
-
-    @staticmethod
-    def hstack(graph, parts):
-        parts = [traced(graph, p) for p in parts]
-        return concatenated(graph, [p if p.shape else p.reshape(1) for p in parts])
-
-    @staticmethod
-    def append(graph, array, values):
-        return _Numpy.hstack(graph, [traced(graph, v).reshape(-1) for v in (array, values)])
-
-    @staticmethod
-    def atleast_1d(graph, values):
-        array = traced(graph, values)
-        return array if array.shape else array.reshape(1)
-
-    @staticmethod
-    def ravel(graph, values):
-        return traced(graph, values).reshape(-1)
-
-    @staticmethod
-    def reshape(graph, values, shape):
-        return traced(graph, values).reshape(shape)
-
-    @staticmethod
-    def where(graph, condition, a, b):
-        return elementwise(graph, "select", condition, a, b)
-
-    @staticmethod
-    def clip(graph, values, low, high):
-        return elementwise(graph, "minimum", elementwise(graph, "maximum", values, low), high)
-
-    @staticmethod
-    def square(graph, values):
-        return elementwise(graph, "mul", values, values)
-
-    @staticmethod
-    def isnan(graph, values):
-        return elementwise(graph, "ne", values, values)
-
-    @staticmethod
-    def isfinite(graph, values):
-        return elementwise(graph, "lt", elementwise(graph, "absolute", values), np.inf)
-
-    @staticmethod
-    def size(graph, values):
-        return traced(graph, values).size
-
-    @staticmethod
-    def shape(graph, values):
-        return traced(graph, values).shape

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import dis
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .arrays import Tracer, concatenated, scalar, traced
 from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, OpenCondition, Untraceable
+from .library.python import Namespace
 from .operators import elementwise
 from .stage import Stage
+from .staged import LIBRARIES
 
 PATHS = 32  # ways through one function that are followed
 
@@ -44,38 +48,82 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
         stage = Stage(graph)
         copy = stage.copied(function)
         run = lambda: copy(*map(stage.instead, arguments()))  # noqa: E731
-        return _followed(graph, lambda: _flat(graph, run()), {}, [PATHS])
+        found = _followed(graph, lambda: _flat(graph, run()), {}, [PATHS])
+        if found is None:
+            raise Untraceable("it raises an error on every way")
+        return found
     except Ambiguous:
         raise
     except Exception as error:  # a traced function may raise whatever it likes
         graph.assumptions = assumptions
-        raise Untraceable(str(error)) from error
+        raise Untraceable(f"{error}{_place(error)}") from error
     finally:
-        graph.decisions, graph.guards = {}, []
+        graph.decisions, graph.implied, graph.guards = {}, {}, []
         graph.limit = UNLIMITED
 
 
 def _followed(
     graph: Graph, run: Callable[[], Tracer], decisions: dict[Expr, bool], left: list[int]
-) -> Tracer:
-    """Follow a function from where the decisions have led."""
-    graph.decisions, graph.guards = decisions, []
+) -> Tracer | None:
+    """Follow a function from where the decisions have led; None where it raises an error."""
+    graph.decisions, graph.implied, graph.guards = decisions, {}, []
     try:
         result = _guarded(graph, run())
     except OpenCondition as question:
         condition = question.condition
+    except Exception as error:
+        if not decisions or not _is_raised(error):
+            raise
+        return _counted(left, None)
     else:
-        left[0] -= 1
-        if left[0] < 0:
-            raise Untraceable(f"more than {PATHS} ways through it")
-        return result
+        return _counted(left, result)
     if len(decisions) >= PATHS:
         raise Untraceable("a loop whose end depends on what is computed")
     yes = _followed(graph, run, {**decisions, condition: True}, left)
     no = _followed(graph, run, {**decisions, condition: False}, left)
+    if yes is None or no is None:
+        found = no if yes is None else yes
+        if found is None:
+            return None
+        nan = elementwise(graph, "mul", np.nan, found)
+        yes, no = (nan, found) if yes is None else (found, nan)
     if yes.shape != no.shape:
         raise Untraceable("results of different sizes")
     return elementwise(graph, "select", scalar(graph, condition), yes, no)
+
+
+def _counted(left: list[int], result: Tracer | None) -> Tracer | None:
+    """Return the result of a way; there are so many left."""
+    left[0] -= 1
+    if left[0] < 0:
+        raise Untraceable(f"more than {PATHS} ways through it")
+    return result
+
+
+def _is_raised(error: Exception) -> bool:
+    """Whether an error is one that a traced function raises itself, by ``raise`` or ``assert``."""
+    if isinstance(error, Untraceable | Ambiguous):
+        return False
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    if place is None or place.tb_frame.f_globals.get("__builtins__") is None:
+        return False
+    code = place.tb_frame.f_code
+    own = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
+    return own and code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
+
+
+def _place(error: BaseException) -> str:
+    """Return at which line of somebody's function an error was raised, in brackets."""
+    where, frame = "", error.__traceback__
+    while frame is not None:
+        code, names = frame.tb_frame.f_code, frame.tb_frame.f_globals
+        module = str(names.get("__name__")).partition(".")[0]
+        if isinstance(names.get("__builtins__"), Namespace) and module not in LIBRARIES:
+            where = f" ({Path(code.co_filename).name}, line {frame.tb_lineno})"
+        frame = frame.tb_next
+    return where
 
 
 def _guarded(graph: Graph, result: Tracer) -> Tracer:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import cloudpickle
 import control as ct
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..annotations import as_annotated
 from ..diagrams import Apart, apart, not_a_system, override
@@ -57,8 +58,8 @@ class Compiled(StandIn):
     linearizes it with exact derivatives, and so do `nlctl.linearize` and ``ct.linearize``.  Every
     other function of python-control takes ``compiled.system``.
 
-    The stiff method's Jacobian is exact too.  Where a function is opaque it is taken by
-    differences; the printed form says so, and why.
+    The stiff method's Jacobian is exact too.  An opaque function has differences in it, and all
+    else is exact; the printed form says so, and why.
 
     Examples
     --------
@@ -124,6 +125,7 @@ class Compiled(StandIn):
         """
         return evaluations(self)
 
+    @as_annotated
     def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
         """Return the flat vector `p` that the program takes.
 
@@ -162,7 +164,10 @@ class Compiled(StandIn):
             override(self.schedule.system, params)
             return packed(self.schedule.holders, self.program.layout, self.program.fixed)
 
-    def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
+    @as_annotated
+    def dynamics(
+        self, t: float, x: ArrayLike, u: ArrayLike = (), params: Mapping[str, Any] | None = None
+    ) -> np.ndarray:
         """Return the right-hand side, as ``system.dynamics`` does.
 
         Parameters
@@ -191,7 +196,10 @@ class Compiled(StandIn):
         g = np.empty(self.lowered.rows["g"])
         return self._call(self.native[0], self.system.nstates, t, x, u, params, g)
 
-    def output(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
+    @as_annotated
+    def output(
+        self, t: float, x: ArrayLike, u: ArrayLike = (), params: Mapping[str, Any] | None = None
+    ) -> np.ndarray:
         """Return the outputs, as ``system.output`` does.
 
         Parameters
@@ -224,6 +232,7 @@ class Compiled(StandIn):
         """The derivatives of the equations along a direction of states, inputs and parameters."""
         return tangent(self)
 
+    @as_annotated
     def linearize(
         self,
         x0: Any,
@@ -260,9 +269,14 @@ class Compiled(StandIn):
         Raises
         ------
         CompileError
-            If a function is called as it stands.
+            If there are transport delays, or the rates of inputs enter.
         ParameterError, UnknownKeywordError, UsageError
             If an argument is refused.
+
+        Warns
+        -----
+        InexactWarning
+            If a function is called as it stands: its derivatives are differences.
 
         Notes
         -----
@@ -270,6 +284,7 @@ class Compiled(StandIn):
         """
         return linear_system(self, x0, u0, t, params, copy_names=copy_names, names=names)
 
+    @as_annotated
     def parameter_jacobian(
         self,
         parameters: Sequence[str],
@@ -380,8 +395,8 @@ def compile(  # noqa: A001 (what it does)
     Functions are read before they are called.  One that remembers something outside of states,
     changes what it was given, draws random numbers, or has ``try ... except`` is refused.
 
-    A function that cannot be written out as expressions (it has a loop that the state ends, reads
-    a table of SciPy) is called as it stands: as machine code that numba makes of it, otherwise
+    A function that cannot be written out as expressions (it has a loop that the state ends, or a
+    quadrature) is called as it stands: as machine code that numba makes of it, otherwise
     back in Python, which is right and as slow as python-control.  ``print(compiled)`` says which.
 
     Examples
@@ -454,11 +469,16 @@ def linearize(
     AlgebraicLoopError
         If signals depend on each other without a state in between.
     CompileError
-        If the diagram cannot be compiled, or a function is called as it stands.
+        If the diagram cannot be compiled.
     ParameterError
         If an argument is refused, or the clocks have no common period.
     UnknownKeywordError, UsageError
         If there is no such keyword; if signals are delayed, whose past is not a state.
+
+    Warns
+    -----
+    InexactWarning
+        If a function is called as it stands: its derivatives are differences, all others exact.
 
     Examples
     --------

@@ -22,6 +22,7 @@ USE = (
     "nlctl.input_output_response, nlctl.ensemble_response, .linearize(x0, u0); "
     "python-control's other functions take .system"
 )
+SLOW = "called back in Python, no faster than python-control until that is written otherwise"
 _SHOWN = 8  # names that are listed before the rest is only counted
 
 
@@ -43,7 +44,7 @@ def described(compiled: Compiled) -> str:
     ]
     if ct.isctime(system) and system.nstates:
         why = inexact(compiled)
-        how = "exact" if why is None else f"by differences, since {why}"
+        how = "exact" if why is None else f"exact, with differences where {why}"
         lines.append(f"  Jacobian     {how}")
     lines += [f"  conditions   {line}" for line in _conditions(compiled)]
     for loop in schedule.loops:
@@ -71,7 +72,7 @@ def called(compiled: Compiled) -> Iterator[str]:
     made = compiled.__dict__.get("_machines", ())
     back = {name for each in made for name in each.called_back}
     for name, call in compiled.equations.calls.items():
-        how = "called back in Python" if name in back else "in machine code of numba"
+        how = SLOW if name in back else "in machine code of numba"
         how = how if made else "as it stands"
         yield f"{call.kind} of block '{call.block}', {how}: {call.reason}"
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,13 @@ from scipy.linalg import expm
 from ..arguments import number
 from ..blocks import Block
 from ..delays.lines import delayed_blocks
-from ..errors import CompileError, ParameterError, UnknownKeywordError, UsageError
+from ..errors import (
+    CompileError,
+    InexactWarning,
+    ParameterError,
+    UnknownKeywordError,
+    UsageError,
+)
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Untraceable, needed
@@ -24,6 +31,7 @@ from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from ..sampling.system import clocks_of
 from ..wording import counted
+from .codegen.calls import Call
 from .codegen.lower import DIRECTION
 from .codegen.solver import searched
 from .equations.blocks import Equations
@@ -56,14 +64,17 @@ class Tangent:
 
 
 def inexact(compiled: Compiled, results: Sequence[str] = ("dx",)) -> str | None:
-    """Return why there are no exact derivatives of a diagram's results, None if there are."""
+    """Return what derivatives of a diagram's results are taken by differences of, and why.
+
+    None if all are exact.
+    """
     found = compiled.equations
     parts = [expr for name in results for expr, _ in found.pieces(name)]
-    for node in needed(parts):
-        if node.op == "call":
-            call = found.calls[node.data[0]]
-            return f"{call.name} is called as it stands ({call.reason})"
-    return None
+    names = dict.fromkeys(node.data[0] for node in needed(parts) if node.op == "call")
+    used = [found.calls[name] for name in names]
+    told = [f"the {c.kind} function of block '{c.block}' is called as it stands ({c.reason})"
+            for c in used]  # fmt: skip
+    return ", and ".join(told) or None
 
 
 def tangent(compiled: Compiled) -> Tangent:
@@ -72,7 +83,7 @@ def tangent(compiled: Compiled) -> Tangent:
     Raises
     ------
     CompileError
-        If a function is opaque, or there are transport delays.
+        If there are transport delays, or ideal relays slide as inputs' rates say.
     """
     found = compiled.equations
     if compiled.schedule.lines:
@@ -83,12 +94,6 @@ def tangent(compiled: Compiled) -> Tangent:
             "nlctl.sampled(gain, dt, delay=...), which is exact"
         )
     names = ("dx", "y", *(name for name in found.results if name.startswith("sample")))
-    why = inexact(compiled, names)
-    if why is not None:
-        raise CompileError(
-            f"'{compiled.system.name}' has no exact derivatives, since {why}: use "
-            "ct.linearize(diagram), which takes differences"
-        )
     n, m = compiled.system.nstates or 0, compiled.schedule.ninputs
     parts = needed([expr for name in names for expr, _ in found.pieces(name)])
     rates = range(m - compiled.schedule.rates, m)
@@ -123,7 +128,7 @@ def along(
     Raises
     ------
     CompileError
-        If a function is opaque.
+        If a search for the signals of an algebraic loop has no derivative.
     """
     graph = equations.graph
     pieces = equations.pieces(name)
@@ -137,7 +142,9 @@ def along(
 
     try:
         with _DIFFERENTIATING, np.errstate(all="ignore"):
-            found = tangents(graph, [expr for expr, _ in pieces], seed, equations.fixed_points)
+            found = tangents(
+                graph, [e for e, _ in pieces], seed, equations.fixed_points, differences=True
+            )
     except Untraceable as error:
         raise CompileError(f"the equations have no derivatives: {error}") from None
     return list(zip(found, [size for _, size in pieces], strict=True))
@@ -171,6 +178,7 @@ def jacobian(
     arrays = {name: np.asarray(v, dtype=float)[:, None] for name, v in columns.items()}
     arrays[DIRECTION] = directions
     searches = {name: searched(one) for name, one in compiled.equations.solvers.items()}
+    searches |= {name: _of_columns(call) for name, call in compiled.equations.calls.items()}
     count, found = directions.shape[1], {}
     for name, rows in made.rows.items():
         wanted = [e for e, _ in rows if e is not None]
@@ -181,6 +189,11 @@ def jacobian(
         ]
         found[name] = np.concatenate([np.zeros((0, count)), *parts])
     return found
+
+
+def _of_columns(call: Call) -> Callable[[np.ndarray], np.ndarray]:
+    """Return an opaque function of arguments in columns."""
+    return lambda given: np.stack([call.function(column.copy()) for column in given.T], axis=1)
 
 
 def _inputs(system: Any, u0: Any) -> np.ndarray:
@@ -219,6 +232,7 @@ def linear_system(
             f"a control.StateSpace cannot have one state and no input, as '{system.name}' has: "
             "give the diagram an input"
         )
+    _tell_of_differences(compiled)
     directions = np.eye(n + given + length(compiled.program.layout), n + m)
     found = jacobian(compiled, x0, u0, t, params, directions)
     rates, outputs, dt = found["dx"], found["y"], system.dt
@@ -234,6 +248,19 @@ def linear_system(
         rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:], dt,
         remove_useless_states=False, **(own if copy_names else {}) | dict(names),
     )  # fmt: skip
+
+
+def _tell_of_differences(compiled: Compiled) -> None:
+    """Warn of derivatives that are not exact."""
+    names = ("dx", "y", *(r for r in compiled.equations.results if r.startswith("sample")))
+    why = inexact(compiled, names)
+    if why is not None:
+        warnings.warn(
+            f"derivatives of '{compiled.system.name}' are differences where {why}, and exact "
+            "elsewhere",
+            InexactWarning,
+            stacklevel=4,
+        )
 
 
 def over_a_period(compiled: Compiled, found: Mapping[str, np.ndarray]) -> tuple[Any, Any, float]:
@@ -299,6 +326,7 @@ def parameter_jacobian(
             for k in range(slot.size if slot.kind == "f" else 0):
                 name = f"{slot.name}[{k}]" if slot.shape else slot.name
                 places[name], owners[name] = slot.offset + k, compiled.schedule.holders[i]
+    _tell_of_differences(compiled)
     compiled.parameter_vector(params)  # blocks have the run's parameters then
     start = (system.nstates or 0) + compiled.schedule.ninputs
     directions = np.zeros((start + length(compiled.program.layout), len(parameters)))

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlctl.expressions.functions import FUNCTIONS
+from nlctl.expressions.graph import numpy_function
 from nlctl.native.codegen.ir import functions as ir
 from nlctl.native.codegen.ir.memory import entry_address, load_value, store
 from nlctl.native.codegen.ir.text import Body, Module
@@ -199,7 +200,7 @@ def test_every_function_of_the_table_is_numpys(name):
     """Element by element, NaN where NumPy has it."""
     x = np.array([-2.5, -1.0, -0.3, 0.0, 0.4, 1.0, 7.5, np.nan])
     with np.errstate(all="ignore"):
-        expected = getattr(np, name)(x)
+        expected = numpy_function(name)(x)
     for width in (1, 8):
         np.testing.assert_allclose(values(name, x, width=width), expected, rtol=1e-14)
 
@@ -210,7 +211,7 @@ def test_every_function_of_two_arguments_is_numpys(name):
     x = np.array([-2.5, -1.0, -0.3, 0.5, 0.0, -0.0, 7.5, np.nan, np.inf, -np.inf, 3.0, -3.0])
     for other in (1.5, -2.0, 0.0, np.inf, np.nan):
         with np.errstate(all="ignore"):
-            expected = getattr(np, name)(x, other)
+            expected = numpy_function(name)(x, other)
         found = values(name, x, other)
         np.testing.assert_allclose(found, expected, rtol=1e-14)
         if name in ("remainder", "copysign", "fmod"):

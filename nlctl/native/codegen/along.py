@@ -16,7 +16,7 @@ import numpy as np
 from ...expressions.dependence import structure
 from ..integrate.methods.lu import Elimination, elimination
 from ..integrate.state import DIRECTIONS
-from ..jacobians import along, inexact
+from ..jacobians import along
 from ..machine.routine import entry, lowered_code
 from .lower import lower_along
 
@@ -56,8 +56,8 @@ class Along:
 def derivatives(compiled: Compiled, p: np.ndarray) -> Along | None:
     """Return the derivatives for a parameter vector, made when they are first needed.
 
-    None if there are no exact ones: an equation is opaque, or was differentiated for an integer
-    parameter that has another value now.
+    None if there are none: an equation was differentiated for an integer parameter that has
+    another value now.  Opaque functions have differences in them.
     """
     with _ONCE:
         if "_along" not in compiled.__dict__:
@@ -73,8 +73,6 @@ def derivatives(compiled: Compiled, p: np.ndarray) -> Along | None:
 
 def _made(compiled: Compiled) -> Any:
     equations = compiled.equations
-    if inexact(compiled) is not None:
-        return None
     n, m = compiled.system.nstates or 0, compiled.schedule.ninputs
     rows = along(equations, "dx", {"x": 0, "u": n, "t": n + m})
     lowered = lower_along(compiled.schedule, compiled.program, equations, rows, DIRECTIONS)

@@ -8,7 +8,7 @@ generator makes machine code of the plan (`codegen.ir`), and one interpreter car
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -168,8 +168,7 @@ def lower_along(
         expr = equations.graph.const(0.0) if expr is None else expr
         stores += split(Store(array="dx", row=row, expr=expr, size=size))
         row += size
-    found = replace(equations, calls={})  # what is opaque has no derivatives
-    return _lowered(schedule, program, found, ALONG, {POINT: [], "along": stores}, lanes)
+    return _lowered(schedule, program, equations, ALONG, {POINT: [], "along": stores}, lanes)
 
 
 def _lowered(

@@ -43,13 +43,16 @@ def traced_arguments(graph: Graph, system: Any, slots: Mapping[str, Slot]) -> tu
     return time(graph), x, u, traced_parameters(graph, system, slots)
 
 
-def _parameter(graph: Graph, slot: Slot, value: Any, p: np.ndarray | None) -> Tracer:
+def _parameter(graph: Graph, slot: Slot, value: Any, p: np.ndarray | None) -> Any:
     if slot.kind in "ib" and not slot.shape:  # Python's True is an integer, too
         now = int(value if p is None else p[slot.offset])
         leaf = graph.leaf("p", slot.offset, None, kind="i", value=now)
         return scalar(graph, leaf)
     whole = leaf_vector(graph, "p", slot.offset, slot.shape)
-    return elementwise(graph, "ne", whole, 0.0) if slot.kind == "b" else whole
+    if slot.kind == "b":
+        return elementwise(graph, "ne", whole, 0.0)
+    named = isinstance(value, tuple) and hasattr(value, "_fields") and len(slot.shape) == 1
+    return type(value)(*whole) if named else whole
 
 
 def dependence(system: Any, function: Callable[..., Any], slots: Mapping[str, Slot]) -> np.ndarray:

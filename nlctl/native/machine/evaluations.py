@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from .routine import called_back, entry, lowered_code, raise_failures
 if TYPE_CHECKING:
     from ..compiled import Compiled
 
+_LOG = logging.getLogger("nlctl")
 ENSEMBLE_WIDTH = 8  # members of a batch in ensembles: one AVX-512 register
 
 
@@ -133,7 +135,22 @@ def machine(
             meetings=meetings,
         )
     )
+    _hint(compiled, known[-1])
     return known[-1]
+
+
+def _hint(compiled: Compiled, made: Machine) -> None:
+    """Say once which functions take the time of Python, and at which line that is decided."""
+    if compiled.__dict__.setdefault("_hinted", not made.called_back):
+        return
+    compiled.__dict__["_hinted"] = True
+    for name in made.called_back:
+        call = compiled.equations.calls[name]
+        _LOG.warning(
+            "hint: the %s function of block '%s' is called back in Python, so runs are no faster "
+            "than python-control's: %s",
+            call.kind, call.block, call.reason,
+        )  # fmt: skip
 
 
 def fitting(compiled: Compiled, p: np.ndarray, width: int) -> np.ndarray:

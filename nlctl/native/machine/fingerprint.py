@@ -368,6 +368,8 @@ def _of_module(module: types.ModuleType, seen: _Seen, names: Iterable[str]) -> I
         if name in vars(module):
             yield name
             yield from _fingerprint(vars(module)[name], seen, names)
+    if seen.deep and "__getattr__" in vars(module):  # it makes what the module lacks
+        yield from _fingerprint(vars(module)["__getattr__"], seen)
     del seen[id(module)]  # another function may read other names of it
 
 

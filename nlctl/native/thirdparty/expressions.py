@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 import ast
+import enum
 import functools
 import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from types import FunctionType, ModuleType
+from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import known_calls
+from . import known_calls, made
 from .known_calls import MEMORY
 from .source import source_file
 from .values import (
     FRESH,
     OUTSIDE,
+    PLAIN,
     SLICE,
     UNKNOWN_VALUE,
     Impure,
+    Instance,
     KnownValue,
     Local,
     OneOf,
+    Parent,
+    Pure,
     Unknown,
     captured,
     element,
@@ -38,6 +43,14 @@ if TYPE_CHECKING:
     from .purity import Walk
 
 CHANGES = "work on a copy, as in x.copy()"
+OPERATORS = {
+    ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "truediv", ast.FloorDiv: "floordiv",
+    ast.Mod: "mod", ast.Pow: "pow", ast.MatMult: "matmul", ast.BitAnd: "and", ast.BitOr: "or",
+    ast.BitXor: "xor", ast.LShift: "lshift", ast.RShift: "rshift", ast.Lt: "lt", ast.LtE: "le",
+    ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne",
+}  # fmt: skip
+_TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le", "eq": "eq", "ne": "ne"}
+_SIGNS = {ast.USub: "__neg__", ast.UAdd: "__pos__", ast.Invert: "__invert__", ast.Not: "__bool__"}
 
 
 @dataclass(eq=False)
@@ -113,8 +126,8 @@ class Expressions(ast.NodeVisitor):
             self.assign(target.id, value)
         elif isinstance(target, ast.Tuple | ast.List):
             self.iterated(value)
-            for part in target.elts:
-                self.bind(part, element(value))
+            for i, part in enumerate(target.elts):
+                self.bind(part, _part(value, i, len(target.elts)))
         elif isinstance(target, ast.Starred):
             self.bind(target.value, replace(element(value), own=True, holds=True))
         elif isinstance(target, ast.Subscript | ast.Attribute):
@@ -126,9 +139,29 @@ class Expressions(ast.NodeVisitor):
         base = self.visit(target.value)
         if isinstance(target, ast.Subscript):
             self.visit(target.slice)
+        if isinstance(base.known, Instance):
+            return self.write_object(target, base, value)
         if not base.own:
             text = ast.unparse(target.value)
             raise Impure(f"writes into '{text}', which it did not make", f"{MEMORY}, or {CHANGES}")
+        self.kept(base, [value])
+
+    def write_object(
+        self, target: ast.Subscript | ast.Attribute, base: KnownValue, value: KnownValue
+    ) -> None:
+        """Note what is written into an object that the call has made."""
+        if isinstance(target, ast.Subscript):
+            found = made.operator_of(base, "__setitem__")
+            if found is None:
+                raise Impure(f"writes into an object of {base.known.cls.__name__}", CHANGES)
+            self.walk.function(found, [base, OUTSIDE, value], {})
+            return
+        found = inspect.getattr_static(base.known.cls, target.attr, None)
+        if isinstance(found, property):
+            if found.fset is not None:
+                self.walk.call(captured(found.fset), [base, value], {})
+            return
+        base.known.learn(target.attr, value)
         self.kept(base, [value])
 
     def kept(self, base: KnownValue, values: Sequence[KnownValue]) -> None:
@@ -154,11 +187,29 @@ class Expressions(ast.NodeVisitor):
         return value
 
     def visit_BinOp(self, node: ast.BinOp) -> KnownValue:
-        self.operands([self.visit(node.left), self.visit(node.right)])
-        return FRESH
+        return self.operated(type(node.op), self.visit(node.left), self.visit(node.right))
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> KnownValue:
-        self.operands([self.visit(node.operand)])
+        value = self.visit(node.operand)
+        found = made.operator_of(value, _SIGNS.get(type(node.op), ""))
+        if found is not None:
+            return self.walk.function(found, [value], {})
+        self.operands([value])
+        return FRESH
+
+    def operated(self, kind: type, left: KnownValue, right: KnownValue) -> KnownValue:
+        """Return what is known of the result of an operator, which an object's class may have."""
+        name, results, plain = OPERATORS.get(kind, ""), [], []
+        turned = _TURNED.get(name, f"r{name}")
+        for one, other, own in ((left, right, name), (right, left, turned)):
+            found = made.operator_of(one, f"__{own}__") if name else None
+            if found is None:
+                plain.append(one)
+            else:
+                results.append(self.walk.function(found, [one, other], {}))
+        if results:
+            return least_upper_bound(results)
+        self.operands(plain)
         return FRESH
 
     def operands(self, values: Sequence[KnownValue]) -> None:
@@ -170,10 +221,13 @@ class Expressions(ast.NodeVisitor):
         self.operands([self.visit(node)])
 
     def visit_Compare(self, node: ast.Compare) -> KnownValue:
-        self.operands([self.visit(part) for part in (node.left, *node.comparators)])
-        for test, part in zip(node.ops, node.comparators, strict=True):
+        values = [self.visit(part) for part in (node.left, *node.comparators)]
+        for test, left, right in zip(node.ops, values, values[1:], strict=False):
+            self.operated(type(test), left, right)
+        for test, part, value in zip(node.ops, node.comparators, values[1:], strict=True):
             is_none = isinstance(part, ast.Constant) and part.value is None
-            if isinstance(test, ast.Is | ast.IsNot) and not is_none:
+            is_one = is_none or isinstance(value.known, enum.Enum)
+            if isinstance(test, ast.Is | ast.IsNot) and not is_one:
                 raise Impure("tests identity with 'is'", "write == or !=")
         return FRESH
 
@@ -220,7 +274,10 @@ class Expressions(ast.NodeVisitor):
         values = [self.visit(index) for index in indices]
         keys = [v.known for v in values]
         if isinstance(base.known, OneOf):
-            return base
+            return element(base) if _are_containers(base.known) else base
+        found = made.operator_of(base, "__getitem__")
+        if found is not None:
+            return self.walk.function(found, [base, *values[:1]], {})
         if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
             parts = base.known.values() if isinstance(base.known, dict) else base.known
             return replace(element(base), known=function_choice(map(captured, parts)))
@@ -246,6 +303,14 @@ class Expressions(ast.NodeVisitor):
         thing = base.known
         if isinstance(thing, Unknown):
             return base
+        if isinstance(thing, Pure):
+            return replace(base, own=base.inside)
+        if isinstance(thing, Instance):
+            return made.attribute(self.walk, base, name)
+        if isinstance(thing, Parent):
+            return made.of_parent(self.walk, thing, name)
+        if isinstance(thing, OneOf):
+            return least_upper_bound([self.attribute(choice, name) for choice in thing.choices])
         if isinstance(thing, np.ndarray):
             return forgotten(base)
         found = inspect.getattr_static(type(thing), name, None)
@@ -258,6 +323,8 @@ class Expressions(ast.NodeVisitor):
             value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):
                 return OUTSIDE
+            if isinstance(value, BuiltinFunctionType) and isinstance(thing, known_calls.CONTAINERS):
+                return captured(value)  # a method, made anew each time it is read
             return self.walk.captured(thing, name, value)
         raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
 
@@ -277,14 +344,27 @@ class Expressions(ast.NodeVisitor):
             return self.parent_class()
         if function.known is getattr and isinstance(given[1].known, str):
             return self.attribute(given[0], given[1].known)
-        result = self.walk.call(function, given, named)
+        result = self.made_once(node, self.walk.call(function, given, named))
         for value in (*given, *named.values()):  # a list may have been given something to keep
             self.kept(value, [*given, *named.values()])
+        return result
+
+    def made_once(self, node: ast.Call, result: KnownValue) -> KnownValue:
+        """Return one object for all that a call makes in a loop, which is walked again."""
+        if not isinstance(result.known, Instance):
+            return result
+        before = self.walk.made.get((node, self.frame))
+        if before is not None and before.known.cls is result.known.cls:
+            before.known.absorb(result.known)
+            result = replace(result, known=before.known)
+        self.walk.made[node, self.frame] = result
         return result
 
     def parent_class(self) -> KnownValue:
         """Return what ``super()`` stands for."""
         own, cls = next(iter(self.frame.names.values()), OUTSIDE), self.lookup("__class__")
+        if isinstance(own.known, Instance) and isinstance(cls.known, type):
+            return KnownValue(True, True, known=Parent(own, cls.known))
         if isinstance(own.known, Unknown) or not isinstance(cls.known, type):
             raise Impure("calls super() of what is only known when it runs", "name the class")
         return captured(super(cls.known, own.known))
@@ -313,6 +393,22 @@ class Expressions(ast.NodeVisitor):
 
     def iterated(self, value: KnownValue) -> None:
         known_calls.check_object(value, "goes through")
+
+
+def _part(value: KnownValue, i: int, count: int) -> KnownValue:
+    """Return what is known of one part of what is taken apart."""
+    known = value.known
+    choices = known.choices if isinstance(known, OneOf) else (value,)
+    rows = [c.known for c in choices]
+    if all(isinstance(row, list | tuple) and len(row) == count for row in rows):
+        return least_upper_bound([replace(element(value), known=UNKNOWN_VALUE)] if all(
+            isinstance(row[i], (*PLAIN, np.ndarray)) for row in rows
+        ) else [captured(row[i]) for row in rows])  # fmt: skip
+    return element(value)
+
+
+def _are_containers(known: OneOf) -> bool:
+    return all(isinstance(choice.known, list | tuple) for choice in known.choices)
 
 
 def _is_plain_attribute(thing: Any, name: str) -> bool:

@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 import builtins
+import dataclasses
+import enum
 import functools
-from types import FunctionType, MethodType, ModuleType
+from collections import Counter, OrderedDict, defaultdict, deque
+from dataclasses import replace
+from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import made
 from .values import (
     FRESH,
     OUTSIDE,
     SLICE,
+    Bound,
     Impure,
+    Instance,
     KnownValue,
     Local,
     OneOf,
+    Parent,
+    Pure,
     Unknown,
     captured,
     element,
     forgotten,
+    function_choice,
     least_upper_bound,
     library,
     python_function,
@@ -61,7 +71,8 @@ READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj"
            "intersection", "isdisjoint", "issubset", "reduce", "accumulate", "outer"}  # fmt: skip
 CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
             "setdefault", "popitem", "add", "discard", "fill", "put", "itemset", "resize",
-            "partition", "setfield", "setflags", "at"}  # fmt: skip
+            "partition", "setfield", "setflags", "at", "appendleft", "extendleft", "popleft",
+            "rotate"}  # fmt: skip
 CONTAINERS = (
     np.ndarray
     | np.generic
@@ -79,6 +90,7 @@ CONTAINERS = (
     | complex
     | range
 )
+HOLDERS = (deque, OrderedDict, Counter, SimpleNamespace, defaultdict)
 MAKING = (list, tuple, set, frozenset, dict, enumerate, zip, reversed, sorted, filter, map, iter)
 _PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "float", "format",
           "hasattr", "hash", "int", "isinstance", "issubclass", "len", "ord", "pow", "range",
@@ -102,13 +114,27 @@ def call(
     owner = getattr(thing, "__self__", None)
     if _is_builtin(thing):
         return _builtin(walk, thing, given, named)
+    if thing is functools.partial:
+        rest = tuple(named.items())
+        return KnownValue(True, True, known=Bound(given[0], tuple(given[1:]), rest))
+    if thing is dataclasses.replace and given:
+        return made.replaced(walk, given[0], named)
+    if thing in (dataclasses.astuple, dataclasses.asdict, dataclasses.fields):
+        return OUTSIDE
+    if isinstance(thing, BuiltinFunctionType) and isinstance(owner, CONTAINERS):
+        bound = method(walk, captured(owner), thing.__name__, given, named)
+        return OUTSIDE if bound is None else bound
     module = library(thing)
     if module is not None and module.partition(".")[0] != "control":
         return _library(walk, thing, module, given, named)
     if isinstance(thing, type):
-        if issubclass(thing, tuple) and hasattr(thing, "_fields"):
-            return KnownValue(True, all(v.own and v.inside for v in given), True)
-        raise Impure(f"makes an object of {thing.__name__}", "use numbers and arrays")
+        parts = [*given, *named.values()]
+        if thing in HOLDERS:
+            _call_functions(walk, parts)
+            parts = [v for v in parts if not isinstance(v.known, type)]
+        if thing in HOLDERS or (issubclass(thing, tuple) and hasattr(thing, "_fields")):
+            return KnownValue(True, all(v.own and v.inside for v in parts), True)
+        return made.instance(walk, thing, given, named)
     function = python_function(thing)
     if type(owner).__module__.startswith(VARYING):
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
@@ -135,7 +161,7 @@ def method(
         If it changes a container that the call has not made.
     """
     thing = base.known
-    if isinstance(thing, ModuleType | type | super | OneOf):
+    if isinstance(thing, ModuleType | type | super | OneOf | Instance | Bound | Pure | Parent):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
         if name in CHANGING and not isinstance(getattr(type(thing), name, None), FunctionType):
@@ -166,7 +192,12 @@ def _read(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
         key = given[0].known
         if isinstance(base.known, dict) and isinstance(key, str) and key in base.known:
             return captured(base.known[key])
-        return least_upper_bound([element(base), *given[1:]])
+        parts = [captured(v) for v in base.known.values()] if isinstance(base.known, dict) else []
+        known = function_choice([*parts, *given[1:]])
+        return replace(least_upper_bound([element(base), *given[1:]]), known=known)
+    if isinstance(base.known, dict) and name in ("values", "items"):
+        parts = tuple(getattr(base.known, name)())
+        return KnownValue(True, base.inside, True, known=parts)
     kept = base.holds and name in ("items", "keys", "values", "copy", "_asdict", "_replace")
     return KnownValue(True, base.inside, True) if kept else FRESH
 
@@ -189,7 +220,15 @@ def check_object(value: KnownValue, what: str) -> None:
     Impure
     """
     thing = value.known
-    if isinstance(thing, Unknown | Local | OneOf):
+    if isinstance(thing, Unknown | Local | Bound | Pure | enum.Enum | BuiltinFunctionType):
+        return
+    if isinstance(thing, OneOf):
+        for choice in thing.choices:
+            check_object(choice, what)
+        return
+    if isinstance(thing, Instance):
+        raise Impure(f"{what} an object of type {thing.cls.__name__}", "use arrays")
+    if isinstance(thing, tuple) and hasattr(thing, "_fields"):
         return
     if not value.own and hasattr(thing, "__next__"):
         raise Impure(f"uses up {type(thing).__name__}, which it did not make", MEMORY)
@@ -220,7 +259,7 @@ def _builtin(
         )
     if thing in MAKING:
         _call_functions(walk, [*given, *named.values()])
-        return KnownValue(True, all(v.inside for v in given), True)
+        return KnownValue(True, all(v.inside for v in given), True, known=_functions_in(given))
     if name == "next":
         _written(given[0], "next()")
         return element(given[0])
@@ -228,6 +267,12 @@ def _builtin(
         return FRESH
     advice = OUTPUT if name in ("print", "input", "open") else "do without it"
     raise Impure(f"calls {name}()", advice)
+
+
+def _functions_in(given: list[KnownValue]) -> Any:
+    """Return the choice between the functions in what is gone through, for whoever calls one."""
+    parts = [element(v) for v in given]
+    return function_choice([v for v in parts if isinstance(v.known, OneOf)])
 
 
 def _library(
@@ -245,16 +290,29 @@ def _library(
     if name in WRITERS or (module.endswith("operator") and name in IN_PLACE):
         _written(given[0], f"{name}()")
         return FRESH
+    if module in ("operator", "_operator") and isinstance(thing, type):
+        return KnownValue(True, True, known=Pure(gives_parts=True))
+    if _makes_objects(thing, module):
+        kept = [*given, *named.values()]  # it may hold what it is given, instead of copies
+        return KnownValue(True, all(v.own and v.inside for v in kept), known=Pure())
     if name in VIEWS or ("copy" in named and named["copy"].known is not True):
         return forgotten(given[0]) if given else FRESH
     return FRESH
+
+
+def _makes_objects(thing: Any, module: str) -> bool:
+    """Whether a function of a library makes objects, such as splines and rotations."""
+    cls = thing if isinstance(thing, type) else getattr(thing, "__self__", None)
+    if isinstance(cls, type) and not issubclass(cls, np.generic | np.ndarray | CONTAINERS):
+        return module.partition(".")[0] in ("numpy", "scipy")
+    return module.startswith(("scipy.interpolate", "scipy.spatial"))
 
 
 def _call_functions(walk: Walk, values: Any) -> None:
     """Walk functions that are handed on: they will be called with anything."""
     for value in values:
         thing = value.known
-        if isinstance(thing, Unknown | type):
+        if isinstance(thing, Unknown | type | Pure):
             continue
-        if isinstance(thing, Local) or callable(thing):
+        if isinstance(thing, Local | Bound | OneOf | Instance) or callable(thing):
             walk.call(value, [OUTSIDE] * 8, {})

@@ -15,19 +15,24 @@ from dataclasses import dataclass
 from types import FunctionType
 from typing import Any
 
-from . import known_calls
+from . import known_calls, made
 from .captured import Captured, noted, noted_function, noted_partial
 from .expressions import Frame
 from .source import Definition, Unreadable, definition
 from .statements import CallWalker
 from .values import (
+    FRESH,
     OUTSIDE,
+    Bound,
     Impure,
+    Instance,
     KnownValue,
     Local,
     OneOf,
+    Pure,
     Unknown,
     captured,
+    element,
     holder,
     least_upper_bound,
 )
@@ -84,6 +89,7 @@ class Walk:
         self.read: dict[tuple[int, str], Captured] = {}
         self.unbound: list[str] = []
         self.bodies = 0
+        self.made: dict[tuple[Any, Any], KnownValue] = {}  # objects, by where they are made
 
     def captured(self, holder: Any, name: str, value: Any) -> KnownValue:
         """Return what is known of a value that is read from around a function, and note it."""
@@ -93,8 +99,8 @@ class Walk:
 
     def note(self, notes: Iterable[Captured]) -> None:
         """Keep notes of what a function or an object consists of."""
-        for made in notes:
-            self.read.setdefault((id(made.holder), made.name), made)
+        for note in notes:
+            self.read.setdefault((id(note.holder), note.name), note)
 
     def call(
         self, function: KnownValue, given: list[KnownValue], named: dict[str, KnownValue]
@@ -105,6 +111,16 @@ class Walk:
             raise Impure("calls what is only known when it runs", "call a function by its name")
         if isinstance(thing, OneOf):
             return least_upper_bound([self.call(choice, given, named) for choice in thing.choices])
+        if isinstance(thing, Pure):
+            if thing.gives_parts:
+                return element(given[0]) if given else FRESH
+            return KnownValue(True, function.inside, known=thing)
+        if isinstance(thing, Bound):
+            first = list(thing.given)
+            return self.call(thing.function, first + given, dict(thing.named) | named)
+        if isinstance(thing, Instance):
+            method = made.attribute(self, function, "__call__")
+            return self.call(method, given, named)
         if isinstance(thing, Local):
             return self.body(thing.node, thing.frame.function, thing.frame, given, named)
         if isinstance(thing, functools.partial):

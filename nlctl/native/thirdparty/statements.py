@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .expressions import CHANGES, Expressions, Frame
+from . import made
+from .expressions import CHANGES, OPERATORS, Expressions, Frame
 from .known_calls import MEMORY
 from .source import Definition
 from .values import (
@@ -17,6 +18,7 @@ from .values import (
     OUTSIDE,
     UNKNOWN_VALUE,
     Impure,
+    Instance,
     KnownValue,
     Local,
     captured,
@@ -77,6 +79,9 @@ class CallWalker(Expressions):
         added = self.visit(node.value)
         if isinstance(node.target, ast.Name):
             value = self.lookup(node.target.id)
+            if isinstance(value.known, Instance):
+                self.assign(node.target.id, self.changed_object(node, value, added))
+                return
             if not value.own:
                 name, mark = node.target.id, _SIGNS.get(type(node.op), "+")
                 raise Impure(
@@ -91,6 +96,16 @@ class CallWalker(Expressions):
             text = ast.unparse(node.target.value)
             raise Impure(f"changes an element of '{text}'", f"{MEMORY}, or {CHANGES}")
         self.write(node.target, added)
+
+    def changed_object(
+        self, node: ast.AugAssign, value: KnownValue, added: KnownValue
+    ) -> KnownValue:
+        """Return what an object becomes by ``+=`` and its kind."""
+        name = OPERATORS.get(type(node.op), "")
+        found = made.operator_of(value, f"__i{name}__")
+        if found is not None:
+            return self.walk.function(found, [value, added], {})
+        return self.operated(type(node.op), value, added)
 
     def visit_Delete(self, node: ast.Delete) -> None:
         for target in node.targets:
@@ -160,10 +175,20 @@ class CallWalker(Expressions):
         if node.exc is not None:
             self.visit(node.exc)
 
-    def visit_Try(self, node: ast.Try | ast.TryStar) -> None:
-        raise Impure("has try ... except or finally", "write an if for the case that fails")
+    def visit_Try(self, node: ast.Try) -> None:
+        """Walk a look-up that may fail; other errors may be those of whoever reads the function."""
+        caught = [handler.type for handler in node.handlers]
+        if node.finalbody or not all(
+            isinstance(c, ast.Name) and c.id == "KeyError" for c in caught
+        ):
+            self.visit_TryStar(node)
+        before = dict(self.frame.names)
+        self.statements(node.body)
+        self.frame.names = merged([before, self.frame.names])
+        self.either([node.orelse, *(handler.body for handler in node.handlers)])
 
-    visit_TryStar = visit_Try
+    def visit_TryStar(self, node: ast.AST) -> None:
+        raise Impure("has try ... except or finally", "write an if for the case that fails")
 
     def visit_With(self, node: ast.With) -> None:
         for item in node.items:

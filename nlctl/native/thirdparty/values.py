@@ -18,6 +18,7 @@ class Unknown:
 
 
 UNKNOWN_VALUE = Unknown()
+_CHOICES = 64  # functions in a list, beyond which it is too much to follow
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
               "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
@@ -50,9 +51,68 @@ class Local:
 
 @dataclass(frozen=True)
 class OneOf:
-    """One of several functions, and which is only known when the function runs."""
+    """One of several functions or objects, and which is only known when the function runs."""
 
     choices: tuple[KnownValue, ...]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A function some of whose arguments are given: a method, a `functools.partial`."""
+
+    function: KnownValue
+    given: tuple[KnownValue, ...]
+    named: tuple[tuple[str, KnownValue], ...] = ()
+
+
+@dataclass(frozen=True)
+class Pure:
+    """An object of a library that the call has made, such as a spline.
+
+    Attributes
+    ----------
+    gives_parts : bool
+        Whether what it is called with may come back, as from `operator.itemgetter`.
+    """
+
+    gives_parts: bool = False
+
+
+class Instance:
+    """An object of somebody's class that the call has made.
+
+    Attributes
+    ----------
+    cls : type
+    attributes : dict
+        What is known of each, whenever it was written.
+    version : int
+        How often something new was learnt.
+    """
+
+    def __init__(self, cls: type) -> None:
+        self.cls, self.attributes, self.version = cls, {}, 0
+
+    def learn(self, name: str, value: KnownValue) -> None:
+        """Note that an attribute is written."""
+        before = self.attributes.get(name)
+        after = value if before is None else least_upper_bound([before, value])
+        if before is None or before != after:
+            self.attributes[name] = after
+            self.version += 1
+
+    def absorb(self, other: Instance) -> None:
+        """Note that it may be another one."""
+        for name, value in list(other.attributes.items()):
+            self.learn(name, value)
+
+
+@dataclass(frozen=True)
+class Parent:
+    """What ``super()`` is in a method of an object that the call has made."""
+
+    own: KnownValue
+    cls: type
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +145,23 @@ class KnownValue:
     @property
     def marks(self) -> tuple[Any, ...]:
         """What two values must have in common to be equal: arrays have no other equality."""
-        return self.own, self.inside, self.holds, id(self.known)
+        return self.own, self.inside, self.holds, _marks(self.known)
+
+
+def _marks(known: Any) -> Any:
+    """Return what tells one object that is known from another."""
+    if isinstance(known, OneOf):
+        return "one of", frozenset(choice.marks for choice in known.choices)
+    if isinstance(known, Local):
+        return "local", id(known.node), id(known.frame)
+    if isinstance(known, Bound):
+        named = tuple((name, v.marks) for name, v in known.named)
+        return "bound", known.function.marks, tuple(v.marks for v in known.given), named
+    if isinstance(known, Instance):
+        return "instance", id(known), known.version
+    if isinstance(known, Parent):
+        return "parent", known.own.marks, known.cls
+    return ("pure", known.gives_parts) if isinstance(known, Pure) else id(known)
 
 
 FRESH = KnownValue(True, True)
@@ -107,18 +183,47 @@ def captured(thing: Any) -> KnownValue:
 def least_upper_bound(values: Iterable[KnownValue]) -> KnownValue:
     """Return what holds for each of several values."""
     values = list(values) or [FRESH]
-    first = values[0]
     return KnownValue(
         own=all(v.own for v in values),
         inside=all(v.inside for v in values),
         holds=any(v.holds for v in values),
-        known=first.known if all(v.known is first.known for v in values) else UNKNOWN_VALUE,
+        known=_of_any(values),
     )
+
+
+def _of_any(values: list[KnownValue]) -> Any:
+    """Return the object that several values are, or the choice between functions."""
+    first = values[0].known
+    if all(v.known is first for v in values):
+        return first
+    if all(isinstance(v.known, Instance) for v in values):
+        if any(v.known.cls is not first.cls for v in values):
+            return OneOf(tuple(values))
+        for value in values[1:]:
+            first.absorb(value.known)
+        return first
+    return function_choice(values)
 
 
 def element(value: KnownValue) -> KnownValue:
     """Return what is known of an element, whichever it is."""
-    return KnownValue(value.inside, value.inside, value.holds)
+    known, plain = value.known, KnownValue(value.inside, value.inside, value.holds)
+    if isinstance(known, OneOf):
+        inner = [element(c) for c in known.choices if isinstance(c.known, list | tuple)]
+        if len(inner) == len(known.choices):
+            return replace(plain, known=_of_any(inner))
+        return least_upper_bound([plain, *inner]) if inner else replace(plain, known=known)
+    if isinstance(known, list | tuple) and known:
+        return replace(plain, known=_among(known))
+    return plain
+
+
+def _among(parts: Iterable[Any]) -> Any:
+    """Return the choice between the parts of a list that was there before the call."""
+    values = [captured(part) for part in parts]
+    if all(isinstance(v.known, (*PLAIN, np.ndarray)) for v in values) or len(values) > _CHOICES:
+        return UNKNOWN_VALUE
+    return OneOf(tuple(values))
 
 
 def holder(values: Iterable[KnownValue]) -> KnownValue:
@@ -131,8 +236,12 @@ def holder(values: Iterable[KnownValue]) -> KnownValue:
 def function_choice(values: Iterable[KnownValue]) -> Any:
     """Return the choice between functions; UNKNOWN where not all values are functions."""
     values = tuple(values)
-    functions = all(callable(v.known) or isinstance(v.known, Local) for v in values)
-    return OneOf(values) if values and functions else UNKNOWN_VALUE
+    kinds = Local | Bound | OneOf | Instance | Pure
+    functions = all(isinstance(v.known, kinds) or callable(v.known) for v in values)
+    if not values or not functions:
+        return UNKNOWN_VALUE
+    flat = [c for v in values for c in (v.known.choices if isinstance(v.known, OneOf) else (v,))]
+    return OneOf(tuple(dict.fromkeys(flat))) if len(flat) <= _CHOICES else UNKNOWN_VALUE
 
 
 def forgotten(value: KnownValue) -> KnownValue:

@@ -195,7 +195,7 @@ def while_loop(t, x, u, params):
 
 
 def by_eigenvalues(t, x, u, params):
-    return [np.linalg.det(np.array([[u[0], 1.0], [params["k"], 2.0]]))]
+    return [np.linalg.eigvals(np.array([[u[0], 1.0], [params["k"], 2.0]])).real.max()]
 
 
 @pytest.mark.slow
@@ -435,11 +435,10 @@ def test_elements_at_fixed_places_are_copies(places, n):
 @pytest.mark.parametrize(
     "picked", [np.array([1, 2, 4, 8, 9, 11, 12, 13, 15, 18]), np.arange(20) > 9]
 )
-def test_many_elements_at_irregular_places_are_not_traced(picked):
+def test_many_elements_at_irregular_places_are_numbers_of_their_own(picked):
     block = ct.nlsys(lambda t, x, u, params: -x, lambda t, x, u, params: x[picked] * u[0],
                      inputs=1, outputs=10, states=20, name="picks")  # fmt: skip
-    lowered = check(block, native=False)
-    assert lowered.opaque
+    assert not check(block, native=False).opaque
 
 
 def test_every_expression_is_computed_once():

@@ -1,0 +1,64 @@
+"""How many functions, as engineers write them, become expressions: python benchmarks/tracing.py.
+
+Of each one of the corpus in ``tests/support/engineers``: whether it is traced, called as it
+stands, or refused; whether its values are python-control's to 1e-12; how long its first run takes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+
+from engineers import ENTRIES
+from engineers.measured import Fate, fate, first_run
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the fractions."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--runs", action="store_true", help="time first runs, too")
+    parser.add_argument("--why", action="store_true", help="list what is not traced, and why")
+    parser.add_argument("--theme", help="one module of the corpus alone")
+    asked = parser.parse_args(arguments)
+    chosen = [e for e in ENTRIES if asked.theme in (None, e.theme)]
+    fates = {entry.name: fate(entry) for entry in chosen}
+    console = Console()
+    console.print(_table([e.theme for e in chosen], list(fates.values())))
+    for name, found in fates.items():
+        if found.apart or (asked.why and found.why):
+            text = f"{name}: {found.kind}: {found.apart or found.why}"
+            console.print(text, markup=False, highlight=False)
+    if asked.runs:
+        traced = [e for e in chosen if fates[e.name].kind == "traced"]
+        times = {e.name: first_run(e) for e in traced}
+        slowest = max(times, key=times.__getitem__)
+        console.print(
+            f"first run of a traced function: median {np.median(list(times.values())):.2f} s, "
+            f"{sum(s <= 0.3 for s in times.values())} of {len(times)} within 0.3 s, "
+            f"slowest {times[slowest]:.2f} s ({slowest})"
+        )
+
+
+def _table(themes: Sequence[str], fates: Sequence[Fate]) -> Table:
+    table = Table("theme", "functions", "traced", "called", "refused", "equal to 1e-12")
+    for theme in (*dict.fromkeys(themes), "all"):
+        own = [f for f, of in zip(fates, themes, strict=True) if theme in (of, "all")]
+        count = Counter(f.kind for f in own)
+        equal = sum(f.kind == "traced" and not f.apart for f in own)
+        share = f"{count['traced']} ({count['traced'] / len(own):.0%})"
+        table.add_row(theme, str(len(own)), share, str(count["called"]), str(count["refused"]),
+                      f"{equal} of {count['traced']}")  # fmt: skip
+    return table
+
+
+if __name__ == "__main__":
+    main()

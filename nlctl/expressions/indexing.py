@@ -1,0 +1,221 @@
+"""Reading and writing elements: at known places, by masks, and where an integer says.
+
+These are the item operators of `Tracer`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .arrays import Tracer, as_array, concatenated, full, full_index, holds_arrays, mapped, traced
+from .graph import Graph, Untraceable
+from .integers import integer_range
+from .masked import Masked, Places
+from .operators import elementwise
+
+GATHERED = 64  # places among which an integer may choose
+
+
+def _item(self: Tracer, key: Any) -> Any:
+    """Return elements; those of a mask, or at a place that the state decides, as choices."""
+    key = _settled(key)
+    if _is_mask(key):
+        return Masked(self, key)
+    if isinstance(key, Tracer) and key.shape:
+        return _each(self, key)
+    place = _open_place(key)
+    return self.item_at(key) if place is None else _gathered(self, key, place)
+
+
+def _each(self: Tracer, places: Tracer) -> Tracer:
+    """Return elements at places that the state decides, one after the other."""
+    found = [_item(self, k) for k in places.short().reshape(-1)]
+    return traced(self.graph, found).reshape(places.shape + self.shape[1:])
+
+
+def _settled(key: Any) -> Any:
+    """Return an index with numbers for what is known."""
+    if isinstance(key, Places):
+        return _settled(key.mask)
+    if isinstance(key, tuple) and len(key) == 1 and isinstance(key[0], Places):
+        return _settled(key[0].mask)
+    if isinstance(key, tuple):
+        return tuple(map(_settled, key))
+    if isinstance(key, list) and any(isinstance(k, Tracer) for k in key):
+        return [_settled(k) for k in key]
+    if not isinstance(key, Tracer):
+        return key
+    kinds = {e.kind for e in key.values.flat}
+    if kinds <= {"i", "b"} and all(e.op == "const" for e in key.values.flat):
+        numbers = mapped(lambda e: bool(e.data) if e.kind == "b" else e.value, key.elements())
+        return numbers.astype(bool if kinds == {"b"} else int)[()]
+    return key
+
+
+def _is_mask(key: Any) -> bool:
+    return isinstance(key, Tracer) and {e.kind for e in key.values.flat} == {"b"}
+
+
+def _open_place(key: Any) -> int | None:
+    """Return which part of an index is an integer that the state decides."""
+    keys = key if isinstance(key, tuple) else (key,)
+    for i, k in enumerate(keys):
+        if isinstance(k, Tracer) and k.shape:
+            raise Untraceable("indexing by an array that depends on the state")
+        if isinstance(k, Tracer) and k.only.kind == "i" and k.only.value is None:
+            return i
+    return None
+
+
+def _with(key: Any, place: int, index: int) -> Any:
+    """Return an index with a number in one place."""
+    if not isinstance(key, tuple):
+        return index
+    return (*key[:place], index, *key[place + 1 :])
+
+
+def _candidates(self: Tracer, key: Any, place: int) -> tuple[Tracer, range]:
+    """Return an integer in an index, and the places that it may name; beyond is an error."""
+    keys = key if isinstance(key, tuple) else (key,)
+    if any(k is None or k is ... for k in keys):
+        raise Untraceable("new axes next to an integer that depends on the state")
+    chosen, length = keys[place], self.shape[place]
+    low, high = integer_range(chosen.only)
+    first, last = max(low, -length), min(high, length - 1)
+    if last - first >= GATHERED or first > last:
+        raise Untraceable("an integer that may name too many places")
+    guard(self.graph, chosen, "ge", first, low)
+    guard(self.graph, chosen, "le", last, high)
+    return chosen, range(int(first), int(last) + 1)
+
+
+def guard(graph: Graph, chosen: Tracer, name: str, bound: float, known: float) -> None:
+    """Note that Python raises an error beyond a bound, unless that is never reached."""
+    if bound != known:
+        graph.guards.append(elementwise(graph, name, chosen, bound).only)
+
+
+def _gathered(self: Tracer, key: Any, place: int) -> Any:
+    chosen, places = _candidates(self, key, place)
+    found = _item(self, _with(key, place, places[-1]))
+    for k in reversed(places[:-1]):
+        here = elementwise(self.graph, "eq", chosen, k)
+        found = elementwise(self.graph, "select", here, _item(self, _with(key, place, k)), found)
+    return found
+
+
+def _scattered(self: Tracer, key: Any, place: int, value: Any) -> None:
+    chosen, places = _candidates(self, key, place)
+    for k in places:
+        here = elementwise(self.graph, "eq", chosen, k)
+        at = _with(key, place, k)
+        old = _item(self, at)
+        new = traced(self.graph, value)
+        _assign(self, at, elementwise(self.graph, "select", here, new, old))
+
+
+def _masked(self: Tracer, mask: Tracer, value: Any) -> None:
+    """Assign where a mask holds."""
+    if isinstance(value, Masked):
+        value = value.whole_for(mask)
+    elif np.ndim(value) if not isinstance(value, Tracer) else value.shape:
+        raise Untraceable("an array assigned to the places of a mask")
+    if mask.shape != self.shape[: mask.ndim]:
+        raise Untraceable("a mask of another shape")
+    mask = mask.reshape(mask.shape + (1,) * (self.ndim - mask.ndim))
+    chosen = elementwise(self.graph, "select", mask, value, self)
+    _assign(self, ..., chosen)
+
+
+def _assign(self: Tracer, key: Any, value: Any) -> None:
+    """Assign to items; what is assigned to a part of a long array goes into that."""
+    key = _settled(key)
+    if _is_mask(key):
+        return _masked(self, key, value)
+    if isinstance(key, Tracer) and key.shape:
+        value = traced(self.graph, value)
+        for i, k in enumerate(key):
+            _assign(self, k, value[i] if value.shape else value)
+        return None
+    place = _open_place(key)
+    if place is not None:
+        return _scattered(self, key, place, value)
+    value = traced(self.graph, value)
+    _check_kinds(self, value)
+    if self.watched is not None:
+        raise Untraceable("assignment to another shape of an array")
+    if holds_arrays(key):
+        return _assign_at(self, key, value)
+    if self.origin is not None:
+        return _assign_to_part(self, key, value)
+    if self.axis is None:
+        cells = value.elements()
+        if value.axis is None and not cells.shape:
+            cells = value.only
+        self.cells[tuple(full_index(key, self.ndim))] = cells
+        return None
+    if self.ndim > 1:
+        raise Untraceable("assignment to a part of a large matrix")
+    (along,) = full_index(key, 1)
+    whole = range(self.length)
+    k = None if isinstance(along, slice) else whole[along]
+    _write(self, whole[along] if k is None else range(k, k + 1), value)
+    return None
+
+
+def _assign_at(self: Tracer, key: Any, value: Tracer) -> None:
+    """Assign to places that an array of integers or truth values names."""
+    if self.origin is not None:
+        raise Untraceable("assignment to places in a part of a long array")
+    cells = self.elements()
+    cells[key] = value.elements() if value.shape else value.only
+    if self.axis is not None:
+        if self.ndim > 1:
+            raise Untraceable("assignment to a part of a large matrix")
+        joined = self.graph.joined([(e, 1) for e in cells])
+        self.values, self.version = as_array(joined), self.version + 1
+
+
+def _check_kinds(self: Tracer, value: Tracer) -> None:
+    """Check that an assignment rounds nothing: arrays of truth values take no others."""
+    kinds = {e.kind for e in self.values.flat}
+    if kinds and "f" not in kinds and {e.kind for e in value.cells.flat} != kinds:
+        raise Untraceable("assignment to an array of integers or truth values")
+
+
+def _assign_to_part(self: Tracer, key: Any, value: Tracer) -> None:
+    assert self.origin is not None
+    _ = self.cells  # is it still what the whole has there?
+    (along,) = full_index(key, self.ndim) if self.ndim == 1 else (None,)
+    if self.place is None or self.place.step != 1 or along is None:
+        raise Untraceable("assignment to a part of a long array")
+    k = None if isinstance(along, slice) else self.place[along]
+    root = self.origin[0]
+    _write(root, self.place[along] if k is None else range(k, k + 1), value)
+    start, stop = self.place.start, self.place.stop
+    renewed = root[start:stop]
+    self.values, self.origin = renewed.values, renewed.origin
+
+
+def _write(whole: Tracer, places: range, value: Tracer) -> None:
+    """Assign to consecutive elements of a long array of one dimension."""
+    if places.step != 1 or value.ndim > 1:
+        raise Untraceable("assignment with a step, or of another shape")
+    if not value.shape or value.shape == (1,):
+        middle = full(whole.graph, (len(places),), value.reshape(1)[0])
+    elif value.size == len(places):
+        middle = value
+    else:
+        raise Untraceable("assignment of another shape")
+    before, after = whole[: places.start], whole[places.stop :]
+    parts = [p for p in (before, middle, after) if p.size]
+    joined = concatenated(whole.graph, parts)
+    if joined.shape != whole.shape:
+        raise Untraceable("assignment of another shape")
+    whole.values, whole.version = joined.cells, whole.version + 1
+
+
+Tracer.__getitem__ = _item  # type: ignore[attr-defined]
+Tracer.__setitem__ = _assign  # type: ignore[attr-defined]

@@ -1,0 +1,31 @@
+"""Functions of NumPy, SciPy and Python, each written once in terms of elementary expressions.
+
+What NumPy computes by moving elements, adding and multiplying, it computes itself (`cells`,
+`shapes`); the rest are formulas.  What reads expressions needs to know none of them.
+"""
+
+from . import (
+    complex_numbers,
+    creation,
+    elementary,
+    linear_algebra,
+    python,
+    reductions,
+    rotations,
+    shapes,
+    special,
+    tables,
+)
+
+__all__ = [
+    "complex_numbers",
+    "creation",
+    "elementary",
+    "linear_algebra",
+    "python",
+    "reductions",
+    "rotations",
+    "shapes",
+    "special",
+    "tables",
+]

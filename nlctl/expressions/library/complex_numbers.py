@@ -1,0 +1,209 @@
+"""Complex numbers as pairs of expressions."""
+
+from __future__ import annotations
+
+import cmath
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from .. import arrays
+from ..arrays import Special, Tracer, traced
+from ..graph import Graph, Untraceable
+from ..operators import elementwise, total
+from .table import enter
+
+__all__ = ["Pair", "is_complex", "paired"]
+
+
+class Pair(Special):
+    """An array of complex numbers: the real and the imaginary parts."""
+
+    __array_ufunc__ = None
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, graph: Graph, real: Any, imag: Any) -> None:
+        self.graph = graph
+        self.real, self.imag = np_broadcast(graph, real, imag)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the array."""
+        return self.real.shape
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return self.real.ndim
+
+    def linear(self, function: Callable[[Tracer], Any]) -> Pair:
+        """Return what a linear function with real coefficients makes of both parts."""
+        return Pair(self.graph, function(self.real), function(self.imag))
+
+    def operation(self, graph: Graph, name: str, operands: Sequence[Any]) -> Any:
+        """Return an operation by its name."""
+        if name not in _OPERATIONS:
+            raise Untraceable(f"{name} of complex numbers")
+        if name == "select":
+            condition, *values = operands
+            return _OPERATIONS[name](graph, condition, *(paired(graph, v) for v in values))
+        return _OPERATIONS[name](graph, *(paired(graph, v) for v in operands))
+
+    def conjugate(self) -> Pair:
+        """Return the conjugate complex numbers."""
+        return Pair(self.graph, self.real, elementwise(self.graph, "neg", self.imag))
+
+    conj = conjugate
+
+    def sum(self, axis: Any = None) -> Pair:
+        """Return the sum."""
+        return self.linear(lambda part: total(part, axis))
+
+    def mean(self, axis: Any = None) -> Pair:
+        """Return the mean."""
+        count = self.real.size if axis is None else self.shape[axis]
+        return self.sum(axis) / float(count)
+
+    def __len__(self) -> int:
+        return len(self.real)
+
+    def __getitem__(self, key: Any) -> Pair:
+        return self.linear(lambda part: part[key])
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        value = paired(self.graph, value)
+        self.real[key], self.imag[key] = value.real, value.imag
+
+    def __pow__(self, exponent: Any) -> Pair:
+        if not isinstance(exponent, int) or not 0 <= exponent <= 64:
+            raise Untraceable("a power of complex numbers that is not a small integer")
+        found = paired(self.graph, 1.0)
+        return functools.reduce(lambda a, _: a * self, range(exponent), found)
+
+    def _text(self, *_: Any) -> Any:
+        raise Untraceable("a complex number in the place of a real one")
+
+    __bool__ = __float__ = __str__ = __repr__ = __format__ = _text
+
+
+def np_broadcast(graph: Graph, real: Any, imag: Any) -> tuple[Tracer, Tracer]:
+    """Return two arrays in one shape."""
+    a, b = traced(graph, real), traced(graph, imag)
+    if a.shape != b.shape:
+        zero = elementwise(graph, "mul", 0.0, elementwise(graph, "add", a, b))
+        a = elementwise(graph, "add", a, zero) if a.shape != zero.shape else a
+        b = elementwise(graph, "add", b, zero) if b.shape != zero.shape else b
+    return a, b
+
+
+def is_complex(value: Any) -> bool:
+    """Whether there are complex numbers in a value, or in a list or tuple."""
+    if isinstance(value, list | tuple):
+        return any(map(is_complex, value))
+    return isinstance(value, Pair) or arrays.is_complex(value)
+
+
+def paired(graph: Graph, value: Any) -> Pair:
+    """Return numbers, arrays and lists as complex numbers."""
+    if isinstance(value, Pair):
+        return value
+    if isinstance(value, list | tuple):
+        parts = [paired(graph, v) for v in value]
+        return Pair(graph, [p.real for p in parts], [p.imag for p in parts])
+    if arrays.is_complex(value):
+        array = np.asarray(value)
+        return Pair(graph, np.asarray(array.real, float), np.asarray(array.imag, float))
+    real = traced(graph, value)
+    return Pair(graph, real, elementwise(graph, "mul", 0.0, traced(graph, np.zeros(real.shape))))
+
+
+Special.of_complex = staticmethod(paired)
+
+
+def _mul(graph: Graph, a: Pair, b: Pair) -> Pair:
+    return Pair(graph, a.real * b.real - a.imag * b.imag, a.real * b.imag + a.imag * b.real)
+
+
+def _div(graph: Graph, a: Pair, b: Pair) -> Pair:
+    size = b.real * b.real + b.imag * b.imag
+    top = _mul(graph, a, b.conjugate())
+    return Pair(graph, top.real / size, top.imag / size)
+
+
+def _exp(graph: Graph, z: Pair) -> Pair:
+    size = elementwise(graph, "exp", z.real)
+    cos, sin = (elementwise(graph, f, z.imag) for f in ("cos", "sin"))
+    return Pair(graph, size * cos, size * sin)
+
+
+def _log(graph: Graph, z: Pair) -> Pair:
+    return Pair(graph, elementwise(graph, "log", _absolute(graph, z)), _angle(graph, z))
+
+
+def _absolute(graph: Graph, z: Pair) -> Tracer:
+    return elementwise(graph, "hypot", z.real, z.imag)
+
+
+def _angle(graph: Graph, z: Pair) -> Tracer:
+    return elementwise(graph, "arctan2", z.imag, z.real)
+
+
+def _select(graph: Graph, condition: Any, a: Pair, b: Pair) -> Pair:
+    parts = ((a.real, b.real), (a.imag, b.imag))
+    return Pair(graph, *(elementwise(graph, "select", condition, *p) for p in parts))
+
+
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "add": lambda g, a, b: Pair(g, a.real + b.real, a.imag + b.imag),
+    "sub": lambda g, a, b: Pair(g, a.real - b.real, a.imag - b.imag),
+    "mul": _mul,
+    "div": _div,
+    "neg": lambda g, a: Pair(g, -a.real, -a.imag),
+    "absolute": _absolute,
+    "exp": _exp,
+    "log": _log,
+    "select": _select,
+    "eq": lambda g, a, b: (a.real == b.real) & (a.imag == b.imag),
+    "ne": lambda g, a, b: (a.real != b.real) | (a.imag != b.imag),
+}
+
+
+def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
+    def method(self: Pair, *other: Any) -> Any:
+        operands = (*other, self) if turned else (self, *other)
+        return self.operation(self.graph, name, operands)
+
+    return method
+
+
+for _name, _op in {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div"}.items():
+    setattr(Pair, f"__{_name}__", _operator(_op))
+    setattr(Pair, f"__r{_name}__", _operator(_op, turned=True))
+for _name, _op in {"neg": "neg", "abs": "absolute", "eq": "eq", "ne": "ne"}.items():
+    setattr(Pair, f"__{_name}__", _operator(_op))
+
+
+def made(graph: Graph, real: Any = 0.0, imag: Any = 0.0) -> Any:
+    """Return ``complex(real, imag)``."""
+    if isinstance(real, Pair):
+        return real
+    return Pair(graph, real, imag)
+
+
+def rect(graph: Graph, size: Any, angle: Any) -> Pair:
+    """Return ``cmath.rect``."""
+    cos, sin = (elementwise(graph, f, angle) for f in ("cos", "sin"))
+    return Pair(graph, elementwise(graph, "mul", size, cos), elementwise(graph, "mul", size, sin))
+
+
+enter([complex], made)
+enter([cmath.rect], rect)
+enter([cmath.exp], lambda graph, z: _exp(graph, paired(graph, z)))
+enter([cmath.log], lambda graph, z: _log(graph, paired(graph, z)))
+enter([cmath.phase], lambda graph, z: _angle(graph, paired(graph, z)))
+enter(
+    [cmath.polar],
+    lambda graph, z: (_absolute(graph, paired(graph, z)), _angle(graph, paired(graph, z))),
+)

@@ -1,0 +1,213 @@
+"""Functions that make arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Tracer, full, traced
+from ..graph import Expr, Graph, Untraceable
+from ..operators import elementwise
+from .complex_numbers import Pair, is_complex, paired
+from .shapes import by_moving
+from .table import METHODS, is_traced, of
+
+__all__: list[str] = []
+
+
+def only_floats(dtype: Any) -> None:
+    """Refuse arrays of anything but floats."""
+    if dtype not in (None, float, np.float64, "float", "float64", "f8", "d"):
+        raise Untraceable(f"arrays of {dtype}")
+
+
+def holds_traced(value: Any) -> bool:
+    """Whether there are expressions in a value, or in a list or tuple."""
+    if isinstance(value, list | tuple):
+        return any(map(holds_traced, value))
+    return is_traced(value)
+
+
+@of(np.zeros, np.empty, makes=True)
+def zeros(graph: Graph, shape: Any, dtype: Any = float) -> Any:
+    """Return an array of zeros."""
+    if dtype in (complex, np.complex128):
+        return Pair(graph, full(graph, shape, 0.0), full(graph, shape, 0.0))
+    if dtype in (int, bool):
+        return np.zeros(shape, dtype)
+    only_floats(dtype)
+    return full(graph, shape, 0.0)
+
+
+@of(np.ones, makes=True)
+def ones(graph: Graph, shape: Any, dtype: Any = float) -> Any:
+    """Return an array of ones."""
+    if dtype in (int, bool):
+        return np.ones(shape, dtype)
+    only_floats(dtype)
+    return full(graph, shape, 1.0)
+
+
+@of(np.full, makes=True)
+def filled(graph: Graph, shape: Any, value: Any, dtype: Any = None) -> Tracer:
+    """Return an array of equal elements."""
+    if not is_traced(value):
+        made = np.full(shape, value, dtype)
+        return traced(graph, made) if made.dtype == float else made
+    only_floats(dtype)
+    return full(graph, shape, value)
+
+
+@of(np.zeros_like, np.empty_like, makes=True)
+def zeros_like(graph: Graph, array: Any, dtype: Any = None) -> Any:
+    """Return zeros in an array's shape."""
+    only_floats(dtype)
+    if not holds_traced(array):
+        found = np.zeros_like(array, dtype=dtype)
+        return traced(graph, found) if found.dtype == float else found
+    array = traced(graph, array)
+    if dtype is None:
+        _ = array.dtype  # which refuses all but floats
+    return full(graph, array.shape, 0.0)
+
+
+@of(np.ones_like, makes=True)
+def ones_like(graph: Graph, array: Any, dtype: Any = None) -> Any:
+    """Return ones in an array's shape."""
+    return elementwise(graph, "add", zeros_like(graph, array, dtype), 1.0)
+
+
+@of(np.full_like, makes=True)
+def full_like(graph: Graph, array: Any, value: Any, dtype: Any = None) -> Any:
+    """Return equal elements in an array's shape."""
+    return elementwise(graph, "add", zeros_like(graph, array, dtype), value)
+
+
+@of(np.array, makes=True)
+def array(graph: Graph, values: Any, dtype: Any = None, copy: Any = True, ndmin: int = 0) -> Any:
+    """Return numbers, lists and arrays as an array of its own."""
+    if not holds_traced(values):
+        made = np.array(values, dtype, ndmin=ndmin)
+        if made.dtype != float:
+            return made  # an array of integers rounds what it is assigned
+        return traced(graph, made)
+    if is_complex(values):
+        return paired(graph, values)
+    only_floats(dtype)
+    made = _of_floats(graph, traced(graph, values)).copy()
+    if dtype is None and len({e.kind for e in made.values.flat}) > 1:
+        raise Untraceable("an array of integers and truth values")
+    if dtype is not None:
+        made = elementwise(graph, "add", made, 0.0)
+    return made.reshape((1,) * (ndmin - made.ndim) + made.shape) if made.ndim < ndmin else made
+
+
+def _of_floats(graph: Graph, array: Tracer) -> Tracer:
+    """Return an array with floats throughout where one element is a float."""
+    kinds = {e.kind for e in array.values.flat}
+    if "f" not in kinds or len(kinds) == 1:
+        return array
+    cells = np.frompyfunc(graph.number, 1, 1)(array.cells)
+    return Tracer(graph, cells, array.axis, array.length)
+
+
+@of(np.asarray, np.asanyarray, np.ascontiguousarray, np.asarray_chkfinite, makes=True)
+def asarray(graph: Graph, values: Any, dtype: Any = None) -> Any:
+    """Return an array as it is, anything else as an array."""
+    if isinstance(values, Pair):
+        return values
+    if not isinstance(values, Tracer):
+        return array(graph, values, dtype)
+    if dtype is not None:
+        only_floats(dtype)
+        if any(e.kind != "f" for e in values.values.flat):
+            return elementwise(graph, "add", values, 0.0)
+    return values
+
+
+@of(np.copy, makes=True)
+def copy(graph: Graph, values: Any) -> Any:
+    """Return a copy."""
+    return traced(graph, values).copy()
+
+
+@of(np.eye, makes=True)
+def eye(graph: Graph, n: int, m: Any = None, k: int = 0, dtype: Any = float) -> Any:
+    """Return a matrix with ones on a diagonal."""
+    found = np.eye(n, m, k, dtype)
+    return traced(graph, found) if found.dtype == float else found
+
+
+@of(np.identity, makes=True)
+def identity(graph: Graph, n: int, dtype: Any = float) -> Any:
+    """Return the unit matrix."""
+    return eye(graph, n, dtype=dtype)
+
+
+@of(np.linspace)
+def linspace(graph: Graph, start: Any, stop: Any, num: int = 50, endpoint: bool = True) -> Tracer:
+    """Return numbers at equal distances."""
+    parts = num - 1 if endpoint else num
+    start, stop = traced(graph, start), traced(graph, stop)
+    step = elementwise(graph, "div", elementwise(graph, "sub", stop, start), float(parts))
+    found = elementwise(
+        graph, "add", elementwise(graph, "mul", traced(graph, np.arange(float(num))), step), start
+    )
+    if endpoint and num > 1:
+        found[-1] = stop
+    return found
+
+
+def as_type(graph: Graph, values: Tracer, dtype: Any, copy: bool = True) -> Tracer:
+    """Return an array's elements in another type."""
+    if dtype in (bool, np.bool_):
+        return elementwise(graph, "ne", values, 0.0)
+    if dtype in (int, np.int64, "int"):
+        return whole_numbers(graph, values)
+    only_floats(dtype)
+    return elementwise(graph, "add", values, 0.0).copy()
+
+
+def whole_numbers(graph: Graph, values: Tracer) -> Tracer:
+    """Return the integers that NumPy casts numbers to."""
+
+    def cast(e: Expr) -> Expr:
+        if e.kind != "f":
+            return graph.integer(e)
+        limit = graph.const(2.0**63)
+        fits = graph.op("lt", graph.op("absolute", e), limit)
+        lowest = graph.const(-(2.0**63))
+        return graph.integer(graph.op("select", fits, graph.op("trunc", e), lowest))
+
+    cells = np.frompyfunc(cast, 1, 1)(values.cells)
+    box = np.empty(np.shape(values.cells), dtype=object)
+    box[...] = cells
+    return Tracer(graph, box, values.axis, values.length)
+
+
+class Joined:
+    """``np.r_`` and ``np.c_``: arrays and numbers in brackets, next to each other."""
+
+    def __init__(self, graph: Graph, real: Any) -> None:
+        self.graph, self.real = graph, real
+
+    def __getitem__(self, key: Any) -> Any:
+        parts = key if isinstance(key, tuple) else (key,)
+        parts = [self.real[p] if isinstance(p, slice) else p for p in parts]
+        if not any(map(holds_traced, parts)):
+            return self.real[key]
+        if any(isinstance(p, str) for p in parts):
+            raise Untraceable("an index with a text")
+        arrays = [traced(self.graph, p) for p in parts]
+        if self.real is np.c_:
+            return by_moving(np.column_stack)(self.graph, [a.reshape(-1) if a.ndim < 2 else a
+                                                           for a in arrays])  # fmt: skip
+        if all(a.ndim < 2 for a in arrays):
+            from .shapes import hstack
+
+            return hstack(self.graph, arrays)
+        return by_moving(np.concatenate)(self.graph, [a.short() for a in arrays])
+
+
+METHODS.update(astype=as_type)

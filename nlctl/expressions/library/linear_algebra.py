@@ -1,0 +1,139 @@
+"""Linear algebra of small matrices, element by element."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Tracer, traced
+from ..elimination import eliminated, substituted
+from ..graph import Graph, Untraceable
+from ..operators import elementwise, product
+from .table import Facade, constant, of
+
+__all__: list[str] = []
+
+Rows = list[list[Any]]
+LARGEST = 12  # rows of a matrix that depends on the state
+
+
+def _rows(graph: Graph, matrix: Any) -> Rows:
+    array = traced(graph, matrix)
+    if array.ndim != 2:
+        raise Untraceable("many matrices at once")
+    return [list(row) for row in array]
+
+
+def _square(graph: Graph, matrix: Any) -> Rows:
+    rows = _rows(graph, matrix)
+    if any(len(row) != len(rows) for row in rows):
+        raise Untraceable("a matrix that is not square")
+    open_ones = any(e.op != "const" for row in rows for v in row for e in v.values.flat)
+    if open_ones and len(rows) > LARGEST:
+        raise Untraceable(f"a matrix of more than {LARGEST} rows")
+    return rows
+
+
+def _guard(graph: Graph, pivots: Sequence[Any]) -> None:
+    """Note that NumPy raises an error for a singular matrix."""
+    for pivot in pivots:
+        guard = elementwise(graph, "ne", pivot, 0.0).only
+        if guard.op != "const":
+            graph.guards.append(guard)
+        elif not guard.data:
+            raise Untraceable("a singular matrix")
+
+
+def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
+    """Return the solution of linear equations: elimination with the pivots that LAPACK takes."""
+    right = traced(graph, b)
+    columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
+    rows = [[*row, *more] for row, more in zip(_square(graph, matrix), columns, strict=True)]
+    found, pivots = eliminated(Facade(graph), rows)
+    _guard(graph, pivots)
+    x = substituted(found)
+    return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
+
+
+@of(np.linalg.solve)
+def solve(graph: Graph, a: Any, b: Any) -> Tracer:
+    """Return the solution of linear equations."""
+    return solved(graph, a, b)
+
+
+@of(np.linalg.inv)
+def inv(graph: Graph, a: Any) -> Tracer:
+    """Return the inverse of a matrix."""
+    n = len(traced(graph, a))
+    return solved(graph, a, np.eye(n))
+
+
+@of(np.linalg.det)
+def det(graph: Graph, a: Any) -> Any:
+    """Return the determinant of a matrix: the product of the pivots, each exchange a minus."""
+    rows = _square(graph, a)
+    np_ = Facade(graph)
+    _, pivots = eliminated(np_, [list(row) for row in rows], exchanges := [])
+    product: Any = 1.0
+    for pivot in pivots:
+        product = product * pivot
+    for exchanged in exchanges:
+        product = np_.where(exchanged, -product, product)
+    singular = _any_is_zero(np_, pivots)
+    return np_.where(singular, 0.0, product)
+
+
+def _any_is_zero(np_: Facade, pivots: Sequence[Any]) -> Any:
+    found = np_.equal(pivots[0], 0.0)
+    for pivot in pivots[1:]:
+        found = np_.logical_or(found, np_.equal(pivot, 0.0))
+    return found
+
+
+@of(np.linalg.lstsq)
+def lstsq(graph: Graph, a: Any, b: Any, rcond: Any = None) -> tuple[Any, ...]:
+    """Return the least squares solution for a matrix that is constant."""
+    matrix = constant(traced(graph, a))
+    if not isinstance(matrix, np.ndarray):
+        raise Untraceable("least squares with a matrix that depends on the state")
+    rows = min(matrix.shape)
+    found = product(traced(graph, np.linalg.pinv(matrix)), traced(graph, b))
+    singular = np.linalg.svd(matrix, compute_uv=False)
+    return found, traced(graph, np.zeros(0)), rows, traced(graph, singular)
+
+
+@of(np.linalg.cholesky)
+def cholesky(graph: Graph, a: Any) -> Tracer:
+    """Return the lower factor of a positive definite matrix."""
+    rows, np_ = _square(graph, a), Facade(graph)
+    n = len(rows)
+    lower: Rows = [[0.0] * n for _ in range(n)]
+    for j in range(n):
+        rest = rows[j][j]
+        for k in range(j):
+            rest = rest - lower[j][k] * lower[j][k]
+        guard = elementwise(graph, "gt", rest, 0.0).only
+        if guard.op != "const":
+            graph.guards.append(guard)
+        lower[j][j] = np_.sqrt(rest)
+        for i in range(j + 1, n):
+            rest = rows[i][j]
+            for k in range(j):
+                rest = rest - lower[i][k] * lower[j][k]
+            lower[i][j] = rest / lower[j][j]
+    return traced(graph, lower)
+
+
+@of(np.linalg.eigvalsh)
+def eigvalsh(graph: Graph, a: Any) -> Tracer:
+    """Return the eigenvalues of a symmetric matrix of two rows; NumPy reads the lower half."""
+    rows, np_ = _square(graph, a), Facade(graph)
+    if len(rows) == 1:
+        return traced(graph, [rows[0][0]])
+    if len(rows) != 2:
+        raise Untraceable("eigenvalues of a matrix of more than two rows")
+    (p, _), (q, r) = rows
+    middle, spread = (p + r) / 2.0, np_.hypot((p - r) / 2.0, q)
+    return traced(graph, [middle - spread, middle + spread])

@@ -1,0 +1,236 @@
+"""Python's own functions, of expressions."""
+
+from __future__ import annotations
+
+import builtins
+import copy
+import functools
+import math
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Tracer, scalar, traced
+from ..graph import Expr, Graph, Untraceable
+from ..operators import elementwise
+from .table import OWN, Kind, applied, is_traced, of, plain
+
+__all__ = ["Builtins", "guard_of_math"]
+
+_SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter", "len",
+         "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sorted", "sum",
+         "tuple", "zip", "object", "property", "staticmethod", "classmethod")  # fmt: skip
+# these ask their arguments, as they do of arrays
+
+
+def guard_of_math(graph: Graph, result: Any, arguments: Any) -> None:
+    """Note when Python's function raises an error where NumPy's gives NaN or infinity."""
+    if not isinstance(result, Tracer):
+        return
+    if result.shape:
+        raise Untraceable("a function of math of an array")
+    op = functools.partial(elementwise, graph)
+    finite = op("lt", op("absolute", result), math.inf)
+    for value in arguments:
+        given = traced(graph, value)
+        nan = op("ne", given, given)
+        infinite = op("eq", op("absolute", given), math.inf)
+        passed = op("and", infinite, op("eq", result, result))
+        finite = op("or", finite, op("or", nan, passed))
+    if finite.only.op != "const" or not finite.only.data:
+        graph.guards.append(finite.only)
+
+
+class Namespace(dict[str, Any]):
+    """Builtins of the copies of functions that are traced: it tells these from other code."""
+
+
+class Builtins:
+    """What a traced function finds as Python's builtins."""
+
+    def __init__(self, stage: Any) -> None:
+        self.stage, self.graph = stage, stage.graph
+
+    def namespace(self, import_: Callable[..., Any]) -> dict[str, Any]:
+        """Return all of them by name."""
+        found = Namespace((name, self._builtin(name, v)) for name, v in vars(builtins).items())
+        found.update(__import__=import_, super=self._super)
+        for name in ("round", "isinstance", "getattr", "hasattr", "type"):
+            found[name] = getattr(self, f"_{name}")
+        makers = {float: self._float, int: self._int, complex: self._complex}
+        found.update({kind.__name__: Kind(kind, make) for kind, make in makers.items()})
+        found["min"] = functools.partial(self._extreme, "min")
+        found["max"] = functools.partial(self._extreme, "max")
+        return found
+
+    def _builtin(self, name: str, real: Any) -> Any:
+        is_error = isinstance(real, type) and issubclass(real, BaseException)
+        safe = name in _SAFE or is_error or not callable(real) or name == "__build_class__"
+        return real if safe else self.stage.for_numbers(real)
+
+    def _float(self, value: Any = 0.0) -> Any:
+        if not isinstance(value, Tracer):
+            return float(value)
+        if value.size != 1:
+            raise Untraceable("the float of an array")
+        return scalar(self.graph, self.graph.number(value.reshape(1)[0].only if value.shape
+                                                    else value.only))  # fmt: skip
+
+    def _complex(self, *parts: Any) -> Any:
+        if not any(map(is_traced, parts)):
+            return complex(*parts)
+        return OWN[complex](self.graph, *parts)
+
+    def _int(self, value: Any = 0, *rest: Any) -> Any:
+        if not isinstance(value, Tracer):
+            return int(value, *rest)
+        if value.shape:
+            raise Untraceable("the integer of an array")
+        only = value.only
+        if only.op == "const":
+            return int(only.data)
+        if only.kind == "i":
+            return int(value) if only.value is not None else value
+        if only.kind == "b":
+            return scalar(self.graph, self.graph.integer(only))
+        return self._whole("trunc", value)
+
+    def _whole(self, name: str, value: Tracer) -> Tracer:
+        """Return an integer; Python raises an error where there is none."""
+        finite = elementwise(self.graph, "lt", elementwise(self.graph, "absolute", value), math.inf)
+        self.graph.guards.append(finite.only)
+        return scalar(self.graph, self.graph.integer(elementwise(self.graph, name, value).only))
+
+    def _round(self, value: Any, digits: Any = None) -> Any:
+        if not isinstance(value, Tracer):
+            return round(value) if digits is None else round(value, digits)
+        if value.shape or value.only.kind != "f":
+            raise Untraceable("round of something else than a float")
+        if digits is None:
+            return self._whole("rint", value)
+        if not is_of_arrays(value.only):
+            raise Untraceable("Python's round to decimals, of one of its own floats")
+        return applied(self.graph, np.round, value, digits)
+
+    def _isinstance(self, thing: Any, kind: Any) -> bool:
+        originals = {made: real for real, made in self.stage.classes.items()}
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        kinds = tuple(getattr(plain(k), "__dict__", {}).get("_real", plain(k)) for k in kinds)
+        both = (*kinds, *(originals[k] for k in kinds if k in originals))
+        if isinstance(thing, Tracer):
+            return self._is_number(thing, both)
+        real = thing.__dict__["_real"] if hasattr(type(thing), "_forwards") else thing
+        return isinstance(real, both)
+
+    def _is_number(self, thing: Tracer, kinds: Any) -> bool:
+        if thing.shape:
+            return isinstance(np.empty(0), kinds)
+        both = {"f": (0.0, np.float64(0)), "i": (0, np.int64(0)), "b": (True, np.True_)}
+        answers = {isinstance(v, kinds) for v in both[thing.only.kind]}
+        if len(answers) > 1:
+            raise Untraceable("a question for the type of a number")
+        return answers.pop()
+
+    def _getattr(self, thing: Any, *rest: Any) -> Any:
+        return getattr(thing, *rest)
+
+    def _hasattr(self, thing: Any, name: str) -> bool:
+        if isinstance(thing, Tracer):
+            return hasattr(np.empty(thing.shape) if thing.shape else 0.0, name)
+        return hasattr(thing, name)
+
+    def _type(self, thing: Any, *rest: Any) -> Any:
+        if is_traced(thing):
+            raise Untraceable("the type of what is only known when it runs")
+        if hasattr(type(thing), "_forwards"):
+            return self.stage.instead(type(thing.__dict__["_real"]))
+        return type(thing, *rest)
+
+    def _super(self, *given: Any) -> Any:
+        frame = sys._getframe(1)
+        cls, thing = given or (
+            frame.f_locals["__class__"], frame.f_locals[frame.f_code.co_varnames[0]],
+        )  # fmt: skip
+        if hasattr(type(thing), "_forwards"):
+            return self.stage.parent(thing, cls)
+        return super(cls, thing)
+
+    def _extreme(self, name: str, *values: Any, **options: Any) -> Any:
+        """Python's min and max: the first of those that no other is beyond."""
+        values = list(values[0]) if len(values) == 1 else list(values)  # type: ignore[assignment]
+        key = options.pop("key", None)
+        keys = [v if key is None else key(v) for v in values]
+        if not any(map(is_traced, (*values, *keys))):
+            return getattr(builtins, name)(values, **({"key": key} if key else {}), **options)
+        if options or any(isinstance(v, Tracer) and v.shape for v in (*values, *keys)):
+            raise Untraceable(f"{name} of arrays, or with {', '.join(options)}")
+        found, best = traced(self.graph, values[0]), traced(self.graph, keys[0])
+        for value, rank in zip(values[1:], keys[1:], strict=True):
+            found, best = self._further(name, (found, best), (value, rank))
+        return found
+
+    def _further(self, name: str, one: Any, other: Any) -> Any:
+        """Return the one of two pairs whose second part is beyond the other's."""
+        op = functools.partial(elementwise, self.graph)
+        kinds = [traced(self.graph, v).only.kind for v in (*one, *other)]
+        if set(kinds) == {"i"} and one[0] is one[1] and other[0] is other[1]:
+            both = op("minimum" if name == "min" else "maximum", one[0], other[0])
+            return both, both
+        beyond = op("lt" if name == "min" else "gt", other[1], one[1])
+        return op("select", beyond, other[0], one[0]), op("select", beyond, other[1], one[1])
+
+
+def is_of_arrays(expr: Expr) -> bool:
+    """Whether a number is one of NumPy's: it depends on states or inputs."""
+    waiting, seen = [expr], set()
+    while waiting:
+        node = waiting.pop()
+        if node.op in ("call", "solve") or (node.op == "leaf" and node.data[0] in ("x", "u")):
+            return True
+        waiting.extend(arg for arg in node.args if arg not in seen)
+        seen.update(node.args)
+    return False
+
+
+@of(copy.copy, copy.deepcopy)
+def copied(graph: Graph, value: Any, memo: Any = None) -> Any:
+    """Return a copy."""
+    if isinstance(value, Tracer):
+        return value.copy()
+    if type(value) in (list, tuple):
+        return type(value)(copied(graph, v) for v in value)
+    if type(value) is dict:
+        return {k: copied(graph, v) for k, v in value.items()}
+    raise Untraceable(f"a copy of {type(value).__name__}")
+
+
+@of(np.vectorize)
+def vectorize(graph: Graph, function: Any, otypes: Any = None) -> Any:
+    """Return a function that is called for each element."""
+
+    def each(*arguments: Any) -> Any:
+        arrays = [traced(graph, a).short() for a in arguments]
+        shape = np.broadcast_shapes(*(a.shape for a in arrays))
+        zero = traced(graph, np.zeros(shape))
+        arrays = [elementwise(graph, "add", a, zero) for a in arrays]
+        found = [
+            traced(graph, function(*(a[index] for a in arrays))) for index in np.ndindex(shape)
+        ]
+        if any(f.shape or f.only.kind != "f" for f in found):
+            raise Untraceable("np.vectorize of something else than floats")
+        return traced(graph, found).reshape(shape) if shape else found[0]
+
+    return each
+
+
+@of(np.apply_along_axis)
+def apply_along_axis(graph: Graph, function: Any, axis: int, values: Any) -> Tracer:
+    """Return what a function makes of each row or column."""
+    array = traced(graph, values)
+    if array.ndim != 2:
+        raise Untraceable("apply_along_axis of something else than a matrix")
+    rows = array if axis in (1, -1) else array.T
+    found = traced(graph, [function(row) for row in rows])
+    return found if found.ndim == 1 or axis in (1, -1) else found.T

@@ -1,0 +1,408 @@
+"""Sums, means, extremes, orders: what makes one number of many."""
+
+from __future__ import annotations
+
+import functools
+import math
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Tracer, as_array, traced
+from ..graph import Expr, Graph, Untraceable
+from ..masked import Masked
+from ..operators import counted, elementwise, total
+from .complex_numbers import Pair
+from .table import METHODS, Facade, constant, formula, of
+
+__all__: list[str] = []
+
+Axis = Any
+_MIDDLE = 64  # elements beyond which no extremes are written out
+
+
+def folded(
+    graph: Graph, values: Any, axis: Axis, keepdims: bool, function: Callable[[Sequence[Expr]], Any]
+) -> Tracer:
+    """Return what a function makes of the elements along an axis, or of all."""
+    array = traced(graph, values)
+    cells = array.elements()
+    if axis is None:
+        lined, shape = cells.reshape(1, -1), (1,) * cells.ndim if keepdims else ()
+    else:
+        axes = axis if isinstance(axis, tuple) else (axis,)
+        places = [operator.index(a) % cells.ndim for a in axes]
+        moved = np.moveaxis(cells, places, range(len(places)))
+        kept = moved.shape[len(places) :]
+        lined = moved.reshape(-1, math.prod(kept)).T
+        shape = tuple(1 if i in places else n for i, n in enumerate(cells.shape)) if keepdims else (
+            kept
+        )  # fmt: skip
+    made = np.empty(len(lined), dtype=object)
+    for i, row in enumerate(lined):
+        made[i] = function(list(row))
+    return Tracer(graph, as_array(made.reshape(shape)))
+
+
+def _numbers(graph: Graph, row: Sequence[Expr]) -> list[Expr]:
+    return [e if e.kind == "i" else graph.number(e) for e in row]
+
+
+def _extreme(name: str, ignores_nan: bool = False) -> Callable[..., Any]:
+    def own(
+        graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False, initial: Any = None
+    ) -> Any:
+        def of_row(row: Sequence[Expr]) -> Expr:
+            row = _numbers(graph, row)
+            if initial is not None:
+                row.append(graph.number(traced(graph, initial).only))
+            if not row:
+                raise Untraceable("an extreme of nothing")
+            return functools.reduce(of_two, row)
+
+        def of_two(a: Expr, b: Expr) -> Expr:
+            if not ignores_nan:
+                return graph.op(name, a, b)
+            return ignoring_nan(graph, name, a, b)
+
+        return folded(graph, values, axis, keepdims, of_row)
+
+    return own
+
+
+def ignoring_nan(graph: Graph, name: str, a: Expr, b: Expr) -> Expr:
+    """Return the larger or smaller of two, the other one where one is NaN."""
+    both = graph.op(name, a, b)
+    known = graph.op("select", graph.op("ne", a, a), b, both)
+    return graph.op("select", graph.op("ne", b, b), a, known)
+
+
+largest = of(np.max, np.amax)(_extreme("maximum"))
+smallest = of(np.min, np.amin)(_extreme("minimum"))
+of(np.nanmax)(_extreme("maximum", ignores_nan=True))
+of(np.nanmin)(_extreme("minimum", ignores_nan=True))
+
+
+@of(np.ptp)
+def ptp(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+    """Return the distance between the largest and the smallest."""
+    return elementwise(graph, "sub", largest(graph, values, axis), smallest(graph, values, axis))
+
+
+@of(np.sum)
+def summed(
+    graph: Graph, values: Any, axis: Axis = None, dtype: Any = None, *, keepdims: bool = False,
+    where: Any = True, initial: Any = None,
+) -> Any:  # fmt: skip
+    """Return a sum."""
+    if isinstance(values, Masked | Pair):
+        return values.sum() if axis is None else values.sum(axis)
+    array = traced(graph, values)
+    if where is not True:
+        array = elementwise(graph, "select", where, array, 0.0)
+    if dtype not in (None, float) or initial is not None:
+        raise Untraceable("a sum with other arguments")
+    if isinstance(axis, tuple) or keepdims:
+        axes = range(array.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
+        places = [operator.index(a) % array.ndim for a in axes]
+        found = array
+        for place in sorted(places, reverse=True):
+            found = total(found, place)
+        shape = tuple(1 if i in places else n for i, n in enumerate(array.shape))
+        return found.reshape(shape) if keepdims else found
+    return total(array, axis)
+
+
+@of(np.nansum)
+def nansum(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+    """Return a sum without what is NaN."""
+    array = traced(graph, values)
+    known = elementwise(graph, "eq", array, array)
+    return total(elementwise(graph, "select", known, array, 0.0), axis)
+
+
+def _count(array: Tracer, axis: Axis) -> float:
+    places = range(array.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
+    return float(math.prod(array.shape[p] for p in places))
+
+
+@of(np.mean)
+def mean(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
+    """Return a mean."""
+    if isinstance(values, Masked):
+        return values.mean()
+    if isinstance(values, Pair):
+        return values.linear(lambda part: mean(graph, part, axis, keepdims=keepdims))
+    array = traced(graph, values)
+    found = summed(graph, array, axis, keepdims=keepdims)
+    return elementwise(graph, "div", found, _count(array, axis))
+
+
+@of(np.var)
+def var(
+    graph: Graph, values: Any, axis: Axis = None, *, ddof: float = 0, keepdims: bool = False
+) -> Tracer:
+    """Return a variance."""
+    array = counted(traced(graph, values))
+    away = elementwise(graph, "sub", array, mean(graph, array, axis, keepdims=True))
+    squares = elementwise(graph, "mul", away, away)
+    found = summed(graph, squares, axis, keepdims=keepdims)
+    return elementwise(graph, "div", found, max(_count(array, axis) - ddof, 0.0))
+
+
+@of(np.std)
+def std(graph: Graph, values: Any, axis: Axis = None, **options: Any) -> Tracer:
+    """Return a standard deviation."""
+    return elementwise(graph, "sqrt", var(graph, values, axis, **options))
+
+
+@of(np.average)
+def average(graph: Graph, values: Any, axis: Axis = None, weights: Any = None) -> Tracer:
+    """Return a weighted mean."""
+    if weights is None:
+        return mean(graph, values, axis)
+    array, weights = traced(graph, values), traced(graph, weights)
+    if weights.shape != array.shape and axis is not None:
+        shape = tuple(n if i == axis % array.ndim else 1 for i, n in enumerate(array.shape))
+        weights = weights.reshape(shape)
+    weighed = summed(graph, elementwise(graph, "mul", array, weights), axis)
+    ones = elementwise(graph, "add", elementwise(graph, "mul", array, 0.0), 1.0)
+    if weights.shape != array.shape:
+        weights = elementwise(graph, "mul", ones, weights)
+    return elementwise(graph, "div", weighed, summed(graph, weights, axis))
+
+
+@of(np.prod)
+def prod(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
+    """Return a product."""
+    if isinstance(values, Masked):
+        return prod(graph, values.filled(1.0))
+
+    def of_row(row: Sequence[Expr]) -> Expr:
+        start = graph.const(1) if all(e.kind != "f" for e in row) else graph.const(1.0)
+        whole = [graph.integer(e) if e.kind == "b" else e for e in row]
+        return functools.reduce(lambda a, b: graph.op("mul", a, b), whole, start)
+
+    return folded(graph, values, axis, keepdims, of_row)
+
+
+def _is_true(graph: Graph, e: Expr) -> Expr:
+    return e if e.kind == "b" else graph.op("ne", e, graph.const(0.0))
+
+
+def _of_truths(name: str, start: bool) -> Callable[..., Any]:
+    def own(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
+        if isinstance(values, Masked):
+            values = values.filled(start)
+
+        def of_row(row: Sequence[Expr]) -> Expr:
+            truths = [_is_true(graph, e) for e in row]
+            return functools.reduce(lambda a, b: graph.op(name, a, b), truths or [
+                graph.const(start)])  # fmt: skip
+
+        return folded(graph, values, axis, keepdims, of_row)
+
+    return own
+
+
+any_of = of(np.any)(_of_truths("or", False))
+all_of = of(np.all)(_of_truths("and", True))
+
+
+@of(np.count_nonzero)
+def count_nonzero(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+    """Return how many elements are not 0."""
+    array = traced(graph, values)
+    return total(elementwise(graph, "ne", array, 0.0) if any(
+        e.kind != "b" for e in array.values.flat) else array, axis)  # fmt: skip
+
+
+# -- orders ----------------------------------------------------------------------------------------
+
+
+def _first(name: str) -> Callable[..., Any]:
+    """Return what finds the first of the largest or smallest; NaN is beyond all."""
+
+    def own(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Tracer:
+        def of_row(row: Sequence[Expr]) -> Expr:
+            best, place = _numbers(graph, row)[0], graph.const(0)
+            for k, e in enumerate(_numbers(graph, row)[1:], start=1):
+                beyond = graph.op(name, e, best)
+                is_nan = graph.op("and", graph.op("ne", e, e), graph.op("eq", best, best))
+                known = graph.op("eq", best, best)
+                better = graph.op("or", graph.op("and", beyond, known), is_nan)
+                best = graph.op("select", better, e, best)
+                place = graph.op("select", better, graph.const(k), place)
+            return place
+
+        return folded(graph, values, axis, keepdims, of_row)
+
+    return own
+
+
+argmax = of(np.argmax)(_first("gt"))
+argmin = of(np.argmin)(_first("lt"))
+
+
+def _is_after(graph: Graph, a: Expr, b: Expr) -> Expr:
+    """Return whether a stands behind b: it is larger, or NaN."""
+    nan = graph.op("and", graph.op("ne", a, a), graph.op("eq", b, b))
+    return graph.op("or", graph.op("gt", a, b), nan)
+
+
+def in_order(graph: Graph, row: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
+    """Return elements in order, NaN last, and where each was; equal ones stay as they are."""
+    values, places = _numbers(graph, row), [graph.const(k) for k in range(len(row))]
+    if len(row) > _MIDDLE:
+        raise Untraceable("too many elements to be sorted")
+    for end in range(len(values) - 1, 0, -1):
+        for i in range(end):
+            turned = _is_after(graph, values[i], values[i + 1])
+            for kept in (values, places):
+                a, b = kept[i], kept[i + 1]
+                kept[i] = graph.op("select", turned, b, a)
+                kept[i + 1] = graph.op("select", turned, a, b)
+    return values, places
+
+
+def _along(graph: Graph, values: Any, axis: Any, function: Callable[..., list[Expr]]) -> Tracer:
+    array = traced(graph, values)
+    cells = array.elements().reshape(-1) if axis is None else array.elements()
+    moved = np.moveaxis(cells, -1 if axis is None else axis, -1)
+    made = np.empty(moved.shape, dtype=object)
+    for index in np.ndindex(moved.shape[:-1]):
+        made[index] = function(list(moved[index]))
+    return Tracer(graph, np.moveaxis(made, -1, -1 if axis is None else axis))
+
+
+@of(np.sort)
+def sort(graph: Graph, values: Any, axis: Any = -1) -> Tracer:
+    """Return an array in order."""
+    return _along(graph, values, axis, lambda row: in_order(graph, row)[0])
+
+
+@of(np.argsort)
+def argsort(graph: Graph, values: Any, axis: Any = -1) -> Tracer:
+    """Return where the elements of an ordered array were."""
+    if traced(graph, values).shape[-1] > 16:
+        raise Untraceable("the order of many elements, some of which may be equal")
+    return _along(graph, values, axis, lambda row: in_order(graph, row)[1])
+
+
+@of(np.median)
+def median(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+    """Return the one in the middle, NaN where one is NaN."""
+
+    def of_row(row: Sequence[Expr]) -> Expr:
+        ordered, _ = in_order(graph, row)
+        n = len(ordered)
+        low, high = ordered[(n - 1) // 2], ordered[n // 2]
+        half = graph.op("div", graph.op("add", low, high), graph.const(2.0))
+        middle = half if n % 2 == 0 else low
+        last = ordered[-1]
+        return graph.op("select", graph.op("ne", last, last), last, middle)
+
+    return folded(graph, values, axis, False, of_row)
+
+
+def _quantile(graph: Graph, row: Sequence[Expr], q: float) -> Expr:
+    """Return the value below which a part lies: between two of the ordered ones."""
+    ordered, _ = in_order(graph, row)
+    at = (len(ordered) - 1) * q
+    low = min(int(at), len(ordered) - 2) if len(ordered) > 1 else 0
+    part, high = at - low, min(low + 1, len(ordered) - 1)
+    a, b = ordered[low], ordered[high]
+    rise = graph.op("sub", b, a)
+    if part >= 0.5:
+        found = graph.op("sub", b, graph.op("mul", rise, graph.const(1.0 - part)))
+    else:
+        found = graph.op("add", a, graph.op("mul", rise, graph.const(part)))
+    last = ordered[-1]
+    return graph.op("select", graph.op("ne", last, last), last, found)
+
+
+@of(np.quantile)
+def quantile(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
+    """Return the value below which a part q lies."""
+    parts = np.asarray(constant(traced(graph, q)))
+    if parts.dtype != float and parts.dtype.kind != "i":
+        raise Untraceable("a quantile whose part depends on the state")
+    found = [folded(graph, values, axis, False, functools.partial(_quantile, graph, q=float(p)))
+             for p in parts.reshape(-1)]  # fmt: skip
+    return found[0] if not parts.shape else traced(graph, found)
+
+
+@of(np.percentile)
+def percentile(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
+    """Return the value below which q per cent lie."""
+    return quantile(graph, values, elementwise(graph, "div", q, 100.0), axis)
+
+
+@of(np.nanmean)
+def nanmean(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+    """Return a mean of what is not NaN."""
+    array = traced(graph, values)
+    known = elementwise(graph, "eq", array, array)
+    return elementwise(graph, "div", nansum(graph, array, axis), total(known, axis))
+
+
+@of(np.cov)
+def cov(graph: Graph, m: Any, y: Any = None, *, bias: bool = False, ddof: Any = None) -> Tracer:
+    """Return the covariances of rows."""
+    rows = [traced(graph, v) for v in (m, y) if v is not None]
+    flat = [row for r in rows for row in (r if r.ndim == 2 else [r])]
+    away = [elementwise(graph, "sub", r, mean(graph, r)) for r in flat]
+    count = float(flat[0].size - (ddof if ddof is not None else 0 if bias else 1))
+    found = [[elementwise(graph, "div", total(elementwise(graph, "mul", a, b)), count)
+              for b in away] for a in away]  # fmt: skip
+    return traced(graph, found if len(away) > 1 else found[0][0])
+
+
+@of(np.corrcoef)
+def corrcoef(graph: Graph, x: Any, y: Any = None) -> Tracer:
+    """Return the correlations of rows."""
+    c = cov(graph, x, y)
+    sizes = [elementwise(graph, "sqrt", c[i, i]) for i in range(len(c))]
+    found = [[elementwise(graph, "div", elementwise(graph, "div", c[i, j], sizes[i]), sizes[j])
+              for j in range(len(c))] for i in range(len(c))]  # fmt: skip
+    low, high = -1.0, 1.0
+    whole = elementwise(graph, "maximum", traced(graph, found), low)
+    return elementwise(graph, "minimum", whole, high)
+
+
+def sorted_in_place(graph: Graph, values: Tracer, axis: int = -1) -> None:
+    """Put an array in order."""
+    values[...] = sort(graph, values, axis)
+
+
+@formula(np.linalg.norm)
+def norm(np: Facade, x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> Any:  # noqa: A002
+    """Return a norm of a vector or matrix."""
+    x = traced(np.graph, x)
+    size = np.abs(x)
+    if x.ndim == 2 and axis is None and ord in (1, -1, math.inf, -math.inf):
+        sums = np.sum(size, axis=0 if abs(ord) == 1 else 1)
+        return np.max(sums) if ord > 0 else np.min(sums)
+    if ord in (math.inf, -math.inf) and not (x.ndim == 2 and axis is None):
+        return (np.max if ord > 0 else np.min)(size, axis=axis, keepdims=keepdims)
+    if ord == 1 and x.ndim != 2:
+        return np.sum(size, axis=axis, keepdims=keepdims)
+    is_euclidean = ord is None or ord == "fro" or (ord == 2 and (x.ndim == 1 or axis is not None))
+    if not is_euclidean:
+        raise Untraceable(f"the norm {ord!r} of this array")
+    return np.sqrt(np.sum(x * x, axis=axis, keepdims=keepdims))
+
+
+def norm_of(graph: Graph, values: Any) -> Tracer:
+    """Return the length of a vector."""
+    array = traced(graph, values)
+    return elementwise(graph, "sqrt", total(elementwise(graph, "mul", array, array)))
+
+
+METHODS.update(
+    {name: getattr(np, name) for name in ("max", "min", "sum", "mean", "var", "std", "prod", "any",
+                                          "all", "argmax", "argmin", "argsort", "ptp")},
+    sort=sorted_in_place,
+)  # fmt: skip

@@ -1,0 +1,301 @@
+"""Functions that move elements, or that only add and multiply them: NumPy does it itself."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Tracer, concatenated, scalar, traced
+from ..graph import Expr, Graph, Untraceable
+from ..masked import Masked
+from ..operators import elementwise, product
+from .cells import by_numpy
+from .table import METHODS, enter, of
+
+__all__: list[str] = []
+
+MOVING = (
+    np.split, np.array_split, np.hsplit, np.vsplit, np.dsplit, np.transpose, np.swapaxes,
+    np.moveaxis, np.rollaxis, np.squeeze, np.expand_dims, np.atleast_2d, np.atleast_3d, np.flip,
+    np.fliplr, np.flipud, np.rot90, np.diagonal, np.diag, np.diagflat, np.broadcast_to,
+    np.broadcast_arrays, np.stack, np.vstack, np.column_stack, np.dstack, np.block, np.tile,
+    np.repeat, np.take, np.insert, np.delete, np.tril, np.triu, np.resize,
+    np.meshgrid, np.take_along_axis, np.choose, np.compress, np.ix_, np.matrix_transpose,
+)  # fmt: skip
+"""Functions that move elements."""
+COMPUTING = (
+    np.convolve, np.correlate, np.kron, np.cross, np.einsum, np.trace,
+    np.inner, np.vdot, np.tensordot, np.linalg.multi_dot, np.linalg.matrix_power, np.cumsum,
+    np.cumprod, np.trapezoid, np.polyval, np.vander, np.polyder, np.polyadd, np.polymul,
+    np.polysub, np.ediff1d, np.linalg.cross, np.linalg.outer, np.linalg.trace,
+    np.linalg.vecdot, np.linalg.tensordot,
+)  # fmt: skip
+"""Functions that add and multiply."""
+
+
+def by_moving(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function of NumPy that moves elements; a view where NumPy's is one."""
+
+    def own(graph: Graph, *arguments: Any, **options: Any) -> Any:
+        owners: list[Tracer] = []
+        given = [_opened(v, owners) for v in arguments]
+        named = {k: _opened(v, owners) for k, v in options.items()}
+        long = next((a for a in owners if a.axis is not None or a.origin is not None), None)
+        return _closed(graph, function(*given, **named), long)
+
+    return own
+
+
+def _opened(value: Any, owners: list[Tracer]) -> Any:
+    if isinstance(value, list | tuple):
+        parts = [_opened(v, owners) for v in value]
+        return parts if isinstance(value, list) else tuple(parts)
+    if not isinstance(value, Tracer):
+        return value
+    if value.shape and all(e.op == "const" and e.kind != "f" for e in value.values.flat):
+        return np.array([e.value if e.kind == "i" else e.data for e in value.values.flat]).reshape(
+            value.shape
+        )
+    owners.append(value)
+    return value.elements() if value.shape else value.only
+
+
+def _closed(graph: Graph, value: Any, long: Tracer | None) -> Any:
+    if isinstance(value, list | tuple):
+        return type(value)(_closed(graph, v, long) for v in value)
+    if isinstance(value, Expr):
+        return scalar(graph, value)
+    if not isinstance(value, np.ndarray):
+        return value
+    if value.dtype != object:
+        return traced(graph, value)
+    if not all(isinstance(e, Expr) for e in value.flat):
+        value = np.frompyfunc(lambda e: e if isinstance(e, Expr) else graph.const(float(e)), 1, 1)(
+            value
+        )
+    return Tracer(graph, value) if long is None else long._part(value, None, 1)
+
+
+for _function in MOVING:
+    enter([_function], by_moving(_function), makes=_function in (np.diag, np.tile, np.diagflat))
+for _function in COMPUTING:
+    enter([_function], by_numpy(_function))
+
+
+@of(np.concatenate)
+def concatenate(graph: Graph, parts: Any, axis: Any = 0) -> Tracer:
+    """Return arrays one after the other."""
+    arrays = [traced(graph, p) for p in parts]
+    if axis is None:
+        return concatenated(graph, [a.reshape(-1) for a in arrays])
+    if all(a.ndim == 1 for a in arrays) and axis in (0, -1):
+        return concatenated(graph, arrays)
+    return by_moving(np.concatenate)(graph, [a.short() for a in arrays], axis=axis)
+
+
+@of(np.hstack)
+def hstack(graph: Graph, parts: Any) -> Tracer:
+    """Return arrays next to each other."""
+    arrays = [traced(graph, p) for p in parts]
+    return concatenate(
+        graph, [a if a.shape else a.reshape(1) for a in arrays], 1 if arrays[0].ndim > 1 else 0
+    )
+
+
+@of(np.append)
+def append(graph: Graph, array: Any, values: Any, axis: Any = None) -> Tracer:
+    """Return an array with values behind it."""
+    arrays = [traced(graph, v) for v in (array, values)]
+    if axis is not None:
+        return concatenate(graph, arrays, axis)
+    return concatenated(graph, [a.reshape(-1) for a in arrays])
+
+
+@of(np.outer)
+def outer(graph: Graph, a: Any, b: Any) -> Tracer:
+    """Return all products."""
+    a, b = (traced(graph, v).reshape(-1) for v in (a, b))
+    return elementwise(graph, "mul", a[:, None], b)
+
+
+@of(np.diff)
+def diff(graph: Graph, a: Any, n: int = 1, axis: int = -1, **ends: Any) -> Tracer:
+    """Return differences of neighbours."""
+    array = traced(graph, a)
+    if array.axis is None or array.ndim > 1:
+        return by_numpy(np.diff)(graph, array, n, axis, **ends)
+    before, after = (ends.get(k) for k in ("prepend", "append"))
+    parts = [traced(graph, v) for v in (before, array, after) if v is not None]
+    array = concatenated(graph, [p if p.shape else p.reshape(1) for p in parts])
+    for _ in range(n):
+        array = elementwise(graph, "sub", array[1:], array[:-1])
+    return array
+
+
+@of(np.gradient)
+def gradient(graph: Graph, f: Any, *spacing: Any) -> Tracer:
+    """Return central differences, one-sided ones at the ends."""
+    array = traced(graph, f)
+    h = traced(graph, spacing[0] if spacing else 1.0)
+    if array.ndim != 1 or len(spacing) > 1 or h.shape:
+        raise Untraceable("a gradient along several axes, or on an uneven grid")
+    op = functools.partial(elementwise, graph)
+    inner = op("div", op("sub", array[2:], array[:-2]), op("mul", 2.0, h))
+    first = op("div", op("sub", array[1:2], array[:1]), h)
+    last = op("div", op("sub", array[-1:], array[-2:-1]), h)
+    return concatenated(graph, [first, inner, last])
+
+
+@of(np.roll)
+def roll(graph: Graph, a: Any, shift: Any, axis: Any = None) -> Tracer:
+    """Return an array whose elements have moved on."""
+    array = traced(graph, a)
+    if array.axis is None or array.ndim > 1 or isinstance(shift, tuple):
+        return by_moving(np.roll)(graph, array, shift, axis)
+    k = int(shift) % array.size
+    return concatenated(graph, [array[array.size - k :], array[: array.size - k]])
+
+
+@of(np.pad)
+def pad(graph: Graph, a: Any, width: Any, mode: str = "constant", **options: Any) -> Tracer:
+    """Return an array with more at its ends."""
+    array = traced(graph, a)
+    if array.axis is None or array.ndim > 1:
+        return by_moving(np.pad)(graph, array, width, mode, **options)
+    places = np.pad(np.arange(array.size), width, mode="constant", constant_values=-1)
+    first, last = int(np.argmax(places >= 0)), places.size - int(np.argmax(places[::-1] >= 0))
+    ends = {"edge": (array[0], array[-1]), "constant": (0.0, 0.0)}.get(mode)
+    if ends is None or options:
+        return by_moving(np.pad)(graph, array.short(), width, mode, **options)
+    low, high = (np.repeat(0, first), np.repeat(0, places.size - last))
+    before = elementwise(graph, "add", traced(graph, low.astype(float)), ends[0])
+    after = elementwise(graph, "add", traced(graph, high.astype(float)), ends[1])
+    return concatenated(graph, [before, array, after])
+
+
+@of(np.dot, np.matmul, np.linalg.matmul)
+def dot(graph: Graph, a: Any, b: Any) -> Tracer:
+    """Return a product of matrices."""
+    a, b = traced(graph, a), traced(graph, b)
+    if not (a.shape and b.shape):
+        return elementwise(graph, "mul", a, b)
+    return product(a, b)
+
+
+@of(np.atleast_1d)
+def atleast_1d(graph: Graph, *values: Any) -> Any:
+    """Return numbers as arrays."""
+    arrays = [traced(graph, v) for v in values]
+    found = [a if a.shape else a.reshape(1) for a in arrays]
+    return found[0] if len(found) == 1 else tuple(found)
+
+
+@of(np.ravel)
+def ravel(graph: Graph, values: Any) -> Tracer:
+    """Return an array in one dimension."""
+    return traced(graph, values).reshape(-1)
+
+
+@of(np.reshape)
+def reshape(graph: Graph, values: Any, shape: Any) -> Tracer:
+    """Return an array in another shape."""
+    return traced(graph, values).reshape(shape)
+
+
+@of(np.copyto)
+def copyto(graph: Graph, target: Any, source: Any, where: Any = True) -> None:
+    """Assign to an array where a condition holds."""
+    target[...] = source if where is True else elementwise(graph, "select", where, source, target)
+
+
+@of(np.put)
+def put(graph: Graph, target: Any, places: Any, values: Any) -> None:
+    """Assign to places of an array in one dimension."""
+    if target.ndim != 1:
+        raise Untraceable("put into a matrix")
+    target[np.asarray(places)] = values
+
+
+@of(np.extract)
+def extract(graph: Graph, condition: Any, values: Any) -> Masked:
+    """Return the elements where a condition holds."""
+    mask, array = traced(graph, condition), traced(graph, values)
+    return Masked(array, elementwise(graph, "ne", mask, 0.0))
+
+
+@of(np.place, np.putmask)
+def place(graph: Graph, target: Any, mask: Any, values: Any) -> None:
+    """Assign where a condition holds: one value, or the elements of the same condition."""
+    mask = elementwise(graph, "ne", traced(graph, mask), 0.0)
+    if isinstance(values, Masked):
+        values = values.whole_for(mask)
+    elif traced(graph, values).size != 1:
+        raise Untraceable("several values in the places of a mask")
+    target[...] = elementwise(graph, "select", mask, values, target)
+
+
+@of(np.fill_diagonal)
+def fill_diagonal(graph: Graph, target: Any, value: Any) -> None:
+    """Assign to the diagonal of a matrix."""
+    if target.ndim != 2:
+        raise Untraceable("the diagonal of something else than a matrix")
+    for k in range(min(target.shape)):
+        target[k, k] = value if not getattr(value, "shape", ()) else value[k]
+
+
+@of(np.ndim)
+def ndim(graph: Graph, values: Any) -> int:
+    """Return the number of axes."""
+    return traced(graph, values).ndim
+
+
+@of(np.size)
+def size(graph: Graph, values: Any, axis: Any = None) -> int:
+    """Return the number of elements."""
+    array = traced(graph, values)
+    return array.size if axis is None else array.shape[axis]
+
+
+@of(np.shape)
+def shape(graph: Graph, values: Any) -> tuple[int, ...]:
+    """Return the shape."""
+    return traced(graph, values).shape
+
+
+@of(np.isscalar)
+def isscalar(graph: Graph, value: Any) -> bool:
+    """Return whether a value is a number and no array."""
+    return not traced(graph, value).shape
+
+
+def permuted(graph: Graph, values: Any, *axes: Any) -> Tracer:
+    """Return an array with its axes in another order."""
+    order = axes[0] if len(axes) == 1 and isinstance(axes[0], tuple | list | None) else axes
+    return by_moving(np.transpose)(graph, values, order or None)
+
+
+def filled(graph: Graph, values: Tracer, value: Any) -> None:
+    """Assign one value to all elements."""
+    values[...] = value
+
+
+def listed(graph: Graph, values: Tracer) -> Any:
+    """Return an array as lists of numbers."""
+    return [listed(graph, v) for v in values] if values.shape else values
+
+
+def item(graph: Graph, values: Tracer, *place: Any) -> Any:
+    """Return one element as a number."""
+    if not place and values.size != 1:
+        raise Untraceable("the only element of an array that has more")
+    flat = values.reshape(-1) if values.shape else values.reshape(1)
+    return flat[0] if not place else flat[place[0]] if len(place) == 1 else values[place]
+
+
+METHODS.update(transpose=permuted, fill=filled, tolist=listed, item=item)
+for _name in ("squeeze", "swapaxes", "repeat", "take", "diagonal", "trace", "cumsum", "cumprod",
+              "dot", "compress"):  # fmt: skip
+    METHODS[_name] = getattr(np, _name)

@@ -1,0 +1,263 @@
+"""Objects of NumPy and SciPy that are functions of x: splines, polynomials, tables."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Tracer, mapped, traced
+from ..graph import Expr, Graph, Untraceable
+from .table import enter
+from .tables import MOST_PIECES, choice, polynomial
+
+__all__ = ["called_object", "enter_splines"]
+
+
+def called_object(graph: Graph, thing: Any, *arguments: Any, **options: Any) -> Any:
+    """Return what an object of a library, that can be called, makes of arrays of expressions.
+
+    Raises
+    ------
+    Untraceable
+        If it is not known here.
+    """
+    for kinds, own in _kinds():
+        if isinstance(thing, kinds):
+            return own(graph, thing, *arguments, **options)
+    raise Untraceable(f"{type(thing).__name__} is not known here")
+
+
+@functools.cache
+def _kinds() -> tuple[tuple[Any, Callable[..., Any]], ...]:
+    from scipy import interpolate
+
+    return (
+        (interpolate.PPoly, piecewise_polynomial),
+        (interpolate.BSpline, b_spline),
+        (interpolate.interp1d, table_of_one),
+        (interpolate.UnivariateSpline, fitted_spline),
+        (interpolate.RegularGridInterpolator, grid),
+        (np.poly1d, lambda graph, p, x: polynomial(graph, x, _floats(p.coeffs[::-1]))),
+        (np.polynomial.Polynomial, _mapped_polynomial),
+    )
+
+
+@functools.cache
+def enter_splines() -> None:
+    """Enter SciPy's functions of splines."""
+    from scipy import interpolate
+
+    enter([interpolate.splev], splev)
+
+
+def _floats(values: Any) -> np.ndarray:
+    return np.asarray(values, dtype=float)
+
+
+def _mapped_polynomial(graph: Graph, p: Any, x: Any) -> Any:
+    off, scale = p.mapparms()
+    return polynomial(graph, float(off) + float(scale) * traced(graph, x), _floats(p.coef))
+
+
+def _each(graph: Graph, x: Any, function: Callable[[Expr], Expr]) -> Tracer:
+    cells = mapped(lambda e: function(graph.number(e)), traced(graph, x).elements())
+    return Tracer(graph, cells)
+
+
+def piecewise_polynomial(
+    graph: Graph, thing: Any, x: Any, nu: int = 0, extrapolate: Any = None
+) -> Any:
+    """Return SciPy's piecewise polynomial, or a derivative."""
+    if nu:
+        thing = thing.derivative(nu)
+    extrapolate = thing.extrapolate if extrapolate is None else extrapolate
+    if thing.c.ndim != 2 or thing.c.dtype != float or extrapolate == "periodic":
+        raise Untraceable("a piecewise polynomial with several values, or with a period")
+    breaks, coefficients = thing.x, thing.c
+    if breaks.size > MOST_PIECES or np.any(np.diff(breaks) <= 0):
+        raise Untraceable("a piecewise polynomial with too many pieces")
+
+    def at(e: Expr) -> Expr:
+        pieces = [_of_piece(graph, e, breaks[j], coefficients[:, j])
+                  for j in range(breaks.size - 1)]  # fmt: skip
+        found = choice(graph, e, list(breaks[1:-1]), pieces)
+        nan = graph.const(np.nan)
+        return found if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), found, nan, nan)
+
+    return _each(graph, x, at)
+
+
+def _beyond(
+    graph: Graph, x: Expr, ends: Sequence[float], found: Expr, below: Expr, above: Expr
+) -> Expr:
+    """Return what is inside of a range, and other values beyond its ends."""
+    found = graph.op("select", graph.op("gt", x, graph.const(float(ends[-1]))), above, found)
+    return graph.op("select", graph.op("lt", x, graph.const(float(ends[0]))), below, found)
+
+
+def _guard_range(graph: Graph, x: Expr, ends: Sequence[float]) -> None:
+    """Note that SciPy raises an error beyond the ends of a range."""
+    graph.guards.append(graph.op("ge", x, graph.const(float(ends[0]))))
+    graph.guards.append(graph.op("le", x, graph.const(float(ends[-1]))))
+
+
+def _of_piece(graph: Graph, x: Expr, start: float, coefficients: np.ndarray) -> Expr:
+    """Return a polynomial in x - start, the highest power first in the coefficients."""
+    inside = graph.op("sub", x, graph.const(float(start)))
+    found = graph.const(float(coefficients[0]))
+    for c in coefficients[1:]:
+        found = graph.op("add", graph.op("mul", found, inside), graph.const(float(c)))
+    return found
+
+
+def b_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, extrapolate: Any = None) -> Any:
+    """Return SciPy's spline by its polynomial in each interval between knots."""
+    from scipy.interpolate import PPoly
+
+    extrapolate = thing.extrapolate if extrapolate is None else extrapolate
+    if thing.c.ndim != 1 or extrapolate == "periodic":
+        raise Untraceable("a spline with several values, or with a period")
+    knots = np.unique(thing.t[thing.k : thing.t.size - thing.k])
+    whole = PPoly.from_spline(thing)
+    kept = [int(np.searchsorted(whole.x, k, side="right")) - 1 for k in knots[:-1]]
+    plain = PPoly(whole.c[:, kept], knots, extrapolate=bool(extrapolate))
+    return piecewise_polynomial(graph, plain, x, nu)
+
+
+def splev(graph: Graph, x: Any, tck: Any, der: int = 0, ext: int = 0) -> Any:
+    """Return a spline that is given by knots, coefficients and degree."""
+    from scipy.interpolate import BSpline
+
+    if isinstance(tck, BSpline):
+        return b_spline(graph, tck, x, der)
+    t, c, k = tck
+    t, c = _floats(_numbers(t)), _floats(_numbers(c))
+    spline = BSpline(t, c[: t.size - k - 1], k)
+    found = b_spline(graph, spline, x, der, True)
+    ends = t[k], t[t.size - k - 1]
+    if ext == 0:
+        return found
+    array = traced(graph, x)
+    if ext == 2:
+        for e in array.elements().reshape(-1):
+            _guard_range(graph, graph.number(e), ends)
+        return found
+    edges = [0.0, 0.0] if ext == 1 else [float(spline(e, der)) for e in ends]
+    below, above = map(graph.const, edges)
+    cells = mapped(
+        lambda e, f: _beyond(graph, graph.number(e), ends, f, below, above),
+        array.elements(), found.elements(),
+    )  # fmt: skip
+    return Tracer(graph, cells)
+
+
+def _numbers(values: Any) -> Any:
+    from .table import constant
+
+    found = constant(values) if isinstance(values, Tracer) else values
+    if isinstance(found, Tracer):
+        raise Untraceable("a spline that depends on the state or on parameters")
+    return found
+
+
+def fitted_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, ext: Any = None) -> Any:
+    """Return one of SciPy's splines that are fitted to data."""
+    codes = {"extrapolate": 0, "zeros": 1, "raise": 2, "const": 3}
+    how = thing.ext if ext is None else ext
+    return splev(graph, x, thing._eval_args, nu, codes.get(how, how))
+
+
+def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
+    """Return SciPy's interp1d."""
+    kind = getattr(thing, "_kind", "")
+    values = np.asarray(thing.y, dtype=float)
+    if values.ndim != 1:
+        raise Untraceable("a table with several values")
+    if kind in ("linear", "linear-np", "slinear") and not hasattr(thing, "_spline"):
+        rule = functools.partial(_line, graph, thing.x, values)
+    elif hasattr(thing, "_spline"):
+        rule = lambda e: b_spline(graph, thing._spline, Tracer(graph, np.array(e)), 0, True).only  # noqa: E731
+    else:
+        raise Untraceable(f"interp1d of kind {kind!r}")
+    extrapolates, bounded = bool(thing._extrapolate), bool(thing.bounds_error)
+    below, above = (graph.const(float(np.ravel(v)[0])) if not extrapolates else None
+                    for v in _fill(thing))  # fmt: skip
+
+    def at(e: Expr) -> Expr:
+        found, ends = rule(e), (thing.x[0], thing.x[-1])
+        if bounded:
+            _guard_range(graph, e, ends)
+        if extrapolates or below is None or above is None:
+            return found
+        return _beyond(graph, e, ends, found, below, above)
+
+    return _each(graph, x, at)
+
+
+def _fill(thing: Any) -> tuple[Any, Any]:
+    if thing._extrapolate:
+        return None, None
+    return thing._fill_value_below, thing._fill_value_above
+
+
+def _line(graph: Graph, places: np.ndarray, values: np.ndarray, x: Expr) -> Expr:
+    """Return the line of the interval of x, those at the ends beyond them, too."""
+    op, const = graph.op, graph.const
+    pieces = []
+    for j in range(len(places) - 1):
+        slope = (values[j + 1] - values[j]) / (places[j + 1] - places[j])
+        inside = op("sub", x, const(float(places[j])))
+        pieces.append(op("add", op("mul", const(float(slope)), inside), const(float(values[j]))))
+    return choice(graph, x, list(map(float, places[1:-1])), pieces)
+
+
+def grid(graph: Graph, thing: Any, xi: Any, method: Any = None) -> Any:
+    """Return SciPy's interpolation on a grid: linear along one axis after the other."""
+    values = np.asarray(thing.values, dtype=float)
+    if (method or thing.method) != "linear" or values.ndim != len(thing.grid):
+        raise Untraceable("an interpolation on a grid that is not linear")
+    array = traced(graph, list(xi) if isinstance(xi, tuple) else xi)
+    flat = isinstance(xi, tuple) and array.ndim == 1
+    rows = array.short().reshape(1, -1) if array.ndim == 1 else array.short()
+    if isinstance(xi, tuple) and array.ndim > 1:
+        raise Untraceable("an interpolation on a grid at several points")
+    found = [_on_grid(graph, thing, values, [graph.number(e) for e in row.elements()])
+             for row in rows]  # fmt: skip
+    made = np.empty(len(found), dtype=object)
+    made[:] = found
+    whole = Tracer(graph, made)
+    return whole[0] if flat else whole
+
+
+def _on_grid(graph: Graph, thing: Any, values: np.ndarray, x: Sequence[Expr]) -> Expr:
+    cells: Any = np.frompyfunc(lambda v: graph.const(float(v)), 1, 1)(values)
+    for axis in range(len(x) - 1, -1, -1):
+        places = np.asarray(thing.grid[axis], dtype=float)
+        made = np.empty(cells.shape[:-1], dtype=object)
+        for index in np.ndindex(made.shape):
+            made[index] = _between(graph, places, cells[index], x[axis])
+        cells = made
+    found = cells[()] if isinstance(cells, np.ndarray) else cells
+    for axis, e in enumerate(x):
+        ends = thing.grid[axis][0], thing.grid[axis][-1]
+        if thing.bounds_error:
+            _guard_range(graph, e, ends)
+        elif thing.fill_value is not None:
+            fill = graph.const(float(thing.fill_value))
+            found = _beyond(graph, e, ends, found, fill, fill)
+    return found
+
+
+def _between(graph: Graph, places: np.ndarray, values: Sequence[Expr], x: Expr) -> Expr:
+    """Return the weighted mean of the two values next to x."""
+    op, const = graph.op, graph.const
+    pieces = []
+    for j in range(places.size - 1):
+        width = const(float(places[j + 1] - places[j]))
+        part = op("div", op("sub", x, const(float(places[j]))), width)
+        low = op("mul", values[j], op("sub", const(1.0), part))
+        pieces.append(op("add", low, op("mul", values[j + 1], part)))
+    return choice(graph, x, list(map(float, places[1:-1])), pieces)

@@ -1,0 +1,168 @@
+"""The table of functions that are written in terms of others, and who looks something up in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Special, Tracer, traced
+from ..functions import FUNCTIONS
+from ..graph import NUMPY, Graph, Untraceable
+from ..operators import elementwise
+
+OWN: dict[Any, Callable[..., Any]] = {}
+"""Of a function of a library: the same of arrays of expressions; it takes the graph first."""
+MAKING: set[Any] = set()
+"""Functions whose results a traced function may change: taken from here even of numbers."""
+METHODS: dict[str, Any] = {}
+"""Of an array's method: the function that does the same."""
+OPERATIONS = {name: op for op, name in NUMPY.items()} | {name: name for name in FUNCTIONS}
+OPERATIONS["divide"] = "div"
+"""Of the name of a ufunc: the operation of expressions."""
+
+
+def of(*functions: Any, makes: bool = False) -> Callable[[Any], Any]:
+    """Enter a function of a graph and arguments into the table."""
+
+    def entered(own: Any) -> Any:
+        enter(functions, own, makes=makes)
+        return own
+
+    return entered
+
+
+def formula(*functions: Any) -> Callable[[Any], Any]:
+    """Enter a function that is a formula of others, which it takes from its first argument."""
+
+    def entered(own: Any) -> Any:
+        def of_graph(graph: Graph, *rest: Any, **named: Any) -> Any:
+            arrays = [traced(graph, v) if isinstance(v, list) else v for v in rest]
+            return own(Facade(graph), *arrays, **named)
+
+        enter(functions, of_graph)
+        return own
+
+    return entered
+
+
+def enter(functions: Iterable[Any], own: Callable[..., Any], *, makes: bool = False) -> None:
+    """Enter a function into the table under each of its names."""
+    for function in functions:
+        OWN[function] = own
+        if makes:
+            MAKING.add(function)
+
+
+class Kind:
+    """A type of numbers that a traced function finds: called, it takes expressions."""
+
+    def __init__(self, real: type, make: Callable[..., Any]) -> None:
+        self.real, self.make = real, make
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        return self.make(*arguments, **options)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.real, name)
+
+
+def plain(value: Any) -> Any:
+    """Return the type that stands behind a value, any other value as it is."""
+    return value.real if isinstance(value, Kind) else value
+
+
+def constant(value: Tracer) -> Any:
+    """Return an array of constants as numbers, any other as it is."""
+    elements = value.values.flat
+    if any(e.op not in ("const", "table") for e in elements):
+        return value
+    kinds = {e.kind for e in value.values.flat}
+    as_number = {"b": bool, "i": int}.get(kinds.pop() if len(kinds) == 1 else "f", float)
+    if not value.shape:
+        return as_number(value.only.data)
+    if value.axis is not None and any(e.op != "table" for e in value.values.flat):
+        rows = [np.full(value.length, e.data) if e.op == "const" else np.array(e.data)
+                for e in value.values.flat]  # fmt: skip
+        whole = np.array(rows).reshape(*value.values.shape, value.length)
+        return np.moveaxis(whole, -1, value.axis)
+    return np.array([as_number(e.data) for e in value.elements().flat]).reshape(value.shape)
+
+
+class Facade:
+    """What formulas find as NumPy: its functions, of arrays of expressions."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
+
+    def __getattr__(self, name: str) -> Any:
+        real = getattr(np, name)
+        if not callable(real):
+            return real
+        return lambda *arguments, **options: applied(self.graph, real, *arguments, **options)
+
+
+def applied(graph: Graph, function: Any, *arguments: Any, **options: Any) -> Any:
+    """Return a function of a library of arrays of expressions.
+
+    Raises
+    ------
+    Untraceable
+        If it is not in the table.
+    """
+    if function in OWN:
+        return OWN[function](graph, *arguments, **options)
+    name = OPERATIONS.get(getattr(function, "__name__", ""))
+    if name is None or not isinstance(function, np.ufunc):
+        raise Untraceable(f"{getattr(function, '__name__', function)} is not known here")
+    return of_ufunc(graph, function, lambda *a: elementwise(graph, name, *a), arguments, options)
+
+
+def of_ufunc(
+    graph: Graph, function: Any, own: Callable[..., Any], arguments: Any, options: Any
+) -> Any:
+    """Return a ufunc, with the options that all have."""
+    count = function.nin
+    out, where = options.get("out"), options.get("where", True)
+    dtype = options.get("dtype")
+    if len(arguments) > count:
+        out, arguments = arguments[count], arguments[:count]
+    out = out[0] if isinstance(out, tuple) else out
+    known = set(options) <= {"out", "where", "dtype", "casting"}
+    if not known or len(arguments) < count or dtype not in (None, float, np.float64):
+        raise Untraceable(f"{function.__name__} with other arguments")
+    if where is not True:
+        if out is None:
+            raise Untraceable("where= without out=: what is not computed is arbitrary")
+        return _where(graph, own, arguments, out, where)
+    found = own(*arguments)
+    if out is None:
+        return found
+    out[...] = found
+    return out
+
+
+def _where(graph: Graph, own: Any, arguments: Any, out: Any, where: Any) -> Any:
+    out[...] = elementwise(graph, "select", where, own(*arguments), out)
+    return out
+
+
+def is_traced(value: Any) -> bool:
+    """Whether a value is one of expressions."""
+    return isinstance(value, Tracer | Special)
+
+
+def _method(array: Tracer, name: str) -> Any:
+    """Return a method of an array, or the part that it names."""
+    if name not in METHODS:
+        raise AttributeError(f"an array of expressions has no {name}")
+    known = METHODS[name]
+    if known in OWN:  # a function that does the same
+        return lambda *rest, **named: applied(array.graph, known, array, *rest, **named)
+    return lambda *rest, **named: known(
+        array.graph, array, *map(plain, rest), **{k: plain(v) for k, v in named.items()}
+    )
+
+
+Tracer.methods = staticmethod(_method)

@@ -1,0 +1,128 @@
+"""Tables, splines and polynomials: which interval, and what holds in it."""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Tracer, mapped, traced
+from ..graph import Expr, Graph, Untraceable
+from .table import of
+
+__all__: list[str] = []
+
+MOST_PIECES = 256
+
+
+def _constants(graph: Graph, values: Any, what: str) -> np.ndarray:
+    """Return what must be known when a function is traced."""
+    array = traced(graph, values)
+    elements = array.elements()
+    if array.ndim != 1 or any(e.op != "const" for e in elements):
+        raise Untraceable(f"{what} that depend on the state or on parameters")
+    if array.size > MOST_PIECES:
+        raise Untraceable("a table with too many places")
+    return np.array([e.data for e in elements], dtype=float)
+
+
+def choice(graph: Graph, x: Expr, bounds: Sequence[float], pieces: Sequence[Expr]) -> Expr:
+    """Return the piece of the interval of x: the first below all bounds, by halving."""
+    if len(pieces) == 1:
+        return pieces[0]
+    middle = len(pieces) // 2
+    low = choice(graph, x, bounds[: middle - 1], pieces[:middle])
+    high = choice(graph, x, bounds[middle:], pieces[middle:])
+    below = graph.op("lt", x, graph.const(float(bounds[middle - 1])))
+    return graph.op("select", below, low, high)
+
+
+@of(np.interp)
+def interp(
+    graph: Graph, x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None
+) -> Tracer:
+    """Return a piecewise linear function, its ends beyond the table."""
+    places = _constants(graph, xp, "places of a table")
+    values = [graph.number(e) for e in traced(graph, fp).elements()]
+    if period is not None or places.size != len(values) or np.any(np.diff(places) <= 0):
+        raise Untraceable("a table with a period, or whose places do not increase")
+    ends = [v if e is None else traced(graph, e).only for e, v in
+            ((left, values[0]), (right, values[-1]))]  # fmt: skip
+    array = traced(graph, x)
+    return Tracer(
+        graph, mapped(lambda e: _linear(graph, e, places, values, *ends), array.elements())
+    )
+
+
+def _linear(
+    graph: Graph, x: Expr, places: np.ndarray, values: Sequence[Expr], left: Expr, right: Expr
+) -> Expr:
+    """Return NumPy's formula of an interval: slope (x - x_j) + f_j, and f_j at the last place."""
+    op, const = graph.op, graph.const
+    x = graph.number(x)
+    pieces = []
+    for j in range(places.size - 1):
+        rise = op("sub", values[j + 1], values[j])
+        slope = op("div", rise, const(float(places[j + 1] - places[j])))
+        inside = op("sub", x, const(float(places[j])))
+        pieces.append(op("add", op("mul", slope, inside), values[j]))
+    found = choice(graph, x, list(places[1:-1]), pieces) if pieces else values[0]
+    found = op("select", op("eq", x, const(float(places[-1]))), values[-1], found)
+    found = op("select", op("gt", x, const(float(places[-1]))), right, found)
+    return op("select", op("lt", x, const(float(places[0]))), left, found)
+
+
+def place(graph: Graph, x: Expr, bounds: np.ndarray, side: str) -> Expr:
+    """Return how many bounds are below x; NaN is behind all."""
+    x = graph.number(x)
+    name = "lt" if side == "left" else "le"
+    found = graph.const(0)
+    for bound in bounds:
+        beyond = graph.op(name, graph.const(float(bound)), x)
+        beyond = graph.op("or", beyond, graph.op("ne", x, x))
+        found = graph.op("add", found, graph.integer(beyond))
+    return found
+
+
+@of(np.searchsorted)
+def searchsorted(graph: Graph, a: Any, v: Any, side: str = "left", sorter: Any = None) -> Tracer:
+    """Return where values belong in an ordered table."""
+    bounds = _constants(graph, a, "places of a table")
+    if sorter is not None or np.any(np.diff(bounds) < 0):
+        raise Untraceable("a table that is not in order")
+    return Tracer(
+        graph, mapped(lambda e: place(graph, e, bounds, side), traced(graph, v).elements())
+    )
+
+
+@of(np.digitize)
+def digitize(graph: Graph, x: Any, bins: Any, right: bool = False) -> Tracer:
+    """Return in which bin values are."""
+    return searchsorted(graph, bins, x, "left" if right else "right")
+
+
+def _bisected(side: str) -> Callable[..., Any]:
+    def own(graph: Graph, a: Any, x: Any) -> Any:
+        if traced(graph, x).shape:
+            raise Untraceable("a bisection for an array")
+        bounds, guard = _constants(graph, a, "places of a table"), traced(graph, x)
+        graph.guards.append(graph.op("eq", guard.only, guard.only))  # by halving: not what NaN does
+        return searchsorted(graph, bounds, x, side)
+
+    return own
+
+
+of(bisect.bisect_left)(_bisected("left"))
+of(bisect.bisect_right)(_bisected("right"))
+
+
+@of(np.polynomial.polynomial.polyval)
+def polynomial(graph: Graph, x: Any, c: Any, tensor: bool = True) -> Any:
+    """Return a polynomial by its coefficients, the constant first."""
+    x, coefficients = traced(graph, x), list(traced(graph, c))
+    found = coefficients[-1] + x * 0.0
+    for coefficient in reversed(coefficients[:-1]):
+        found = coefficient + found * x
+    return found

@@ -1,0 +1,96 @@
+"""The elements of an array that a mask chooses: how many there are, only the run knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from .arrays import Special, Tracer, traced
+from .graph import Graph, Untraceable
+from .operators import elementwise, total
+
+
+class Masked(Special):
+    """``x[x > 0]``: the whole array, and where its elements count."""
+
+    def __init__(self, whole: Tracer, mask: Tracer) -> None:
+        if mask.shape != whole.shape:
+            raise Untraceable("a mask of another shape")
+        self.whole, self.mask = whole, mask
+
+    def whole_for(self, mask: Tracer) -> Tracer:
+        """Return the whole array, for the places of the same mask."""
+        same = mask.shape == self.mask.shape and all(
+            a is b for a, b in zip(mask.values.flat, self.mask.values.flat, strict=True)
+        )
+        if not same:
+            raise Untraceable("elements that two different masks choose")
+        return self.whole
+
+    def operation(self, graph: Graph, name: str, operands: Sequence[Any]) -> Masked:
+        """Return an operation on the chosen elements."""
+        wholes = []
+        for each in operands:
+            if isinstance(each, Masked):
+                each = each.whole_for(self.mask)
+            elif traced(graph, each).shape:
+                raise Untraceable("an array next to elements that a mask chooses")
+            wholes.append(each)
+        return Masked(elementwise(graph, name, *wholes), self.mask)
+
+    def filled(self, value: Any) -> Tracer:
+        """Return the whole array with a value in the places that do not count."""
+        return elementwise(self.whole.graph, "select", self.mask, self.whole, value)
+
+    def count(self) -> Tracer:
+        """Return how many elements there are."""
+        graph = self.whole.graph
+        return total(elementwise(graph, "select", self.mask, 1, 0))
+
+    def sum(self) -> Tracer:
+        """Return the sum of the elements."""
+        return total(self.filled(0.0))
+
+    def mean(self) -> Tracer:
+        """Return their mean, NaN if there is none."""
+        return elementwise(self.whole.graph, "div", self.sum(), self.count())
+
+    size = property(count)
+
+    def _text(self, *_: Any) -> Any:
+        raise Untraceable("elements that a mask chooses, whose number only the run knows")
+
+    __len__ = __iter__ = __getitem__ = __bool__ = __str__ = __repr__ = _text
+    __hash__ = None  # type: ignore[assignment]
+
+
+class Places(Special):
+    """``np.where(x > 0)[0]``: the places that a mask chooses, for use as an index."""
+
+    def __init__(self, mask: Tracer) -> None:
+        self.mask = mask
+
+
+def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
+    def method(self: Masked, *other: Any) -> Any:
+        operands = (*other, self) if turned else (self, *other)
+        return self.operation(self.whole.graph, name, operands)
+
+    return method
+
+
+def _power(self: Masked, exponent: Any) -> Masked:
+    if isinstance(exponent, Tracer | np.ndarray) and np.ndim(exponent):
+        raise Untraceable("an array next to elements that a mask chooses")
+    return Masked(self.whole**exponent, self.mask)  # type: ignore[operator]
+
+
+Masked.__array_ufunc__ = None  # type: ignore[attr-defined]
+Masked.__pow__ = _power  # type: ignore[attr-defined]
+for _name, _op in {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div"}.items():
+    setattr(Masked, f"__{_name}__", _operator(_op))
+    setattr(Masked, f"__r{_name}__", _operator(_op, turned=True))
+for _name, _op in {"neg": "neg", "abs": "absolute"}.items():
+    setattr(Masked, f"__{_name}__", _operator(_op))

@@ -1,0 +1,233 @@
+"""Modules, objects, classes and ufuncs, as a traced function sees them."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import itertools
+from collections.abc import Callable
+from types import FunctionType, ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .arrays import Special, Tracer, traced
+from .graph import Graph, Untraceable
+from .library.rotations import enter_rotations
+from .library.table import OPERATIONS, OWN, applied, constant, of_ufunc, plain
+from .operators import elementwise
+
+if TYPE_CHECKING:
+    from .stage import Stage
+
+LIBRARIES = ("numpy", "scipy", "numba")
+
+
+def holds_tracers(value: Any) -> bool:
+    """Whether there are tracers in a value, or in a list, tuple or dict."""
+    if isinstance(value, dict):
+        return any(map(holds_tracers, value.values()))
+    if isinstance(value, list | tuple | set):
+        return any(map(holds_tracers, value))
+    return isinstance(value, Tracer | Special | StagedObject)
+
+
+def settled(value: Any) -> Any:
+    """Return a value with arrays and numbers for what is constant."""
+    if isinstance(value, Tracer):
+        return constant(value)
+    if type(value) in (list, tuple):
+        return type(value)(map(settled, value))
+    return value.__dict__["_real"] if type(value) in (StagedObject, StagedType) else plain(value)
+
+
+def is_of_a_library(thing: Any) -> bool:
+    """Whether a function, or an object's class, is one of a well-known library."""
+    module = getattr(thing, "__module__", None) or type(thing).__module__
+    return module.partition(".")[0] in LIBRARIES
+
+
+class StagedModule:
+    """A module whose functions are replaced."""
+
+    def __init__(self, real: Any, function: Callable[[str, Any], Any]) -> None:
+        self._real, self._function = real, function
+
+    def __getattr__(self, name: str) -> Any:
+        real = getattr(self._real, name)
+        plain = not (callable(real) or isinstance(real, ModuleType | np.ndarray)) and (
+            real is not np.r_ and real is not np.c_
+        )
+        return real if plain else self._function(name, real)
+
+
+class StagedType:
+    """A class of a library: what it makes of constants is an object of the library."""
+
+    def __init__(self, real: Any, stage: Stage) -> None:
+        self.__dict__.update(_real=real, _stage=stage)
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        own, given = OWN.get(self._real), [*arguments, *options.values()]
+        if own is not None and (self._real is np.vectorize or holds_tracers(given)):
+            return own(self._stage.graph, *arguments, **options)
+        return self._stage.for_numbers(self._real)(*arguments, **options)
+
+    def __getattr__(self, name: str) -> Any:
+        real, stage = self.__dict__["_real"], self.__dict__["_stage"]
+        if real.__module__.startswith("scipy.spatial.transform"):
+            enter_rotations()
+        known = OWN.get((real, name))
+        found = getattr(real, name)
+        if known is None:
+            return stage.for_numbers(found) if callable(found) else found
+        return functools.partial(known, stage.graph)
+
+
+class StagedObject:
+    """An object of somebody's class: what its methods read is replaced as well."""
+
+    __hash__ = None  # type: ignore[assignment]
+    _forwards = True
+
+    def __init__(self, real: Any, stage: Stage) -> None:
+        self.__dict__.update(_real=real, _stage=stage)
+
+    def __getattr__(self, name: str) -> Any:
+        real, stage = self.__dict__["_real"], self.__dict__["_stage"]
+        found = inspect.getattr_static(type(real), name, None)
+        if name in getattr(real, "__dict__", {}) and not isinstance(found, property):
+            return stage.instead(getattr(real, name))  # its own is what Python finds first
+        if isinstance(found, property | functools.cached_property) and not is_of_a_library(real):
+            getter = found.fget if isinstance(found, property) else found.func
+            return stage.copied(getter)(self)
+        if isinstance(found, FunctionType) and not is_of_a_library(real):
+            return functools.partial(stage.copied(found), self)
+        if is_of_a_library(real) and callable(getattr(real, name)):
+            return stage.for_numbers(getattr(real, name))
+        return stage.instead(getattr(real, name))
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise Untraceable("a function that changes an object")
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        return self._stage.called_object(self._real)(*arguments, **options)
+
+
+def _forwarded(name: str) -> Callable[..., Any]:
+    """Return an operator of an object: its class's own, on the stage."""
+
+    def method(self: StagedObject, *rest: Any) -> Any:
+        real, stage = self.__dict__["_real"], self.__dict__["_stage"]
+        found = inspect.getattr_static(type(real), name, None)
+        if isinstance(found, FunctionType) and not is_of_a_library(real):
+            return stage.copied(found)(self, *rest)
+        if name in ("__eq__", "__ne__"):
+            raise Untraceable(f"comparison of an object of {type(real).__name__}")
+        if name == "__iter__" and hasattr(real, "__iter__"):
+            return iter([stage.instead(v) for v in real])
+        if name == "__len__" and hasattr(real, "__len__"):
+            return len(real)
+        if name == "__getitem__" and hasattr(real, "__getitem__"):
+            return stage.instead(real[settled(rest[0])])
+        if name == "__bool__":
+            return bool(real)
+        raise Untraceable(f"{name} of an object of {type(real).__name__}")
+
+    return method
+
+
+for _name in ("add", "sub", "mul", "truediv", "matmul", "pow", "mod", "floordiv"):
+    for _kind in ("", "r"):
+        _full = f"__{_kind}{_name}__"
+        setattr(StagedObject, _full, _forwarded(_full))
+for _name in ("neg", "pos", "abs", "invert", "eq", "ne", "lt", "le", "gt", "ge", "iter", "len",
+              "getitem", "contains", "bool"):  # fmt: skip
+    setattr(StagedObject, f"__{_name}__", _forwarded(f"__{_name}__"))
+
+
+class StagedParent:
+    """What ``super()`` is in a method of somebody's object."""
+
+    def __init__(self, thing: StagedObject, stage: Stage, cls: type) -> None:
+        original = {made: real for real, made in stage.classes.items()}.get(cls, cls)
+        order = type(thing.__dict__["_real"]).__mro__
+        self.__dict__.update(_thing=thing, _stage=stage, _rest=order[order.index(original) + 1 :])
+
+    def __getattr__(self, name: str) -> Any:
+        for cls in self.__dict__["_rest"]:
+            if name in vars(cls):
+                return self._bound(vars(cls)[name])
+        raise AttributeError(name)
+
+    def _bound(self, found: Any) -> Any:
+        thing, stage = self.__dict__["_thing"], self.__dict__["_stage"]
+        if isinstance(found, FunctionType):
+            return functools.partial(stage.copied(found), thing)
+        if isinstance(found, property):
+            return stage.copied(found.fget)(thing)
+        return stage.instead(found.__func__ if isinstance(found, staticmethod) else found)
+
+
+_REDUCING = {"add": np.sum, "multiply": np.prod, "maximum": np.max, "minimum": np.min,
+             "logical_and": np.all, "logical_or": np.any}  # fmt: skip
+_ACCUMULATING = {"add": np.cumsum, "multiply": np.cumprod}
+
+
+class Ufunc:
+    """A function of NumPy or SciPy, element by element."""
+
+    def __init__(self, graph: Graph, real: Any, plain: Callable[..., Any]) -> None:
+        self.graph, self.real, self.plain = graph, real, plain
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        if not holds_tracers([*arguments, *options.values()]):
+            return self.plain(*arguments, **options)
+        options = {k: plain(v) for k, v in options.items()}
+        return of_ufunc(self.graph, self.real, self._own, arguments, options)
+
+    def _own(self, *arguments: Any) -> Any:
+        if self.real in OWN:
+            return OWN[self.real](self.graph, *arguments)
+        name = OPERATIONS[self.real.__name__]
+        if name == "power":
+            return _base(self.graph, arguments[0]) ** arguments[1]
+        return elementwise(self.graph, name, *arguments)
+
+    def reduce(self, values: Any, axis: Any = 0, **options: Any) -> Any:
+        """Return what is left of an array when two elements become one."""
+        if not holds_tracers(values):
+            return self.plain_method("reduce", values, axis, **options)
+        if self.real.__name__ in _REDUCING:
+            return applied(self.graph, _REDUCING[self.real.__name__], values, axis, **options)
+        if options or axis != 0:
+            raise Untraceable(f"{self.real.__name__}.reduce with other arguments")
+        return functools.reduce(self, list(traced(self.graph, values)))
+
+    def plain_method(self, name: str, *values: Any, **options: Any) -> Any:
+        """Return what a method of NumPy's makes of constants."""
+        return getattr(self.real, name)(*map(settled, values), **options)
+
+    def accumulate(self, values: Any, axis: Any = 0) -> Any:
+        """Return all that is left on the way."""
+        if not holds_tracers(values):
+            return self.plain_method("accumulate", values, axis)
+        array = traced(self.graph, values)
+        if self.real.__name__ in _ACCUMULATING:
+            return applied(self.graph, _ACCUMULATING[self.real.__name__], array, axis)
+        if axis != 0:
+            raise Untraceable(f"{self.real.__name__}.accumulate along another axis")
+        return traced(self.graph, list(itertools.accumulate(array, self)))
+
+    def outer(self, a: Any, b: Any) -> Any:
+        """Return all results of an element of one and of the other."""
+        a, b = _base(self.graph, a), _base(self.graph, b)
+        return self(a.reshape(a.shape + (1,) * b.ndim), b)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.real, name)
+
+
+def _base(graph: Graph, value: Any) -> Any:
+
+    return value if isinstance(value, Special) else traced(graph, value)

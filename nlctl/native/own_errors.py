@@ -1,0 +1,68 @@
+"""The error that a diagram's own functions raise where a run has ended.
+
+Machine code has NaN where Python raises.  Who reads the message wants the error itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import control as ct
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from ..diagrams import override
+from ..upstream.control_internals import outputs_now, rates_now
+
+if TYPE_CHECKING:
+    from .compiled import Compiled
+    from .integrate.results import Trajectory
+
+_FURTHER = 1e-3  # part of the run behind its end that is looked at
+_CALLS = 2000  # of the functions, beyond which no error is expected
+
+
+class _Enough(BaseException):
+    """It was called often enough."""
+
+
+def own_error(
+    compiled: Compiled, made: Trajectory, params: Mapping[str, Any] | None
+) -> Exception | None:
+    """Return what python-control's functions raise just behind the end of a run, if they do.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    made : Trajectory
+        It ended before its last time.
+    params : mapping or None
+        Parameters of the run.
+    """
+    finite = np.flatnonzero(np.isfinite(made.states).all(axis=0))
+    if compiled.schedule.lines or compiled.program.sampled or compiled.schedule.loops:
+        return None  # what these do depends on more than the present
+    if not finite.size or not ct.isctime(compiled.system):
+        return None
+    system, k, left = compiled.schedule.system, finite[-1], [_CALLS]
+    override(system, params)
+
+    def rates(t: float, x: np.ndarray) -> np.ndarray:
+        left[0] -= 1
+        if left[0] < 0:
+            raise _Enough
+        u = np.array([np.interp(t, made.time, row) for row in made.inputs])
+        outputs_now(system, t, x, u)
+        return rates_now(system, t, x, u)
+
+    span = float(made.time[-1] - made.time[0]) or 1.0
+    end = max(float(made.statistics.time), float(made.time[k])) + _FURTHER * span
+    try:
+        with np.errstate(all="ignore"):
+            solve_ivp(rates, (float(made.time[k]), end), made.states[:, k], max_step=span / 100)
+    except _Enough:
+        return None
+    except Exception as error:  # whatever somebody's function raises
+        return error
+    return None

@@ -1,0 +1,165 @@
+"""Objects of somebody's class that a function makes, and what their operators are.
+
+What such an object does is what its class's functions do: these are walked like any other.
+"""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import enum
+import inspect
+from types import FunctionType
+from typing import TYPE_CHECKING, Any, Generic, Protocol
+
+from .values import (
+    OUTSIDE,
+    Bound,
+    Impure,
+    Instance,
+    KnownValue,
+    Parent,
+    Pure,
+    Unknown,
+    captured,
+    library,
+)
+
+if TYPE_CHECKING:
+    from .purity import Walk
+
+_RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__", "__del__")
+_NEUTRAL = (object, Generic, Protocol, abc.ABC)
+
+
+def instance(
+    walk: Walk, cls: type, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue:
+    """Return what is known of a new object of somebody's class.
+
+    Raises
+    ------
+    Impure
+        If making it is more than its ``__init__``, which is walked.
+    """
+    _check_plain(cls)
+    own = Instance(cls)
+    value = KnownValue(True, True, True, known=own)
+    start = inspect.getattr_static(cls, "__init__", None)
+    if dataclasses.is_dataclass(cls) and _is_generated(start):
+        _of_fields(walk, own, given, dict(named))
+        after = inspect.getattr_static(cls, "__post_init__", None)
+        if isinstance(after, FunctionType):
+            walk.function(after, [value], {})
+    elif isinstance(start, FunctionType):
+        walk.captured(cls, "__init__", start)
+        walk.function(start, [value, *given], named)
+    elif given or named:
+        raise Impure(f"makes an object of {cls.__name__}", "use numbers and arrays")
+    return KnownValue(True, all(v.own and v.inside for v in own.attributes.values()), True, own)
+
+
+def _check_plain(cls: type) -> None:
+    """Refuse a class whose objects are more than their attributes."""
+    ruling = [name for name in _RULING if inspect.getattr_static(cls, name, None) is not (
+        inspect.getattr_static(object, name, None))]  # fmt: skip
+    if dataclasses.is_dataclass(cls) and cls.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+        ruling = [name for name in ruling if name not in ("__setattr__", "__delattr__")]
+    foreign = [c for c in cls.__mro__ if c not in _NEUTRAL and library(c) is not None]
+    plain = type(cls) in (type, abc.ABCMeta, type(Protocol)) and not issubclass(cls, enum.Enum)
+    made = inspect.getattr_static(cls, "__new__", None)
+    if ruling or foreign or not plain or made is not object.__dict__["__new__"]:
+        raise Impure(f"makes an object of {cls.__name__}", "use numbers and arrays")
+
+
+def _is_generated(start: Any) -> bool:
+    return isinstance(start, FunctionType) and start.__code__.co_filename == "<string>"
+
+
+def _of_fields(
+    walk: Walk, own: Instance, given: list[KnownValue], named: dict[str, KnownValue]
+) -> None:
+    """Note the attributes that a dataclass's generated ``__init__`` writes."""
+    waiting = list(given)
+    for each in dataclasses.fields(own.cls):  # type: ignore[arg-type]
+        if not each.init:
+            value = OUTSIDE
+        elif waiting and not each.kw_only:
+            value = waiting.pop(0)
+        elif each.name in named:
+            value = named.pop(each.name)
+        elif each.default is not dataclasses.MISSING:
+            value = captured(each.default)
+        elif each.default_factory is not dataclasses.MISSING:
+            value = walk.call(captured(each.default_factory), [], {})
+        else:  # among *args or **kwargs, or an error where it runs
+            value = named.get("**", OUTSIDE)
+        own.learn(each.name, value)
+
+
+def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
+    """Return what is known of an attribute of an object that the call has made."""
+    own: Instance = base.known
+    if name in own.attributes:
+        return own.attributes[name]
+    found = inspect.getattr_static(own.cls, name, None)
+    if found is None:
+        return OUTSIDE  # it raises where it runs
+    walk.captured(own.cls, name, getattr(own.cls, name))
+    return of_class(walk, base, found)
+
+
+def replaced(walk: Walk, base: KnownValue, named: dict[str, KnownValue]) -> KnownValue:
+    """Return what is known of what `dataclasses.replace` makes of an object."""
+    thing = base.known
+    known = isinstance(thing, Instance)
+    cls = thing.cls if known else type(thing)
+    if isinstance(thing, Unknown) or not dataclasses.is_dataclass(cls):
+        raise Impure("replaces fields of what is only known when it runs", "name the class")
+    before = {
+        each.name: attribute(walk, base, each.name)
+        if known
+        else captured(getattr(thing, each.name))
+        for each in dataclasses.fields(cls)
+    }
+    return instance(walk, cls, [], before | named)
+
+
+def of_parent(walk: Walk, parent: Parent, name: str) -> KnownValue:
+    """Return what ``super().name`` is for an object that the call has made."""
+    order = parent.own.known.cls.__mro__
+    for cls in order[order.index(parent.cls) + 1 :]:
+        if name in vars(cls):
+            if cls is object:
+                return KnownValue(True, True, known=Pure())  # object.__init__ does nothing
+            walk.captured(cls, name, getattr(cls, name))
+            return of_class(walk, parent.own, vars(cls)[name])
+    return OUTSIDE
+
+
+def of_class(walk: Walk, base: KnownValue, found: Any) -> KnownValue:
+    """Return what is known of what an object finds in its class."""
+    if isinstance(found, property):
+        return walk.call(captured(found.fget), [base], {})
+    if hasattr(found, "func") and hasattr(found, "attrname"):  # a cached property
+        return walk.call(captured(found.func), [base], {})
+    if isinstance(found, staticmethod):
+        return captured(found.__func__)
+    if isinstance(found, classmethod):
+        cls = captured(base.known.cls)
+        return KnownValue(True, True, known=Bound(captured(found.__func__), (cls,)))
+    if isinstance(found, FunctionType):
+        return KnownValue(True, True, known=Bound(captured(found), (base,)))
+    return captured(found)
+
+
+def operator_of(value: KnownValue, name: str) -> FunctionType | None:
+    """Return the function of somebody's class that is an object's operator."""
+    thing = value.known
+    if isinstance(thing, Instance):
+        found = inspect.getattr_static(thing.cls, name, None)
+    elif isinstance(thing, Unknown | type) or library(type(thing)) is not None:
+        return None
+    else:
+        found = inspect.getattr_static(type(thing), name, None)
+    return found if isinstance(found, FunctionType) and not _is_generated(found) else None

@@ -1,0 +1,11 @@
+"""Functions as engineers write them: everyday NumPy, SciPy and Python in equations of plants."""
+
+import importlib
+
+from engineers.entry import ENTRIES, Entry, system
+
+__all__ = ["ENTRIES", "Entry", "system"]
+
+for _theme in ("shapes", "reductions", "matrices", "choices", "tables", "elementary", "language",
+               "objects", "models"):  # fmt: skip
+    importlib.import_module(f"engineers.{_theme}")
