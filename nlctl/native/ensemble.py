@@ -199,8 +199,6 @@ def ensemble_response(
     [1. 2. 3.] ['OK', 'OK', 'OK']
     """
     times = checked_times(timepts)
-    if max_step is not None:
-        checked_number("ensemble_response", "max_step", max_step, above=0)
     if not isinstance(compiled, Compiled):
         compiled = compile_diagram(compiled)
     if threads is not None:
@@ -219,7 +217,7 @@ def ensemble_response(
     u = input_array(compiled.system, inputs, times)
     settings = Settings(
         rtol=rtol, atol=atol, max_steps=max_steps, method="auto" if method is None else method,
-        max_step=np.inf if max_step is None else max_step,
+        max_step=_longest(max_step),
     )  # fmt: skip
     varied = variations(compiled, times)  # once for all members
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
@@ -242,6 +240,14 @@ def ensemble_response(
 
     rows = _run(one, every.size, threads or cores(), progress)
     return Ensemble(table=_table(every, rows), time=times, signals=kept)
+
+
+def _longest(max_step: float | None) -> float:
+    """Return the longest step, checked."""
+    if max_step is None:
+        return np.inf
+    checked_number("ensemble_response", "max_step", max_step, above=0)
+    return max_step
 
 
 def _audit(every: Members, number: int, run: Trajectory, wanted: Audit) -> None:

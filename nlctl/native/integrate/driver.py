@@ -275,10 +275,7 @@ def prepared(
         inputs=inputs,
         p=c,
         **_rows(program, code, read.watched),
-        rtol=float(settings.rtol),
-        atol=float(settings.atol),
-        fixed=float(settings.step),
-        max_steps=int(settings.max_steps),
+        **_bounds(settings),
         method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
         **_pair(settings.pair) | expansion,
         alone=int(count == 1),
@@ -302,6 +299,14 @@ def prepared(
     work.lanes["stiff"] = method == "rodas5p"
     work = with_past(compiled, task, work, p)
     return Run(machine=code, task=task, work=work)
+
+
+def _bounds(settings: Settings) -> dict[str, Any]:
+    """Return what errors and numbers of steps are bounded by."""
+    return {
+        "rtol": float(settings.rtol), "atol": float(settings.atol),
+        "fixed": float(settings.step), "max_steps": int(settings.max_steps),
+    }  # fmt: skip
 
 
 def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> dict[str, Any]:
