@@ -99,9 +99,16 @@ def _across(task, lane, w, j):
     if not np.isfinite(w.error[j]):
         return NOTHING
     for i in range(task.declared, task.switching):
-        if _crossed(task, w, i, w.e[i, j], j):
+        if _crossed(task, w, i, w.e[i, j], j) or left_to_other_side(task, w, i, j):
             return EVENT
     return CLEAR
+
+
+@numba.njit(**INNER)
+def left_to_other_side(task, w, i, j):
+    """Whether a step leads from where a condition is exactly 0 to where it has not come from."""
+    is_condition = task.declared <= i < task.guarded
+    return is_condition and w.e_start[i, j] == 0.0 and w.behind[i, j] * w.e[i, j] < 0.0
 
 
 @numba.njit(**INNER)
