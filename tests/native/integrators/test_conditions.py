@@ -203,6 +203,22 @@ def test_functions_that_a_run_watches_end_it_by_every_method():
         assert made.statistics.conditions == 2
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_function_that_is_0_where_a_step_ends_anyway_is_an_event(method):
+    """At t = 5 the input has a break point, and x = 1 - t rounds to 0 at t = 1."""
+    ramp = ct.nlsys(
+        lambda t, x, u, p: [u[0] - 1.0], None, inputs=1, outputs=1, states=1, name="ramp"
+    )
+    times, how = np.arange(11.0), {"engine": "native", "method": method}
+    for five in (lambda t, x, u, p: t - 5.0, lambda t, x, u, p: 5.0 - t):
+        ended = nlctl.input_output_response(ramp, times, 0 * times, 1.0, stop_when=five, **how)
+        assert ended.time[-1] == pytest.approx(5.0, abs=1e-9)
+    made = nlctl.input_output_response(
+        ramp, times, 0 * times, 1.0, events={"half": lambda t, x, u, p: x[0]}, **how
+    )
+    np.testing.assert_allclose(made.events["time"], [1.0], atol=1e-9)
+
+
 def test_print_and_statistics_say_what_is_located():
     compiled = nlctl.compile(plain(oscillator, [1.0, 0.0]))
     assert "conditions   1 located" in str(compiled)
