@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable
 
 from .graph import Expr, Graph, needed
 
-__all__ = ["conditions", "switching_function"]
+__all__ = ["at_integers", "conditions", "switching_function"]
 
 _ORDERS = ("lt", "le", "gt", "ge")
 _OF_DIFFERENCES = (*_ORDERS, "minimum", "maximum")
@@ -48,10 +48,19 @@ def _switches(node: Expr) -> bool:
     return (
         node.op in _OF_SIGNS
         or node.op in _OF_FIRSTS
-        or node.op in _OF_INTEGERS
-        or node.op in _OF_QUOTIENTS
+        or at_integers(node)
         or (node.op in _OF_SECONDS and node.args[1].varies)
     )
+
+
+def at_integers(node: Expr) -> bool:
+    """Return whether an operation jumps where something is an integer, as `floor` and `%` do.
+
+    Parameters
+    ----------
+    node : Expr
+    """
+    return node.op in _OF_INTEGERS or node.op in _OF_QUOTIENTS
 
 
 def _of_truths(node: Expr) -> bool:

@@ -39,9 +39,10 @@ class RealFunction:
         Names in Python's `math` module.
     series : str or callable
         How the Taylor coefficients of f(x(t)) follow from those of x(t).  ``"derivative"``: from
-        y' = f'(x) x', where f' is made of functions that have theirs.  A callable writes the
-        function as a choice, whose side is that on which x(t) goes on.  ``"unknown"``: the
-        function is refused where they are needed.
+        y' = f'(x) x', where f' is made of functions that have theirs.  ``"steady"``: f is a
+        constant between its jumps.  A callable writes the function as a choice, whose side is that
+        on which x(t) goes on, or in others.  ``"unknown"``: the function is refused where they are
+        needed.
     """
 
     name: str
@@ -126,10 +127,10 @@ _ROWS = (
     _row("absolute", "llvm.fabs", r"\left|{0}\right|", lambda x: np.where(x < 0.0, -1.0, 1.0),
          math="fabs", series=lambda x: np.where(x < 0.0, -x, x)),
     _row("floor", "llvm.floor", r"\left\lfloor {0} \right\rfloor", _zero,
-         ball=lambda x: x.floor(), math="-", series="unknown"),
+         ball=lambda x: x.floor(), math="-", series="steady"),
     _row("copysign", "llvm.copysign", r"\left|{0}\right| \operatorname{{sgn}} {1}",
          lambda x, y: np.where(x < 0.0, -1.0, 1.0) * np.copysign(1.0, y), _zero,
-         series="unknown"),
+         series=lambda x, y: np.where(x < 0.0, -x, x) * np.where(y < 0.0, -1.0, 1.0)),
     _row("sign", "own", r"\operatorname{{sgn}} {0}", _zero, ball=lambda x: x.sgn(), math="-",
          series=lambda x: np.where(x < 0.0, -1.0, 1.0)),
     _row("minimum", "own", r"\min\left({0}, {1}\right)",
@@ -165,11 +166,11 @@ _ROWS = (
     _row("arctanh", "atanh", r"\operatorname{{artanh}} {0}",
          lambda x: 1.0 / ((1.0 - x) * (1.0 + x)), ball=lambda x: x.atanh(), math="atanh"),
     _row("ceil", "llvm.ceil", r"\left\lceil {0} \right\rceil", _zero,
-         ball=lambda x: x.ceil(), math="-", series="unknown"),
+         ball=lambda x: x.ceil(), math="-", series="steady"),
     _row("trunc", "llvm.trunc", r"\operatorname{{trunc}} {0}", _zero,
-         ball=_truncated, math="-", series="unknown"),
+         ball=_truncated, math="-", series="steady"),
     _row("rint", "llvm.rint", r"\operatorname{{round}} {0}", _zero, ball=_rounded, math="-",
-         series="unknown"),
+         series="steady"),
     _row("cbrt", "cbrt", r"\sqrt[3]{{{0}}}", lambda x: 1.0 / (3.0 * np.cbrt(x) ** 2),
          ball=_cube_root),
     _row("erf", "erf", r"\operatorname{{erf}} {0}",
@@ -185,14 +186,16 @@ _ROWS = (
          math="pow", series="unknown"),
     _row("heaviside", "own", r"\operatorname{{H}}_{{{1}}}\left({0}\right)",
          _zero, lambda x, y: np.where(x == 0.0, 1.0, 0.0), math="-",
-         series="unknown"),
+         series=lambda x, y: np.where(x < 0.0, 0.0, 1.0)),
     _row("logaddexp", "own", r"\ln\left(e^{{{0}}} + e^{{{1}}}\right)",
          lambda x, y: np.exp(x - np.logaddexp(x, y)), lambda x, y: np.exp(y - np.logaddexp(x, y)),
          math="-"),
     _row("remainder", "own", r"{0} \bmod {1}",
-         lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.floor(x / y), math="-", series="unknown"),
+         lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.floor(x / y), math="-",
+         series=lambda x, y: x - y * np.floor(x / y)),
     _row("fmod", "fmod", r"\operatorname{{fmod}}\left({0}, {1}\right)",
-         lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.trunc(x / y), series="unknown"),
+         lambda x, y: 1.0 + 0.0 * x, lambda x, y: -np.trunc(x / y),
+         series=lambda x, y: x - y * np.trunc(x / y)),
 )  # fmt: skip
 
 FUNCTIONS = {row.name: row for row in _ROWS}

@@ -13,6 +13,7 @@ import control as ct
 import numpy as np
 
 from ..annotations import as_annotated
+from ..arguments import number as checked_number
 from ..delays.variation import Variation
 from ..errors import ParameterError
 from ..host.notebook import table_html
@@ -122,6 +123,7 @@ def ensemble_response(
     rtol: float = 1e-6,
     atol: float = 1e-8,
     max_steps: int = 1_000_000,
+    max_step: float | None = None,
     method: str | Tableau | None = None,
     progress: Callable[[int], object] | None = None,
     audit: Audit = True,
@@ -133,8 +135,8 @@ def ensemble_response(
     another order and agrees to rounding.)  Metrics are taken as each member ends, and only the
     signals in `keep` are stored.  After Ctrl-C the members that are finished are returned.
 
-    A diagram in discrete time goes from sample to sample; `rtol`, `atol`, `max_steps` and `method`
-    then mean nothing.
+    A diagram in discrete time goes from sample to sample; `rtol`, `atol`, `max_steps`, `max_step`
+    and `method` then mean nothing.
 
     Parameters
     ----------
@@ -158,6 +160,8 @@ def ensemble_response(
     max_steps : int, optional
         A member that needs more steps ends with the status STEP_LIMIT, one that switches over and
         over again at a jump with CHATTERING.
+    max_step : float, optional
+        Longest step of the integrator (s), the same for all members.
     method : str or Tableau, optional
         As in `nlctl.input_output_response`.
     progress : callable, optional
@@ -212,8 +216,9 @@ def ensemble_response(
             raise unknown("signal", signal, labels)
     u = input_array(compiled.system, inputs, times)
     settings = Settings(
-        rtol=rtol, atol=atol, max_steps=max_steps, method="auto" if method is None else method
-    )
+        rtol=rtol, atol=atol, max_steps=max_steps, method="auto" if method is None else method,
+        max_step=_longest(max_step),
+    )  # fmt: skip
     varied = variations(compiled, times)  # once for all members
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
     _, p = every.batch(range(1), ENSEMBLE_WIDTH)  # checks all members before anything runs
@@ -235,6 +240,14 @@ def ensemble_response(
 
     rows = _run(one, every.size, threads or cores(), progress)
     return Ensemble(table=_table(every, rows), time=times, signals=kept)
+
+
+def _longest(max_step: float | None) -> float:
+    """Return the longest step, checked."""
+    if max_step is None:
+        return np.inf
+    checked_number("ensemble_response", "max_step", max_step, above=0)
+    return max_step
 
 
 def _audit(every: Members, number: int, run: Trajectory, wanted: Audit) -> None:

@@ -32,7 +32,7 @@ def with_log(task: Any, work: Any) -> Any:
     """
     free = work.log_t.size - int(work.lanes["noted"][0])
     least = log_room(task, work.g.shape[0])
-    if free >= least:
+    if not least or free >= least:
         return work
     room, given = 2 * work.log_t.size + 2 * least, work._asdict()
     del given["table"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -41,6 +41,11 @@ class EventLog:
         block, which, direction = (np.array(each, dtype=object)[self.label] for each in columns)
         named = {"block": block, "which": which, "direction": direction}
         return pd.DataFrame({"time": self.time, **named})
+
+    def rows(self) -> Iterator[tuple[float, str, str, str]]:
+        """Yield time, block, which and direction of each event."""
+        for t, k in zip(self.time.tolist(), self.label.tolist(), strict=True):
+            yield t, *self.labels[k]
 
     def times(self, block: str, which: str) -> np.ndarray:
         """Return when something of a block has happened (s)."""

@@ -24,7 +24,7 @@ class Response(ct.TimeResponseData):
     Attributes
     ----------
     statistics : Statistics or None
-        Status, time reached and steps of a run in machine code.
+        Status, time reached, steps and events of a run in machine code.
     happened : EventLog
         What is in `events`.
     """
@@ -37,7 +37,8 @@ class Response(ct.TimeResponseData):
         """What has happened in the run: time (s), block, which, direction; a row each.
 
         Guards that have fallen, switching functions that blocks declare, and conditions of the
-        equations, where steps have ended.
+        equations, where steps have ended, those of t alone included.  ``statistics.events`` is
+        their number.
         """
         return self.happened.table()
 
@@ -60,7 +61,8 @@ class Response(ct.TimeResponseData):
                 f"{counted(run.accepted, 'step')}, {run.rejected} rejected, "
                 f"{counted(run.events, 'event')}"
             )
-            lines.append(f"  run      {run.status.name}, {steps}")
+            turns = f", {counted(run.turns, 'turn')} of memories" if run.turns else ""
+            lines.append(f"  run      {run.status.name}, {steps}{turns}")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

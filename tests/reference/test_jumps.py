@@ -21,10 +21,12 @@ G = 9.81
 def run(system, times, inputs: Any = 0.0, start=None, **more):
     """A run in the reference engine, unless another is named."""
     how = TIGHT | {"engine": "python-control"} | more
+    if how["engine"] == "taylor":
+        how |= {"engine": "native", "method": "taylor"}
     return nlctl.input_output_response(system, times, inputs, start, squeeze=False, **how)
 
 
-engines = pytest.mark.parametrize("engine", ["python-control", "native"])
+engines = pytest.mark.parametrize("engine", ["python-control", "native", "taylor"])
 
 
 def made(**own):
@@ -63,7 +65,9 @@ def height(times, e, bounces):
     return found, start
 
 
-@pytest.mark.parametrize("method", ["LSODA", "DOP853", "Radau", "auto", "tsit5", "rodas5p"])
+@pytest.mark.parametrize(
+    "method", ["LSODA", "DOP853", "Radau", "auto", "tsit5", "rodas5p", "taylor"]
+)
 def test_twelve_bounces(method):
     _, end = height(np.zeros(1), 0.8, 12)
     times = np.linspace(0, end - 1e-3, 201)

@@ -13,7 +13,7 @@ import numpy as np
 
 from .control import choose_method, choose_step, limit_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
-from .events.crossing import NOTHING, crossing
+from .events.crossing import NOTHING, crossing, left_to_other_side
 from .events.excursions import look_between
 from .events.location import (
     AGAIN,
@@ -159,11 +159,14 @@ def _take(task, w, done):
             k[0, i, j] = k[last, i, j]
         for i in range(task.declared):
             w.behind[i, j] = w.e_start[i, j] * w.e[i, j] < 0.0
+        for i in range(task.declared, task.guarded):
+            if w.e[i, j] != 0.0 or w.e_start[i, j] != 0.0:
+                w.behind[i, j] = np.sign(w.e_start[i, j]) if w.e[i, j] == 0.0 else 0.0
         for i in range(task.memory.size):
             m, become = task.memory[i], w.g[switching + i, j]
             if w.e_start[switching + i, j] == 0.0 and x[m, j] != become:  # otherwise locked
                 x[m, j] = become
-                for c in range(w.behind.shape[0]):
+                for c in range(task.declared):
                     w.behind[c, j] = 0.0  # with another memory the way back is an event
         for i in range(w.e.shape[0]):
             w.e_start[i, j] = w.e[i, j]
@@ -275,13 +278,23 @@ def _counts(task, lane, i, end):
 
 @numba.njit(**INNER)
 def _note_events(task, lanes, w, found, done):
-    """Note the switching functions that have changed their signs in accepted steps."""
-    for j in range(lanes.size if task.alone else 0):
+    """Note the switching functions that have changed their signs in accepted steps.
+
+    Guards are noted where they fall.  Where none has changed its sign it was a memory.
+    """
+    for j in range(lanes.size):
         if not done[j] or found[j] != EVENT:
             continue
+        turns = 1 if task.memory.size else 0
         for i in range(task.guarded):
-            if w.e_start[i, j] * w.e[i, j] < 0.0 and _counts(task, lanes[j], i, w.e[i, j]):
-                note(task, lanes[j], w, i, w.e[i, j] > 0.0, j)
+            if w.e_start[i, j] * w.e[i, j] < 0.0 or left_to_other_side(task, w, i, j):
+                turns = 0
+                if _counts(task, lanes[j], i, w.e[i, j]):
+                    note(task, lanes[j], w, i, w.e[i, j] > 0.0, j)
+        for i in range(task.guarded, task.switching):
+            if w.above[i - task.guarded, j] != 0 and w.e[i, j] < 0.0:
+                turns = 0
+        lanes[j].turns += turns
 
 
 @numba.njit(**INNER)

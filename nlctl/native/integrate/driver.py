@@ -274,11 +274,8 @@ def prepared(
         times=times,
         inputs=inputs,
         p=c,
-        **_rows(program, code, method, read.watched),
-        rtol=float(settings.rtol),
-        atol=float(settings.atol),
-        fixed=float(settings.step),
-        max_steps=int(settings.max_steps),
+        **_rows(program, code, read.watched),
+        **_bounds(settings),
         method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
         **_pair(settings.pair) | expansion,
         alone=int(count == 1),
@@ -304,17 +301,23 @@ def prepared(
     return Run(machine=code, task=task, work=work)
 
 
-def _rows(
-    program: Program, code: Machine, method: str | Tableau, watched: tuple[Watched, ...]
-) -> dict[str, Any]:
-    """Return how many rows are whose: declared, located, memories; Taylor has its own sides."""
+def _bounds(settings: Settings) -> dict[str, Any]:
+    """Return what errors and numbers of steps are bounded by."""
+    return {
+        "rtol": float(settings.rtol), "atol": float(settings.atol),
+        "fixed": float(settings.step), "max_steps": int(settings.max_steps),
+    }  # fmt: skip
+
+
+def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> dict[str, Any]:
+    """Return how many rows are whose: declared, located, memories."""
     located = code.lowered.rows["g"] - len(program.memory)
     bending = code.lowered.conditions.bending
     return {
         "bending": program.switching,
-        "declared": program.switching + (0 if method == "taylor" else bending),
-        "guarded": program.switching if method == "taylor" else located - len(program.guards),
-        "switching": program.switching if method == "taylor" else located,
+        "declared": program.switching + bending,
+        "guarded": located - len(program.guards),
+        "switching": located,
         "watched": located - len(program.guards) - len(watched),
         "ways": np.array([each.direction for each in watched], dtype=np.int64),
         "ending": np.array([each.ends for each in watched], dtype=np.int64),
@@ -324,12 +327,6 @@ def _rows(
 
 def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
     """Return the method of a run; what has delays is for the explicit one."""
-    located = compiled.program.guards or compiled.schedule.watched
-    if located and settings.method == "taylor":
-        raise ParameterError(
-            f"'{compiled.system.name}' has guards or events, which method='auto', 'tsit5' and "
-            "'rodas5p' locate, got method='taylor'"
-        )
     if not compiled.schedule.lines:
         return settings.method
     if settings.method not in ("auto", "tsit5"):

@@ -20,11 +20,12 @@ def log_room(task: Any, rows: int, expected: int = 0) -> int:
 
 @numba.njit(**INNER)
 def note(task, lane, w, row, rises, j):
-    """Note an event of a lane, if it is a single run; there is room, see `log_is_full`."""
-    if not task.alone or lane.noted >= w.log_t.size:
-        return
-    w.log_t[lane.noted] = lane.t
-    w.log_row[lane.noted] = 2 * row + (1 if rises else 0)
+    """Count an event of a lane, and write it down in a single run: there is room for it."""
+    if task.alone:
+        if lane.noted >= w.log_t.size:  # never, see `log_is_full`
+            return
+        w.log_t[lane.noted] = lane.t
+        w.log_row[lane.noted] = 2 * row + (1 if rises else 0)
     lane.noted += 1
 
 

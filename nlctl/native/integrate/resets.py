@@ -103,7 +103,7 @@ def _jump(task, lanes, w, fallen, chosen):
         if task.times[lane.segment] == lane.t:
             for i in range(w.x.shape[0]):
                 w.samples[lane.segment, i, j] = w.x[i, j]
-        for i in range(w.behind.shape[0]):
+        for i in range(task.declared):
             w.behind[i, j] = 0.0
 
 

@@ -24,7 +24,9 @@ class Statistics:
     accepted, rejected : int
         Steps of the integrator; steps tried to locate events count as rejected.
     events : int
-        Break points and turning memories at which a step was ended.
+        What has happened: as many as there are rows in the ``events`` of a single run's response.
+        Guards that have fallen, switching functions and conditions of the equations that have
+        changed their signs, and conditions of t alone.
     stiff : bool
         Whether the run ended with the stiff method.
     jump : Jump or None
@@ -33,6 +35,9 @@ class Statistics:
         Conditions of the equations that were located, guards included.
     opaque : bool
         Whether a function was called as it stands: nobody knows of its conditions.
+    turns : int
+        Steps that were ended where a memory turns or jumps, and nothing else happens: they are no
+        events.
     """
 
     status: Status
@@ -44,6 +49,7 @@ class Statistics:
     jump: Jump | None = None
     conditions: int = 0
     opaque: bool = False
+    turns: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,11 +87,12 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         time=reached,
         accepted=int(lane["accepted"]),
         rejected=int(lane["rejected"]),
-        events=int(lane["events"]),
+        events=int(lane["noted"]),
         stiff=bool(lane["stiff"]),
         jump=run.jumps.get(j),
         conditions=int(run.task.switching - run.task.bending),
         opaque=bool(run.task.opaque),
+        turns=int(lane["turns"]),
     )
     return Trajectory(
         time=times[:done],

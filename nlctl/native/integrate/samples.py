@@ -125,5 +125,5 @@ def _take(task, lane, w, j, k):
             if shown:
                 w.samples[lane.segment, row, j] = w.s[i, j]
     lane.jacobian_at = np.nan
-    for i in range(w.behind.shape[0]):
+    for i in range(task.declared):
         w.behind[i, j] = 0.0

@@ -60,7 +60,8 @@ _FIELDS = [
     ("crowd", "i8"),  # resets in a row without progress of time
     ("culprit", "i8"),  # the guard that has fallen last, or has ended the run
     ("resumes", "i8"),  # whether a sample has been taken at the last time, see `Work.resume`
-    ("noted", "i8"),  # what has been noted in the log
+    ("noted", "i8"),  # what has happened: entries of the log, which a single run has
+    ("turns", "i8"),  # steps that ended where a memory turns or jumps, and nothing else happens
     ("jump", "i8"),  # which of their break points comes next
     ("traces", "i8"),  # whether what is being located is a condition
     ("rests", "i8"),  # whether no state has moved by more than its tolerance in the last step
@@ -69,7 +70,7 @@ _FIELDS = [
     ("status", "i8"),
     ("accepted", "i8"),
     ("rejected", "i8"),
-    ("events", "i8"),
+    ("events", "i8"),  # steps that ended with an event or a turn
     ("tries", "i8"),  # attempts at the event being located
     ("seeks", "i8"),  # whether that is where a memory jumps that no switching function tells of
     ("same_side", "i8"),  # of these in a row with the event inside

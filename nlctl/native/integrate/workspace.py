@@ -131,7 +131,8 @@ class Work(NamedTuple):
     e_before: np.ndarray  # at the end of a step that ended before a condition, see `crossing`
     e_low: np.ndarray  # at the ends of the bracket in which an event is located
     e_high: np.ndarray
-    behind: np.ndarray  # 1 where the step before ended with this event
+    behind: np.ndarray  # 1 where the step before ended with this event; of a condition that is
+    # exactly 0 the side that it has come from
     slope: np.ndarray  # rates of g
     slope_start: np.ndarray
     u: np.ndarray

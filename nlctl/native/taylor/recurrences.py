@@ -22,9 +22,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ...expressions.arrays import scalar
+from ...expressions.conditions import at_integers, switching_function
 from ...expressions.derivatives import partials
 from ...expressions.functions import FUNCTIONS
-from ...expressions.graph import COMPARISONS, LOGIC, Expr, Graph
+from ...expressions.graph import COMPARISONS, LOGIC, Expr, Graph, needed
 from ...expressions.stage import Stage
 from ..codegen.plan import Store
 
@@ -80,7 +81,7 @@ class Recurrences:
         Of every array.
     sides : list of tuple
         Rows of ``"k"`` for each comparison: the difference of what is compared, and the first of
-        its coefficients that is not 0.
+        its coefficients that is not 0; the same of what is 0 where `floor` and its like jump.
     """
 
     first: list[Store]
@@ -134,6 +135,8 @@ class _Reader:
     values, before, sides : dict
         Rows of "o" that have an expression's value, and rows of "k" that have its coefficients
         or, of a comparison, its side.
+    distances : dict
+        Of what is compared with 0, its first coefficient that is not 0.
     sums : dict
         Which sums there are, by their factors.
     pairs : list
@@ -148,6 +151,7 @@ class _Reader:
     values: dict[Expr, int] = field(default_factory=dict)
     before: dict[Expr, int] = field(default_factory=dict)
     sides: dict[Expr, Expr] = field(default_factory=dict)
+    distances: dict[Expr, Expr] = field(default_factory=dict)
     sums: dict[tuple[_Key, _Key], Expr] = field(default_factory=dict)
     pairs: list[tuple[int, int]] = field(default_factory=list)
     waiting: list[tuple[Expr, bool]] = field(default_factory=list)
@@ -169,6 +173,9 @@ class _Reader:
         for name, begin in (("g", n), ("dx", n + self.g)):
             for s in stores[name]:
                 self._write("k", begin + s.row, s.expr, self.term(s.expr), s.size)
+        for node in needed([s.expr for s in stores["dx"]]):
+            if at_integers(node) and not _of_time(node):
+                self._side_of(switching_function(graph, node))
         while self.waiting:
             node, is_read = self.waiting.pop()
             term = self.term(node)
@@ -325,6 +332,8 @@ class _Reader:
         terms, row = [self.term(a) for a in node.args], FUNCTIONS[node.op].series
         if all(t is None for t in terms):
             return None
+        if row == "steady":
+            return None
         if row == "unknown":
             raise NoSeriesError(f"no Taylor coefficients of '{node.op}' are known")
         if isinstance(row, Callable):
@@ -389,16 +398,23 @@ class _Reader:
             return graph.op(node.op, *(self.side(a) for a in node.args))
         if node.op not in COMPARISONS:
             raise NoSeriesError(f"it is not known on which side '{node.op}' goes on")
-        distance = graph.op("sub", *node.args)
-        row, term = self._take("k", node.size or 1), self.term(distance)
+        return graph.op(node.op, self._side_of(graph.op("sub", *node.args)), zero)
+
+    def _side_of(self, distance: Expr) -> Expr:
+        """Return the first coefficient of what is compared with 0 that is not 0 itself."""
+        if distance in self.distances:
+            return self.distances[distance]
+        graph, zero, size = self.graph, self.graph.const(0.0), distance.size or 1
+        row, term = self._take("k", size), self.term(distance)
         self.previous(distance)  # for its polynomial
-        self.pairs += [(self.before[distance] + i, row + i) for i in range(node.size or 1)]
-        before = graph.leaf("b", row, node.size)
+        self.pairs += [(self.before[distance] + i, row + i) for i in range(size)]
+        before = graph.leaf("b", row, distance.size)
         now = graph.op(
             "select", graph.op("eq", before, zero), zero if term is None else term, before
         )
-        self._write("k", row, distance, now, node.size or 1)
-        return graph.op(node.op, now, zero)
+        self._write("k", row, distance, now, size)
+        self.distances[distance] = now
+        return now
 
     # -- where factors lie
 
@@ -438,6 +454,11 @@ class _Reader:
 
     def _later(self, row: int, factor: Expr) -> None:
         self.following.append(Store(array="k", row=row, expr=factor, size=factor.size or 1))
+
+
+def _of_time(node: Expr) -> bool:
+    """Whether an expression varies with t alone: its jumps are known before a run."""
+    return all(e.data[0] == "t" for e in needed([node]) if e.op == "leaf" and e.varies)
 
 
 def _moved(graph: Graph, leaf: Expr, array: str, by: int) -> Expr:

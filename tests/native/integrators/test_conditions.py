@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 import nlctl
+from nlctl.native.integrate.driver import Settings, begin, finish, go_on, prepared
+from nlctl.native.integrate.results import made as result
+from nlctl.native.integrate.state import RUNNING
 
 ROOT2 = np.sqrt(2.0)
 
@@ -51,6 +54,18 @@ def fast_gaussian(t, x, u, p):
     return [np.exp(-(((t - 50.0) / 0.1) ** 2))]
 
 
+def sawtooth(t, x, u, p):
+    return [1.0 + 0.5 * ((2.0 * x[0] + 0.3) % 1.0)]
+
+
+def rounded(t, x, u, p):
+    return [-1.0 - abs(np.rint(x[0]))]
+
+
+def truncated(t, x, u, p):
+    return [-1.0 - np.ceil(x[0]) + np.trunc(x[0])]
+
+
 def oscillator_end(t):
     """x'' = -sign(x) from rest at 1: arcs of period 4 sqrt(2)."""
     s = t % (4 * ROOT2)
@@ -67,6 +82,17 @@ def stairs_end(t):
     return n + t * (1 + n)
 
 
+def sawtooth_end(t):
+    """x' = 1 + (2 x + 0.3 - n) / 2 = x + 1.15 - n / 2, up to each z = 2 x + 0.3 = n + 1."""
+    x, n = 0.0, 0
+    while True:
+        rate, end = x + 1.15 - n / 2, (n + 0.7) / 2
+        needed = np.log((end + 1.15 - n / 2) / rate)
+        if needed >= t:
+            return rate * np.exp(t) - 1.15 + n / 2
+        x, t, n = end, t - needed, n + 1
+
+
 CASES = {  # equations, initial state, last time, the first state there
     "duty cycle": (duty_cycle, [0.0], 10.0, 3.0),
     "window": (window, [0.0], 3.0, 0.6 + 2.5 - 0.1 / 11),
@@ -75,11 +101,15 @@ CASES = {  # equations, initial state, last time, the first state there
     "oscillator": (oscillator, [1.0, 0.0], 30.0, oscillator_end(30.0)),
     "load": (load, [0.0], 100.0, (1 - np.exp(-5)) * np.exp(-45)),
     "stairs": (stairs, [0.0], 3.5, stairs_end(3.5)),
+    "sawtooth": (sawtooth, [0.0], 3.5, sawtooth_end(3.5)),
+    "rounded": (rounded, [2.2], 2.0, -0.5 - 2.0 * (2.0 - 0.7 / 3 - 0.5 - 1.0)),
+    "truncated": (truncated, [1.5], 2.0, -(2.0 - 1.5 / 2)),
     "clipped": (clipped, [0.0], 5.5, 2.5 + (5.5 - np.log(4.5) - 1 / 1.5) / 2),
     "limited": (limited, [0.0], 4.0, 1 + np.sin(4.0) - 1),
     "gaussian": (fast_gaussian, [0.0], 100.0, 0.1 * np.sqrt(np.pi)),
 }
-HOW = [("tsit5", 1e-6), ("tsit5", 1e-9), ("rodas5p", 1e-6), ("rodas5p", 1e-9)]
+METHODS = ("tsit5", "rodas5p", "taylor")
+HOW = [(method, rtol) for method in METHODS for rtol in (1e-6, 1e-9)]
 every_case = pytest.mark.parametrize("case", CASES)
 
 
@@ -151,11 +181,82 @@ def test_events_are_a_table_of_both_engines():
             assert direction == way
 
 
+def test_functions_that_a_run_watches_end_it_by_every_method():
+    """cos t: x = 1/2 at pi/3, and the run ends where x' = -1/2 next, at 5 pi / 6 from below."""
+
+    def half(t, x, u, params):
+        return x[0] - 0.5
+
+    def slope(t, x, u, params):
+        return x[1] + 0.5
+
+    slope.direction = 1
+    swing = plain(lambda t, x, u, p: [x[1], -x[0]], [1.0, 0.0])
+    for method in METHODS:
+        made = nlctl.input_output_response(
+            swing, [0, 10], 0, [1.0, 0.0], engine="native", method=method, events={"half": half},
+            stop_when=slope,
+        )  # fmt: skip
+        assert made.time[-1] == pytest.approx(5 * np.pi / 6, abs=1e-7)
+        assert list(made.events["which"]) == ["half", "stop_when"]
+        np.testing.assert_allclose(made.events["time"], np.pi * np.array([1 / 3, 5 / 6]), atol=1e-7)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_function_that_is_0_where_a_step_ends_anyway_is_an_event(method):
+    """At t = 5 the input has a break point, and x = 1 - t rounds to 0 at t = 1."""
+    ramp = ct.nlsys(
+        lambda t, x, u, p: [u[0] - 1.0], None, inputs=1, outputs=1, states=1, name="ramp"
+    )
+    times, how = np.arange(11.0), {"engine": "native", "method": method}
+    for five in (lambda t, x, u, p: t - 5.0, lambda t, x, u, p: 5.0 - t):
+        ended = nlctl.input_output_response(ramp, times, 0 * times, 1.0, stop_when=five, **how)
+        assert ended.time[-1] == pytest.approx(5.0, abs=1e-9)
+    made = nlctl.input_output_response(
+        ramp, times, 0 * times, 1.0, events={"half": lambda t, x, u, p: x[0]}, **how
+    )
+    np.testing.assert_allclose(made.events["time"], [1.0], atol=1e-9)
+
+
 def test_print_and_statistics_say_what_is_located():
     compiled = nlctl.compile(plain(oscillator, [1.0, 0.0]))
     assert "conditions   1 located" in str(compiled)
     _, made = end("oscillator", engine="native")
     assert (made.statistics.conditions, made.statistics.opaque) == (1, False)
+
+
+@pytest.mark.parametrize("case", ["duty cycle", "oscillator", "square wave", "clipped"])
+def test_statistics_count_the_rows_of_the_table(case):
+    """Of a single run; members of an ensemble count the same."""
+    equations, start, last, _ = CASES[case]
+    times, compiled = np.linspace(0, last, 21), nlctl.compile(plain(equations, start))
+    made = nlctl.input_output_response(compiled, times, 0, start, rtol=1e-6, atol=1e-8)
+    assert made.statistics.events == len(made.events) > 0
+    assert f", {len(made.events)} events" in repr(made)
+    x0, p = np.tile(np.array(start)[:, None], 8), compiled.parameter_vector()[:, None]
+    settings, none = Settings(rtol=1e-6, atol=1e-8), np.zeros((0, times.size))
+    run = prepared(compiled, times, none, x0, np.tile(p, 8), settings, [])
+    begin(run)
+    while np.any(run.lanes["status"] == RUNNING):
+        run = go_on(run)
+    assert {result(run, finish(run), j).statistics.events for j in range(8)} == {len(made.events)}
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+def test_steps_of_an_ensemble_are_bounded(method):
+    """x' = -x over 1 s with steps of 1 / 64 s at most, and no bound: the least number of steps."""
+    compiled = nlctl.compile(plain(lambda t, x, u, p: [-x[0]], [1.0]))
+    members = {compiled.system.state_labels[0]: [1.0, 2.0, 3.0]}
+
+    def steps(**bound):
+        made = nlctl.ensemble_response(compiled, [0, 1], 0, members, method=method, **bound)
+        assert (made.table["status"] == "OK").all()
+        return made.table["steps"]
+
+    assert (steps(max_step=1 / 64) >= 64).all()
+    assert (steps() < 32).all()
+    with pytest.raises(nlctl.ParameterError, match=r"ensemble_response.*max_step"):
+        steps(max_step=0.0)
 
 
 def test_a_condition_that_is_always_0_is_no_event():

@@ -19,7 +19,7 @@ from ..state import INNER, is_stiff
 from .location import AGAIN, CLEAR, EVENT, REFUSED
 
 NOTHING = -2  # no condition lies in the step just tried
-_SHARE = 0.01  # of the relative tolerance, of a step: how close to a condition steps end
+CLOSE = 0.01  # of the relative tolerance, of a step: how close to a condition steps end
 _TRIES = 60
 # of a step with a stage behind a condition: how much is left out
 _CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
@@ -114,9 +114,16 @@ def _across(task, lane, w, j):
     if not np.isfinite(w.error[j]):
         return NOTHING
     for i in range(task.declared, task.switching):
-        if _crossed(task, w, i, w.e[i, j], j):
+        if _crossed(task, w, i, w.e[i, j], j) or left_to_other_side(task, w, i, j):
             return EVENT
     return CLEAR
+
+
+@numba.njit(**INNER)
+def left_to_other_side(task, w, i, j):
+    """Whether a step leads from where a condition is exactly 0 to where it has not come from."""
+    is_condition = task.declared <= i < task.guarded
+    return is_condition and w.e_start[i, j] == 0.0 and w.behind[i, j] * w.e[i, j] < 0.0
 
 
 @numba.njit(**INNER)
@@ -159,7 +166,7 @@ def _bracket(task, lane, w, bad, j):
 def _next_try(task, lane, w, bad, j):
     """Say what to try next, or take the step just tried, which ends right before a condition."""
     t_end = max(abs(lane.t), abs(lane.t + lane.high))
-    close = max(_SHARE * task.rtol * lane.whole, 8e-16 * t_end)
+    close = max(CLOSE * task.rtol * lane.whole, 8e-16 * t_end)
     root = _foreseen(task, lane, w, bad, j)
     if lane.high <= 2.0 * close and bad:  # right behind the start
         lane.across, lane.traces, lane.tries = 1, 0, 0

@@ -19,14 +19,15 @@ from ...machine.address import (
     call_step,
     call_values,
 )
-from ..events.location import behind_event, triggered
+from ..events.crossing import CLOSE
+from ..events.location import SMALL, behind_event, triggered
 from ..state import INNER, RUNNING
 from ..workspace import input_rates, inputs_at
 
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
 _LOOKS = 16  # parts of a step
-_BRIEF = 0.01  # part of a step: a nearer event is located by trying
+_BRIEF = 0.01  # part of a step: a nearer break point is located by trying
 _PLACES = 4  # at 0.9, 0.99, ... of a step that ends at an event
 _BEFORE = 3.0  # times as far before an event as a step may end behind it
 _SHORTEST = 1e-12  # of the times: a step in which nothing is compared
@@ -148,12 +149,42 @@ def _aim(task, lanes, w):
     events_at(task, lanes, w, w.g_ahead)
     for j in range(lanes.size):
         lane, first = lanes[j], 1.0
-        for i in range(task.switching if lane.tries == 0 else 0):
-            if triggered(w.e_start[i, j], w.g_ahead[i, j], False, w.behind[i, j] != 0.0):
-                first = min(first, _root(task, w, i, lane.step, j))
-        if _BRIEF < first < 1.0:
-            lane.step *= min(1.0, first * (1.0 + 0.5 * behind_event(task.rtol)))
+        for i in range(task.switching if lane.tries == 0 and lane.across == 0 else 0):
+            if _meets(task, w, i, w.g_ahead[i, j], j):
+                part = _behind(task, lane, i, _root(task, w, i, lane.step, j))
+                if part > _BRIEF or i >= task.declared:
+                    first = min(first, part)
+        if 0.0 < first < 1.0:
+            lane.step *= first
             lane.ends = 0
+
+
+@numba.njit(**INNER)
+def _meets(task, w, i, end, j):
+    """Whether an event function has changed its sign in a step, or a guard has fallen."""
+    if i >= task.guarded:
+        return w.above[i - task.guarded, j] != 0 and end < 0.0
+    small = abs(w.e_start[i, j]) + abs(end) <= SMALL * task.atol
+    if task.bending <= i < task.declared and small:
+        return False  # see `first_root`
+    return triggered(w.e_start[i, j], end, False, w.behind[i, j] != 0.0)
+
+
+@numba.njit(**INNER)
+def _behind(task, lane, i, root):
+    """Return the part of a step that ends right behind an event, by what can be told from none."""
+    part = root * (1.0 + _rest(task, i))
+    if i < task.declared:
+        return part
+    return max(part, root + 4e-16 * abs(lane.t + root * lane.step) / lane.step)
+
+
+@numba.njit(**INNER)
+def _rest(task, i):
+    """Return by which part of a step one may end behind an event: half of what is allowed."""
+    if i < task.declared:
+        return 0.5 * behind_event(task.rtol)
+    return max(0.5 * CLOSE * task.rtol, 1e-15)
 
 
 @numba.njit(**INNER)
@@ -169,7 +200,7 @@ def _root(task, w, i, h, j):
             low, f_low = middle, f
         else:
             high, f_high = middle, f
-        if high - low < 0.01 * behind_event(task.rtol):
+        if high - low < 0.1 * _rest(task, i) * high:
             break
     return high
 
@@ -194,7 +225,7 @@ def _error(task, w, j):
     if w.looked[j] != 0.0:  # on another side inside of the step: a shorter one is to be tried
         return (0.9 / min(w.foreseen[j], 0.8)) ** task.pair_order + 0.0 * (defect + term)
     for i in range(task.switching):
-        if triggered(w.e_start[i, j], w.g[i, j], False, w.behind[i, j] != 0.0):
+        if _meets(task, w, i, w.g[i, j], j):
             return term + 0.0 * defect
     share = defect / (task.highest + 1.0)
     return share if share <= term else defect + 0.0 * term
@@ -222,13 +253,19 @@ def _compare(task, lane, w, j):
     until, p, n = 1.0, task.highest - 1, w.x.shape[0]
     for i in range(task.switching):
         before, now = w.e_start[i, j], w.g[i, j]
-        if triggered(before, now, False, w.behind[i, j] != 0.0):
-            until = min(until, lane.low / lane.step if lane.tries else before / (before - now))
+        if _meets(task, w, i, now, j):
+            part = min(max(before / (before - now), 0.0), 1.0)
+            until = min(until, lane.low / lane.step if lane.tries else part)
     for i in range(task.switching):
+        if task.bending <= i < task.watched:
+            continue  # these are among the comparisons
         if not _is_followed(p, w.h[j], w.terms, n + i, j):
             w.looked[j], w.foreseen[j] = -1.0, 0.5
         elif not w.e_start[i, j] * w.g[i, j] < 0.0:
-            first, farthest = _crossing(p, w.h[j], w.terms, n + i, w.e_start[i, j], until, j)
+            side = w.e_start[i, j]
+            if i >= task.guarded and w.above[i - task.guarded, j] != 0:
+                side = 1.0
+            first, farthest = _crossing(p, w.h[j], w.terms, n + i, side, until, j)
             if first < until:  # a step that ends there has an event
                 w.looked[j], w.foreseen[j] = -1.0, min(w.foreseen[j], farthest)
     for i in range(task.sides.shape[0]):
@@ -244,7 +281,7 @@ def _compare(task, lane, w, j):
 @numba.njit(**INNER)
 def _ends_at_event(task, lane, w, j):
     """Whether a step may end right behind an event, so that it is accepted."""
-    for i in range(task.switching):
+    for i in range(task.declared):
         before, now = w.e_start[i, j], w.g[i, j]
         if triggered(before, now, False, w.behind[i, j] != 0.0):
             low = 0.0
