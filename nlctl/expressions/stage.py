@@ -165,7 +165,7 @@ class Stage:
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
-            return type(value)(*map(self.instead, value))
+            return type(value)(*map(self.instead, value))  # type: ignore[arg-type]
         if type(value).__module__ in _OPERATORS:
             return value  # itemgetter and its kind
         if is_of_a_library(value) and callable(value) and hasattr(value, "__wrapped__"):
@@ -310,7 +310,7 @@ class Stage:
             parts = (value.fget, value.fset, value.fdel)
             return property(*(None if p is None else self._member(p) for p in parts))
         if isinstance(value, functools.cached_property):
-            made = functools.cached_property(self._member(value.func))
+            made: Any = functools.cached_property(self._member(value.func))
             made.__set_name__(made, value.attrname or value.func.__name__)
             return made
         return self.instead(value) if callable(value) or type(value) is np.ndarray else value

@@ -64,7 +64,7 @@ class Pair(Special):
     def mean(self, axis: Any = None) -> Pair:
         """Return the mean."""
         count = self.real.size if axis is None else self.shape[axis]
-        return self.sum(axis) / float(count)
+        return self.linear(lambda part: total(part, axis) / float(count))
 
     def __len__(self) -> int:
         return len(self.real)
@@ -80,7 +80,7 @@ class Pair(Special):
         if not isinstance(exponent, int) or not 0 <= exponent <= 64:
             raise Untraceable("a power of complex numbers that is not a small integer")
         found = paired(self.graph, 1.0)
-        return functools.reduce(lambda a, _: a * self, range(exponent), found)
+        return functools.reduce(lambda a, _: _mul(self.graph, a, self), range(exponent), found)
 
     def _text(self, *_: Any) -> Any:
         raise Untraceable("a complex number in the place of a real one")
@@ -113,8 +113,8 @@ def paired(graph: Graph, value: Any) -> Pair:
         parts = [paired(graph, v) for v in value]
         return Pair(graph, [p.real for p in parts], [p.imag for p in parts])
     if arrays.is_complex(value):
-        array = np.asarray(value)
-        return Pair(graph, np.asarray(array.real, float), np.asarray(array.imag, float))
+        array = np.asarray(value, dtype=complex)
+        return Pair(graph, np.real(array), np.imag(array))
     real = traced(graph, value)
     return Pair(graph, real, elementwise(graph, "mul", 0.0, traced(graph, np.zeros(real.shape))))
 

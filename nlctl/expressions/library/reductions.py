@@ -98,7 +98,7 @@ def summed(
 ) -> Any:  # fmt: skip
     """Return a sum."""
     if isinstance(values, Masked | Pair):
-        return values.sum() if axis is None else values.sum(axis)
+        return values.sum() if isinstance(values, Masked) else values.sum(axis)
     array = traced(graph, values)
     if where is not True:
         array = elementwise(graph, "select", where, array, 0.0)

@@ -91,14 +91,14 @@ def piecewise_polynomial(
 
 
 def _beyond(
-    graph: Graph, x: Expr, ends: Sequence[float], found: Expr, below: Expr, above: Expr
+    graph: Graph, x: Expr, ends: Sequence[Any], found: Expr, below: Expr, above: Expr
 ) -> Expr:
     """Return what is inside of a range, and other values beyond its ends."""
     found = graph.op("select", graph.op("gt", x, graph.const(float(ends[-1]))), above, found)
     return graph.op("select", graph.op("lt", x, graph.const(float(ends[0]))), below, found)
 
 
-def _guard_range(graph: Graph, x: Expr, ends: Sequence[float]) -> None:
+def _guard_range(graph: Graph, x: Expr, ends: Sequence[Any]) -> None:
     """Note that SciPy raises an error beyond the ends of a range."""
     graph.guards.append(graph.op("ge", x, graph.const(float(ends[0]))))
     graph.guards.append(graph.op("le", x, graph.const(float(ends[-1]))))
@@ -166,7 +166,7 @@ def _numbers(values: Any) -> Any:
 def fitted_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, ext: Any = None) -> Any:
     """Return one of SciPy's splines that are fitted to data."""
     codes = {"extrapolate": 0, "zeros": 1, "raise": 2, "const": 3}
-    how = thing.ext if ext is None else ext
+    how: Any = thing.ext if ext is None else ext
     return splev(graph, x, thing._eval_args, nu, codes.get(how, how))
 
 
@@ -240,7 +240,7 @@ def _on_grid(graph: Graph, thing: Any, values: np.ndarray, x: Sequence[Expr]) ->
         for index in np.ndindex(made.shape):
             made[index] = _between(graph, places, cells[index], x[axis])
         cells = made
-    found = cells[()] if isinstance(cells, np.ndarray) else cells
+    found: Any = cells[()] if isinstance(cells, np.ndarray) else cells
     for axis, e in enumerate(x):
         ends = thing.grid[axis][0], thing.grid[axis][-1]
         if thing.bounds_error:

@@ -18,10 +18,12 @@ from .values import (
     FRESH,
     OUTSIDE,
     SLICE,
+    UNKNOWN_VALUE,
     Bound,
     Impure,
     Instance,
     KnownValue,
+    ListOf,
     Local,
     OneOf,
     Parent,
@@ -161,6 +163,8 @@ def method(
         If it changes a container that the call has not made.
     """
     thing = base.known
+    if isinstance(thing, ListOf):
+        return _of_list(base, name, given)
     if isinstance(thing, ModuleType | type | super | OneOf | Instance | Bound | Pure | Parent):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
@@ -184,6 +188,17 @@ def method(
     if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
         return None
     raise Impure(f"calls a method '{name}()' that is not known", "use NumPy's functions")
+
+
+def _of_list(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
+    """Return what is known of the result of a method of a list or dict of functions."""
+    if name in ("values", "items", "copy"):
+        return base
+    if name == "get":
+        return least_upper_bound([element(base), *given[1:]])
+    if name in ("keys", "index", "count"):
+        return FRESH
+    raise Impure(f"calls {name}() of a list of functions or objects", "make a new list")
 
 
 def _read(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
@@ -222,7 +237,7 @@ def check_object(value: KnownValue, what: str) -> None:
     thing = value.known
     if isinstance(thing, Unknown | Local | Bound | Pure | enum.Enum | BuiltinFunctionType):
         return
-    if isinstance(thing, OneOf):
+    if isinstance(thing, OneOf | ListOf):
         for choice in thing.choices:
             check_object(choice, what)
         return
@@ -246,7 +261,7 @@ def _builtin(
 ) -> KnownValue:
     name = thing.__name__
     for value in given if name not in ("isinstance", "issubclass", "callable", "type") else ():
-        check_object(value, f"calls {name}() of")
+        _check_parts(value, name)
     if name == "slice":
         return SLICE
     if name == "type" and len(given) == 1:
@@ -269,10 +284,27 @@ def _builtin(
     raise Impure(f"calls {name}()", advice)
 
 
+_MOVING = ("list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter", "len")
+
+
+def _check_parts(value: KnownValue, name: str) -> None:
+    """Check what a builtin does with a value, and with what is in it unless it only moves that."""
+    known = value.known
+    if isinstance(known, ListOf) and name in _MOVING:
+        return
+    check_object(value, f"calls {name}() of")
+    if isinstance(known, list | tuple) and name not in _MOVING:
+        for part in known:
+            if not callable(part) or not isinstance(part, FunctionType | MethodType | np.ufunc):
+                check_object(captured(part), f"calls {name}() of a list that holds")
+
+
 def _functions_in(given: list[KnownValue]) -> Any:
     """Return the choice between the functions in what is gone through, for whoever calls one."""
     parts = [element(v) for v in given]
-    return function_choice([v for v in parts if isinstance(v.known, OneOf)])
+    kinds = OneOf | Instance | Bound | Local | FunctionType
+    found = [v for v in parts if isinstance(v.known, kinds)]
+    return ListOf(tuple(found)) if found else UNKNOWN_VALUE
 
 
 def _library(

@@ -27,6 +27,7 @@ from .values import (
     Impure,
     Instance,
     KnownValue,
+    ListOf,
     Local,
     OneOf,
     Pure,
@@ -111,6 +112,8 @@ class Walk:
             raise Impure("calls what is only known when it runs", "call a function by its name")
         if isinstance(thing, OneOf):
             return least_upper_bound([self.call(choice, given, named) for choice in thing.choices])
+        if isinstance(thing, ListOf):
+            raise Impure("calls a list", "call what is in it")
         if isinstance(thing, Pure):
             if thing.gives_parts:
                 return element(given[0]) if given else FRESH

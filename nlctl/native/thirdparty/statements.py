@@ -102,7 +102,7 @@ class CallWalker(Expressions):
     ) -> KnownValue:
         """Return what an object becomes by ``+=`` and its kind."""
         name = OPERATORS.get(type(node.op), "")
-        found = made.operator_of(value, f"__i{name}__")
+        found = made.operator_of(self.walk, value, f"__i{name}__")
         if found is not None:
             return self.walk.function(found, [value, added], {})
         return self.operated(type(node.op), value, added)
