@@ -166,8 +166,9 @@ def _numbers(values: Any) -> Any:
 def fitted_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, ext: Any = None) -> Any:
     """Return one of SciPy's splines that are fitted to data."""
     codes = {"extrapolate": 0, "zeros": 1, "raise": 2, "const": 3}
-    how: Any = thing.ext if ext is None else ext
-    return splev(graph, x, thing._eval_args, nu, codes.get(how, how))
+    how = thing.ext if ext is None else ext
+    code: Any = codes.get(how, how)
+    return splev(graph, x, thing._eval_args, nu, code)
 
 
 def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:

@@ -62,6 +62,7 @@ _OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoption
 _OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt",
                           "loads", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
                          "read files before the run, and write them after it")  # fmt: skip
+_TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial", "numpy")
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
@@ -138,6 +139,8 @@ def call(
             return KnownValue(True, all(v.own and v.inside for v in parts), True)
         return made.instance(walk, thing, given, named)
     function = python_function(thing)
+    if isinstance(thing, MethodType) and type(owner).__module__.startswith(_TABLES):
+        return KnownValue(True, False, known=Pure())  # (what would change it is named in CHANGING)
     if type(owner).__module__.startswith(VARYING):
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
     if function is None or not _walkable(function):
