@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Tracer, mapped, traced
+from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from .table import enter
 from .tables import MOST_PIECES, choice, polynomial
@@ -180,7 +180,8 @@ def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
     if kind in ("linear", "linear-np", "slinear") and not hasattr(thing, "_spline"):
         rule = functools.partial(_line, graph, thing.x, values)
     elif hasattr(thing, "_spline"):
-        rule = lambda e: b_spline(graph, thing._spline, Tracer(graph, np.array(e)), 0, True).only  # noqa: E731
+        spline = _of_one_value(thing._spline)
+        rule = lambda e: b_spline(graph, spline, scalar(graph, e), 0, True).only  # noqa: E731
     else:
         raise Untraceable(f"interp1d of kind {kind!r}")
     extrapolates, bounded = bool(thing._extrapolate), bool(thing.bounds_error)
@@ -196,6 +197,13 @@ def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
         return _beyond(graph, e, ends, found, below, above)
 
     return _each(graph, x, at)
+
+
+def _of_one_value(spline: Any) -> Any:
+    """Return a spline whose values are numbers instead of rows of one number."""
+    from scipy.interpolate import BSpline
+
+    return BSpline(spline.t, spline.c.reshape(len(spline.c), -1)[:, 0], spline.k)
 
 
 def _fill(thing: Any) -> tuple[Any, Any]:

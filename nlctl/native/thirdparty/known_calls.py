@@ -62,7 +62,7 @@ _OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoption
 _OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt",
                           "loads", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
                          "read files before the run, and write them after it")  # fmt: skip
-_TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial", "numpy")
+_TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial")
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
@@ -117,32 +117,57 @@ def call(
     owner = getattr(thing, "__self__", None)
     if _is_builtin(thing):
         return _builtin(walk, thing, given, named)
+    if isinstance(thing, BuiltinFunctionType) and isinstance(owner, CONTAINERS):
+        bound = method(walk, captured(owner), thing.__name__, given, named)
+        return OUTSIDE if bound is None else bound
+    special = _of_python(walk, thing, given, named)
+    if special is not None:
+        return special
+    module = library(thing)
+    if module is not None and module.partition(".")[0] != "control":
+        return _library(walk, thing, module, given, named)
+    if isinstance(thing, type):
+        return _made(walk, thing, given, named)
+    return _called(walk, thing, owner, given, named)
+
+
+def _of_python(
+    walk: Walk, thing: Any, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue | None:
+    """Return what is known of the result of functions of Python's own that make others."""
     if thing is functools.partial:
         rest = tuple(named.items())
         return KnownValue(True, True, known=Bound(given[0], tuple(given[1:]), rest))
     if thing is dataclasses.replace and given:
         return made.replaced(walk, given[0], named)
-    if thing in (dataclasses.astuple, dataclasses.asdict, dataclasses.fields):
-        return OUTSIDE
-    if isinstance(thing, BuiltinFunctionType) and isinstance(owner, CONTAINERS):
-        bound = method(walk, captured(owner), thing.__name__, given, named)
-        return OUTSIDE if bound is None else bound
-    module = library(thing)
-    if module is not None and module.partition(".")[0] != "control":
-        return _library(walk, thing, module, given, named)
-    if isinstance(thing, type):
-        parts = [*given, *named.values()]
-        if thing in HOLDERS:
-            _call_functions(walk, parts)
-            parts = [v for v in parts if not isinstance(v.known, type)]
-        if thing in HOLDERS or (issubclass(thing, tuple) and hasattr(thing, "_fields")):
-            return KnownValue(True, all(v.own and v.inside for v in parts), True)
-        return made.instance(walk, thing, given, named)
+    reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
+    return OUTSIDE if any(thing is each for each in reading) else None
+
+
+def _made(
+    walk: Walk, cls: type, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue:
+    """Return what is known of an object of a class that is no library's."""
+    parts, holds = [*given, *named.values()], cls in HOLDERS
+    if holds:
+        _call_functions(walk, parts)
+        parts = [v for v in parts if not isinstance(v.known, type)]
+    if holds or (issubclass(cls, tuple) and hasattr(cls, "_fields")):
+        return KnownValue(True, all(v.own and v.inside for v in parts), True)
+    return made.instance(walk, cls, given, named)
+
+
+def _called(
+    walk: Walk, thing: Any, owner: Any, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue:
+    """Return what is known of the result of a function or method of Python code."""
     function = python_function(thing)
-    if isinstance(thing, MethodType) and type(owner).__module__.startswith(_TABLES):
-        return KnownValue(True, False, known=Pure())  # (what would change it is named in CHANGING)
     if type(owner).__module__.startswith(VARYING):
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
+    if isinstance(thing, MethodType) and _is_table(type(owner)):
+        if thing.__name__.startswith(("set_", "add_")):
+            raise Impure(f"changes with {thing.__name__}() what it did not make", MEMORY)
+        return KnownValue(True, False, known=Pure())  # (other changes are named in CHANGING)
     if function is None or not _walkable(function):
         name = getattr(thing, "__qualname__", type(thing).__name__)
         module = getattr(thing, "__module__", None) or getattr(owner, "__name__", "")
@@ -153,6 +178,11 @@ def call(
     if not isinstance(thing, MethodType):
         walk.captured(type(thing), "__call__", function)
     return walk.function(function, [captured(owner if owner is not None else thing), *given], named)
+
+
+def _is_table(cls: type) -> bool:
+    """Whether objects of a class are functions of numbers: splines, polynomials, rotations."""
+    return cls is np.poly1d or cls.__module__.startswith(_TABLES)
 
 
 def method(
