@@ -235,18 +235,20 @@ class Tracer:
         """Return a copy."""
         return Tracer(self.graph, self.cells.copy(), self.axis, self.length)
 
-    def ravel(self) -> Tracer:
+    def ravel(self, order: str = "C") -> Tracer:
         """Return the array in one dimension: a view where NumPy's is one."""
-        return self.reshape(-1)
+        return self.reshape(-1, order=order)
 
-    def flatten(self) -> Tracer:
+    def flatten(self, order: str = "C") -> Tracer:
         """Return a copy in one dimension."""
-        return self.reshape(-1).copy()
+        return self.reshape(-1, order=order).copy()
 
-    def reshape(self, *shape: Any) -> Tracer:
+    def reshape(self, *shape: Any, order: Any = "C") -> Tracer:
         """Return the array in another shape."""
         several = len(shape) == 1 and isinstance(shape[0], tuple | list)
         wanted = tuple(operator.index(n) for n in (shape[0] if several else shape))
+        if order != "C":  # NumPy knows what is a view; of a long array it cannot be written to
+            return self._part(self.elements().reshape(wanted, order=order), None, 1)
         if self.ndim == 1 and wanted in ((-1,), (self.size,)):
             return self
         if self.axis is not None and self.ndim > 1:

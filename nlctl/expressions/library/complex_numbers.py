@@ -12,7 +12,7 @@ import numpy as np
 from .. import arrays
 from ..arrays import Special, Tracer, traced
 from ..graph import Graph, Untraceable
-from ..operators import elementwise, total
+from ..operators import elementwise, product, total
 from .table import enter
 
 __all__ = ["Pair", "is_complex", "paired"]
@@ -198,6 +198,25 @@ def rect(graph: Graph, size: Any, angle: Any) -> Pair:
     return Pair(graph, elementwise(graph, "mul", size, cos), elementwise(graph, "mul", size, sin))
 
 
+def _transform(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a discrete Fourier transform, by its matrix."""
+
+    def own(graph: Graph, values: Any, n: Any = None, axis: int = -1, norm: Any = None) -> Any:
+        z = paired(graph, values)
+        if z.ndim != 1 or n is not None or norm is not None or axis not in (0, -1):
+            raise Untraceable("a Fourier transform with other arguments")
+        matrix = function(np.eye(len(z)), axis=0)
+        parts = (traced(graph, np.ascontiguousarray(p)) for p in (matrix.real, matrix.imag))
+        real, imag = (functools.partial(product, part) for part in parts)
+        if not is_complex(values):
+            return Pair(graph, real(z.real), imag(z.real))
+        return Pair(graph, real(z.real) - imag(z.imag), real(z.imag) + imag(z.real))
+
+    return own
+
+
+for _function in (np.fft.fft, np.fft.ifft):
+    enter([_function], _transform(_function))
 enter([complex], made)
 enter([cmath.rect], rect)
 enter([cmath.exp], lambda graph, z: _exp(graph, paired(graph, z)))

@@ -126,6 +126,12 @@ def asarray(graph: Graph, values: Any, dtype: Any = None) -> Any:
     return values
 
 
+@of(np.fromiter, makes=True)
+def fromiter(graph: Graph, values: Any, dtype: Any, count: int = -1) -> Any:
+    """Return what an iterator yields as an array."""
+    return array(graph, list(values), dtype)
+
+
 @of(np.copy, makes=True)
 def copy(graph: Graph, values: Any) -> Any:
     """Return a copy."""
