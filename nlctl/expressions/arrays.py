@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -79,6 +79,23 @@ class Tracer:
         return found(self, name)  # pyright: ignore[reportCallIssue]
 
     __hash__ = None  # type: ignore[assignment]
+
+    if TYPE_CHECKING:  # what `operators` and `indexing` give it
+
+        def __getitem__(self, key: Any) -> Any: ...
+        def __setitem__(self, key: Any, value: Any) -> None: ...
+        def __add__(self, other: Any) -> Any: ...
+        def __radd__(self, other: Any) -> Any: ...
+        def __sub__(self, other: Any) -> Any: ...
+        def __rsub__(self, other: Any) -> Any: ...
+        def __mul__(self, other: Any) -> Any: ...
+        def __rmul__(self, other: Any) -> Any: ...
+        def __truediv__(self, other: Any) -> Any: ...
+        def __rtruediv__(self, other: Any) -> Any: ...
+        def __pow__(self, other: Any) -> Any: ...
+        def __and__(self, other: Any) -> Any: ...
+        def __or__(self, other: Any) -> Any: ...
+        def __neg__(self) -> Any: ...
 
     @property
     def cells(self) -> np.ndarray:
@@ -218,18 +235,20 @@ class Tracer:
         """Return a copy."""
         return Tracer(self.graph, self.cells.copy(), self.axis, self.length)
 
-    def ravel(self) -> Tracer:
+    def ravel(self, order: str = "C") -> Tracer:
         """Return the array in one dimension: a view where NumPy's is one."""
-        return self.reshape(-1)
+        return self.reshape(-1, order=order)
 
-    def flatten(self) -> Tracer:
+    def flatten(self, order: str = "C") -> Tracer:
         """Return a copy in one dimension."""
-        return self.reshape(-1).copy()
+        return self.reshape(-1, order=order).copy()
 
-    def reshape(self, *shape: Any) -> Tracer:
+    def reshape(self, *shape: Any, order: Any = "C") -> Tracer:
         """Return the array in another shape."""
         several = len(shape) == 1 and isinstance(shape[0], tuple | list)
         wanted = tuple(operator.index(n) for n in (shape[0] if several else shape))
+        if order != "C":  # NumPy knows what is a view; of a long array it cannot be written to
+            return self._part(self.elements().reshape(wanted, order=order), None, 1)
         if self.ndim == 1 and wanted in ((-1,), (self.size,)):
             return self
         if self.axis is not None and self.ndim > 1:
@@ -280,7 +299,7 @@ def as_array(cells: Any) -> np.ndarray:
     return box
 
 
-def mapped(function: Callable[..., Expr], *cells: np.ndarray) -> np.ndarray:
+def mapped(function: Callable[..., Any], *cells: np.ndarray) -> np.ndarray:
     return as_array(np.frompyfunc(function, len(cells), 1)(*cells))
 
 

@@ -82,7 +82,7 @@ def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
 
 
 def _power(self: Masked, exponent: Any) -> Masked:
-    if isinstance(exponent, Tracer | np.ndarray) and np.ndim(exponent):
+    if isinstance(exponent, Tracer | np.ndarray) and exponent.ndim:
         raise Untraceable("an array next to elements that a mask chooses")
     return Masked(self.whole**exponent, self.mask)  # type: ignore[operator]
 

@@ -136,7 +136,7 @@ class Stage:
     def _is_known(self, value: Any) -> bool:
         module = getattr(value, "__module__", None) or ""
         foreign = isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is not value
-        if foreign or module.startswith(("scipy.special", "scipy.linalg")):
+        if foreign or module.startswith(("scipy.special", "scipy.linalg", "scipy.integrate")):
             enter_scipy()
         if module.startswith("scipy.interpolate"):
             enter_splines()
@@ -165,7 +165,7 @@ class Stage:
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
-            return type(value)(*map(self.instead, value))
+            return type(value)._make(map(self.instead, value))  # pyright: ignore[reportAttributeAccessIssue]
         if type(value).__module__ in _OPERATORS:
             return value  # itemgetter and its kind
         if is_of_a_library(value) and callable(value) and hasattr(value, "__wrapped__"):
@@ -246,7 +246,7 @@ class Stage:
             except Untraceable:
                 return value
         if type(value) in (list, tuple):
-            return type(value)(map(self.fresh, value))
+            return type(value)([self.fresh(v) for v in value])
         known = isinstance(value, (*_RAW, np.ndarray, type)) or not is_of_a_library(value)
         return value if known else self._instead_of_object(value)
 
@@ -310,7 +310,7 @@ class Stage:
             parts = (value.fget, value.fset, value.fdel)
             return property(*(None if p is None else self._member(p) for p in parts))
         if isinstance(value, functools.cached_property):
-            made = functools.cached_property(self._member(value.func))
+            made: Any = functools.cached_property(self._member(value.func))
             made.__set_name__(made, value.attrname or value.func.__name__)
             return made
         return self.instead(value) if callable(value) or type(value) is np.ndarray else value

@@ -16,7 +16,7 @@ from .operators import elementwise
 from .stage import Stage
 from .staged import LIBRARIES
 
-PATHS = 32  # ways through one function that are followed
+PATHS = 64  # ways through one function that are followed
 
 
 def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:

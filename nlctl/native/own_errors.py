@@ -64,5 +64,14 @@ def own_error(
     except _Enough:
         return None
     except Exception as error:  # whatever somebody's function raises
-        return error
+        return None if _is_of_the_library(error) else error
     return None
+
+
+def _is_of_the_library(error: Exception) -> bool:
+    """Whether it is python-control that raises, of values that are not finite, say."""
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    module = "" if place is None else str(place.tb_frame.f_globals.get("__name__"))
+    return module.partition(".")[0] in ("control", "nlctl", "scipy")

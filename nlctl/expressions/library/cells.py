@@ -107,7 +107,7 @@ def _of_one_kind(graph: Graph, cells: np.ndarray) -> np.ndarray:
     kinds = {e.kind for e in cells.flat}
     if len(kinds) < 2 or "f" not in kinds:
         return cells
-    return np.frompyfunc(graph.number, 1, 1)(cells)
+    return as_array(np.frompyfunc(graph.number, 1, 1)(cells))
 
 
 def by_numpy(function: Callable[..., Any]) -> Callable[..., Any]:

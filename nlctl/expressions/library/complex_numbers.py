@@ -12,7 +12,7 @@ import numpy as np
 from .. import arrays
 from ..arrays import Special, Tracer, traced
 from ..graph import Graph, Untraceable
-from ..operators import elementwise, total
+from ..operators import elementwise, product, total
 from .table import enter
 
 __all__ = ["Pair", "is_complex", "paired"]
@@ -64,7 +64,7 @@ class Pair(Special):
     def mean(self, axis: Any = None) -> Pair:
         """Return the mean."""
         count = self.real.size if axis is None else self.shape[axis]
-        return self.sum(axis) / float(count)
+        return self.linear(lambda part: total(part, axis) / float(count))
 
     def __len__(self) -> int:
         return len(self.real)
@@ -80,7 +80,7 @@ class Pair(Special):
         if not isinstance(exponent, int) or not 0 <= exponent <= 64:
             raise Untraceable("a power of complex numbers that is not a small integer")
         found = paired(self.graph, 1.0)
-        return functools.reduce(lambda a, _: a * self, range(exponent), found)
+        return functools.reduce(lambda a, _: _mul(self.graph, a, self), range(exponent), found)
 
     def _text(self, *_: Any) -> Any:
         raise Untraceable("a complex number in the place of a real one")
@@ -113,8 +113,8 @@ def paired(graph: Graph, value: Any) -> Pair:
         parts = [paired(graph, v) for v in value]
         return Pair(graph, [p.real for p in parts], [p.imag for p in parts])
     if arrays.is_complex(value):
-        array = np.asarray(value)
-        return Pair(graph, np.asarray(array.real, float), np.asarray(array.imag, float))
+        array = np.asarray(value, dtype=complex)
+        return Pair(graph, np.real(array), np.imag(array))
     real = traced(graph, value)
     return Pair(graph, real, elementwise(graph, "mul", 0.0, traced(graph, np.zeros(real.shape))))
 
@@ -198,6 +198,25 @@ def rect(graph: Graph, size: Any, angle: Any) -> Pair:
     return Pair(graph, elementwise(graph, "mul", size, cos), elementwise(graph, "mul", size, sin))
 
 
+def _transform(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a discrete Fourier transform, by its matrix."""
+
+    def own(graph: Graph, values: Any, n: Any = None, axis: int = -1, norm: Any = None) -> Any:
+        z = paired(graph, values)
+        if z.ndim != 1 or n is not None or norm is not None or axis not in (0, -1):
+            raise Untraceable("a Fourier transform with other arguments")
+        matrix = function(np.eye(len(z)), axis=0)
+        parts = (traced(graph, np.ascontiguousarray(p)) for p in (matrix.real, matrix.imag))
+        real, imag = (functools.partial(product, part) for part in parts)
+        if not is_complex(values):
+            return Pair(graph, real(z.real), imag(z.real))
+        return Pair(graph, real(z.real) - imag(z.imag), real(z.imag) + imag(z.real))
+
+    return own
+
+
+for _function in (np.fft.fft, np.fft.ifft):
+    enter([_function], _transform(_function))
 enter([complex], made)
 enter([cmath.rect], rect)
 enter([cmath.exp], lambda graph, z: _exp(graph, paired(graph, z)))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Tracer, full, traced
+from ..arrays import Tracer, full, mapped, traced
 from ..graph import Expr, Graph, Untraceable
 from ..operators import elementwise
 from .complex_numbers import Pair, is_complex, paired
@@ -50,7 +50,7 @@ def ones(graph: Graph, shape: Any, dtype: Any = float) -> Any:
 
 
 @of(np.full, makes=True)
-def filled(graph: Graph, shape: Any, value: Any, dtype: Any = None) -> Tracer:
+def filled(graph: Graph, shape: Any, value: Any, dtype: Any = None) -> Any:
     """Return an array of equal elements."""
     if not is_traced(value):
         made = np.full(shape, value, dtype)
@@ -108,7 +108,7 @@ def _of_floats(graph: Graph, array: Tracer) -> Tracer:
     kinds = {e.kind for e in array.values.flat}
     if "f" not in kinds or len(kinds) == 1:
         return array
-    cells = np.frompyfunc(graph.number, 1, 1)(array.cells)
+    cells = mapped(graph.number, array.cells)
     return Tracer(graph, cells, array.axis, array.length)
 
 
@@ -124,6 +124,12 @@ def asarray(graph: Graph, values: Any, dtype: Any = None) -> Any:
         if any(e.kind != "f" for e in values.values.flat):
             return elementwise(graph, "add", values, 0.0)
     return values
+
+
+@of(np.fromiter, makes=True)
+def fromiter(graph: Graph, values: Any, dtype: Any, count: int = -1) -> Any:
+    """Return what an iterator yields as an array."""
+    return array(graph, list(values), dtype)
 
 
 @of(np.copy, makes=True)

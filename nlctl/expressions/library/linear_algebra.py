@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Tracer, traced
 from ..elimination import eliminated, substituted
 from ..graph import Graph, Untraceable
-from ..operators import elementwise, product
+from ..operators import elementwise, product, total
 from .table import Facade, constant, of
 
 __all__: list[str] = []
@@ -98,10 +98,16 @@ def lstsq(graph: Graph, a: Any, b: Any, rcond: Any = None) -> tuple[Any, ...]:
     matrix = constant(traced(graph, a))
     if not isinstance(matrix, np.ndarray):
         raise Untraceable("least squares with a matrix that depends on the state")
-    rows = min(matrix.shape)
-    found = product(traced(graph, np.linalg.pinv(matrix)), traced(graph, b))
+    b = traced(graph, b)
+    found = product(traced(graph, np.linalg.pinv(matrix)), b)
     singular = np.linalg.svd(matrix, compute_uv=False)
-    return found, traced(graph, np.zeros(0)), rows, traced(graph, singular)
+    rank = int(np.linalg.matrix_rank(matrix))
+    rest = traced(graph, np.zeros(0))
+    if rank == matrix.shape[1] < matrix.shape[0]:
+        apart = elementwise(graph, "sub", b, product(traced(graph, matrix), found))
+        rest = total(elementwise(graph, "mul", apart, apart), 0)
+        rest = rest if rest.shape else rest.reshape(1)
+    return found, rest, rank, traced(graph, singular)
 
 
 @of(np.linalg.cholesky)

@@ -92,7 +92,7 @@ class Builtins:
         if only.op == "const":
             return int(only.data)
         if only.kind == "i":
-            return int(value) if only.value is not None else value
+            return value.__index__() if only.value is not None else value  # type: ignore[attr-defined]
         if only.kind == "b":
             return scalar(self.graph, self.graph.integer(only))
         return self._whole("trunc", value)

@@ -98,7 +98,7 @@ def summed(
 ) -> Any:  # fmt: skip
     """Return a sum."""
     if isinstance(values, Masked | Pair):
-        return values.sum() if axis is None else values.sum(axis)
+        return values.sum() if isinstance(values, Masked) else values.sum(axis)
     array = traced(graph, values)
     if where is not True:
         array = elementwise(graph, "select", where, array, 0.0)
@@ -285,7 +285,10 @@ def sort(graph: Graph, values: Any, axis: Any = -1) -> Tracer:
 
 @of(np.argsort)
 def argsort(graph: Graph, values: Any, axis: Any = -1) -> Tracer:
-    """Return where the elements of an ordered array were."""
+    """Return where the elements of an ordered array were.
+
+    Equal ones stay in their order; NumPy's own depends on the machine there.
+    """
     if traced(graph, values).shape[-1] > 16:
         raise Untraceable("the order of many elements, some of which may be equal")
     return _along(graph, values, axis, lambda row: in_order(graph, row)[1])

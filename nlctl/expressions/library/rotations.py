@@ -212,4 +212,4 @@ def turn_of(graph: Graph, rotation: Any) -> Turn:
     quat = np.asarray(rotation.as_quat(), dtype=float)
     if quat.shape != (4,):
         raise Untraceable("several rotations at once")
-    return Turn(graph, quat)
+    return Turn(graph, list(quat))

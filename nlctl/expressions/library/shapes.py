@@ -18,7 +18,7 @@ from .table import METHODS, enter, of
 __all__: list[str] = []
 
 MOVING = (
-    np.split, np.array_split, np.hsplit, np.vsplit, np.dsplit, np.transpose, np.swapaxes,
+    np.hsplit, np.vsplit, np.dsplit, np.transpose, np.swapaxes,
     np.moveaxis, np.rollaxis, np.squeeze, np.expand_dims, np.atleast_2d, np.atleast_3d, np.flip,
     np.fliplr, np.flipud, np.rot90, np.diagonal, np.diag, np.diagflat, np.broadcast_to,
     np.broadcast_arrays, np.stack, np.vstack, np.column_stack, np.dstack, np.block, np.tile,
@@ -94,6 +94,16 @@ def concatenate(graph: Graph, parts: Any, axis: Any = 0) -> Tracer:
     if all(a.ndim == 1 for a in arrays) and axis in (0, -1):
         return concatenated(graph, arrays)
     return by_moving(np.concatenate)(graph, [a.short() for a in arrays], axis=axis)
+
+
+@of(np.split, np.array_split)
+def split(graph: Graph, values: Any, sections: Any, axis: int = 0) -> Any:
+    """Return parts of an array, which are views."""
+    array = traced(graph, values)
+    if array.axis is None or array.ndim > 1:
+        return by_moving(np.array_split)(graph, array, sections, axis)
+    places = np.array_split(np.arange(array.size), sections)
+    return [array[int(p[0]) : int(p[-1]) + 1] if p.size else array[:0] for p in places]
 
 
 @of(np.hstack)
@@ -194,15 +204,15 @@ def atleast_1d(graph: Graph, *values: Any) -> Any:
 
 
 @of(np.ravel)
-def ravel(graph: Graph, values: Any) -> Tracer:
+def ravel(graph: Graph, values: Any, order: str = "C") -> Tracer:
     """Return an array in one dimension."""
-    return traced(graph, values).reshape(-1)
+    return traced(graph, values).reshape(-1, order=order)
 
 
 @of(np.reshape)
-def reshape(graph: Graph, values: Any, shape: Any) -> Tracer:
+def reshape(graph: Graph, values: Any, shape: Any, order: str = "C") -> Tracer:
     """Return an array in another shape."""
-    return traced(graph, values).reshape(shape)
+    return traced(graph, values).reshape(shape, order=order)
 
 
 @of(np.copyto)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Tracer, traced
+from ..arrays import Tracer, concatenated, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
 from .creation import whole_numbers
@@ -22,8 +22,9 @@ __all__ = ["enter_scipy"]
 @functools.cache
 def enter_scipy() -> None:
     """Enter functions of SciPy, as soon as somebody uses one."""
-    from scipy import linalg, special
+    from scipy import integrate, linalg, special
 
+    enter([integrate.cumulative_trapezoid], cumulative_trapezoid)
     for name in ("solve", "inv", "det", "cholesky", "norm"):
         enter([getattr(linalg, name)], _of_linalg(name))
     enter([linalg.block_diag], by_moving(linalg.block_diag))
@@ -34,6 +35,25 @@ def enter_scipy() -> None:
     for name in ("log1p", "expm1", "exp2", "cbrt"):
         if getattr(special, name) is not getattr(np, name):
             enter([getattr(special, name)], functools.partial(_elementwise, name))
+
+
+def cumulative_trapezoid(
+    graph: Graph, y: Any, x: Any = None, dx: Any = 1.0, axis: int = -1, initial: Any = None
+) -> Tracer:
+    """Return the integrals from the first place to each."""
+    array = traced(graph, y)
+    if array.ndim != 1 or axis not in (0, -1):
+        raise Untraceable("integrals along one axis of several")
+    width = dx if x is None else elementwise(graph, "sub", *(traced(graph, x)[s] for s in _SHIFTED))
+    both = elementwise(graph, "add", *(array[s] for s in _SHIFTED))
+    areas = elementwise(graph, "div", elementwise(graph, "mul", width, both), 2.0)
+    found = OWN[np.cumsum](graph, areas)
+    if initial is None:
+        return found
+    return concatenated(graph, [traced(graph, [initial]), found])
+
+
+_SHIFTED = (slice(1, None), slice(None, -1))
 
 
 def _of_linalg(name: str) -> Any:

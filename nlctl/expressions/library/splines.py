@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Tracer, mapped, traced
+from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from .table import enter
 from .tables import MOST_PIECES, choice, polynomial
@@ -91,14 +91,14 @@ def piecewise_polynomial(
 
 
 def _beyond(
-    graph: Graph, x: Expr, ends: Sequence[float], found: Expr, below: Expr, above: Expr
+    graph: Graph, x: Expr, ends: Sequence[Any], found: Expr, below: Expr, above: Expr
 ) -> Expr:
     """Return what is inside of a range, and other values beyond its ends."""
     found = graph.op("select", graph.op("gt", x, graph.const(float(ends[-1]))), above, found)
     return graph.op("select", graph.op("lt", x, graph.const(float(ends[0]))), below, found)
 
 
-def _guard_range(graph: Graph, x: Expr, ends: Sequence[float]) -> None:
+def _guard_range(graph: Graph, x: Expr, ends: Sequence[Any]) -> None:
     """Note that SciPy raises an error beyond the ends of a range."""
     graph.guards.append(graph.op("ge", x, graph.const(float(ends[0]))))
     graph.guards.append(graph.op("le", x, graph.const(float(ends[-1]))))
@@ -167,7 +167,8 @@ def fitted_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, ext: Any = None
     """Return one of SciPy's splines that are fitted to data."""
     codes = {"extrapolate": 0, "zeros": 1, "raise": 2, "const": 3}
     how = thing.ext if ext is None else ext
-    return splev(graph, x, thing._eval_args, nu, codes.get(how, how))
+    code: Any = codes.get(how, how)
+    return splev(graph, x, thing._eval_args, nu, code)
 
 
 def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
@@ -179,7 +180,8 @@ def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
     if kind in ("linear", "linear-np", "slinear") and not hasattr(thing, "_spline"):
         rule = functools.partial(_line, graph, thing.x, values)
     elif hasattr(thing, "_spline"):
-        rule = lambda e: b_spline(graph, thing._spline, Tracer(graph, np.array(e)), 0, True).only  # noqa: E731
+        spline = _of_one_value(thing._spline)
+        rule = lambda e: b_spline(graph, spline, scalar(graph, e), 0, True).only  # noqa: E731
     else:
         raise Untraceable(f"interp1d of kind {kind!r}")
     extrapolates, bounded = bool(thing._extrapolate), bool(thing.bounds_error)
@@ -195,6 +197,13 @@ def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
         return _beyond(graph, e, ends, found, below, above)
 
     return _each(graph, x, at)
+
+
+def _of_one_value(spline: Any) -> Any:
+    """Return a spline whose values are numbers instead of rows of one number."""
+    from scipy.interpolate import BSpline
+
+    return BSpline(spline.t, spline.c.reshape(len(spline.c), -1)[:, 0], spline.k)
 
 
 def _fill(thing: Any) -> tuple[Any, Any]:
@@ -240,7 +249,7 @@ def _on_grid(graph: Graph, thing: Any, values: np.ndarray, x: Sequence[Expr]) ->
         for index in np.ndindex(made.shape):
             made[index] = _between(graph, places, cells[index], x[axis])
         cells = made
-    found = cells[()] if isinstance(cells, np.ndarray) else cells
+    found: Any = cells[()] if isinstance(cells, np.ndarray) else cells
     for axis, e in enumerate(x):
         ends = thing.grid[axis][0], thing.grid[axis][-1]
         if thing.bounds_error:

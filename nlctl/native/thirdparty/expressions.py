@@ -25,6 +25,7 @@ from .values import (
     Impure,
     Instance,
     KnownValue,
+    ListOf,
     Local,
     OneOf,
     Parent,
@@ -141,6 +142,8 @@ class Expressions(ast.NodeVisitor):
             self.visit(target.slice)
         if isinstance(base.known, Instance):
             return self.write_object(target, base, value)
+        if isinstance(base.known, ListOf | OneOf):
+            raise Impure(f"changes '{ast.unparse(target.value)}', which holds functions", CHANGES)
         if not base.own:
             text = ast.unparse(target.value)
             raise Impure(f"writes into '{text}', which it did not make", f"{MEMORY}, or {CHANGES}")
@@ -151,7 +154,7 @@ class Expressions(ast.NodeVisitor):
     ) -> None:
         """Note what is written into an object that the call has made."""
         if isinstance(target, ast.Subscript):
-            found = made.operator_of(base, "__setitem__")
+            found = made.operator_of(self.walk, base, "__setitem__")
             if found is None:
                 raise Impure(f"writes into an object of {base.known.cls.__name__}", CHANGES)
             self.walk.function(found, [base, OUTSIDE, value], {})
@@ -191,7 +194,7 @@ class Expressions(ast.NodeVisitor):
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> KnownValue:
         value = self.visit(node.operand)
-        found = made.operator_of(value, _SIGNS.get(type(node.op), ""))
+        found = made.operator_of(self.walk, value, _SIGNS.get(type(node.op), ""))
         if found is not None:
             return self.walk.function(found, [value], {})
         self.operands([value])
@@ -202,7 +205,7 @@ class Expressions(ast.NodeVisitor):
         name, results, plain = OPERATORS.get(kind, ""), [], []
         turned = _TURNED.get(name, f"r{name}")
         for one, other, own in ((left, right, name), (right, left, turned)):
-            found = made.operator_of(one, f"__{own}__") if name else None
+            found = made.operator_of(self.walk, one, f"__{own}__") if name else None
             if found is None:
                 plain.append(one)
             else:
@@ -273,9 +276,12 @@ class Expressions(ast.NodeVisitor):
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         values = [self.visit(index) for index in indices]
         keys = [v.known for v in values]
+        if isinstance(base.known, ListOf):
+            slices = any(isinstance(key, slice) for key in keys)
+            return base if slices else element(base)
         if isinstance(base.known, OneOf):
             return element(base) if _are_containers(base.known) else base
-        found = made.operator_of(base, "__getitem__")
+        found = made.operator_of(self.walk, base, "__getitem__")
         if found is not None:
             return self.walk.function(found, [base, *values[:1]], {})
         if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
@@ -307,6 +313,8 @@ class Expressions(ast.NodeVisitor):
             return replace(base, own=base.inside)
         if isinstance(thing, Instance):
             return made.attribute(self.walk, base, name)
+        if isinstance(thing, ListOf):
+            raise Impure(f"reads '.{name}' of a list of functions or objects", "take one of them")
         if isinstance(thing, Parent):
             return made.of_parent(self.walk, thing, name)
         if isinstance(thing, OneOf):
@@ -392,7 +400,8 @@ class Expressions(ast.NodeVisitor):
         return made
 
     def iterated(self, value: KnownValue) -> None:
-        known_calls.check_object(value, "goes through")
+        if not isinstance(value.known, ListOf):  # whatever is in it is only handed on
+            known_calls.check_object(value, "goes through")
 
 
 def _part(value: KnownValue, i: int, count: int) -> KnownValue:

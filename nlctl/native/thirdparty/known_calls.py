@@ -18,10 +18,12 @@ from .values import (
     FRESH,
     OUTSIDE,
     SLICE,
+    UNKNOWN_VALUE,
     Bound,
     Impure,
     Instance,
     KnownValue,
+    ListOf,
     Local,
     OneOf,
     Parent,
@@ -60,6 +62,7 @@ _OTHERS |= dict.fromkeys(("seterr", "seterrcall", "setbufsize", "set_printoption
 _OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load", "loadtxt",
                           "loads", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
                          "read files before the run, and write them after it")  # fmt: skip
+_TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial")
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
@@ -114,11 +117,30 @@ def call(
     owner = getattr(thing, "__self__", None)
     if _is_builtin(thing):
         return _builtin(walk, thing, given, named)
+    if isinstance(thing, BuiltinFunctionType) and isinstance(owner, CONTAINERS):
+        bound = method(walk, captured(owner), thing.__name__, given, named)
+        return OUTSIDE if bound is None else bound
+    special = _of_python(walk, thing, given, named)
+    if special is not None:
+        return special
+    module = library(thing)
+    if module is not None and module.partition(".")[0] != "control":
+        return _library(walk, thing, module, given, named)
+    if isinstance(thing, type):
+        return _made(walk, thing, given, named)
+    return _called(walk, thing, owner, given, named)
+
+
+def _of_python(
+    walk: Walk, thing: Any, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue | None:
+    """Return what is known of the result of functions of Python's own that make others."""
     if thing is functools.partial:
         rest = tuple(named.items())
         return KnownValue(True, True, known=Bound(given[0], tuple(given[1:]), rest))
     if thing is dataclasses.replace and given:
         return made.replaced(walk, given[0], named)
+<<<<<<< HEAD
     if thing in (dataclasses.astuple, dataclasses.asdict, dataclasses.fields):
         return OUTSIDE
     if isinstance(thing, BuiltinFunctionType) and isinstance(owner, CONTAINERS):
@@ -129,9 +151,36 @@ def call(
         return _library(walk, thing, module, given, named)
     if isinstance(thing, type):
         return _instance(walk, thing, given, named)
+=======
+    reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
+    return OUTSIDE if any(thing is each for each in reading) else None
+
+
+def _made(
+    walk: Walk, cls: type, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue:
+    """Return what is known of an object of a class that is no library's."""
+    parts, holds = [*given, *named.values()], cls in HOLDERS
+    if holds:
+        _call_functions(walk, parts)
+        parts = [v for v in parts if not isinstance(v.known, type)]
+    if holds or (issubclass(cls, tuple) and hasattr(cls, "_fields")):
+        return KnownValue(True, all(v.own and v.inside for v in parts), True)
+    return made.instance(walk, cls, given, named)
+
+
+def _called(
+    walk: Walk, thing: Any, owner: Any, given: list[KnownValue], named: dict[str, KnownValue]
+) -> KnownValue:
+    """Return what is known of the result of a function or method of Python code."""
+>>>>>>> graph
     function = python_function(thing)
     if type(owner).__module__.startswith(VARYING):
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
+    if isinstance(thing, MethodType) and _is_table(type(owner)):
+        if thing.__name__.startswith(("set_", "add_")):
+            raise Impure(f"changes with {thing.__name__}() what it did not make", MEMORY)
+        return KnownValue(True, False, known=Pure())  # (other changes are named in CHANGING)
     if function is None or not _walkable(function):
         name = getattr(thing, "__qualname__", type(thing).__name__)
         module = getattr(thing, "__module__", None) or getattr(owner, "__name__", "")
@@ -144,6 +193,7 @@ def call(
     return walk.function(function, [captured(owner if owner is not None else thing), *given], named)
 
 
+<<<<<<< HEAD
 def _instance(
     walk: Walk, thing: type, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
@@ -155,6 +205,11 @@ def _instance(
     if thing in HOLDERS or (issubclass(thing, tuple) and hasattr(thing, "_fields")):
         return KnownValue(True, all(v.own and v.inside for v in parts), True)
     return made.instance(walk, thing, given, named)
+=======
+def _is_table(cls: type) -> bool:
+    """Whether objects of a class are functions of numbers: splines, polynomials, rotations."""
+    return cls is np.poly1d or cls.__module__.startswith(_TABLES)
+>>>>>>> graph
 
 
 def method(
@@ -168,6 +223,8 @@ def method(
         If it changes a container that the call has not made.
     """
     thing = base.known
+    if isinstance(thing, ListOf):
+        return _of_list(base, name, given)
     if isinstance(thing, ModuleType | type | super | OneOf | Instance | Bound | Pure | Parent):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
@@ -191,6 +248,17 @@ def method(
     if isinstance(thing, dict | tuple | list) and not isinstance(thing, Unknown):
         return None
     raise Impure(f"calls a method '{name}()' that is not known", "use NumPy's functions")
+
+
+def _of_list(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
+    """Return what is known of the result of a method of a list or dict of functions."""
+    if name in ("values", "items", "copy"):
+        return base
+    if name == "get":
+        return least_upper_bound([element(base), *given[1:]])
+    if name in ("keys", "index", "count"):
+        return FRESH
+    raise Impure(f"calls {name}() of a list of functions or objects", "make a new list")
 
 
 def _read(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
@@ -229,7 +297,7 @@ def check_object(value: KnownValue, what: str) -> None:
     thing = value.known
     if isinstance(thing, Unknown | Local | Bound | Pure | enum.Enum | BuiltinFunctionType):
         return
-    if isinstance(thing, OneOf):
+    if isinstance(thing, OneOf | ListOf):
         for choice in thing.choices:
             check_object(choice, what)
         return
@@ -253,7 +321,7 @@ def _builtin(
 ) -> KnownValue:
     name = thing.__name__
     for value in given if name not in ("isinstance", "issubclass", "callable", "type") else ():
-        check_object(value, f"calls {name}() of")
+        _check_parts(value, name)
     if name == "slice":
         return SLICE
     if name == "type" and len(given) == 1:
@@ -276,10 +344,27 @@ def _builtin(
     raise Impure(f"calls {name}()", advice)
 
 
+_MOVING = ("list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter", "len")
+
+
+def _check_parts(value: KnownValue, name: str) -> None:
+    """Check what a builtin does with a value, and with what is in it unless it only moves that."""
+    known = value.known
+    if isinstance(known, ListOf) and name in _MOVING:
+        return
+    check_object(value, f"calls {name}() of")
+    if isinstance(known, list | tuple) and name not in _MOVING:
+        for part in known:
+            if not callable(part) or not isinstance(part, FunctionType | MethodType | np.ufunc):
+                check_object(captured(part), f"calls {name}() of a list that holds")
+
+
 def _functions_in(given: list[KnownValue]) -> Any:
     """Return the choice between the functions in what is gone through, for whoever calls one."""
     parts = [element(v) for v in given]
-    return function_choice([v for v in parts if isinstance(v.known, OneOf)])
+    kinds = OneOf | Instance | Bound | Local | FunctionType
+    found = [v for v in parts if isinstance(v.known, kinds)]
+    return ListOf(tuple(found)) if found else UNKNOWN_VALUE
 
 
 def _library(

@@ -153,13 +153,15 @@ def of_class(walk: Walk, base: KnownValue, found: Any) -> KnownValue:
     return captured(found)
 
 
-def operator_of(value: KnownValue, name: str) -> FunctionType | None:
+def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None:
     """Return the function of somebody's class that is an object's operator."""
     thing = value.known
-    if isinstance(thing, Instance):
-        found = inspect.getattr_static(thing.cls, name, None)
-    elif isinstance(thing, Unknown | type) or library(type(thing)) is not None:
+    cls = thing.cls if isinstance(thing, Instance) else type(thing)
+    plain = isinstance(thing, Unknown | type) or library(cls) is not None
+    if plain and not isinstance(thing, Instance):
         return None
-    else:
-        found = inspect.getattr_static(type(thing), name, None)
-    return found if isinstance(found, FunctionType) and not _is_generated(found) else None
+    found = inspect.getattr_static(cls, name, None)
+    if not isinstance(found, FunctionType) or _is_generated(found):
+        return None
+    walk.captured(cls, name, found)
+    return found

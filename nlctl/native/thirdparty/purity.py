@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import inspect
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from types import FunctionType
@@ -18,7 +19,7 @@ from typing import Any
 from . import known_calls, made
 from .captured import Captured, noted, noted_function, noted_partial
 from .expressions import Frame
-from .source import Definition, Unreadable, definition
+from .source import Definition, Unreadable, definition, source_file
 from .statements import CallWalker
 from .values import (
     FRESH,
@@ -27,6 +28,7 @@ from .values import (
     Impure,
     Instance,
     KnownValue,
+    ListOf,
     Local,
     OneOf,
     Pure,
@@ -35,6 +37,7 @@ from .values import (
     element,
     holder,
     least_upper_bound,
+    python_function,
 )
 
 _BUDGET = 400  # bodies that are walked for one function, before it is too much to follow
@@ -75,6 +78,11 @@ def check_pure(function: Any, arguments: Sequence[KnownValue]) -> Reading:
     Impure
         With the reason, and the place in ``place``.
     """
+    plain = python_function(function)
+    if plain is not None and inspect.isgeneratorfunction(plain):
+        error = Impure("yields its values", "return them as a list")
+        error.place = f"{source_file(plain)}, line {plain.__code__.co_firstlineno}"
+        raise error
     walk = Walk()
     walk.call(captured(function), list(arguments), {})
     return Reading(captured=tuple(walk.read.values()), unbound=tuple(dict.fromkeys(walk.unbound)))
@@ -111,6 +119,8 @@ class Walk:
             raise Impure("calls what is only known when it runs", "call a function by its name")
         if isinstance(thing, OneOf):
             return least_upper_bound([self.call(choice, given, named) for choice in thing.choices])
+        if isinstance(thing, ListOf):
+            raise Impure("calls a list", "call what is in it")
         if isinstance(thing, Pure):
             if thing.gives_parts:
                 return element(given[0]) if given else FRESH

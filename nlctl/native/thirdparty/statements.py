@@ -24,6 +24,7 @@ from .values import (
     captured,
     element,
     forgotten,
+    holder,
     least_upper_bound,
 )
 
@@ -39,12 +40,25 @@ class CallWalker(Expressions):
     def __init__(self, walk: Walk, frame: Frame) -> None:
         super().__init__(walk, frame)
         self.returned: list[KnownValue] = []
+        self.yielded: list[KnownValue] = []
 
     def result(self, node: Definition) -> KnownValue:
         if isinstance(node, ast.Lambda):
             return self.visit(node.body)
         self.statements(node.body)
+        if self.yielded:
+            return holder(self.yielded)
         return least_upper_bound(self.returned)
+
+    def visit_Yield(self, node: ast.Yield) -> KnownValue:
+        self.yielded.append(FRESH if node.value is None else self.visit(node.value))
+        return FRESH
+
+    def visit_YieldFrom(self, node: ast.YieldFrom) -> KnownValue:
+        over = self.visit(node.value)
+        self.iterated(over)
+        self.yielded.append(element(over))
+        return FRESH
 
     def statements(self, body: Sequence[ast.stmt]) -> None:
         for statement in body:
@@ -102,7 +116,7 @@ class CallWalker(Expressions):
     ) -> KnownValue:
         """Return what an object becomes by ``+=`` and its kind."""
         name = OPERATORS.get(type(node.op), "")
-        found = made.operator_of(value, f"__i{name}__")
+        found = made.operator_of(self.walk, value, f"__i{name}__")
         if found is not None:
             return self.walk.function(found, [value, added], {})
         return self.operated(type(node.op), value, added)

@@ -57,6 +57,13 @@ class OneOf:
 
 
 @dataclass(frozen=True)
+class ListOf:
+    """A list, tuple or dict that the call has made of functions or objects."""
+
+    choices: tuple[KnownValue, ...]
+
+
+@dataclass(frozen=True)
 class Bound:
     """A function some of whose arguments are given: a method, a `functools.partial`."""
 
@@ -150,8 +157,8 @@ class KnownValue:
 
 def _marks(known: Any) -> Any:
     """Return what tells one object that is known from another."""
-    if isinstance(known, OneOf):
-        return "one of", frozenset(choice.marks for choice in known.choices)
+    if isinstance(known, OneOf | ListOf):
+        return type(known).__name__, frozenset(choice.marks for choice in known.choices)
     if isinstance(known, Local):
         return "local", id(known.node), id(known.frame)
     if isinstance(known, Bound):
@@ -202,12 +209,16 @@ def _of_any(values: list[KnownValue]) -> Any:
         for value in values[1:]:
             first.absorb(value.known)
         return first
+    if all(isinstance(v.known, ListOf) for v in values):
+        return ListOf(tuple(dict.fromkeys(c for v in values for c in v.known.choices)))
     return function_choice(values)
 
 
 def element(value: KnownValue) -> KnownValue:
     """Return what is known of an element, whichever it is."""
     known, plain = value.known, KnownValue(value.inside, value.inside, value.holds)
+    if isinstance(known, ListOf):
+        return least_upper_bound(known.choices)
     if isinstance(known, OneOf):
         inner = [element(c) for c in known.choices if isinstance(c.known, list | tuple)]
         if len(inner) == len(known.choices):
@@ -230,13 +241,14 @@ def holder(values: Iterable[KnownValue]) -> KnownValue:
     """Return what is known of a list or tuple of these."""
     values = list(values)
     known = function_choice(values)
+    known = ListOf(tuple(values)) if isinstance(known, OneOf) else known
     return KnownValue(True, all(v.own and v.inside for v in values), True, known)
 
 
 def function_choice(values: Iterable[KnownValue]) -> Any:
     """Return the choice between functions; UNKNOWN where not all values are functions."""
     values = tuple(values)
-    kinds = Local | Bound | OneOf | Instance | Pure
+    kinds = Local | Bound | OneOf | ListOf | Instance | Pure
     functions = all(isinstance(v.known, kinds) or callable(v.known) for v in values)
     if not values or not functions:
         return UNKNOWN_VALUE
