@@ -140,18 +140,6 @@ def _of_python(
         return KnownValue(True, True, known=Bound(given[0], tuple(given[1:]), rest))
     if thing is dataclasses.replace and given:
         return made.replaced(walk, given[0], named)
-<<<<<<< HEAD
-    if thing in (dataclasses.astuple, dataclasses.asdict, dataclasses.fields):
-        return OUTSIDE
-    if isinstance(thing, BuiltinFunctionType) and isinstance(owner, CONTAINERS):
-        bound = method(walk, captured(owner), thing.__name__, given, named)
-        return OUTSIDE if bound is None else bound
-    module = library(thing)
-    if module is not None and module.partition(".")[0] != "control":
-        return _library(walk, thing, module, given, named)
-    if isinstance(thing, type):
-        return _instance(walk, thing, given, named)
-=======
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
     return OUTSIDE if any(thing is each for each in reading) else None
 
@@ -173,7 +161,6 @@ def _called(
     walk: Walk, thing: Any, owner: Any, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
     """Return what is known of the result of a function or method of Python code."""
->>>>>>> graph
     function = python_function(thing)
     if type(owner).__module__.startswith(VARYING):
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
@@ -193,23 +180,9 @@ def _called(
     return walk.function(function, [captured(owner if owner is not None else thing), *given], named)
 
 
-<<<<<<< HEAD
-def _instance(
-    walk: Walk, thing: type, given: list[KnownValue], named: dict[str, KnownValue]
-) -> KnownValue:
-    """Return what is known of an object that a class makes."""
-    parts = [*given, *named.values()]
-    if thing in HOLDERS:
-        _call_functions(walk, parts)
-        parts = [v for v in parts if not isinstance(v.known, type)]
-    if thing in HOLDERS or (issubclass(thing, tuple) and hasattr(thing, "_fields")):
-        return KnownValue(True, all(v.own and v.inside for v in parts), True)
-    return made.instance(walk, thing, given, named)
-=======
 def _is_table(cls: type) -> bool:
     """Whether objects of a class are functions of numbers: splines, polynomials, rotations."""
     return cls is np.poly1d or cls.__module__.startswith(_TABLES)
->>>>>>> graph
 
 
 def method(
