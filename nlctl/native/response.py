@@ -109,7 +109,7 @@ def _error(
     """Return why a run has not reached its last time, if it has not."""
     run, guards = made.statistics, compiled.program.guards
     if run.status is Status.ENDED:
-        return not_a_number(made.happened.rows())
+        return not_a_number(made.happened)
     if run.status is Status.OK:
         return None
     if made.culprit >= 0 and run.status in (Status.ZENO, Status.DIVERGED):

@@ -130,7 +130,7 @@ class Driver:
             self._record_within(stop, lambda _: x, closes=True)
             return stop, x + (stop - t) * self._rates(t, x), sides, [(t, lambda _: x)], None
         solver = self.method(self._rates, t, x, stop, **self._bounded(t, stop))
-        seen = self.jumps.look(t, x) if self.jumps.any else np.zeros(0)
+        seen = self._first_seen(t, x)
         self.jumps.check_watched(t, seen)
         pieces: list[Any] = []
         while True:
@@ -157,7 +157,17 @@ class Driver:
                 sides = seen[: sides.size] >= 0.0
                 self.jumps.check_resolved(until, seen)
             if closes:
+                self._before = None if event else seen
                 return until, x, sides, pieces, event
+
+    def _first_seen(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Return what is seen where a flow begins; of what is exactly 0 at a stop, before that."""
+        seen = self.jumps.look(t, x) if self.jumps.any else np.zeros(0)
+        guards, others = self.jumps.kinds
+        own = slice(guards, guards + others)
+        if self._before is not None and self._before.shape == seen.shape:
+            seen[own] = np.where(seen[own] == 0.0, self._before[own], seen[own])
+        return seen
 
     def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
         """Whether the step just made, from rest, has passed something that moves the state."""
@@ -258,6 +268,7 @@ class Driver:
             self.progress(self.reached)
 
     _repeated, _longest, _ended = 0, 0.0, False
+    _before: np.ndarray | None = None
 
     def _record_within(self, until: float, state: Any, closes: bool) -> None:
         """Record the times of the response that a step has passed, but not what is to jump."""

@@ -42,7 +42,7 @@ class EventLog:
         named = {"block": block, "which": which, "direction": direction}
         return pd.DataFrame({"time": self.time, **named})
 
-    def rows(self) -> Iterator[tuple[float, str, str, str]]:
+    def __iter__(self) -> Iterator[tuple[float, str, str, str]]:
         """Yield time, block, which and direction of each event."""
         for t, k in zip(self.time.tolist(), self.label.tolist(), strict=True):
             yield t, *self.labels[k]
