@@ -257,8 +257,6 @@ def _compare(task, lane, w, j):
             part = min(max(before / (before - now), 0.0), 1.0)
             until = min(until, lane.low / lane.step if lane.tries else part)
     for i in range(task.switching):
-        if task.bending <= i < task.watched:
-            continue  # these are among the comparisons
         if not _is_followed(p, w.h[j], w.terms, n + i, j):
             w.looked[j], w.foreseen[j] = -1.0, 0.5
         elif not w.e_start[i, j] * w.g[i, j] < 0.0:
