@@ -59,7 +59,9 @@ def _magnitude(a: Range) -> Range:
 
 
 _RULES = {
-    "sign": lambda a: (-1.0, 1.0),
+    **dict.fromkeys(("sign", "sin", "cos", "tanh", "erf"), lambda _: (-1.0, 1.0)),
+    "arctan": lambda _: (-math.pi / 2, math.pi / 2),
+    "arctan2": lambda _, __: (-math.pi, math.pi),
     "add": lambda a, b: (a[0] + b[0], a[1] + b[1]),
     "sub": lambda a, b: (a[0] - b[1], a[1] - b[0]),
     "neg": lambda a: (-a[1], -a[0]),

@@ -89,6 +89,15 @@ def product(a: Tracer, b: Tracer) -> Tracer:
     return total(elementwise(a.graph, "mul", a, b), -1)
 
 
+def _matrix_product(graph: Graph, a: Any, b: Any) -> Any:
+    if is_complex(a) or is_complex(b):
+        assert Special.of_complex is not None
+        return Special.of_complex(graph, a) @ b
+    if isinstance(a, Special) or isinstance(b, Special):
+        return NotImplemented
+    return product(traced(graph, a), traced(graph, b))
+
+
 def _batched(a: Tracer, b: Tracer) -> Tracer:
     """Return the products of many matrices."""
     if a.ndim == 1 or b.ndim == 1:
@@ -237,7 +246,7 @@ for _name, _method in {
     "rfloordiv": lambda self, other: floor_quotient(self.graph, other, self),
     "divmod": lambda self, other: (self // other, self % other),
     "pos": lambda self: self,
-    "matmul": lambda self, other: product(self, traced(self.graph, other)),
-    "rmatmul": lambda self, other: product(traced(self.graph, other), self),
+    "matmul": lambda self, other: _matrix_product(self.graph, self, other),
+    "rmatmul": lambda self, other: _matrix_product(self.graph, other, self),
 }.items():
     setattr(Tracer, f"__{_name}__", _method)

@@ -126,6 +126,24 @@ def _mul(graph: Graph, a: Pair, b: Pair) -> Pair:
     return Pair(graph, a.real * b.real - a.imag * b.imag, a.real * b.imag + a.imag * b.real)
 
 
+def paired_product(graph: Graph, a: Any, b: Any) -> Pair:
+    """Return the matrix product of complex numbers."""
+    a, b = paired(graph, a), paired(graph, b)
+    real = product(a.real, b.real) - product(a.imag, b.imag)
+    return Pair(graph, real, product(a.real, b.imag) + product(a.imag, b.real))
+
+
+def _sqrt(graph: Graph, z: Pair) -> Pair:
+    """The root with a real part that is not negative, by the larger of both parts."""
+    op = functools.partial(elementwise, graph)
+    half = (op("absolute", z.real) + _absolute(graph, z)) / 2.0
+    large = op("sqrt", half)
+    small = op("select", op("eq", large, 0.0), 0.0, op("absolute", z.imag) / (2.0 * large))
+    right = op("ge", z.real, 0.0)
+    real, imag = op("select", right, large, small), op("select", right, small, large)
+    return Pair(graph, real, op("copysign", imag, z.imag))
+
+
 def _div(graph: Graph, a: Pair, b: Pair) -> Pair:
     size = b.real * b.real + b.imag * b.imag
     top = _mul(graph, a, b.conjugate())
@@ -163,6 +181,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "neg": lambda g, a: Pair(g, -a.real, -a.imag),
     "absolute": _absolute,
     "exp": _exp,
+    "sqrt": _sqrt,
     "log": _log,
     "select": _select,
     "eq": lambda g, a, b: (a.real == b.real) & (a.imag == b.imag),
@@ -183,6 +202,10 @@ for _name, _op in {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div"}.i
     setattr(Pair, f"__r{_name}__", _operator(_op, turned=True))
 for _name, _op in {"neg": "neg", "abs": "absolute", "eq": "eq", "ne": "ne"}.items():
     setattr(Pair, f"__{_name}__", _operator(_op))
+
+
+Pair.__matmul__ = lambda self, other: paired_product(self.graph, self, other)  # type: ignore[attr-defined]
+Pair.__rmatmul__ = lambda self, other: paired_product(self.graph, other, self)  # type: ignore[attr-defined]
 
 
 def made(graph: Graph, real: Any = 0.0, imag: Any = 0.0) -> Any:

@@ -73,10 +73,9 @@ class Builtins:
     def _float(self, value: Any = 0.0) -> Any:
         if not isinstance(value, Tracer):
             return float(value)
-        if value.size != 1:
+        if value.shape:
             raise Untraceable("the float of an array")
-        return scalar(self.graph, self.graph.number(value.reshape(1)[0].only if value.shape
-                                                    else value.only))  # fmt: skip
+        return scalar(self.graph, self.graph.number(value.only))
 
     def _complex(self, *parts: Any) -> Any:
         if not any(map(is_traced, parts)):

@@ -13,6 +13,7 @@ from ..graph import Expr, Graph, Untraceable
 from ..masked import Masked
 from ..operators import elementwise, product
 from .cells import by_numpy
+from .complex_numbers import is_complex, paired_product
 from .table import METHODS, enter, of
 
 __all__: list[str] = []
@@ -59,6 +60,8 @@ def _opened(value: Any, owners: list[Tracer]) -> Any:
         return np.array([e.value if e.kind == "i" else e.data for e in value.values.flat]).reshape(
             value.shape
         )
+    if not value.shape and value.only.kind == "i":
+        return value.__index__()  # pyright: ignore[reportAttributeAccessIssue] (each is followed)
     owners.append(value)
     return value.elements() if value.shape else value.only
 
@@ -187,8 +190,10 @@ def pad(graph: Graph, a: Any, width: Any, mode: str = "constant", **options: Any
 
 
 @of(np.dot, np.matmul, np.linalg.matmul)
-def dot(graph: Graph, a: Any, b: Any) -> Tracer:
+def dot(graph: Graph, a: Any, b: Any) -> Any:
     """Return a product of matrices."""
+    if is_complex(a) or is_complex(b):
+        return paired_product(graph, a, b)
     a, b = traced(graph, a), traced(graph, b)
     if not (a.shape and b.shape):
         return elementwise(graph, "mul", a, b)
