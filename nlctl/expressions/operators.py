@@ -16,7 +16,7 @@ from .arrays import Special, Tracer, as_array, is_complex, mapped, traced
 from .graph import SMALL, Ambiguous, Expr, Graph, Untraceable
 from .integers import integer_range
 
-FOLLOWED = 16  # values of an integer, each a way through a function
+_FOLLOWED = 16  # values of an integer, each a way through a function
 
 
 def elementwise(graph: Graph, name: str, *operands: Any) -> Tracer:
@@ -48,7 +48,7 @@ def _is_mixed(arrays: list[Tracer], long: tuple[int, int]) -> bool:
     return any(a.axis is None and a.ndim >= place and a.shape[-place] > 1 for a in arrays)
 
 
-def counted(array: Tracer) -> Tracer:
+def with_counts(array: Tracer) -> Tracer:
     """Return an array with 0 and 1 for truth values, as NumPy's sums take them."""
     if all(e.kind != "b" for e in array.values.flat):
         return array
@@ -57,7 +57,7 @@ def counted(array: Tracer) -> Tracer:
 
 def total(array: Tracer, axis: Any = None) -> Tracer:
     """Return the sum of all elements, or along an axis, from left to right."""
-    array = counted(array)
+    array = with_counts(array)
     graph, cells, long = array.graph, array.cells, array.axis
     along = range(array.ndim) if axis is None else [operator.index(axis) % array.ndim]
     if long in along:
@@ -142,7 +142,7 @@ def _integer(self: Tracer) -> int:
     if self.only.value is not None:
         return self.graph.assumed(self.only)
     low, high = integer_range(self.only)
-    if high - low >= FOLLOWED:
+    if high - low >= _FOLLOWED:
         raise Untraceable("an integer that may have too many values")
     values = range(int(low), int(high) + 1)
     equal = {k: self.graph.op("eq", self.only, self.graph.const(k)) for k in values}
