@@ -147,7 +147,7 @@ def _of_python(
 def _made(
     walk: Walk, cls: type, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
-    """Return what is known of an object of a class that is no library's."""
+    """Return what is known of a new object of somebody's class."""
     parts, holds = [*given, *named.values()], cls in HOLDERS
     if holds:
         _call_functions(walk, parts)
