@@ -138,9 +138,13 @@ class Builtins:
         return getattr(thing, *rest)
 
     def _hasattr(self, thing: Any, name: str) -> bool:
-        if isinstance(thing, Tracer):
-            return hasattr(np.empty(thing.shape) if thing.shape else 0.0, name)
-        return hasattr(thing, name)
+        if not isinstance(thing, Tracer):
+            return hasattr(thing, name)
+        kinds = (np.empty(thing.shape),) if thing.shape else (0.0, np.float64(0.0), 0)
+        answers = {hasattr(each, name) for each in kinds}
+        if len(answers) > 1:
+            raise Untraceable(f"a question for {name} of a number")
+        return answers.pop()
 
     def _type(self, thing: Any, *rest: Any) -> Any:
         if is_traced(thing):

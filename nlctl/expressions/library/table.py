@@ -67,6 +67,12 @@ class NumberType:
     def __getattr__(self, name: str) -> Any:
         return getattr(self.real, name)
 
+    def __eq__(self, other: object) -> bool:
+        return unwrapped(other) is self.real
+
+    def __hash__(self) -> int:
+        return hash(self.real)
+
 
 def unwrapped(value: Any) -> Any:
     """Return the type that stands behind a value, any other value as it is."""
@@ -156,7 +162,9 @@ def is_traced(value: Any) -> bool:
 def _method(array: Tracer, name: str) -> Any:
     """Return a method of an array, or the part that it names."""
     if name not in ARRAY_METHODS:
-        raise AttributeError(f"an array of expressions has no {name}")
+        text = f"an array of expressions has no {name}"
+        known = hasattr(np.ndarray, name) or hasattr(np.float64, name)
+        raise Untraceable(text) if known else AttributeError(text)
     known = ARRAY_METHODS[name]
     if known in WRITTEN:  # a function that does the same
         return lambda *rest, **named: written_out(array.graph, known, array, *rest, **named)
