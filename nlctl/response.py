@@ -20,7 +20,7 @@ from .names import unknown
 from .params import checked_times
 from .reference.interpreted import SOLVE_IVP_METHODS, python_control_response
 from .responses.arguments import RunArguments, checked_params, unified, with_aliases
-from .responses.watched import watched_functions
+from .responses.watched import check_moves, watched_functions
 from .sliding.blocks import sliding_blocks
 from .upstream.control_internals import is_system
 
@@ -170,7 +170,7 @@ def input_output_response(
     Raises
     ------
     DivergedError
-        If the state becomes infinite or NaN.
+        If the state becomes infinite or NaN, or an event function NaN.
     ChatteringError
         If a run switches over and over again at a jump; the message names the block.
     ZenoError
@@ -185,7 +185,8 @@ def input_output_response(
         If a state, a parameter, a method or an argument of that name does not exist.
     ParameterError
         If a value is refused: times that are not finite and increasing, inputs or states of a
-        wrong shape or not finite, an argument that has no meaning for the engine.
+        wrong shape or not finite, an argument that has no meaning for the engine, an event
+        function that does not return one number or is 0 all the time.
 
     Warns
     -----
@@ -230,7 +231,10 @@ def input_output_response(
         },
         watched=watched_functions(stop_when, events),
     )
-    return _computed(unified(run), "auto" if engine is None else engine)
+    made = _computed(unified(run), "auto" if engine is None else engine)
+    if run.watched and made.success is not False:
+        check_moves(run.watched, (made.t, made.x, made.u), params)
+    return made
 
 
 @functools.cache

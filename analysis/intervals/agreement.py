@@ -20,19 +20,21 @@ from nlctl.wording import counted
 
 from .arithmetic import Ball, as_ball, quiet
 from .normal_form import Sum
+from .numpy_functions import NumPyFunctions
 from .paths import Undecided, decided_so_far
 from .quotient import Slope
 from .time_dependence import UNREAD
 from .type_questions import type_question
 from .written import Written
 
-__all__ = ["agreeing", "on_balls"]
+__all__ = ["agreeing", "on_balls", "one_number", "several_numbers"]
 
 _ALL, _EVERY = 400, 16  # calls that are all compared, and then every so many
 _AT_POINTS = 40  # calls that are compared with balls without width, too: wide ones hold a lot
 _GOLDEN = 0.6180339887498949
 _ROUNDING, _BALLS = 1e-9, 16  # relative; and radii of balls at a point, which bound rounding
 _LARGE = 5.0  # scale of points in balls without an end
+_NUMBERS = (NumPyFunctions, arb, int, float, np.integer, np.floating, np.bool_)
 _APART = 1e-2  # least |v| at which a difference quotient keeps its digits
 _ASKED = (
     "it {}, and may then do one thing in a run and another in a proof: leave it to numbers, with "
@@ -92,19 +94,58 @@ def on_balls(
     Undecided
         When the function that is returned compares balls that decide nothing.
     UsageError
-        The refusal, when it fails otherwise, or makes something else of floats.
+        The refusal, when it fails otherwise, gives what is not a number, or makes something else
+        of floats.
     """
     compared = agreeing(function, refusal)
 
     def called(*arguments: Any) -> Any:
         try:
-            return compared(*arguments)
+            result = compared(*arguments)
         except (Undecided, UsageError):
             raise
         except Exception as error:  # a user's function may raise whatever it likes
             raise refusal(f"{type(error).__name__}: {error}") from error
+        for part in _elements(result):
+            if not isinstance(part, _NUMBERS) and part is not UNREAD:
+                raise refusal(f"it gives {_kind_of(part)}, where a number is needed")
+        return result
 
     return called
+
+
+def one_number(function: Callable[..., Any], refusal: _Refusal) -> Callable[..., Any]:
+    """Return a function as `on_balls` does, that gives one number and nothing else."""
+    compared = on_balls(function, refusal)
+
+    def called(*arguments: Any) -> Any:
+        result = compared(*arguments)
+        if isinstance(result, np.ndarray) and not result.ndim:  # of np.where
+            result = result.item()
+        if not isinstance(result, _NUMBERS):
+            raise refusal(f"it gives {_kind_of(result)}, where one number is needed")
+        return result
+
+    return called
+
+
+def several_numbers(function: Callable[..., Any], refusal: _Refusal) -> Callable[..., Any]:
+    """Return a function as `on_balls` does, that gives a tuple, list or array of numbers."""
+    compared = on_balls(function, refusal)
+
+    def called(*arguments: Any) -> tuple[Any, ...]:
+        result = compared(*arguments)
+        if isinstance(result, tuple | list | np.ndarray) and np.ndim(result) <= 1:
+            parts = tuple(_elements(result))
+            if len(parts) == len(np.atleast_1d(result)):
+                return parts
+        raise refusal(f"it gives {_kind_of(result)}, where a tuple of numbers is needed")
+
+    return called
+
+
+def _kind_of(result: Any) -> str:
+    return f"an object of type {type(result).__name__}"
 
 
 def _compare(

@@ -417,7 +417,7 @@ def as_ball(x: Any) -> Any:
         return x
     if isinstance(x, arb):
         return Ball(x)
-    if isinstance(x, np.ndarray) and x.dtype == object and not x.ndim:  # of np.where
+    if isinstance(x, np.ndarray) and not x.ndim:  # of np.where
         return as_ball(x.item())
     if isinstance(x, int | float | np.integer | np.floating | np.bool_):
         return Ball(arb(float(x)))

@@ -9,7 +9,7 @@ from typing import Literal
 import control as ct
 import numpy as np
 
-from nlctl.annotations import as_annotated
+from nlctl.annotations import as_annotated, as_numbers
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.wording import counted
@@ -62,7 +62,18 @@ class Box:
         -------
         Box
             In the order given.
+
+        Raises
+        ------
+        ParameterError
+            If a side is not a pair of numbers, or its lower end is above the upper one.
         """
+        for name, ends in sides.items():
+            numbers = as_numbers(ends) if isinstance(ends, tuple | list | np.ndarray) else None
+            if numbers is None or numbers.shape != (2,):
+                raise ParameterError(
+                    f"Box needs (low, high) for side {name}, as in (-1, 1), got {str(ends)[:40]!r}"
+                )
         low, high = (tuple(float(ends[i]) for ends in sides.values()) for i in (0, 1))
         return cls(names=tuple(sides), low=low, high=high)
 
@@ -82,6 +93,7 @@ class Box:
         i = self.names.index(name)
         return self.low[i], self.high[i]
 
+    @as_annotated
     def only(self, *names: str) -> Box:
         """Return the box of some of the sides, in the order given.
 
@@ -98,6 +110,7 @@ class Box:
         low, high = (tuple(self[name][i] for name in names) for i in (0, 1))
         return dataclasses.replace(self, names=names, low=low, high=high)
 
+    @as_annotated
     def times(self, name: str, low: float, high: float) -> Box:
         """Return the product of the box with one more side.
 

@@ -25,7 +25,7 @@ from nlctl.arguments import a_function, integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
-from .agreement import on_balls
+from .agreement import one_number
 from .arithmetic import Ball, as_ball, common
 from .box import Box, Cell
 from .paths import Undecided, every_way
@@ -266,7 +266,7 @@ def _also_of_floats(who: str, function: _Function) -> _Function:
     """Return a user's function, to be compared with itself on floats."""
     if is_of_library(function):  # what it calls was compared on its own
         return function
-    return on_balls(
+    return one_number(
         function,
         lambda why: ParameterError(f"{who} needs a function of numbers, of which it holds: {why}"),
     )

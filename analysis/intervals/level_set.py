@@ -14,7 +14,7 @@ from nlctl.arguments import a_function, of_type
 from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
-from .agreement import on_balls
+from .agreement import one_number, several_numbers
 from .arithmetic import Ball, as_ball
 from .box import Box
 from .branch_and_bound import Proof, prove
@@ -117,7 +117,8 @@ def prove_decrease(
 
 def _compared(name: str, function: Any) -> Any:
     """Return a function that is compared with itself on floats."""
-    return on_balls(
+    numbers = one_number if name == "V" else several_numbers
+    return numbers(
         function, lambda why: ParameterError(f"prove_decrease needs {name} of numbers: {why}")
     )
 

@@ -95,6 +95,7 @@ class Tightened:
     horizon: float
     trials: tuple[TrialBound, ...]
 
+    @as_annotated
     def table(self, bound: str = "C_0") -> pd.DataFrame:
         """Return the trade-off curve: trials that no other beats in max |u| and in the bound.
 

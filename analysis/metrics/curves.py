@@ -11,8 +11,9 @@ a sample further, the curve's extreme p* counts as p* - `_GUARD` R, and only whe
 sample by more than `_CLEAR` R.  So what is lost of a smooth peak is O(h^8), and a limiter's corner
 is not overshot: a kink, wherever it lies, moves the polynomial by less than `_GUARD` R.
 A largest or smallest value that three samples in a row have is a limit, and no curve goes beyond
-it.  What no sample has seen, such as a limit reached for less than a sampling interval and nowhere
-else, samples alone cannot say; the estimate is then beyond it by at most h^2 |y''| / 8.
+it, not on the way to a break either.  What no sample has seen, such as a limit reached for less
+than a sampling interval and nowhere else, samples alone cannot say; the estimate is then beyond it
+by at most h^2 |y''| / 8.
 
 *Breaks* are the times at which a signal may jump or bend.  No curve goes through one; the limits
 from both sides, extrapolated from the samples of that side, are values of the signal as well.
@@ -142,6 +143,13 @@ def _held(y, value):
 
 
 @equation
+def _limits(y):
+    """Return below and above which no curve goes: -inf and inf where no value is held."""
+    low, high = np.min(y), np.max(y)
+    return low if _held(y, low) else -np.inf, high if _held(y, high) else np.inf
+
+
+@equation
 def turning_points(t, y, breaks):
     """Return extremes between samples: before which sample each is, when, and its value.
 
@@ -155,8 +163,7 @@ def turning_points(t, y, breaks):
     place, value = np.empty(y.size), np.empty(y.size)
     before = np.zeros(y.size, np.int64)
     count = 0
-    bottom = np.min(y) if _held(y, np.min(y)) else -np.inf
-    top = np.max(y) if _held(y, np.max(y)) else np.inf
+    bottom, top = _limits(y)
     firsts, lasts, starts, ends = _pieces(t, breaks)
     for first, last, start, end in zip(firsts, lasts, starts, ends):  # noqa: B905 (numba)
         if last - first < 5:
@@ -213,7 +220,7 @@ def limits_at_breaks(t, y, breaks):
     """
     firsts, lasts, starts, ends = _pieces(t, breaks)
     place, value = np.empty(2 * starts.size), np.empty(2 * starts.size)
-    count = 0
+    (bottom, top), count = _limits(y), 0
     for first, last, start, end in zip(firsts, lasts, starts, ends):  # noqa: B905 (numba)
         if last == first:
             continue
@@ -223,7 +230,7 @@ def limits_at_breaks(t, y, breaks):
         if end > t[last - 1]:
             place[count], value[count] = end, _extrapolated(t[first:last], y[first:last], end)
             count += 1
-    return place[:count], value[:count]
+    return place[:count], np.minimum(np.maximum(value[:count], bottom), top)
 
 
 @equation
@@ -300,7 +307,8 @@ def path(t, y, breaks, apart=0.0):
                 values.append(np.array([_extrapolated(own_t, own_y, at)]))
     times.append(t[done:].copy())
     values.append(y[done:].copy())
-    return _joined(times), _joined(values)
+    bottom, top = _limits(y)
+    return _joined(times), np.minimum(np.maximum(_joined(values), bottom), top)
 
 
 @equation

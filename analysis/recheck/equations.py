@@ -11,6 +11,7 @@ from .integers import KNOWN_FUNCTIONS, UNITY, ZERO, Interval
 
 _INF = math.inf
 _CELLS = 4_000
+_TEXT = 100_000  # characters
 _ARGUMENTS = {"number": 1, "symbol": 1, "power": 2, "+": 2, "*": 2, "/": 2, "minimum": 2,
               "maximum": 2} | dict.fromkeys(KNOWN_FUNCTIONS, 1)  # fmt: skip
 _Box = Mapping[str, Interval]
@@ -89,6 +90,7 @@ class WrittenEquation:
                 texts.append(f"({texts[given[0]]} {operation} {texts[given[1]]})")
             else:
                 texts.append(f"{operation}({', '.join(texts[i] for i in given)})")
+            need(len(texts[-1]) <= _TEXT, "an equation is too long to be read")
         return texts[-1]
 
 

@@ -9,20 +9,26 @@ from typing import Any
 
 _UNIT = 1 << 96
 _INF = math.inf
+_FAR = _UNIT << 900  # no end has more digits, whatever powers a file has; floats go so far
 
 
 def _product(a: Any, b: Any) -> Any:
     """Return a b, where an end at 0 wins over one without bound."""
-    return 0 if not a or not b else a * b
+    if not a or not b:
+        return 0
+    if abs(a) == _INF or abs(b) == _INF:
+        return _INF if (a > 0) == (b > 0) else -_INF
+    return a * b
 
 
 class Interval:
-    """All numbers from `low` to `high`, in units of 2^-96."""
+    """All numbers from `low` to `high`, in units of 2^-96; none has an end beyond 2^900."""
 
     __slots__ = ("high", "low")
 
-    def __init__(self, low: Any, high: Any) -> None:
-        self.low, self.high = low, high
+    def __init__(self, low: Any, high: Any) -> None:  # rounded outward
+        self.low = low if -_FAR <= low <= _FAR else _FAR if low > 0 else -_INF
+        self.high = high if -_FAR <= high <= _FAR else _INF if high > 0 else -_FAR
 
     @staticmethod
     def of(low: Any, high: Any = None) -> Interval:

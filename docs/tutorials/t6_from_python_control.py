@@ -43,4 +43,5 @@ assert isinstance(exact, ct.StateSpace)
 #
 # * parameters are qualified, ``"actuator.b_r"``: two blocks never share one by accident;
 # * an unknown name is an error with the nearest name;
+# * steps end where equations switch, here at the limits of ``np.clip``, so that no ``max_step`` is needed;
 # * a run that diverges is an error (``DivergedError``) unless ``ignore_errors=True``.

@@ -14,7 +14,9 @@ Gain, Sum, Transfer Fcn         ``ct.ss``, ``ct.tf``, ``ct.summing_junction`` of
 MATLAB Function                 a function of ``ct.nlsys``, or an equation of a record
 Saturation, Dead Zone, ...      ``nlctl.Saturation``, ``nlctl.DeadZone``, ``nlctl.Backlash``, ``nlctl.Relay``, ...
 initial condition               ``nlctl.initial_state(loop, {"plant.x1": 0.8})``
-zero-crossing detection         switching functions of a block (``switching``): steps end there
+zero-crossing detection         always, of all equations that can be read: ``print(nlctl.compile(model))``
+external reset, Hit Crossing    ``guard`` and ``reset`` of a block; ``events=`` of a run, ``response.events``
+Stop Simulation                 ``stop_when=`` of a run
 Memory, Unit Delay              a state that is memory (``commit``); blocks in discrete time
 sample time, rate transition    ``nlctl.sampled(controller, dt)``
 accelerator mode                always: machine code; ``engine="python-control"`` interprets

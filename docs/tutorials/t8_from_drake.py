@@ -12,8 +12,10 @@ Drake                             nlctl
 ``Context``                       there is none: time, state, input and parameters are arguments of pure functions
 declared parameters               fields of the record, ``"actuator.b_r"`` in a diagram
 direct feedthrough                ``feedthrough``, declared and compared with the equations
-witness functions                 ``switching``
-unrestricted update, events       a state that is memory, and ``commit``
+witness functions                 conditions of equations are located anyway; ``guard``, ``switching``
+unrestricted update at a witness  ``guard`` and ``reset``
+per-step events                   a state that is memory, and ``commit``
+monitor that terminates           ``stop_when=`` of a run
 periodic discrete update          ``nlctl.sampled(block, dt)``
 ``Simulator``                     ``nlctl.input_output_response``; a run has a status
 scalar types: ``AutoDiffXd``      the equations are traced once: machine code, derivatives, intervals, LaTeX

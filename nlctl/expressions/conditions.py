@@ -19,6 +19,7 @@ _OF_SIGNS = ("absolute", "sign", "heaviside")
 _OF_SECONDS = ("copysign",)
 _OF_FIRSTS = ("arctan2",)
 _OF_INTEGERS = {"floor": 0.0, "ceil": 0.0, "trunc": 0.0, "rint": 0.5}
+_ROOTS = ("sqrt", "hypot")
 _OF_QUOTIENTS = ("remainder", "fmod")
 
 
@@ -87,10 +88,25 @@ def switching_function(graph: Graph, condition: Expr) -> Expr:
 
 
 def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
-    """Return a - b; of what is compared with 0 itself, so that no rounding comes in."""
+    """Return a - b; of what is compared with 0 itself, so that no rounding comes in.
+
+    Of a root, a distance, the squares: near 0 it has a corner that no polynomial follows, so that
+    a step could pass through a small circle unseen.
+    """
     if a.op == "const" and a.data == 0.0:
         return b
+    for root, other, turned in ((a, b, 1), (b, a, -1)):
+        if root.op in _ROOTS and not other.varies:
+            squares = [_square_of_root(graph, root), graph.op("mul", other, other)]
+            return graph.op("sub", *squares[::turned])
     return graph.op("sub", a, b)
+
+
+def _square_of_root(graph: Graph, root: Expr) -> Expr:
+    args = [graph.number(arg) for arg in root.args]
+    if root.op == "sqrt":
+        return args[0]
+    return graph.op("add", *(graph.op("mul", arg, arg) for arg in args))
 
 
 def _at_integers(graph: Graph, counted: Expr, shift: float) -> Expr:

@@ -1,13 +1,15 @@
 """The native engine: any python-control diagram as machine code, and ensembles of it.
 
-`compile` reads a diagram (`diagram/`).  The blocks' functions are run once on symbols, and what
-they compute is planned for one member or several; one generator writes LLVM IR from the plan
-(`codegen/`), and its object code is kept on disk (`machine/`).  What cannot be traced is called as
-it stands, as numba compiles it or back in Python (`machine.called`, `thirdparty/`); algebraic loops
-are refused, or solved by Newton's method with the derivatives of their own expressions.
+`compile` reads a diagram (`diagram/`).  The blocks' functions are run once on symbols
+(`equations/`), and what they compute is planned for one member or several; one generator writes
+LLVM IR from the plan (`codegen/`), and its object code is kept on disk (`machine/`).  What cannot
+be traced is called as it stands, as numba compiles it or back in Python (`machine.called`,
+`thirdparty/`); algebraic loops are refused, or solved by Newton's method with the derivatives of
+their own expressions.
 
-`integrate/` moves batched members through time, each with its own steps.  `response` makes of
-one run what python-control returns, `ensemble` runs many.
+`timed/` knows before a run when functions of t alone jump, `integrate/` moves batched members
+through time, each with its own steps.  `response` makes of one run what python-control returns,
+`ensemble` runs many.
 """
 
 from ..errors import CompileError

@@ -27,6 +27,7 @@ from .codegen.lower import lower
 from .codegen.program import instants_of
 from .codegen.solver import searched
 from .compiled import Compiled
+from .declared import declared_labels, declared_now, declared_rows
 from .diagram.block_inputs import block_inputs
 from .diagram.schedule import Schedule, Signal, signal_name
 from .equations.blocks import equations
@@ -151,19 +152,23 @@ def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
 def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
     """Return what machine code computes at a point."""
     events = code.lowered.rows["g"]
-    rows = np.array(compiled.program.sampled, dtype=int)
+    declared = declared_rows(compiled.schedule, compiled.program, events - compiled.program.events)
+    rows, jumping = np.array(compiled.program.sampled, dtype=int), compiled.program.resets
 
     def several(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
         tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), code.width, axis=1) for v in (t, x, u))
         dx, y = np.empty_like(xx), np.empty((len(compiled.schedule.outputs), code.width))
-        code.rhs(tt[0].copy(), xx, uu, c, dx, np.empty((events, code.width)))
+        g, after = np.empty((events, code.width)), np.empty((jumping, code.width))
+        code.rhs(tt[0].copy(), xx, uu, c, dx, g)
         code.out(tt[0].copy(), xx, uu, c, y)
         found = [dx[:, -1], y[:, -1]]
         for sample in code.samples:
             s = np.zeros((rows.size, code.width))  # 0 as python-control has it where nothing is due
             sample(tt[0].copy(), xx, uu, c, s)
             found.append(s[:, -1])
-        return tuple(found)
+        if code.resets is not None:
+            code.resets(tt[0].copy(), xx, uu, c, after)
+        return *found, g[declared, -1], after[:, -1]
 
     return several
 
@@ -172,7 +177,7 @@ def _compare(compiled: Compiled, trial: Trial, evaluated: Evaluated, point: Any)
     """Compare one point."""
     system = compiled.system
     ours = evaluated(*point)
-    if not all(np.isfinite(values).all() for values in ours):
+    if not all(np.isfinite(values).all() for values in ours[:-1]):
         return  # the run says that it diverged
     try:
         theirs = _by_python_control(compiled, point, trial)
@@ -212,7 +217,10 @@ def _compare_beyond_rounding(
     allowed = tuple(a + b for a, b in zip(allowed, rounded, strict=True))
     after = [system.state_labels[i] for i in compiled.program.sampled]
     arrivals = [signal_name(compiled.schedule.nodes, s) for s in compiled.schedule.lines]
-    names = [system.state_labels, [*system.output_labels, *arrivals], *[after] * (len(ours) - 2)]
+    names = [
+        system.state_labels, [*system.output_labels, *arrivals], *[after] * len(trial.meetings),
+        *declared_labels(compiled.schedule),
+    ]  # fmt: skip
     for labels, a, b, most in zip(names, ours, theirs, allowed, strict=True):
         wrong = np.flatnonzero(~agree(a, b, most))
         if wrong.size:
@@ -232,7 +240,9 @@ def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> PointVal
         now = frozenset(moment._replace(owner=trial.of(moment.owner)) for moment in what)
         with past(lines), happening(now):
             after.append(rates_now(system, *point)[rows])
-    return rates, np.concatenate([outputs, *arriving]), *after
+    with past(lines), happening():
+        declared = declared_now(compiled.schedule, system, point)
+    return rates, np.concatenate([outputs, *arriving]), *after, *declared
 
 
 def _relay_outputs(compiled: Compiled, found: np.ndarray) -> dict[int, float]:
@@ -331,7 +341,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: PointValues, point: 
         set_parameters(system, dict(trial.params) if trial.params else None)
     schedule = _with_every_output(compiled)
     y = block_outputs(compiled, trial.p, point)
-    rates, every = rounding(compiled, replace(trial, meetings=()), point, schedule)
+    rates, every, *_ = rounding(compiled, replace(trial, meetings=()), point, schedule)
     counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
     outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
     given = list(block_inputs(system, u[: system.ninputs or 0], outputs))
@@ -384,13 +394,15 @@ def rounding(
     Returns
     -------
     tuple of ndarray
-        For the rates, the outputs, and the states after each meeting.
+        For the rates, the outputs, the states after each meeting, what is declared of jumps, and
+        the states behind resets.
     """
     schedule = schedule or compiled.schedule
     found = equations(schedule, compiled.program.layout, trial.p, trial.meetings)
     t, x, u = point
     arrays = {"t": [t], "x": x, "u": u, "p": trial.p}
-    names = [name for name in found.results if name not in ("g", "reset")]
+    meetings = [f"sample{k}" for k in range(len(trial.meetings))]
+    names = [name for name in ("dx", "y", *meetings, "g", "reset") if name in found.results]
     values = iter(
         nudged_values(
             [expr for name in names for expr, _ in found.pieces(name)],
@@ -400,10 +412,10 @@ def rounding(
             found.fixed_points,
         )
     )
-    sizes = [x.size, len(schedule.outputs)]
-    sizes += [len(compiled.program.sampled)] * len(trial.meetings)
-    moved = [np.zeros(size) for size in sizes]
-    for name, total in zip(names, moved, strict=True):
+    located, program = found.conditions.rows, compiled.program
+    sizes = [x.size, len(schedule.outputs), *[len(program.sampled)] * len(meetings)]
+    moved = [np.zeros(size) for size in (*sizes, program.events + located, program.resets)]
+    for name, total in zip(names, moved, strict=False):  # there may be no resets
         for row, array in found.results[name]:
             at = row
             for _, size in array.pieces():
@@ -411,6 +423,7 @@ def rounding(
                 far = np.abs(ways - ways[:, :1])
                 total[at : at + size] = np.where(np.isfinite(far), far, 0.0).max(axis=1)
                 at += size
+    moved[-2] = moved[-2][declared_rows(schedule, program, located)]
     return tuple(moved)
 
 
@@ -419,7 +432,7 @@ def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], np.ndarra
     schedule = _with_every_output(compiled)
     found = equations(schedule, compiled.program.layout, p)
     lowered = lower(schedule, compiled.program, 1, found)
-    prepare, _, out = lowered_code(lowered)
+    prepare, _, out, *_ = lowered_code(lowered)
     c = np.zeros((lowered.size, 1))
     prepare(np.ascontiguousarray(p[:, None]), c)
 

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import cloudpickle
 import control as ct
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..annotations import as_annotated
 from ..diagrams import Apart, apart, not_a_system, override
@@ -124,6 +125,7 @@ class Compiled(StandIn):
         """
         return evaluations(self)
 
+    @as_annotated
     def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
         """Return the flat vector `p` that the program takes.
 
@@ -162,7 +164,10 @@ class Compiled(StandIn):
             override(self.schedule.system, params)
             return packed(self.schedule.holders, self.program.layout, self.program.fixed)
 
-    def dynamics(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
+    @as_annotated
+    def dynamics(
+        self, t: float, x: ArrayLike, u: ArrayLike = (), params: Mapping[str, Any] | None = None
+    ) -> np.ndarray:
         """Return the right-hand side, as ``system.dynamics`` does.
 
         Parameters
@@ -191,7 +196,10 @@ class Compiled(StandIn):
         g = np.empty(self.lowered.rows["g"])
         return self._call(self.native[0], self.system.nstates, t, x, u, params, g)
 
-    def output(self, t: float, x: Any, u: Any = (), params: Any = None) -> np.ndarray:
+    @as_annotated
+    def output(
+        self, t: float, x: ArrayLike, u: ArrayLike = (), params: Mapping[str, Any] | None = None
+    ) -> np.ndarray:
         """Return the outputs, as ``system.output`` does.
 
         Parameters
@@ -224,6 +232,7 @@ class Compiled(StandIn):
         """The derivatives of the equations along a direction of states, inputs and parameters."""
         return tangent(self)
 
+    @as_annotated
     def linearize(
         self,
         x0: Any,
@@ -275,6 +284,7 @@ class Compiled(StandIn):
         """
         return linear_system(self, x0, u0, t, params, copy_names=copy_names, names=names)
 
+    @as_annotated
     def parameter_jacobian(
         self,
         parameters: Sequence[str],

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from ..responses.event_log import EventLog
 from ..wording import numbered
 from .codegen.program import count_guards, count_switching_functions
 from .compiled import Compiled
-from .integrate.log import OF_TIME
+from .integrate.log import OF_TIME, log_room
 from .integrate.memory import with_table
 from .integrate.workspace import WORK, Work
 
-EventRow = tuple[float, str, str, str]  # time (s), block, which, direction
 _WORDS = {
     "lt": "comparison", "le": "comparison", "gt": "comparison", "ge": "comparison",
     "absolute": "abs", "minimum": "minimum", "maximum": "maximum", "remainder": "%",
@@ -30,9 +30,9 @@ def with_log(task: Any, work: Any) -> Any:
     task, work : Task, Work
         See `workspace`.
     """
-    least = 8 * work.g.shape[0] + 256
     free = work.log_t.size - int(work.lanes["noted"][0])
-    if not task.alone or not _notes(task) or free >= least:
+    least = log_room(task, work.g.shape[0])
+    if free >= least:
         return work
     room, given = 2 * work.log_t.size + 2 * least, work._asdict()
     del given["table"]
@@ -41,10 +41,6 @@ def with_log(task: Any, work: Any) -> Any:
         given[name] = np.zeros(room, dtype=before.dtype)
         given[name][: before.size] = before
     return with_table(Work, like=WORK, **given)
-
-
-def _notes(task: Any) -> bool:
-    return bool(task.switching or task.jumps.shape[1])
 
 
 def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
@@ -62,29 +58,29 @@ def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
         count = count_switching_functions(node)
         labels += [(node.path, name) for name in numbered("switching", count)]
     for each in conditions.located:
-        what = _WORDS.get(each.what, each.what)
-        labels += [(each.block, name) for name in numbered(what, each.rows)]
+        what: str = each.what
+        names = numbered(_WORDS.get(what, what), each.rows)
+        labels += [(each.block, name) for name in names]
     for node in nodes:
         count = count_guards(node)
         labels += [(node.path, name) for name in numbered("guard", count)]
     return labels
 
 
-def happened(compiled: Compiled, run: Any) -> tuple[EventRow, ...]:
-    """Return what has happened in a single run, in the order of time.
+def happened(compiled: Compiled, run: Any) -> EventLog:
+    """Return what has happened in a single run.
 
     Parameters
     ----------
     compiled : Compiled
     run : Run
     """
-    labels = row_labels(compiled, run.machine.lowered.conditions)
+    rows = row_labels(compiled, run.machine.lowered.conditions)
+    labels = [(*row, direction) for row in rows for direction in ("falling", "rising")]
     count = int(run.lanes["noted"][0])
-    found = []
-    for t, coded in zip(run.work.log_t[:count], run.work.log_row[:count].tolist(), strict=True):
-        row, rises = divmod(coded, 2)
-        if row == OF_TIME:
-            found.append((float(t), "", "condition of t", ""))
-        else:
-            found.append((float(t), *labels[row], "rising" if rises else "falling"))
-    return tuple(found)
+    coded = run.work.log_row[:count]
+    return EventLog(
+        time=run.work.log_t[:count].copy(),
+        label=np.where(coded // 2 == OF_TIME, len(labels), coded),
+        labels=(*labels, ("", "condition of t", "")),
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import control as ct
@@ -14,6 +15,8 @@ from . import compiled as engine
 from .compiled import Compiled
 from .diagram.schedule import AlgebraicLoopError
 from .happened import row_labels
+from .machine.evaluations import prepared_parameters
+from .machine.routine import Routine
 from .timed.ahead import ahead
 
 
@@ -39,7 +42,7 @@ def known_conditions(system: Any, params: Any, times: np.ndarray) -> Known:
     found = {k: v[0] for k, v in ahead(lowered, p[:, None], times, np.inf).items()}
     jumps = found["jumps"][np.isfinite(found["jumps"])]
     located = lowered.conditions.rows
-    if not located or compiled.schedule.lines:
+    if not located:
         return Known(stops=jumps, longest=_longest(found, times))
     first = compiled.program.switching
     labels = row_labels(compiled, lowered.conditions)[first : first + located]
@@ -63,11 +66,15 @@ def _longest(found: dict[str, Any], times: np.ndarray) -> Callable[[float], floa
 
 
 def _crossings(compiled: Compiled, p: np.ndarray, rows: slice) -> Callable[..., np.ndarray]:
-    rhs, n = compiled.native[0], compiled.system.nstates or 0
+    code, c = prepared_parameters(compiled, p)
+    sizes = compiled.system.nstates or 0, compiled.schedule.ninputs, code.lowered.rows["g"]
+    now, (x_now, u_now, g) = np.empty(1), (np.empty((n, 1)) for n in sizes)
+    given = now, x_now, u_now, c, np.empty_like(x_now), g
+    rhs = code.rhs.bound(*given) if isinstance(code.rhs, Routine) else partial(code.rhs, *given)
 
     def crossings(t: float, x: Any, u: Any) -> np.ndarray:
-        dx, g = np.empty(n), np.empty(compiled.lowered.rows["g"])
-        rhs(t, x, u, p, dx, g)
-        return g[rows]
+        now[0], x_now[:, 0], u_now[:, 0] = t, x, u
+        rhs()
+        return g[rows, 0].copy()
 
     return crossings

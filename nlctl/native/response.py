@@ -13,7 +13,7 @@ from ..annotations import as_annotated
 from ..errors import ChatteringError, DivergedError, ParameterError, ZenoError
 from ..responses.arguments import evaluation_array, input_array, interpolated, state_array
 from ..responses.time_response import Response, response_of
-from ..responses.watched import Watched
+from ..responses.watched import Watched, check_numbers, not_a_number, numbers
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.place import chattering_words
@@ -60,13 +60,14 @@ def respond(
         If an argument has a wrong shape, or times do not fit a discrete-time diagram.
     """
     system = compiled.system
-    compiled = _with_watched(compiled, watched, params)
+    compiled = _with_watched(compiled, (*watched, *numbers(watched)), params)
     wanted = evaluation_array(evaluation_times, times)
     u, x0 = input_array(system, inputs, times), state_array(system, initial_state)
     grid = times if wanted is times else _grid(system, times, wanted)
     if grid is not times:
         u = interpolated(u, times, grid)
     p = compiled.parameter_vector(params)
+    check_numbers(watched, (float(grid[0]), x0, u[:, 0]), params)
     made = trajectory(compiled, grid, u, x0, p, settings, progress)
     trial = Trial(
         time=made.time, states=made.states, inputs=made.inputs, p=p, params=params, width=1
@@ -77,13 +78,13 @@ def respond(
         # whoever takes it for an error continues
         raise KeyboardInterrupt(_message(compiled, run, p, params))
     ended = run.status is Status.ENDED
-    fine = ended or run.status is Status.OK
-    if not fine and not ignore_errors:
+    failed = _error(compiled, made, p, params)
+    if failed is not None and not ignore_errors:
         raised = own_error(compiled, made, params) if run.status is Status.DIVERGED else None
-        raise raised or _error(compiled, made, p, params)
+        raise raised or failed
     shown = np.isin(made.time, wanted)
     shown[-1:] |= ended
-    message = None if fine else str(_error(compiled, made, p, params))
+    message = None if failed is None else str(failed)
     return _response(compiled, made, np.flatnonzero(shown), (params, form, message))
 
 
@@ -104,9 +105,13 @@ def _with_watched(
 
 def _error(
     compiled: Compiled, made: Trajectory, p: np.ndarray, params: Mapping[str, Any] | None
-) -> DivergedError:
-    """Return why a run has not reached its last time."""
+) -> DivergedError | None:
+    """Return why a run has not reached its last time, if it has not."""
     run, guards = made.statistics, compiled.program.guards
+    if run.status is Status.ENDED:
+        return not_a_number(made.happened)
+    if run.status is Status.OK:
+        return None
     if made.culprit >= 0 and run.status in (Status.ZENO, Status.DIVERGED):
         block = compiled.schedule.nodes[guards[made.culprit]].path
         if run.status is Status.ZENO:
@@ -124,7 +129,7 @@ def _falls(compiled: Compiled, made: Trajectory) -> list[float]:
     own = [k for k, block in enumerate(guards) if block == guards[made.culprit]]
     path = compiled.schedule.nodes[guards[made.culprit]].path
     name = "guard" if len(own) == 1 else f"guard {own.index(made.culprit) + 1}"
-    return [t for t, block, which, _ in made.happened if (block, which) == (path, name)]
+    return made.happened.times(path, name).tolist()
 
 
 def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:

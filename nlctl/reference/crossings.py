@@ -9,7 +9,7 @@ where it reverses, and where it jumps.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -19,6 +19,7 @@ FEW_PLACES = np.array([0.0, 1e-3, 0.25, 0.5, 0.75, 1.0 - 1e-3, 1.0])
 _CLOSE = 2.0  # a function that falls by half of its value from place to place may reach 0
 _ULPS = 4.0
 _RESOLVED = 1e-9  # of a bracket: how closely an extreme value is located
+_NEITHER = 2.0  # the side of a number that is NaN
 _STEADY = 0.6  # a memory that changes by less than this part in half of the time does not jump
 
 
@@ -66,7 +67,7 @@ def first_event(
     t[-1] = end
     seen = np.array([before, *(look(float(s)) for s in t[1:])])
     guards, signed = kinds[0], sum(kinds)
-    sides = np.sign(seen[:, :signed])
+    sides = _side(seen[:, :signed])
     sides[:, :guards] = np.where(seen[:, :guards] >= 0.0, 1.0, -1.0)
     found = Event(np.inf, -1)
     for i, k in _suspects(seen[:, :signed], sides, guards):
@@ -79,6 +80,12 @@ def first_event(
         return None
     apart = _TOGETHER * max(abs(begin), abs(end))
     return Event(min(found.time + apart, end), found.number, max(found.time - apart, begin))
+
+
+def _side(values: Any) -> Any:
+    """Return the signs of numbers; NaN is on a side of its own."""
+    sides = np.sign(values)
+    return np.where(np.isnan(sides), _NEITHER, sides)
 
 
 def _suspects(seen: np.ndarray, sides: np.ndarray, guards: int) -> list[tuple[int, int]]:
@@ -103,7 +110,7 @@ def _crossing(look, t, side, i, k, values, is_guard) -> Event:
     """Return where a function leaves its side behind a place, or dips around it."""
 
     def stays(value: float) -> bool:
-        return (value >= 0.0) if is_guard else (np.sign(value) == side)
+        return (value >= 0.0) if is_guard else (_side(value) == side)
 
     last = t.size - 1
     a, b = float(t[k]), float(t[min(k + 1, last)])

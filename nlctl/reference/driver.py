@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
@@ -12,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from ..blocks import past
-from ..errors import ChatteringError, DivergedError
+from ..errors import DivergedError
 from ..sampling.system import happening
 from ..upstream.control_internals import outputs_now, parts_now, rates_now
 from .crossings import FEW_PLACES, STEP_PLACES, Event, first_event
 from .jumps import Jumps
 from .past import Past
 from .stops import TIME_ROUNDING, Stops
+from .switches import Switches
 
 _STANDSTILL = 200  # steps in a row that do not advance the time
-_CROWD, _CROWDED = 300, 1e-6  # so many events in this part of a run: it is chattering
 _ASIDE = 1e-3  # part of a run: how far behind its end what leaves a delay there is read
 _PLACES = 1024  # of a run: a loop at rest is looked at in as many
 _SHORT = 0.25  # of the longest step so far: an integrator that has begun again
@@ -86,11 +85,12 @@ class Driver:
         self.rows: list[tuple[float, np.ndarray, np.ndarray]] = []
         self._held = np.zeros(0)
         self.happened = jumps.happened
-        self._events: deque[tuple[float, int]] = deque(maxlen=_CROWD)
 
     def run(self, begin: float, end: float, x: np.ndarray) -> None:
         """Go from the first time to the last; `rows` grow on the way."""
         self.reached, self._span = begin, end - begin
+        tolerances = self.settings["rtol"], self.settings["atol"]
+        self._switches = Switches(self.system.name, self.jumps.label, (begin, end), tolerances)
         t, sides, what, is_break = begin, None, self.stops.due.get(begin, frozenset()), True
         with ExitStack() as stack:
             stack.enter_context(past(self.known.lines))
@@ -131,6 +131,7 @@ class Driver:
             return stop, x + (stop - t) * self._rates(t, x), sides, [(t, lambda _: x)], None
         solver = self.method(self._rates, t, x, stop, **self._bounded(t, stop))
         seen = self.jumps.look(t, x) if self.jumps.any else np.zeros(0)
+        self.jumps.check_watched(t, seen)
         pieces: list[Any] = []
         while True:
             message = solver.step()
@@ -206,7 +207,7 @@ class Driver:
         length = solver.t - solver.t_old
         self._longest = max(self._longest, length)
         event = first_event(
-            lambda t: self.jumps.look(min(t, self._last), state(t)),
+            lambda t: self._looked(t, state(t)),
             (float(solver.t_old), float(solver.t)),
             seen,
             self.jumps.kinds,
@@ -214,29 +215,31 @@ class Driver:
             FEW_PLACES if length < _SHORT * self._longest else STEP_PLACES,
         )
         if event is not None:
-            self._events.append((event.time, event.number))
             self._note(event, seen, state)
-            block, which = self.jumps.label(event.number)
-            first = self._events[0][0]
-            if len(self._events) == _CROWD and event.time - first < _CROWDED * self._span:
-                raise ChatteringError(
-                    f"'{self.system.name}' is chattering at t = {event.time:.6g} s: "
-                    + (f"block '{block}'" if block else f"'{which}'")
-                    + " switches over and over again",
-                    event.time,
-                )
         return event
 
+    def _looked(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Return what is seen, on the side of the next stop that the run comes from."""
+        return self.jumps.look(min(t, self._last), x)
+
     def _note(self, event: Event, seen: np.ndarray, state: Any) -> None:
-        """Note a switching function or a condition that has changed its sign."""
-        if self.jumps.kinds[0] <= event.number < sum(self.jumps.kinds):
-            i = event.number
-            behind = self.jumps.look(min(event.time, self._last), state(event.time))[i]
-            rises, changed = behind > seen[i], behind * seen[i] <= 0.0
-            if changed and self.jumps.counts(i, rises):
-                way = "rising" if rises else "falling"
-                self.happened.append((event.time, *self.jumps.label(i), way))
-                self._ended = self.jumps.ends(i, rises)
+        """Note what happens, and all switching functions and conditions that change their signs."""
+        x, (guards, others) = state(event.time), self.jumps.kinds
+        self._switches.note(event.number, event.time)
+        after = self._looked(event.time, x)
+        self.jumps.check_watched(event.time, after)
+        rows = np.arange(guards, guards + others)
+        changed = rows[(seen[rows] != 0.0) & (seen[rows] * after[rows] <= 0.0)]
+        for i in changed.tolist():
+            self._note_change(i, event.time, bool(after[i] > seen[i]), x)
+
+    def _note_change(self, i: int, t: float, rises: bool, x: np.ndarray) -> None:
+        """Note a change of sign, whether it ends the run, and whether there is an end of them."""
+        if self.jumps.counts(i, rises):
+            way = "rising" if rises else "falling"
+            self.happened.append((float(t), *self.jumps.label(i), way))
+            self._ended |= self.jumps.ends(i, rises)
+        self._switches.switched(i, t, lambda t, x: self._looked(t, x)[i], x, self._rates(t, x))
 
     def _watch(self, t: float, x: np.ndarray) -> None:
         """End a run whose state is not finite, or whose time stands still.

@@ -22,6 +22,7 @@ from ..responses.arguments import (
     interpolated,
     state_array,
 )
+from ..responses.event_log import event_log
 from ..responses.time_response import Response, as_response, response_of
 from ..sampling.system import happening
 from ..sliding.blocks import sliding_blocks
@@ -129,12 +130,12 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
     system, times, (inputs, x0, wanted), (method, settings) = run.system, run.times, given, how
     begin, end, at = float(times[0]), float(times[-1]), _linear(times, inputs)
     conditions = Known() if known is None else known(system, run.params, times)
-    jumps = Jumps(system, at, conditions, (run.watched, dict(run.params or {})))
+    past = Past(delayed_blocks(system), begin, end, (settings["rtol"], settings["atol"]))
+    jumps = Jumps(system, at, conditions, (run.watched, dict(run.params or {})), past.leaving)
     grid = times if wanted is None else np.union1d(times, wanted)
     driver = Driver(
         system, at, wanted, jumps=jumps, method=method, settings=settings, progress=run.progress,
-        stops=Stops(grid, times, inputs, jumps.sampled.values(), conditions),
-        known=Past(delayed_blocks(system), begin, end, (settings["rtol"], settings["atol"])),
+        stops=Stops(grid, times, inputs, jumps.sampled.values(), conditions), known=past,
     )  # fmt: skip
     message = None
     try:
@@ -163,14 +164,17 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
     response = response_of(
         system, (reached, y, x, interpolated(inputs, times, reached)), run.params, run.form, **form
     )
-    response.happened = tuple(driver.happened)
+    response.happened = event_log(driver.happened)
     return response
 
 
 def _linear(times: np.ndarray, inputs: np.ndarray) -> Callable[[float], np.ndarray]:
     """Return inputs that are linear between their times, as python-control has them."""
+    nothing = np.zeros(0)
 
     def at(t: float) -> np.ndarray:
+        if not inputs.shape[0]:
+            return nothing
         i = min(max(int(np.searchsorted(times, t)), 1), times.size - 1)
         part = (t - times[i - 1]) / (times[i] - times[i - 1])
         return inputs[:, i - 1] * (1.0 - part) + inputs[:, i] * part

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from ..blocks import Block, memory_states
 from ..diagrams import leaves
 from ..errors import BlockError, DivergedError, ZenoError
-from ..responses.watched import Watched
+from ..responses.watched import Watched, nan_error
 from ..sampling.system import Happening, Sampled, happening
 from ..upstream.control_internals import current_parameters, parts_now, rates_now
 from ..wording import counted, numbered
@@ -20,6 +20,7 @@ _MOST = 100  # jumps without progress of time
 _STILL = 1e-11  # of a time: less is no progress
 _ALIKE, _SHRUNK, _FEW = 0.02, 1e-4, 4  # a geometric sequence: of what ratios, how far, how long
 _AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
+_NOTHING = np.zeros(0)
 
 
 class _Part(NamedTuple):
@@ -43,6 +44,8 @@ class Jumps:
         What changes its sign where conditions of the diagram's equations change.
     watched : tuple
         Functions of the run, and the overrides that they get.
+    leaving : callable
+        ``leaving(t)``: what leaves transport delays.
 
     Attributes
     ----------
@@ -54,11 +57,11 @@ class Jumps:
 
     def __init__(
         self, system: Any, inputs: Callable[[float], Any], conditions: Known,
-        watched: tuple[tuple[Watched, ...], Any] = ((), None),
+        watched: tuple[tuple[Watched, ...], Any], leaving: Callable[[float], np.ndarray],
     ) -> None:  # fmt: skip
         self.watched, self._overrides = watched
         self.system, self.inputs, self.conditions = system, inputs, conditions
-        self.crossings = conditions.crossings
+        self.crossings, self._leaving = conditions.crossings, leaving
         self.happened: list[tuple[float, str, str, str]] = []
         parts, self.sampled = [], {}
         for number, leaf in enumerate(leaves(system)):
@@ -69,35 +72,40 @@ class Jumps:
                 path = leaf.path or leaf.system.name
                 parts.append(_Part(number, path, leaf.system, rows))
         self._guarded = [one for one in parts if hasattr(one.block.spec, "guard")]
-        self._switching = [one for one in parts if hasattr(one.block.spec, "switching")]
         self._remembering = [one for one in parts if memory_states(one.block.spec)]
+        self._blocks = {
+            "guard": self._guarded,
+            "switching": [one for one in parts if hasattr(one.block.spec, "switching")],
+            "commit": self._remembering,
+        }
         places = [_memory_rows(one) for one in self._remembering]
         self.memories = np.concatenate([np.zeros(0, dtype=int), *places])
         self.still = np.concatenate([self.memories, np.array(list(self.sampled), dtype=int)])
         self.kinds: tuple[int, int] = (0, 0)
         self.labels: list[tuple[str, str]] | None = None
-        self.any = bool(self._guarded or self._switching or self._remembering)
-        self.any |= bool(self.watched or self.crossings)
+        self._own = any(self._blocks.values())
+        self.any = self._own or bool(self.watched or self.crossings)
         self._taken: dict[int, list[float]] = {}
         self._rising: dict[int, float] = {}
 
     def look(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return guards, switching functions and crossings, and what memories would become."""
-        u = self.inputs(t)
-        parts = list(parts_now(self.system, t, x, u))
-        guards = _values("guard", self._guarded, t, parts)
-        signed = _values("switching", self._switching, t, parts)
-        memories = _values("commit", self._remembering, t, parts)
-        found = {"guard": guards, "switching": signed, "commit": memories}
-        seen = [row for _, row in (*guards, *signed)]
+        u, seen = self.inputs(t), [_NOTHING]
+        found = dict.fromkeys(self._blocks, ())
+        if self._own:
+            parts = list(parts_now(self.system, t, x, u))
+            found = {what: _values(what, own, t, parts) for what, own in self._blocks.items()}
+            seen = [row for what in ("guard", "switching") for _, row in found[what]]
         if self.crossings is not None:
-            seen.append(np.asarray(self.crossings(t, x, u), dtype=float).reshape(-1))
-        seen.append(np.array([one.value(t, x, u, self._overrides) for one in self.watched]))
+            given = np.concatenate([u, self._leaving(t)])
+            seen.append(np.asarray(self.crossings(t, x, given), dtype=float).reshape(-1))
+        if self.watched:
+            seen.append(np.array([one.value(t, x, u, self._overrides) for one in self.watched]))
         if self.labels is None:
             self._label(found, sum(row.size for row in seen))
-        return np.concatenate([*seen, *(row for _, row in memories)])
+        return np.concatenate([*seen, *(row for _, row in found["commit"])])
 
-    def _label(self, found: dict[str, list[tuple[str, np.ndarray]]], signed: int) -> None:
+    def _label(self, found: Mapping[str, Sequence[tuple[str, np.ndarray]]], signed: int) -> None:
         """Say whose is what `look` returns; its first `signed` rows change their signs."""
         own = {
             kind: [(path, name) for path, row in rows for name in numbered(kind, row.size)]
@@ -114,6 +122,13 @@ class Jumps:
     def label(self, number: int) -> tuple[str, str]:
         """Return block and name of a row of what `look` returns."""
         return self.labels[number] if self.labels else ("", "")
+
+    def check_watched(self, t: float, seen: np.ndarray) -> None:
+        """End a run in which a function that it watches is NaN."""
+        signed = sum(self.kinds)
+        for one, value in zip(self.watched, seen[signed - len(self.watched) : signed], strict=True):
+            if np.isnan(value):
+                raise nan_error(one.name, t)
 
     def ends(self, number: int, rises: bool) -> bool:
         """Whether a change of sign of a row ends the run."""
@@ -211,7 +226,7 @@ class Jumps:
                 after[one.rows] = row
             first += count
         for i in np.flatnonzero(fallen).tolist():
-            self.happened.append((t, *self.label(i), "falling"))
+            self.happened.append((float(t), *self.label(i), "falling"))
             self._taken.setdefault(i, []).append(t)
             self._check_progress(i, t)
         self._rising = self._rises(t, after, fallen)

@@ -27,7 +27,8 @@ class Known:
         ``longest(t)``: how long a step from there may be (s), so that nothing that is a function
         of t alone is stepped over.
     crossings : callable or None
-        ``crossings(t, x, u)``: numbers that change their sign where other conditions change.
+        ``crossings(t, x, u)``: numbers that change their sign where other conditions change; u
+        has the inputs of the diagram, and behind them what leaves its delays.
     labels : list of tuple
         Block and name of each of these.
     """

@@ -71,6 +71,11 @@ class Past:
                 arriving=np.full(made.noutputs or 0, np.nan),
             )
 
+    def leaving(self, t: float) -> np.ndarray:
+        """Return what leaves all blocks, one after the other."""
+        found = [line.leaving(t) for line in self.lines.values()]
+        return np.concatenate(found) if found else np.zeros(0)
+
     def _leaving(self, number: int, t: float) -> np.ndarray:
         """Return what leaves a block: of the side of a break that the step lies on."""
         spec = self.specs[number]

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..host.notebook import table_html
 from ..wording import counted
+from .event_log import NOTHING, EventLog
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,12 +25,12 @@ class Response(ct.TimeResponseData):
     ----------
     statistics : Statistics or None
         Status, time reached and steps of a run in machine code.
-    happened : tuple
-        Rows of `events`.
+    happened : EventLog
+        What is in `events`.
     """
 
     statistics: Any = None
-    happened: tuple[tuple[float, str, str, str], ...] = ()
+    happened: EventLog = NOTHING
 
     @property
     def events(self) -> pd.DataFrame:
@@ -38,9 +39,7 @@ class Response(ct.TimeResponseData):
         Guards that have fallen, switching functions that blocks declare, and conditions of the
         equations, where steps have ended.
         """
-        import pandas as pd
-
-        return pd.DataFrame(list(self.happened), columns=["time", "block", "which", "direction"])
+        return self.happened.table()
 
     def plot(self, *args: Any, **kwargs: Any) -> Any:
         """Plot the response as `control.time_response_plot` does, also without inputs."""

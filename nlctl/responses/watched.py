@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import DivergedError, ParameterError
 
-__all__ = ["Watched", "watched_functions"]
+__all__ = [
+    "Watched", "check_moves", "check_numbers", "nan_error", "not_a_number", "numbers",
+    "watched_functions",
+]  # fmt: skip
 
 STOP = "stop_when"
+_IS_NAN = " is NaN"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,12 +53,17 @@ class Watched:
         ParameterError
             If it is not one number.
         """
-        found = np.asarray(self.function(t, x, u, dict(params or {})), dtype=float)
-        if found.size != 1:
-            raise ParameterError(
-                f"event function '{self.name}' must return one number, got {found.size}"
-            )
+        with np.errstate(all="ignore"):  # what is NaN is reported
+            found = np.asarray(self.function(t, x, u, dict(params or {})))
+        if found.size != 1 or found.dtype.kind not in "bfiu":
+            got = found.size if found.size != 1 else repr(found.reshape(-1)[0])
+            raise ParameterError(f"event function '{self.name}' must return one number, got {got}")
         return float(found.reshape(-1)[0])
+
+
+def nan_error(name: str, time: float) -> DivergedError:
+    """Return the error of an event function that is NaN at a time (s)."""
+    return DivergedError(f"event function '{name}' is NaN at t = {time:.6g} s", float(time))
 
 
 def watched_functions(stop_when: Any, events: Any) -> tuple[Watched, ...]:
@@ -71,7 +80,7 @@ def watched_functions(stop_when: Any, events: Any) -> tuple[Watched, ...]:
     Raises
     ------
     ParameterError
-        If one is not a function, or two have the same name.
+        If one is not a function, two have the same name, or `terminal` is a number of events.
     """
     given: list[tuple[str, Any]] = [] if stop_when is None else [(STOP, stop_when)]
     if isinstance(events, Mapping):
@@ -94,8 +103,104 @@ def watched_functions(stop_when: Any, events: Any) -> tuple[Watched, ...]:
     return tuple(_watched(name, function) for name, function in given)
 
 
+def check_numbers(watched: Sequence[Watched], begin: Any, params: Any) -> None:
+    """End a run before it begins whose functions are NaN at its start.
+
+    Parameters
+    ----------
+    watched : sequence of Watched
+    begin : tuple
+        First time (s), states and inputs there.
+    params : mapping or None
+        Overrides of the run.
+
+    Raises
+    ------
+    DivergedError
+        If one is NaN.
+    """
+    for one in watched:
+        if np.isnan(one.value(*begin, params)):
+            raise nan_error(one.name, begin[0])
+
+
+def numbers(watched: Sequence[Watched]) -> tuple[Watched, ...]:
+    """Return functions that fall through 0, and end a run, where those of a run become NaN.
+
+    Parameters
+    ----------
+    watched : sequence of Watched
+    """
+
+    def sides(each: Watched) -> Callable[..., Any]:
+        def side(t: Any, x: Any, u: Any, params: Any) -> Any:
+            value = each.function(t, x, u, params)
+            return np.where(value > 0.0, 1.0, np.where(value <= 0.0, 1.0, -1.0))
+
+        return side
+
+    return tuple(
+        replace(each, name=each.name + _IS_NAN, function=sides(each), direction=-1, ends=True)
+        for each in watched
+    )
+
+
+def not_a_number(happened: Iterable[tuple[float, str, str, str]]) -> DivergedError | None:
+    """Return the error of a run that one of the `numbers` has ended, None if none has.
+
+    Parameters
+    ----------
+    happened : iterable of tuple
+        Its events.
+    """
+    for time, block, which, _ in happened:
+        if not block and which.endswith(_IS_NAN):
+            return nan_error(which.removesuffix(_IS_NAN), time)
+    return None
+
+
+def check_moves(watched: Sequence[Watched], run: Any, params: Any) -> None:
+    """Refuse functions that are 0 all the time.
+
+    Parameters
+    ----------
+    watched : sequence of Watched
+    run : tuple of ndarray
+        Times, states and inputs of a run.
+    params : mapping or None
+        Its overrides.
+
+    Raises
+    ------
+    ParameterError
+        If one is 0 at each time and between any two.
+    """
+    parts = [np.atleast_1d(np.asarray(part, dtype=float)) for part in run]
+    between = [0.5 * (part[..., 1:] + part[..., :-1]) for part in parts]
+    for one in watched:
+        values = (
+            one.value(float(t), x, u, params)
+            for t, x, u in (*_points(*parts), *_points(*between))
+        )  # fmt: skip
+        if all(value == 0.0 for value in values):
+            raise ParameterError(
+                f"event function '{one.name}' is 0 at all times of the run: an event is a change "
+                "of its sign"
+            )
+
+
+def _points(times: np.ndarray, states: np.ndarray, inputs: np.ndarray) -> Iterator[tuple]:
+    return zip(times, states.T, inputs.T, strict=True)
+
+
 def _watched(name: str, function: Any) -> Watched:
-    ends = name == STOP or bool(getattr(function, "terminal", False))
+    terminal = getattr(function, "terminal", False)
+    if not isinstance(terminal, (bool, np.bool_)) and terminal != 1:
+        raise ParameterError(
+            f"event '{name}' needs terminal = True or False, got {terminal!r}: a run ends at its "
+            "first event, or does not end there"
+        )
+    ends = name == STOP or bool(terminal)
     direction = int(np.sign(getattr(function, "direction", 0)))
     return Watched(name=name, function=function, direction=direction, ends=ends)
 

@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 
 from ..annotations import as_annotated
-from ..arguments import number
+from ..arguments import flag, number, of_type
 from ..blocks import Block, block, default_state
 from ..diagrams import leaves
 from ..errors import ParameterError, UsageError
@@ -84,8 +84,11 @@ class Sampled(Around):
         delays: bool = False,
         converters: tuple[str, str] = ("", ""),
     ) -> None:
+        of_type("Sampled", "inner", inner, ct.InputOutputSystem, "a block")
+        of_type("Sampled", "sampling", sampling, Block, "a block of a Sampling")
         self.inner, self.sampling = inner, sampling
-        self.euler, self.delays, self.converters = euler, delays, converters
+        self.euler, self.delays = flag("Sampled", "euler", euler), flag("Sampled", "delays", delays)
+        self.converters = converters
         outputs = list(inner.output_labels)
         self.waiting = sampling.spec.waiting if delays else 0
         waiting = [f"{y}_pending{i + 1}" for i in range(self.waiting) for y in outputs]

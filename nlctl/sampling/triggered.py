@@ -87,6 +87,6 @@ class TriggeredHold:
     @staticmethod
     @equation
     def reset(t, x, u, p):
-        """Take the inputs; the time since the start is no interval."""
+        """Take the inputs; the time since the start is not an interval."""
         interval = np.where(x[-1:] > 0.5, x[-2:-1], 0.0)
         return np.concatenate([u[:-1], interval, np.zeros(1), np.ones(1)])

@@ -231,8 +231,8 @@ class TestJoined:
     @each_row(
         ("order", "pieces", "told"),
         [
-            (1, {}, "order >= 2, got 1"),
-            (2.0, {}, "order >= 2, got 2.0"),
+            (0, {}, "order >= 1, got 0"),
+            (2.0, {}, "order >= 1, got 2.0"),
             (3, {"filtered_error": nlctl.FilteredError()}, r"order 3 needs 2 lambdas, got 1 \("),
             (2, {"basis": nlctl.GaussianBasis(centres=np.eye(3))}, "at most 2 coordinates, got 3"),
         ],

@@ -1,7 +1,10 @@
 """Code of the pages in Markdown runs, and their figures are those that the tests check."""
 
 import ast
+import linecache
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -28,11 +31,12 @@ def blocks(page):
 def ran(page, *, without=()):
     """Run a page's code, leaving out some assignments; return what it has made."""
     names = {}
-    for code in blocks(page):
-        tree = ast.parse(code)
+    for place, code in enumerate(blocks(page), 1):
+        file, tree = f"<{page}, block {place}>", ast.parse(code)
+        linecache.cache[file] = (len(code), None, code.splitlines(True), file)  # functions are read
         made = [ast.unparse(s.targets[0]) if isinstance(s, ast.Assign) else None for s in tree.body]
         tree.body = [s for s, name in zip(tree.body, made, strict=True) if name not in without]
-        exec(compile(tree, page, "exec"), names)
+        exec(compile(tree, file, "exec"), names)
     return names
 
 
@@ -42,6 +46,14 @@ def test_code_of_the_explanations_runs(page):
     """Each block asserts what the text says; but for the run of 10,000 s, which is weekly."""
     assert all("assert" in code for code in blocks(page))
     ran(page, without=["late"])
+
+
+@pytest.mark.slow
+def test_the_figure_of_the_jumps_is_made_again(tmp_path):
+    """Its script checks each curve against closed forms, and writes the figure that is shown."""
+    script = EXPLANATION / "between_steps.py"
+    subprocess.run([sys.executable, "-W", "error", str(script), str(tmp_path)], check=True)
+    assert (tmp_path / "between-steps.svg").stat().st_size > 1e4
 
 
 def test_the_burst_that_is_told_is_that_of_the_kept_run():

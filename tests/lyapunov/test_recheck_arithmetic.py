@@ -47,6 +47,34 @@ def test_functions_enclose_their_values_and_derivatives(name, a, b, share):
         )
 
 
+POWERS = st.lists(st.sampled_from([2, 3, 63, 64]), min_size=1, max_size=9)
+
+
+@given(st.lists(NUMBERS, min_size=2, max_size=2), SHARES, POWERS)
+def test_powers_of_powers_end_and_enclose(ends, share, powers):
+    """2^(64^9) has no digits that anybody keeps: its ends are rounded outward."""
+    x = between(*ends)
+    a = x.bottom + Fraction(share) * (x.top - x.bottom)
+    nodes = [["symbol", "x"], *(["power", i, n] for i, n in enumerate(powers))]
+    found = WrittenEquation(nodes).on({"x": x})
+    sign = -1 if a < 0 and all(n % 2 for n in powers) else 1
+    size = math.prod(powers) * math.log2(abs(a)) if a else -math.inf
+    if size < 200:
+        power = Fraction(a) ** math.prod(powers) if size > -200 and math.prod(powers) < 500 else 0
+        assert found.bottom - Fraction(1, 2**60) <= power <= found.top + Fraction(1, 2**60)
+    elif size > 2100 and sign > 0:
+        assert found.top == math.inf
+    elif size > 2100:
+        assert found.bottom == -math.inf
+
+
+def test_an_equation_that_nobody_can_read_is_refused():
+    """Sums of itself, forty times: its text would fill the memory."""
+    nodes = [["symbol", "x"], *(["+", i, i] for i in range(40))]
+    with pytest.raises(Refuted, match="too long to be read"):
+        str(WrittenEquation(nodes))
+
+
 def test_pi_is_enclosed():
     assert (
         PI_ENCLOSED.bottom

@@ -217,3 +217,37 @@ def test_a_plant_that_asks_has_no_certificate(what, law):
 
 def _controller(law):
     return nlctl.adaptive_neural(2, law=law)
+
+
+NO_NUMBERS = {  # what is given where x > 0.99: nowhere that floats are tried
+    "nothing": None, "text": "x", "a complex number": 1j, "an array": np.array([1.0, 2.0]),
+    "a pair": (1.0, 2.0), "a list": [1.0, 2.0], "a set": {1.0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", NO_NUMBERS)
+def test_what_is_no_number_somewhere_is_refused(what):
+    """By its type; no error of what reads it."""
+
+    def sometimes(x):
+        return NO_NUMBERS[what] if x[0] > 0.99 else x[0] ** 2
+
+    for ask in (
+        lambda: enclose(sometimes, BOX),
+        lambda: prove(sometimes, BOX, high=100.0),
+        lambda: prove_decrease(sometimes, lambda x: (-x[0],), box=BOX, level=0.9, floor=0.1),
+        lambda: prove_decrease(
+            lambda x: x[0] ** 2, lambda x: (NO_NUMBERS[what] if x[0] > 0.9 else -x[0],),
+            box=BOX, level=0.9, floor=0.1,
+        ),
+    ):  # fmt: skip
+        with pytest.raises(ParameterError):
+            ask()
+
+
+@pytest.mark.parametrize("one", [1.0, 2, np.float32(0.5), np.array(3.0), np.array(2), np.bool_(1)])
+def test_plain_numbers_are_numbers(one):
+    """Those that NumPy makes of a choice between floats as well."""
+    found = enclose(lambda x: np.where(x[0] > 0, one, 0.25), BOX)
+    assert [found.low, found.high] == pytest.approx(sorted([0.25, float(one)]), abs=1e-6)
+    assert enclose(lambda x: one, BOX).high == pytest.approx(float(one))

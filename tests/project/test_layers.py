@@ -12,7 +12,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.errors", "nlctl.wording", "nlctl.names", "nlctl.arguments", "nlctl.params"]
     + ["nlctl.equations", "nlctl.annotations"],
     ["nlctl.blocks", "nlctl.diagrams", "nlctl.functions", "nlctl.drawing", "nlctl.responses"]
-    + ["nlctl.sampling", "nlctl.delays", "nlctl.sliding", "nlctl.reference"],
+    + ["nlctl.accumulation", "nlctl.sampling", "nlctl.delays", "nlctl.sliding", "nlctl.reference"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers", "nlctl.faults"],
     ["nlctl.paper"],
     ["nlctl.expressions"],

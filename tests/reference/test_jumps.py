@@ -187,6 +187,22 @@ def test_a_guard_that_falls_and_rises_within_a_step(engine, depth):
     assert found.outputs[1, -1] == 1
 
 
+def test_a_guard_that_rises_where_another_block_jumps_may_fall_again():
+    """The first jumps at t = 1; the guard of the second, below 0, rises for another 0.1 ms."""
+    first = made(
+        states=("a",), initial={"a": 1.0}, update=lambda t, x, u, p: -np.ones(1),
+        guard=lambda t, x, u, p: x, reset=lambda t, x, u, p: x + 10.0,
+    ).spec  # fmt: skip
+    second = made(
+        states=("b",), update=lambda t, x, u, p: 0 * x,
+        guard=lambda t, x, u, p: np.array([-0.5 - (t - 1.0001) ** 2]),
+        reset=lambda t, x, u, p: x + 1.0,
+    ).spec  # fmt: skip
+    loop = nlctl.interconnect({"first": first(), "second": second()}, outputs=["a", "b"])
+    found = run(loop, [0.0, 0.9, 1.7, 2.4])
+    np.testing.assert_allclose(found.outputs, [[1, 0.1, 9.3, 8.6], [0, 0, 0, 0]], atol=1e-9)
+
+
 @nlctl.record
 class Swap:
     """Takes over its input at t = 1."""

@@ -1,4 +1,4 @@
-"""Pairs of what jumps in the reference engine, one acting on the other, against closed forms."""
+"""Pairs of what jumps, in both engines, one acting on the other, against closed forms."""
 
 import control as ct
 import numpy as np
@@ -63,6 +63,18 @@ def relay(name_in="u", name_out="v", **fields):
 
 def late(name_in, name_out, delay):
     return nlctl.TransportDelay(inputs=(name_in,), outputs=(name_out,), delay=delay)
+
+
+def below(level, name_in="u", name_out="v"):
+    """1 below a level, 0 above, by a user's own function."""
+    return ct.nlsys(None, lambda t, x, u, p: np.where(u < level, 1.0, 0.0), inputs=[name_in],
+                    outputs=[name_out], name="below")  # fmt: skip
+
+
+def narrow(name_in, name_out):
+    """1 within 0.001 of 0, by a user's own function."""
+    return ct.nlsys(None, lambda t, x, u, p: np.where(abs(u) < 1e-3, 1.0, 0.0), inputs=[name_in],
+                    outputs=[name_out], name="narrow")  # fmt: skip
 
 
 def integral(name_in, name_out):
@@ -138,6 +150,44 @@ PAIRS = {  # blocks, an output, what it is at t > 0
         {"d": late("x", "u", 0.4), "v": relay(on=0.2, off=-0.2, v0=1.0), "x": ct.ss(
             0, -1, 1, 0, inputs="v", outputs="x", name="plant")}, "x", triangle,
     ),
+    "a delay moves a narrow condition": (
+        {"s": signal(np.cos), "d": late("u", "w", DELAYED), "n": narrow("w", "v"),
+         "p": integral("v", "z")}, "z",
+        lambda t: np.minimum(t, DELAYED) + 2 * np.arcsin(1e-3) * (t > np.pi / 2 + DELAYED),
+    ),
+    "a clock moves a play": (
+        {"s": signal(lambda t: t), "h": through("u", "r", 0.25), "p": play("r", "v")}, "v",
+        lambda t: np.maximum(0.25 * np.floor(4 * t) - 0.3, 0.0),
+    ),
+    "a play moves what a clock samples": (
+        {"s": signal(lambda t: t), "p": play("u", "r"), "h": through("r", "v", 0.4)}, "v",
+        lambda t: np.maximum(0.4 * np.floor(t / 0.4) - 0.3, 0.0),
+    ),
+    "a condition of time moves a guard": (
+        {"s": signal(lambda t: np.where(t % 1.0 < 0.25, 1.0, 0.0), "watched"),
+         "w": Watch(level=0.5)}, "since",
+        lambda t: np.where(t < 1, t, t % 1),
+    ),
+    "a guard moves a condition": (
+        {"s": Saw(), "c": below(0.3), "p": integral("v", "z")}, "z",
+        lambda t: 0.3 * np.floor(t) + np.minimum(t % 1, 0.3),
+    ),
+    "a clock moves a condition": (
+        {"s": signal(lambda t: t), "h": through("u", "r", 0.4), "c": below(1.0, "r"),
+         "p": integral("v", "z")}, "z", lambda t: np.minimum(t, 1.2),
+    ),
+    "a condition moves what a clock samples": (
+        {"s": signal(lambda t: t % 1.0), "c": below(0.5, "u", "r"), "h": through("r", "v", 0.3)},
+        "v", lambda t: np.where(0.3 * np.floor(t / 0.3) % 1 < 0.5 - 1e-9, 1.0, 0.0),
+    ),
+    "a play moves a condition": (
+        {"s": signal(lambda t: t), "p": play("u", "r"), "c": below(1.0, "r"),
+         "p2": integral("v", "z")}, "z", lambda t: np.minimum(t, 1.3),
+    ),
+    "a condition moves a play": (
+        {"s": signal(lambda t: t), "c": below(1.5, "u", "r"), "p": play("r", "v")}, "v",
+        lambda t: np.where(t < 1.5, 0.7, 0.3),
+    ),
     "a play moves what is delayed, which moves a clock": (
         {"s": signal(lambda t: t), "p": play("u", "r"), "d": late("r", "w", 0.5),
          "h": through("w", "v", 0.4)}, "v",
@@ -161,6 +211,6 @@ def test_in_the_reference(pair):
     np.testing.assert_allclose(*outputs(pair, "python-control"), rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("pair", [pair for pair in PAIRS if "guard" not in pair])
+@pytest.mark.parametrize("pair", PAIRS)
 def test_in_machine_code(pair):
     np.testing.assert_allclose(*outputs(pair, "native"), rtol=0, atol=1e-7)

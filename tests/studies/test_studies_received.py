@@ -9,6 +9,7 @@ import struct
 import sys
 from pathlib import Path
 
+import control as ct
 import pytest
 from command_line import nlctl_here
 from studies_example import HEAD, write
@@ -148,6 +149,28 @@ def test_a_name_that_a_file_has_imported_is_not_its_own(home, name):
     with pytest.raises(StudyError, match=r"is a function of .* Trust it with --trust"):
         read_study(path)
     assert not (base / "ran").exists()
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["control:set_defaults", "control:reset_defaults", "control:use_fbs_defaults",
+     "control.config:use_legacy_defaults", "control:bode_plot", "control.sisotool:sisotool",
+     "control.matlab:bode", "control:ControlPlot"],
+)  # fmt: skip
+def test_what_makes_no_system_of_python_control_is_not_called(home, name):
+    """It may change what every later run of the process computes."""
+    before = dict(ct.config.defaults)
+    with pytest.raises(StudyError, match="Trust it with --trust"):
+        read_study(write(home, *in_options(name)))
+    assert dict(ct.config.defaults) == before
+
+
+@pytest.mark.parametrize("name", ["control:ss", "control:tf", "control:rss", "control.nlsys:nlsys"])
+def test_what_makes_systems_is_asked_for_nothing(home, name):
+    """Other mistakes are told of it: not that it needs trust."""
+    with pytest.raises(StudyError) as told:
+        read_study(write(home, *in_options(name)))
+    assert "--trust" not in str(told.value)
 
 
 def test_packages_within_the_folder_are_no_files_of_the_study(home):

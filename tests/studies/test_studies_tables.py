@@ -354,6 +354,22 @@ def test_resealed_tables_end_in_a_sentence(run_of, tmp_path_factory, kind, data)
     any_change_ends_in_a_sentence(run_of(kind), tmp_path_factory.mktemp("any") / "out", data)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("how", CHANGES)
+def test_every_column_of_kept_rows_may_be_anything(run_of, tmp_path, how):
+    """Labels that are none and numbers in the place of text among them: a problem in words."""
+    whole = run_of("probability")
+    (name,) = tables_in(whole, in_chunks=True)
+    for place in range(len(read_parquet(whole / name).columns) - 1):
+        folder = shutil.copytree(whole, tmp_path / str(place))
+        if with_change(folder, name, how, place):
+            reseal(folder, name)
+            assert all("\n" not in problem for problem in verify(folder).problems)
+            column = read_parquet(whole / name).set_index("row").columns[place]
+            if column == "status" and how in ("text", "a number", "not a number", "infinite"):
+                assert "no label of it" in " ".join(verify(folder).problems)
+
+
 @pytest.mark.weekly
 @settings(max_examples=80)
 @given(data=st.data())

@@ -49,6 +49,11 @@ def lag():
 
 
 @functools.cache
+def ready():
+    return nlctl.compile(lag())
+
+
+@functools.cache
 def short_run():
     return nlctl.input_output_response(example(), np.linspace(0, 0.2, 21))
 
@@ -336,8 +341,25 @@ PROOFS = {
     lyapunov.tighten: lambda: {"loop": lag(), "u_limit": 1.0, "bound": "C_0", "horizon": 1.0,
                                "k": None, "evaluations": 2, "max_steps": 100},
 }  # fmt: skip
+METHODS = {
+    Box.of: lambda: {"x1": (-1.0, 1.0), "x2": (0.0, 1.0)},
+    SQUARE.times: lambda: {"name": "x3", "low": 0.0, "high": 1.0},
+    ready().dynamics: lambda: {"t": 0.0, "x": (0.5,), "u": (1.0,), "params": None},
+    ready().output: lambda: {"t": 0.0, "x": (0.5,), "u": (1.0,), "params": None},
+    ready().parameter_vector: lambda: {"params": {"plant.k": 3.0}},
+    ready().parameter_jacobian: lambda: {
+        "parameters": ["plant.k"], "x0": (0.5,), "u0": (1.0,), "t": 0.0, "params": None},
+    ready().linearize: lambda: {
+        "x0": (0.5,), "u0": (1.0,), "t": 0.0, "params": None, "copy_names": True},
+    nlctl.Sampled: lambda: {
+        "inner": nlctl.block(nlctl.Lag(), "lag"),
+        "sampling": nlctl.block(nlctl.Sampling(dt=0.1), "sampling"), "euler": True,
+        "delays": False, "converters": ("", "")},
+    lyapunov.aftermath: lambda: {"zeta": 2.0, "kG": (1.0, 1.0), "energy": 0.0, "drag": 0.0},
+}  # fmt: skip
+
 GROUPS = {
     "nlctl": NLCTL, "records": RECORDS, "designs": DESIGNS, "statistics": STATISTICS,
     "searches": SEARCHES, "metrics": METRICS, "pages": PAGES, "figures": FIGURES,
-    "proofs": PROOFS,
+    "proofs": PROOFS, "methods": METHODS,
 }  # fmt: skip

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 from nlctl.host.notebook import table_html
 from nlctl.names import unknown
@@ -224,9 +225,11 @@ class Shown:
 
     @property
     def claim(self) -> str:
-        """What is proved, with the starts and inputs that it is about."""
+        """What is proved, with the starts and inputs that it is about; or that nothing is."""
         added = f", whatever external inputs add up to {self.disturbance:.6g} to v"
-        return f"{self.bound} from {self.starts}{added if self.disturbance else ''}"
+        about = f"from {self.starts}{added if self.disturbance else ''}"
+        lost = f"no bound is proved {about}, and none is refuted; undecided"
+        return f"{self.bound} {about}" if self.holds else lost
 
     @property
     def constants(self) -> tuple[Constant, ...]:
@@ -236,9 +239,9 @@ class Shown:
     @property
     def verdict(self) -> str:
         """What is proved, in a sentence."""
-        lost = f"no bound is proved from {self.starts}, and none is refuted; undecided"
-        return f"{self.claim if self.holds else lost}: {self.reason}"
+        return f"{self.claim}: {self.reason}"
 
+    @as_annotated
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Write the proof so that others can check it: rationals, boxes and the claim, as JSON.
 
@@ -265,9 +268,9 @@ class Shown:
             raise UsageError(
                 f"nothing is proved of '{self.name}' that could be saved: {self.reason}"
             )
-        return self._saved(file)
+        return self._saved(Path(file))
 
-    def _saved(self, file: str | os.PathLike[str]) -> Path:
+    def _saved(self, file: Path) -> Path:
         raise NotImplementedError
 
     def _repr_html_(self) -> str:

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from nlctl import functions
+from nlctl.annotations import as_annotated
 from nlctl.arguments import number
 from nlctl.errors import ParameterError
 from nlctl.params import as_numbers
@@ -61,6 +62,7 @@ class Aftermath:
         )
 
 
+@as_annotated
 def aftermath(
     zeta: float,
     N: GainFunction = functions.nussbaum,

@@ -371,8 +371,15 @@ def typed(frame: pd.DataFrame, columns: Columns) -> pd.DataFrame:
     Raises
     ------
     ValueError
-        If a column cannot have its type.
+        If a column cannot have its type, or holds another label than it may.
     """
+    for name, kind in columns.items():
+        if name in frame and not isinstance(kind, str):
+            others = frame[name][~frame[name].isin(list(kind))]
+            if len(others):
+                raise ValueError(
+                    f"column '{name}' holds {str(others.iloc[0])[:40]!r}, no label of it"
+                )
     types = {
         name: kind if isinstance(kind, str) else pd.CategoricalDtype(list(kind))
         for name, kind in columns.items()

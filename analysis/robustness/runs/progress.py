@@ -62,6 +62,7 @@ class Progress:
         """Time (s) that the rest takes at this rate."""
         return (self.total - self.done) / self.rate if self.rate > 0 else np.inf
 
+    @as_annotated
     def interval(self, confidence: float = 0.99) -> tuple[float, float] | None:
         """Return bounds of the probability of a violation that may be looked at any time.
 

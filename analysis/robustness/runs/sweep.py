@@ -6,7 +6,7 @@ import math
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
@@ -33,6 +33,12 @@ __all__ = ["Interrupt", "Sweep", "gentle_interrupt", "load", "sweep"]
 _LARGEST = 1024  # rows of a chunk: some 200 kB on disk, and seconds of work
 FEWEST = 20  # chunks of a sweep, so that a kill costs little
 _STEP = 64  # rows: a chunk keeps the SIMD lanes of several threads busy
+
+
+def _check_columns(names: Iterable[str], known: list[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise unknown("column", name, known, "of the sweep")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,6 +81,7 @@ class Sweep:
         """All finished rows by their numbers; read from the folder each time it is asked for."""
         return self.columns()
 
+    @as_annotated
     def columns(self, *names: str) -> pd.DataFrame:
         """Return some columns of `table`; the others are not read.
 
@@ -87,11 +94,21 @@ class Sweep:
         -------
         pandas.DataFrame
             One row for each row that is finished.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such column.
+        StoreError
+            If a file cannot be read.
         """
         if self.folder is None:
             assert self.held is not None
-            return self.held.filter(list(names)) if names else self.held
-        return table_of(opened(self.folder), names or None)
+            _check_columns(names, list(self.held))
+            return self.held[list(names)] if names else self.held
+        store = opened(self.folder)
+        _check_columns(names, list(store.columns))
+        return table_of(store, names or None)
 
 
 @as_annotated

@@ -5,7 +5,8 @@ may run without being asked is what makes loops of nlctl's blocks:
 
 * modules of nlctl that do, `MADE_OF`;
 * files in the study's own folder, where somebody has pointed at the study;
-* installed packages that are built on nlctl or python-control, likewise.
+* installed packages that are built on nlctl or python-control, likewise; of python-control what
+  makes systems, `SYSTEMS`.
 
 Anything else needs the trust of this user, see `record`; so does all but the first of these in a
 folder of results, which is data that somebody may have sent.  It is looked at twice: what is named,
@@ -65,6 +66,13 @@ MADE_OF = tuple(
     *(f"analysis.paper.{part}" for part in ("controllers", "loops", "rivals")),
     *("analysis.metrics", "analysis.lyapunov.nussbaum.forecast", "analysis.studies.kinds"),
 )
+SYSTEMS = tuple(  # of python-control: not what draws, and what changes the settings of a process
+    f"control.{room}"
+    for room in ("bdalg", "canonical", "delay", "descfcn", "dtime", "flatsys", "frdata", "iosys")
+) + (
+    *(f"control.{room}" for room in ("lti", "mateqn", "modelsimp", "nlsys", "optimal", "robust")),
+    *(f"control.{room}" for room in ("statefbk", "statesp", "stochsys", "xferfcn")),
+)
 NO_DIAGRAMS = {"None", "bool", "int", "float", "complex", "str", "bytes", "list", "tuple", "dict"}
 SITES = ("site-packages", "dist-packages")
 _LONGEST = 500  # characters of a function's name
@@ -113,7 +121,7 @@ class Grant:
     def admits_module(self, name: str) -> str:
         """Return why a module may not be imported; nothing if it may, or if there is none."""
         if name.partition(".")[0] in _OURS:
-            fits = name in _OURS or name.startswith(MADE_OF)
+            fits = name in _OURS or _is_in(name, MADE_OF)
             return "" if fits or self.reach == "all" else f"'{name}' makes nothing of a loop"
         try:
             places = _module_places(name)
@@ -128,7 +136,11 @@ class Grant:
         outside = [p for p in places if not any(p.resolve().is_relative_to(h) for h in homes)]
         if outside:
             return f"'{name}' is '{outside[0]}', and no installed package"
-        if all(_is_own(p.resolve(), home) for p in places) or top in _built_on():
+        if all(_is_own(p.resolve(), home) for p in places):
+            return ""
+        if top == "control" and name != top and not _is_in(name, SYSTEMS):
+            return f"'{name}' makes nothing of a loop"
+        if top in _built_on():
             return ""
         return f"'{top}' is not built on nlctl or python-control"
 
@@ -143,6 +155,11 @@ class Grant:
         """What to do about what is refused."""
         here = ", or put it into the study's folder" if self.reach == "study" else ""
         return f"reading this study would run it. Trust it with --trust{here}"
+
+
+def _is_in(module: str, rooms: Iterable[str]) -> bool:
+    """Whether a module is one of these, or in one of them."""
+    return any(module == room or module.startswith(f"{room}.") for room in rooms)
 
 
 def _is_own(path: Path, home: Path) -> bool:

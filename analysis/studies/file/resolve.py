@@ -165,7 +165,8 @@ def option(value: Any, folder: Path) -> Any:
     Raises
     ------
     UsageError
-        If block, function or a field does not exist, or a value is refused.
+        If block, function or a field does not exist, or a value is refused; or a function of a
+        package fails.
     """
     if isinstance(value, list):
         return tuple(option(part, folder) for part in value)
@@ -188,8 +189,18 @@ def option(value: Any, folder: Path) -> Any:
     )
     for key in arguments:
         check_keyword(made, key)
-    check_complete(made, str(value.get("function", name)), arguments)
-    return made(**arguments)
+    named_as = str(value.get("function", name))
+    check_complete(made, named_as, arguments)
+    try:
+        return made(**arguments)
+    except UsageError:
+        raise
+    except Exception as error:
+        if named_as.rpartition(":")[0].endswith(".py"):  # their own traceback helps
+            raise
+        raise ParameterError(
+            f"'{named_as}' does not take these arguments ({type(error).__name__}: {error})"
+        ) from error
 
 
 def check_complete(function: Callable[..., Any], name: str, given: Mapping[str, Any]) -> None:

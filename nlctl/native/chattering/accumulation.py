@@ -1,9 +1,6 @@
-"""Switches that accumulate: they come ever closer together, and there is no end of them.
+"""Whether the switches of a lane accumulate in the steps that it has tried, see `accumulation`.
 
-Behind a lag, or with u'' as the first derivative of its input that it acts on, a relay drives its
-input back and forth through 0 (second-order sliding).  Where every way back is shorter than the
-one before, the switches are so many that no run comes to its end: in a geometric sequence, whose
-sum is finite, or as exp(t).  Two things together tell that from an oscillation:
+Two things together tell that from an oscillation:
 
 * between two switches what is compared changes by no more than some tolerances;
 * each period from switch to switch is shorter than the one before, by more than a switch is
@@ -16,19 +13,17 @@ from typing import Any
 
 import numpy as np
 
+from ...accumulation import LEAST, WITHIN, Crowd, crowd_of, reached, tolerance_of
 from ..integrate.workspace import TAYLOR
-from .steps import Attempt, Crowd, Jump, LaneEquations
+from .steps import Attempt, Jump, LaneEquations
 
-__all__ = ["accumulating"]
+__all__ = ["accumulated", "accumulating"]
 
 _RATE = 1e-3  # of what is compared (1/s): an ideal relay that comes to rest has done so by then
 _MANY = 3e4  # switches, of a sequence of periods as 1 / n, after which it is enough
 _STEPS = 20  # accepted for each event: with more it does not switch all the time
-_LEAST = 5  # switches that are looked at
-_WITHIN = 100.0  # tolerances that what is compared changes by in between
-_LOCATED = 50.0  # relative tolerances by which periods fall at least; switches are located to 10
-_FALLS = 0.2  # part by which it is enough that they fall, whatever the tolerance is
 _MORE = 1e6  # switches to come that are too many
+_RESOLVED = 1e-4  # part of the longest period: shorter ones may be rounding where a run stays
 
 
 def accumulating(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | None:
@@ -50,40 +45,44 @@ def accumulating(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | No
     places = 1 + np.flatnonzero(sides[1:, row] * sides[:-1, row] < 0)
     if not places.size:
         return None
-    crowd = _crowd(_noted(run, row, t[first][places]), row, run.task)
+    switches = _noted(run, row, t[first][places])
+    crowd = crowd_of(switches, row, run.task.times[-1], run.task.rtol, _MORE)
     if crowd is None or not _is_small(evaluated, points[places[-1]], rates[places[-1]], crowd):
         return None
-    if not np.abs(g[:, row]).max() <= _WITHIN * _tolerance(evaluated, points[places[-1]], row):
+    if not np.abs(g[:, row]).max() <= WITHIN * _tolerance(evaluated, points[places[-1]], row):
         return None
     (before, x, _), (after, x_2, u) = points[places[-1] - 1], points[places[-1]]
     return Jump(times=(float(before), float(after)), before=x, after=x_2, inputs=u, crowd=crowd)
 
 
+def accumulated(run: Any, end: float) -> Crowd | None:
+    """Return how the switches of a single run have accumulated before the jump where it stays."""
+    rows, times = _log(run)
+    if not rows.size:
+        return None
+    row = int(np.bincount(rows).argmax())
+    own = times[rows == row]
+    periods = own[2:] - own[:-2]
+    last = np.flatnonzero(periods > _RESOLVED * periods.max(initial=0.0))[-2 * LEAST :]
+    if not last.size:
+        return None
+    crowd = crowd_of(own[last[0] : last[-1] + 3], row, run.task.times[-1], run.task.rtol, _MORE)
+    return crowd if crowd and abs(crowd.end - end) <= crowd.period else None
+
+
+def _log(run: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return which conditions were at 0, and when: of a single run they are all noted."""
+    log = slice(int(run.lanes["noted"][0]) if run.task.alone else 0)
+    rows, times = run.work.log_row[log] // 2, run.work.log_t[log]
+    return rows[rows >= 0], times[rows >= 0]
+
+
 def _noted(run: Any, row: int, times: np.ndarray) -> np.ndarray:
-    """Return the last times at which a condition was at 0: of a single run they are all noted."""
-    if times.size >= _LEAST or not run.task.alone:
+    """Return the last times at which a condition was at 0."""
+    if times.size >= LEAST or not run.task.alone:
         return times
-    log = slice(int(run.lanes["noted"][0]))
-    rows, noted = run.work.log_row[log] // 2, run.work.log_t[log]
-    return noted[rows == row][-2 * _LEAST :]
-
-
-def _crowd(times: np.ndarray, row: int, task: Any) -> Crowd | None:
-    """Return how switches at some times accumulate, if they do."""
-    if times.size < _LEAST:
-        return None
-    periods = times[2:] - times[:-2]
-    enough = min(_FALLS, _LOCATED * task.rtol)
-    if not (np.all(periods[2:] < periods[:-2]) and periods[-1] < (1 - enough) * periods[0]):
-        return None
-    fall = np.log(periods[0] / periods[-1])
-    pace = fall / (times[-1] - times[-1 - periods.size])
-    with np.errstate(over="ignore"):
-        more = 2.0 * np.expm1(pace * (task.times[-1] - times[-1])) / (pace * periods[-1])
-    if not more > _MORE:
-        return None
-    ratio = float(np.exp(-2.0 * fall / (periods.size - 1)))
-    return Crowd(row=row, period=float(periods[-1]), ratio=ratio, more=float(more))
+    rows, noted = _log(run)
+    return noted[rows == row][-2 * LEAST :]
 
 
 def _is_small(evaluated: LaneEquations, point: tuple, rates: np.ndarray, crowd: Crowd) -> bool:
@@ -94,9 +93,9 @@ def _is_small(evaluated: LaneEquations, point: tuple, rates: np.ndarray, crowd: 
     """
     t, x, u = point
     ahead = crowd.period / 8
-    there = abs(evaluated.switching(t + ahead, x + ahead * rates, u)[crowd.row])
+    there = reached(lambda s, z: evaluated.switching(s, z, u)[crowd.row], t, x, rates, ahead)
     settled = there < _RATE * ahead or _MANY * (1 - crowd.ratio) < 2
-    return bool(settled and there <= _WITHIN * _tolerance(evaluated, point, crowd.row))
+    return bool(settled and there <= WITHIN * _tolerance(evaluated, point, crowd.row))
 
 
 def _tolerance(evaluated: LaneEquations, point: tuple, row: int) -> float:
@@ -105,9 +104,4 @@ def _tolerance(evaluated: LaneEquations, point: tuple, row: int) -> float:
     task = evaluated.run.task
     away = task.atol + task.rtol * np.abs(x)
     away[task.memory] = 0.0
-    here = evaluated.switching(t, x, u)[row]
-    moved = [
-        evaluated.switching(t, x + away[i] * (np.arange(x.size) == i), u)[row] - here
-        for i in np.flatnonzero(away)
-    ]
-    return float(np.abs(moved).sum())
+    return tolerance_of(lambda s, z: evaluated.switching(s, z, u)[row], t, x, away)

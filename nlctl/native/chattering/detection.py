@@ -22,14 +22,14 @@ goes on as it began.  What is found of a member never depends on the members bes
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..integrate.state import RUNNING
 from ..integrate.workspace import TAYLOR
-from .accumulation import accumulating
+from .accumulation import accumulated, accumulating
 from .steps import Attempt, Jump, LaneEquations, parameters_of
 
 __all__ = ["Attempt", "Jump", "asked", "jump_of", "new_paces", "probe_of", "snapshot"]
@@ -94,9 +94,10 @@ def snapshot(work: Any, advance: Callable[[], Any]) -> tuple[Any, Attempt]:
 def jump_of(run: Any, attempts: list[Attempt], j: int) -> Jump | None:
     """Return the last jump in the steps that lane `j` has tried, if it chatters there."""
     c = parameters_of(run, j)
-    return _stayed_at(run, attempts[-PROBE:], j, c) or accumulating(
-        LaneEquations(run=run, j=j, c=c), attempts
-    )
+    jump = _stayed_at(run, attempts[-PROBE:], j, c)
+    if jump is None:
+        return accumulating(LaneEquations(run=run, j=j, c=c), attempts)
+    return replace(jump, crowd=accumulated(run, jump.time))
 
 
 def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump | None:

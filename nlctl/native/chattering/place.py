@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...accumulation import SECOND_ORDER, Crowd, accumulation_words
 from ...diagrams import apart, override
 from ...upstream.control_internals import rates_now
 from ..audit import block_outputs
@@ -17,7 +18,7 @@ from ..compiled import Compiled
 from ..diagram.block_inputs import block_inputs
 from ..happened import row_labels
 from ..sliding.reading import relay_places
-from .steps import Crowd, Jump
+from .steps import Jump
 
 __all__ = ["chattering_words"]
 
@@ -25,12 +26,6 @@ _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in 
 _WIDER = (0.0, *(4.0**k for k in range(14)))  # in distances between neighbouring states
 _JUMPS = 1e3  # change of an output over that of inputs and states, which no usual function has
 _ROUNDING = 1e-9  # of a value: what is not a jump
-_FINITE = 0.99  # of two periods: a sum that is not far away
-_SECOND_ORDER = (
-    "what switches does not reach the rate of what is compared, and cannot hold it at 0 (second-"
-    "order sliding): give it hysteresis (nlctl.Relay), smooth it over a small width, make a sign "
-    "an nlctl.IdealRelay with a larger rest_rate, or let the run end before"
-)
 _SMALL = 1e-300  # what is divided by where nothing else has changed
 
 
@@ -51,9 +46,9 @@ def chattering_words(
     """
     relays = relay_places(compiled.schedule.nodes)
     if jump.crowd is not None:
-        return _accumulation(compiled, jump, jump.crowd)
+        return _accumulation(compiled, jump.crowd)
     if relays and _keeps_on_switching(compiled, p, jump):
-        return f"{_committed(compiled, p, jump)}: its switches accumulate; {_SECOND_ORDER}"
+        return f"{_committed(compiled, p, jump)}: its switches accumulate; {SECOND_ORDER}"
     advice = (
         "the run comes back to it with each of the shortest steps: smooth the jump over a small "
         "width, give it hysteresis, or sample the controller (nlctl.sampled)"
@@ -63,19 +58,11 @@ def chattering_words(
     return f"{found}; {advice}"
 
 
-def _accumulation(compiled: Compiled, jump: Jump, crowd: Crowd) -> str:
+def _accumulation(compiled: Compiled, crowd: Crowd) -> str:
     """Return whose switches come ever closer together, and how."""
     labels = row_labels(compiled, compiled.lowered.conditions)
-    block, which = labels[crowd.row] if crowd.row < len(labels) else ("", "a condition")
-    whose = f"block '{block}' ({which})" if block else which
-    end = jump.time + 0.5 * crowd.period * crowd.ratio**0.5 / (1 - crowd.ratio**0.5)
-    left = f"{crowd.more:.2g}" if np.isfinite(crowd.more) else "no end of them"
-    where = f"near t = {end:.6g} s" if crowd.ratio < _FINITE else "ever faster"
-    return (
-        f"the switches of {whose} accumulate {where}: two of them in {crowd.period:.3g} s at "
-        f"t = {jump.time:.6g} s, {left} to come, and what is compared is within tolerances of 0; "
-        f"{_SECOND_ORDER}"
-    )
+    which = labels[crowd.row] if crowd.row < len(labels) else ("", "a condition")
+    return accumulation_words(which, crowd, "and what is compared is within tolerances of 0")
 
 
 def _keeps_on_switching(compiled: Compiled, p: np.ndarray, jump: Jump) -> bool:

@@ -8,29 +8,9 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Attempt", "Crowd", "Jump", "LaneEquations", "parameters_of"]
+from ...accumulation import Crowd
 
-
-@dataclass(frozen=True, kw_only=True)
-class Crowd:
-    """Switches that come ever closer together.
-
-    Attributes
-    ----------
-    row : int
-        Which switching function or condition, in the order of the program.
-    period : float
-        From one switch to the next but one, at last (s).
-    ratio : float
-        Of two such periods in a row.
-    more : float
-        Switches that there would be until the end of the run, at that pace.
-    """
-
-    row: int
-    period: float
-    ratio: float
-    more: float
+__all__ = ["Attempt", "Jump", "LaneEquations", "parameters_of"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,6 +9,7 @@ from ...errors import CompileError
 from ...expressions.arrays import leaf_vector
 from ...expressions.graph import Ambiguous, Untraceable
 from ...expressions.trace import trace
+from ...wording import counted
 from ..codegen.trace import time
 from ..diagram.schedule import Schedule
 from .located import Located
@@ -42,7 +43,7 @@ def watched_conditions(reader: Reader, schedule: Schedule) -> list[Located]:
         try:
             value = trace(graph, partial(each.function), arguments)
             if value.size != 1:
-                raise Untraceable(f"it returns {value.size} numbers, not one")
+                raise Untraceable(f"it returns {counted(value.size, 'number')}, not one")
         except (Untraceable, Ambiguous) as error:
             raise CompileError(
                 f"event function '{each.name}' cannot be compiled: {error}; "

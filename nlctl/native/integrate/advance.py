@@ -33,7 +33,7 @@ from .methods.stiff import stiff_attempt
 from .resets import fall
 from .restart import memory_rates, restart
 from .samples import begin_afresh, next_stop, pass_jumps, take_samples
-from .state import DERIVATIVES, ENDED, INNER, RUNNING
+from .state import DERIVATIVES, ENDED, INNER, RUNNING, is_stiff
 from .workspace import AUTO, UNKNOWN, inputs_at
 
 
@@ -185,7 +185,7 @@ def _event_functions(rhs, task, lanes, w):
 @numba.njit(**INNER)
 def _attempt(rhs, point, along, task, lanes, w):
     """Try a step in every lane, by the method of the run."""
-    if lanes[0].stiff:
+    if is_stiff(lanes[0]):
         stiff_attempt(rhs, point, along, task, lanes, w)
     elif task.highest:
         taylor.taylor_attempt(rhs, task, lanes, w)

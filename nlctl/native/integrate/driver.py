@@ -28,6 +28,7 @@ from ..machine.integrators import integrators
 from ..taylor.method import taylor_task
 from ..timed.ahead import ahead
 from .discrete import simulate_discrete
+from .log import log_room
 from .memory import with_table
 from .methods import EXPLICIT_PAIRS
 from .methods.lu import WHOLE, Elimination, cost
@@ -296,6 +297,7 @@ def prepared(
         x0, times, read.ninputs, code.lowered.rows["g"], len(read.outputs),
         code.lowered.rows["s"], len(program.guards), len(read.lines),
         2 if terms else settings.pair.stages, terms or (1, 0),
+        log_room(task, code.lowered.rows["g"], 2 * task.jumps.shape[1]),
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"
     work = with_past(compiled, task, work, p)

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numba
 
 from .state import INNER
 
 OF_TIME = -1  # instead of a row: a condition of t alone
 _ROOM = 4  # entries of one row in one step at most: its event, and jumps that follow
+
+
+def log_room(task: Any, rows: int, expected: int = 0) -> int:
+    """Return how many entries there is to be room for, with so many rows of g; 0 for none."""
+    notes = task.alone and (task.switching or task.jumps.shape[1])
+    return 2 * _ROOM * rows + 256 + expected if notes else 0
 
 
 @numba.njit(**INNER)

@@ -87,7 +87,7 @@ def with_table(record: Any, like: Any = None, **values: Any) -> Any:
         if isinstance(value, np.ndarray):
             if not value.flags.c_contiguous:
                 raise ValueError(f"'{name}' of {record.__name__} needs a C-contiguous array")
-            row = [value.__array_interface__["data"][0], *value.shape]
+            row = [value.ctypes.data, *value.shape]
         else:
             row = [int(np.asarray(value).view(np.int64))]  # a float's bits, or an integer
         rows.append(row + [0] * (_ENTRY - len(row)))

@@ -34,7 +34,7 @@ def begin_guards(task, lanes, w):
 def fall(rhs, task, lanes, w, seen):
     """Let jump what has fallen in the lanes that are seen; these begin again behind that."""
     fallen = np.zeros((task.switching - task.guarded, lanes.size), np.bool_)
-    any_risen = False
+    jumped, any_risen = np.zeros(fallen.shape, np.bool_), False
     for j in range(lanes.size):
         if seen[j] and lanes[j].status == RUNNING:
             _check_rising(task, lanes[j], w, j)
@@ -47,10 +47,11 @@ def fall(rhs, task, lanes, w, seen):
                 lanes[j].status = ZENO if chosen[j] else lanes[j].status
             break
         any_risen = True
+        jumped |= fallen
         _jump(task, lanes, w, fallen, chosen)
         restart(rhs, task, lanes, w, chosen)
     if any_risen:
-        _rises(rhs, task, lanes, w, fallen)
+        _rises(rhs, task, lanes, w, jumped)
 
 
 @numba.njit(**INNER)
@@ -121,7 +122,7 @@ def _counted(lane):
 
 
 @numba.njit(**INNER)
-def _rises(rhs, task, lanes, w, fallen):
+def _rises(rhs, task, lanes, w, jumped):
     """Keep the values of guards that are still negative behind their jump, and rise."""
     for j in range(lanes.size):
         ahead = max(abs(lanes[j].t) * _AHEAD, _AHEAD)
@@ -129,10 +130,10 @@ def _rises(rhs, task, lanes, w, fallen):
         for i in range(w.x.shape[0]):
             w.x_ahead[i, j] = w.x[i, j] + ahead * w.k[0, i, j]
     evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
-    for i in range(fallen.shape[0]):
+    for i in range(jumped.shape[0]):
         for j in range(lanes.size):
             now, later = w.e[task.guarded + i, j], w.g_ahead[task.guarded + i, j]
-            if lanes[j].fell_at == lanes[j].t and now < 0.0 and later > now:
+            if jumped[i, j] and lanes[j].fell_at == lanes[j].t and now < 0.0 and later > now:
                 w.rising[i, j] = now
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ...responses.event_log import NOTHING, EventLog
 from ..chattering.detection import Jump
-from ..happened import EventRow
 from .state import Status
 
 
@@ -55,7 +55,7 @@ class Trajectory:
     states: np.ndarray
     statistics: Statistics
     inputs: np.ndarray  # what leaves transport delays, and rates: as the program has them
-    happened: tuple[EventRow, ...] = ()  # of a single run
+    happened: EventLog = NOTHING  # of a single run
     culprit: int = -1  # the guard that has fallen last, or has ended it
     guard: float = 0.0  # and its value
     since: float = np.nan  # time of the first of the jumps that have ended it

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+import numba
 import numpy as np
 
 
@@ -94,3 +95,13 @@ def new_lanes(times: np.ndarray, count: int) -> np.ndarray:
     lanes["culprit"] = -1
     lanes["patience"] = FIRST_PATIENCE
     return lanes
+
+
+@numba.njit(**INNER)
+def is_stiff(lane):
+    """Whether the step being tried is one of the stiff method.
+
+    One that leads across a condition is explicit: it is as short as can be, and begins with the
+    right-hand side of the near side, while stages that look behind would hold it back.
+    """
+    return lane.stiff != 0 and lane.across == 0

@@ -194,11 +194,12 @@ def new_work(
     lines: int = 0,
     stages: int = 3,
     terms: tuple[int, int] = (1, 0),
+    log: int = 0,
 ) -> Work:
     """Return the arrays for integrating members from `x0` (states, lanes) on.
 
     The inputs include the lines, and so do the outputs what arrives there.  `terms` are the
-    numbers of orders and rows of Taylor coefficients.
+    numbers of orders and rows of Taylor coefficients, and `log` of events that can be noted.
     """
     n, lanes = x0.shape
     stiff = n if lanes == 1 else 0  # the stiff method is for single runs
@@ -221,7 +222,7 @@ def new_work(
         **_of_the_stiff_method(stiff, inputs),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-    arrays |= _guards(guards, lanes)
+    arrays |= _guards(guards, lanes, log)
     counted = ("wanted", "sought", "attempts", "expanded")
     arrays |= {name: np.zeros(lanes, dtype=np.int64) for name in counted}
     arrays |= {"terms": zeros((*terms, lanes)), "largest": np.zeros((4, lanes))}
@@ -251,13 +252,13 @@ def _of_the_stiff_method(n: int, inputs: int) -> dict[str, tuple[int, ...]]:
     }
 
 
-def _guards(guards: int, lanes: int) -> dict[str, np.ndarray]:
-    """Return the arrays for guards, and for a log that has no room yet."""
-    counts = {"above": (guards, lanes), "log_row": (0,)}
+def _guards(guards: int, lanes: int, log: int) -> dict[str, np.ndarray]:
+    """Return the arrays for guards, and for a log of so many entries."""
+    counts = {"above": (guards, lanes), "log_row": (log,)}
     return {
         **{name: np.zeros(shape, dtype=np.int64) for name, shape in counts.items()},
         "rising": np.zeros((guards, lanes)),
-        "log_t": np.zeros(0),
+        "log_t": np.zeros(log),
     }
 
 

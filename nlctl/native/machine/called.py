@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from ...blocks import Block
-from ...errors import CompileError
+from ...errors import BlockError, CompileError
 from ...upstream.control_internals import current_parameters
 from ...upstream.numba_internals import CPUDispatcher
 from ...wording import counted
@@ -100,7 +100,7 @@ class _AsItStands:
 
         Raises
         ------
-        ValueError
+        BlockError
             If there are more or fewer than the block has states or outputs.
         """
         _, x, u, p, count = self.lengths
@@ -112,7 +112,7 @@ class _AsItStands:
         ]
         values = np.concatenate([np.empty(0), *found])
         if values.size != count:
-            raise ValueError(
+            raise BlockError(
                 f"block '{self.path}' returns {counted(values.size, 'value')} from its {self.kind} "
                 f"function, needs {count}"
             )

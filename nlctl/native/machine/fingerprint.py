@@ -24,6 +24,7 @@ from typing import Any, Protocol
 import numba
 import numpy as np
 
+from ...annotations import behind
 from ..thirdparty.held import LAID_OUT, OPAQUE, held_by, inherited
 from ..thirdparty.outside import asked_outside, imports_in
 
@@ -187,6 +188,9 @@ def _of_container(thing: tuple | list | dict, seen: _Seen) -> Iterator[str]:
 
 
 def _of_function(function: types.FunctionType, seen: _Seen) -> Iterator[str]:
+    if (called := behind(function)) is not function:  # which only words the errors of the other
+        yield from _fingerprint(called, seen)
+        return
     if _is_library(function.__module__) or (seen.deep and _is_controls(function)):
         yield f"{function.__module__}.{function.__qualname__}"
         if seen.deep and (function.__closure__ or function.__dict__) and seen.add(function):
@@ -364,6 +368,8 @@ def _of_module(module: types.ModuleType, seen: _Seen, names: Iterable[str]) -> I
         if name in vars(module):
             yield name
             yield from _fingerprint(vars(module)[name], seen, names)
+    if seen.deep and "__getattr__" in vars(module):  # it makes what the module lacks
+        yield from _fingerprint(vars(module)["__getattr__"], seen)
     del seen[id(module)]  # another function may read other names of it
 
 

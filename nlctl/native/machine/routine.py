@@ -62,13 +62,27 @@ class Routine:
     opaque: tuple[Opaque, ...]
 
     def __call__(self, *arrays: np.ndarray) -> None:
+        self.bound(*arrays)()
+
+    def bound(self, *arrays: np.ndarray) -> Callable[[], None]:
+        """Return a call with these arrays, which are looked at once; their values may change.
+
+        Parameters
+        ----------
+        *arrays : ndarray
+        """
         for array, shape in zip(arrays, self.shapes, strict=True):
             fits = array.shape == shape and array.dtype == float and array.flags.c_contiguous
             if not fits:
                 raise ValueError(f"an array of shape {shape} is needed, got {array.shape}")
-        self._function(*(array.ctypes.data for array in arrays))
-        if self.opaque:
-            self.check(arrays[3])
+        function, places = self._function, [array.ctypes.data for array in arrays]
+
+        def call() -> None:
+            function(*places)
+            if self.opaque:
+                self.check(arrays[3])
+
+        return call
 
     @cached_property
     def _function(self) -> Any:

@@ -120,7 +120,7 @@ def same(now: Any, then: Any) -> bool:
     if isinstance(now, np.ndarray):
         alike = now.dtype == then.dtype and now.shape == then.shape
         masks = [np.ma.getmaskarray(v) for v in (now, then) if isinstance(v, np.ma.MaskedArray)]
-        alike = alike and (not masks or np.array_equal(*masks))
+        alike = alike and (not masks or np.array_equal(masks[0], masks[1]))
         return alike and np.array_equal(_bits(np.asarray(now)), _bits(np.asarray(then)))
     if isinstance(now, MethodType):  # made anew each time it is read
         return now.__func__ is then.__func__ and now.__self__ is then.__self__

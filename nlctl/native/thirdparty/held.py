@@ -28,12 +28,11 @@ LAID_OUT = ("_mgr", "_item_cache", "_flags", "_cache")
 """Where pandas keeps content: how it is laid out in memory may change."""
 _TOLD_BY_TEXT = {"numba", "llvmlite", "pydantic", "pydantic_core", "annotated_types"} | {
     *("typing", "typing_extensions", "matplotlib", "jinja2", "rich", "abc", "inspect", "ast"),
-    *("enum", "string"),  # machinery: what it is made of computes nothing, or is gone through
+    "enum",  # machinery: what it is made of computes nothing, or is gone through
 }
 _LOCKS = ("lock", "RLock")  # of _thread: they hold nothing
 _RANDOM = ("Generator", "RandomState", "BitGenerator", "SeedSequence", "Random")
 _TOLD = (type, bool, int, float, complex, bytes, range, slice, type(None), type(...), np.generic)
-_CACHES = (weakref.WeakKeyDictionary,)  # of functools.singledispatch
 _LIKE_LISTS = (type({}.keys()), type({}.values()), type({}.items()))
 _BOUND = (types.BuiltinFunctionType, types.MethodWrapperType)
 
@@ -55,13 +54,16 @@ def held_by(thing: Any, is_library: Callable[[str], bool]) -> Any:
     """
     kind = type(thing)
     top = (getattr(kind, "__module__", None) or "").partition(".")[0]  # arrays of ctypes have none
-    if isinstance(thing, (*_TOLD, *_CACHES)) or (top == "_thread" and kind.__name__ in _LOCKS):
+    if isinstance(thing, _TOLD) or (top == "_thread" and kind.__name__ in _LOCKS):
         return None
     if isinstance(thing, contextvars.ContextVar):  # NumPy's says how errors are told
         is_numpys = thing.name.startswith("numpy")
         return None if is_numpys else ("variable", thing.name, *_value_of(thing))
     if isinstance(thing, threading.local):
         return ("local", kind.__name__, vars(thing))
+    if isinstance(thing, weakref.WeakKeyDictionary):
+        kept = [pair for pair in thing.items() if not isinstance(pair[0], type)]
+        return (kind.__name__, kept) if kept else None  # by class: what singledispatch has found
     if isinstance(thing, weakref.WeakValueDictionary | weakref.WeakSet):
         return (kind.__name__, dict(thing) if isinstance(thing, Mapping) else set(thing))
     if any(base.__name__ in _RANDOM for base in kind.__mro__):

@@ -160,7 +160,7 @@ def _combined(node: Expr, found: Mapping[Expr, Lines]) -> Lines:
     """Return what an operation makes of lines."""
     args = _same(*(found[arg] for arg in node.args))
     if node.op in ("add", "sub"):
-        return _sum(*args, 1.0 if node.op == "add" else -1.0)
+        return _sum(args[0], args[1], 1.0 if node.op == "add" else -1.0)
     if node.op == "neg":
         return _scaled(args[0], np.full(args[0].starts.size, -1.0))
     if node.op == "div":

@@ -161,6 +161,8 @@ def test_a_start_where_error_and_weights_are_0_is_not_any_start(remedy):
     far = certify(loop, starts={"plant.x1": 3.0, "model.xm1": 3.0})
     assert far.V_0 == own.V_0 == 0.0
     assert far.status == "undecided"
+    assert far.claim == f"no bound is proved from {far.starts}, and none is refuted; undecided"
+    assert far.missing in far.verdict
     level = certify(loop, starts={"V": 1e-6})
     assert "V(0) <= 1e-06" in level.claim
     assert "model.xm1(0) = 0" in level.claim

@@ -301,3 +301,12 @@ def test_the_bar_shows_rows_rate_and_bounds():
         assert shown == is_terminal
         assert ("50/100 rows, 12.5/s" in text) == is_terminal
     assert progress.remaining == 4
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_a_column_that_is_not_there_is_an_error(made, design, tmp_path, kept):
+    """In memory and in a folder; not one column less."""
+    found = sweep(made, design, folder=tmp_path / "rows" if kept else None)
+    assert list(found.columns("spec").columns) == ["spec"]
+    with pytest.raises(nlctl.UnknownNameError, match="unknown column 'spek' of the sweep"):
+        found.columns("spec", "spek")

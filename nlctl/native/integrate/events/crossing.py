@@ -15,19 +15,16 @@ import numba
 import numpy as np
 
 from ..control import shorten
-from ..state import INNER
+from ..state import INNER, is_stiff
 from .location import AGAIN, CLEAR, EVENT, REFUSED
 
 NOTHING = -2  # no condition lies in the step just tried
 _SHARE = 0.01  # of the relative tolerance, of a step: how close to a condition steps end
 _TRIES = 60
-_CLEARLY, _GAP, _MOST = (
-    3.0,
-    1e-4,
-    0.05,
-)  # of a step with a stage behind a condition: how much is left out
+# of a step with a stage behind a condition: how much is left out
+_CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
 _NOTICED = 0.02  # the same where the step ends at a stop: a little less would be taken for it
-_LEAST = 1e-12  # of the time: shorter steps are taken whatever their stages see
+_LEAST = 1e-12  # of the time: shorter steps are taken, by the explicit method, whatever stages see
 
 
 @numba.njit(**INNER)
@@ -44,15 +41,33 @@ def crossing(task, lane, w, j):
     inside = _is_behind(task, lane, w, j)
     beyond = 0.0 if inside else _beyond(task, lane, w, j)
     if beyond > 0.0:
-        least = _NOTICED if lane.ends else _GAP
-        shorten(lane, 1.0 - min(max(_CLEARLY * beyond, least), _MOST))
-        return REFUSED
+        return _shortened(lane, beyond)
     if not inside and lane.traces == 0:
         return NOTHING
     # a step that is wrong has seen a jump at a stage, whatever it says of its end
     bad = inside or (task.fixed == 0.0 and not w.error[j] <= 1.0)
     _bracket(task, lane, w, bad, j)
     return _next_try(task, lane, w, bad, j)
+
+
+@numba.njit(**INNER)
+def _shortened(lane, beyond):
+    """Propose a shorter step in the place of one with a stage behind a condition.
+
+    The stiff method's stages may hold each other back there, however short it is: what is too
+    short for that is tried again as a step across.
+    """
+    if not lane.step > _LEAST * max(abs(lane.t), lane.last):
+        if not is_stiff(lane):
+            return NOTHING
+        shorten(lane, 1.0)
+        lane.cross = lane.step
+        return REFUSED
+    left = 1.0 - min(max(_CLEARLY * beyond, _NOTICED if lane.ends else _GAP), _MOST)
+    if is_stiff(lane):
+        left = min(left, max(0.2, 1.0 / (1.0 + beyond)))
+    shorten(lane, left)
+    return REFUSED
 
 
 @numba.njit(**INNER)
@@ -81,8 +96,8 @@ def _beyond(task, lane, w, j):
     In parts of what the switching function is at the start; what follows a shorter step begins
     nearer, and has better stages.
     """
-    known = task.inside[1 if lane.stiff else 0, 0] != 0.0
-    if not known or task.fixed > 0.0 or lane.step < _LEAST * abs(lane.t):
+    known = task.inside[1 if is_stiff(lane) else 0, 0] != 0.0
+    if not known or task.fixed > 0.0:
         return 0.0
     farthest = 0.0
     for i in range(task.declared, task.guarded):

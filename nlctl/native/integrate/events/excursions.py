@@ -21,7 +21,7 @@ from ..control import shorten
 from ..methods.dense import events_at_parts
 from ..methods.quartic import doubt, least_value, parabola, quartic, slope_at
 from ..restart import AHEAD
-from ..state import INNER
+from ..state import INNER, is_stiff
 from .location import AGAIN, STARTS_BEHIND
 
 _CLEAR, _SUSPECT, _UNRESOLVED = 0, 1, 2  # what is known of an event function in a step
@@ -80,7 +80,7 @@ def look_between(rhs, task, lanes, w, found):
 @numba.njit(**INNER)
 def _suspected(task, lane, w, j):
     """Whether the values at a method's stages leave anything to be looked at."""
-    row = 1 if lane.stiff else 0
+    row = 1 if is_stiff(lane) else 0
     if task.inside[row, 0] == 0.0:
         return True  # no such stages
     suspected = False

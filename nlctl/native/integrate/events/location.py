@@ -16,7 +16,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..state import INNER
+from ..state import INNER, is_stiff
 
 _SMALL = 0.01  # of the absolute tolerance
 STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
@@ -137,7 +137,7 @@ def jumped(task, lane, w, j):
         if w.e_start[row, j] != 0.0 or w.slope[row, j] != 0.0:
             continue  # it is carried along, also while memories are committed step by step
         changed = _apart(task, before, w.g[row, j])
-        if lane.seeks > 0 and task.inside[1 if lane.stiff else 0, 0] != 0.0:
+        if lane.seeks > 0 and task.inside[1 if is_stiff(lane) else 0, 0] != 0.0:
             for n in range(3):
                 changed |= _apart(task, before, w.g_inside[n, row, j])
         if changed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numba
 
-from ..state import INNER
+from ..state import INNER, is_stiff
 from ..workspace import evaluate
 from . import explicit, rodas5p, taylor
 
@@ -12,7 +12,7 @@ from . import explicit, rodas5p, taylor
 @numba.njit(**INNER)
 def solution_at(theta, task, lane, w, j, result):
     """Fill column `j` of `result` with the solution at the fraction theta of a lane's step."""
-    if lane.stiff:
+    if is_stiff(lane):
         rodas5p.interpolate(theta, w.x, w.x_new, w.U, result)
     elif task.highest:
         taylor.interpolate(theta, lane.step, task.highest, w.terms, j, result)

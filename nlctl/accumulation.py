@@ -1,0 +1,132 @@
+"""Switches that accumulate: they come ever closer together, and there is no end of them.
+
+Behind a lag, or with u'' as the first derivative of its input that it acts on, a sign drives its
+input back and forth through 0 (second-order sliding).  Where every way back is shorter than the
+one before, the switches are so many that no run comes to its end: in a geometric sequence, whose
+sum is finite, or as exp(t).  Each engine asks `crowd_of` for the times at which one condition has
+been at 0, and `reached` and `tolerance_of` for whether what is compared is still more than nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = [
+    "LEAST", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words", "crowd_of", "reached",
+    "tolerance_of",
+]  # fmt: skip
+
+LEAST = 5  # switches that are looked at
+WITHIN = 100.0  # tolerances that what is compared changes by in between
+SECOND_ORDER = (
+    "what switches does not reach the rate of what is compared, and cannot hold it at 0 (second-"
+    "order sliding): give it hysteresis (nlctl.Relay), smooth it over a small width, make a sign "
+    "an nlctl.IdealRelay with a larger rest_rate, or let the run end before"
+)
+_LOCATED = 50.0  # relative tolerances by which periods fall at least; switches are located to 10
+_FALLS = 0.2  # part by which it is enough that they fall, whatever the tolerance is
+_FINITE = 0.9  # of two periods: those that fall as 1 / n do not fall so much for long
+
+Value = Callable[[float, np.ndarray], float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crowd:
+    """Switches that come ever closer together.
+
+    Attributes
+    ----------
+    row : int
+        Which condition, in the order of the engine.
+    last : float
+        Time of the last switch (s).
+    period : float
+        From the last switch but two to it: two of them (s).
+    ratio : float
+        Of two such periods in a row.
+    more : float
+        Switches that there would be until the end of the run, at that pace.
+    """
+
+    row: int
+    last: float
+    period: float
+    ratio: float
+    more: float
+
+    @property
+    def end(self) -> float:
+        """Where a geometric sequence has its end (s); periods that fall as 1 / n have none."""
+        half = self.ratio**0.5
+        return self.last + 0.5 * self.period * half / (1 - half)
+
+
+def crowd_of(times: np.ndarray, row: int, end: float, rtol: float, most: float) -> Crowd | None:
+    """Return how switches at some times accumulate, if they do.
+
+    Parameters
+    ----------
+    times : ndarray
+        Of the last switches of one condition (s), in order.
+    row : int
+        Which condition.
+    end : float
+        Of the run (s).
+    rtol : float
+        Relative tolerance of the run.
+    most : float
+        Switches to come that are not too many.
+    """
+    if times.size < LEAST:
+        return None
+    periods = times[2:] - times[:-2]
+    enough = min(_FALLS, _LOCATED * rtol)
+    if not (np.all(periods[2:] < periods[:-2]) and periods[-1] < (1 - enough) * periods[0]):
+        return None
+    if not periods[-1] > 0.0:
+        return None
+    fall = np.log(periods[0] / periods[-1])
+    pace = fall / (times[-1] - times[-1 - periods.size])
+    with np.errstate(over="ignore"):
+        more = 2.0 * np.expm1(pace * (end - times[-1])) / (pace * periods[-1])
+    if not more > most:
+        return None
+    ratio = float(np.exp(-2.0 * fall / (periods.size - 1)))
+    return Crowd(
+        row=row, last=float(times[-1]), period=float(periods[-1]), ratio=ratio, more=float(more)
+    )
+
+
+def reached(value: Value, t: float, x: np.ndarray, rates: np.ndarray, ahead: float) -> float:
+    """Return how far from 0 what is compared comes in a time, at the rates behind a switch."""
+    return abs(value(t + ahead, x + ahead * rates))
+
+
+def tolerance_of(value: Value, t: float, x: np.ndarray, away: np.ndarray) -> float:
+    """Return by how much a switching function changes where states change by their tolerances."""
+    here = value(t, x)
+    places = np.flatnonzero(away)
+    return float(sum(abs(value(t, x + away[i] * (np.arange(x.size) == i)) - here) for i in places))
+
+
+def accumulation_words(which: tuple[str, str], crowd: Crowd, beyond: str) -> str:
+    """Return whose switches accumulate, and how.
+
+    Parameters
+    ----------
+    which : tuple of str
+        Block, "" for none, and name of the condition.
+    crowd : Crowd
+    beyond : str
+        Why that is the end of the run.
+    """
+    whose = f"block '{which[0]}' ({which[1]})" if which[0] else which[1]
+    left = f"{crowd.more:.2g}" if np.isfinite(crowd.more) else "no end of them"
+    where = f"near t = {crowd.end:.6g} s" if crowd.ratio < _FINITE else "ever faster"
+    return (
+        f"the switches of {whose} accumulate {where}: two of them in {crowd.period:.3g} s at "
+        f"t = {crowd.last:.6g} s, {left} to come, {beyond}; {SECOND_ORDER}"
+    )

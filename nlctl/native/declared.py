@@ -1,0 +1,87 @@
+"""What blocks say of jumps, in python-control: switching functions, guards, memories, resets.
+
+Machine code computes the same in its arrays ``g`` and ``reset``.  What it locates beyond that are
+conditions of the very expressions whose rates are compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..blocks import slides
+from ..upstream.control_internals import current_parameters, parts_now
+from ..wording import numbered
+from .codegen.program import Program, count_guards, count_switching_functions, memory
+from .diagram.schedule import Node, Schedule
+
+_DECLARED = {  # the functions of a block, and how many values of each are compared
+    "switching": count_switching_functions,
+    "guard": count_guards,
+    "commit": lambda node: len(memory(node)),
+}
+
+
+def declared_rows(schedule: Schedule, program: Program, located: int) -> np.ndarray:
+    """Return which rows of ``g`` blocks and event functions compute, among `located` others.
+
+    What an ideal relay declares is of its input's rate too, and is compared as it slides.
+    """
+    signed = [
+        not slides(n.system) for n in schedule.nodes for _ in range(count_switching_functions(n))
+    ]
+    kept = [not slides(node.system) for node in schedule.nodes for _ in memory(node)]
+    unknown = located - len(schedule.watched)
+    others = len(schedule.watched) + len(program.guards)
+    return np.flatnonzero([*signed, *[False] * unknown, *[True] * others, *kept])
+
+
+def declared_labels(schedule: Schedule) -> tuple[list[str], list[str]]:
+    """Return names of the rows of `declared_now`."""
+    found: dict[str, list[str]] = {what: [] for what in _DECLARED}
+    for (what, count), node in _each(schedule.nodes):
+        found[what] += [f"{node.path}: {name}" for name in numbered(what, count)]
+    guarded = [node for node in schedule.nodes if count_guards(node)]
+    states = [f"{n.path}: reset of '{name}'" for n in guarded for name in n.system.state_labels]
+    watched = [each.name for each in schedule.watched]
+    return [*found["switching"], *watched, *found["guard"], *found["commit"]], states
+
+
+def declared_now(
+    schedule: Schedule, system: Any, point: tuple[Any, Any, Any]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return switching functions, watched ones, guards and commits, and what resets return.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    system : InputOutputSystem
+        The diagram with its current parameters.
+    point : tuple
+        Time, states and inputs of the diagram.
+    """
+    t, x, u = point
+    parts = dict(zip(map(id, schedule.nodes), parts_now(system, t, x, u), strict=True))
+
+    def value(what: str, node: Node) -> np.ndarray:
+        block, own, given = parts[id(node)]
+        found = getattr(block.spec, what)(t, own, given, current_parameters(block))
+        return np.asarray(found, dtype=float).reshape(-1)
+
+    found: dict[str, list[np.ndarray]] = {what: [] for what in _DECLARED}
+    for (what, _), node in _each(schedule.nodes):
+        found[what].append(value(what, node))
+    resets = [value("reset", node) for node in schedule.nodes if count_guards(node)]
+    watched = [[one.value(t, x, u, dict(schedule.overrides))] for one in schedule.watched]
+    rows = [*found["switching"], *watched, *found["guard"], *found["commit"]]
+    return np.concatenate([np.zeros(0), *rows]), np.concatenate([np.zeros(0), *resets])
+
+
+def _each(nodes: Sequence[Node]) -> Iterator[tuple[tuple[str, int], Node]]:
+    """Yield what each block declares: the function's name and its number of values."""
+    for node in nodes:
+        for what, count in _DECLARED.items():
+            if count(node) and not slides(node.system):
+                yield (what, count(node)), node
