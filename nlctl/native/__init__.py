@@ -14,13 +14,14 @@ through time, each with its own steps.  `response` makes of one run what python-
 
 from ..errors import CompileError
 from .audit import AuditError
-from .compiled import Compiled, compile, linearize  # noqa: A004 (what it does)
+from .compiled import Compiled, compile  # noqa: A004 (what it does)
 from .diagram.schedule import AlgebraicLoopError
 from .ensemble import Ensemble, ensemble_response
 from .integrate.driver import Settings
 from .integrate.methods.tableau import Tableau
 from .integrate.results import Statistics
 from .integrate.state import Status
+from .linearized import linearize
 from .machine.ahead import compile_ahead
 from .machine.store import CacheWarning
 from .response import Response, uninterrupted
