@@ -39,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             console.print(text, markup=False, highlight=False)
     if asked.runs:
         traced = [e for e in chosen if fates[e.name].kind == "traced"]
+        first_run(traced[0])  # the integrators are loaded
         times = {e.name: first_run(e) for e in traced}
         slowest = max(times, key=times.__getitem__)
         console.print(

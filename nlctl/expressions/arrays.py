@@ -11,8 +11,8 @@ import numpy as np
 
 from .graph import SMALL, Expr, Graph, Untraceable
 
-MOST = 2048  # elements of an array that are kept one by one
-TABLED = 256  # elements of a constant matrix beyond which each row is a table
+_MOST = 2048  # elements of an array that are kept one by one
+_TABLED = 256  # elements of a constant matrix beyond which each row is a table
 
 
 class Special:
@@ -221,7 +221,7 @@ class Tracer:
         """Return all elements, each an expression of its own, in the array's shape."""
         if self.axis is None:
             return self.cells
-        if self.size > MOST:
+        if self.size > _MOST:
             raise Untraceable("too many elements to be written out")
         parts = [mapped(lambda e, k=k: self.graph.item(e, k), self.cells)
                  for k in range(self.length)]  # fmt: skip
@@ -262,7 +262,7 @@ class Tracer:
     def _in_rows(self, shape: tuple[int, ...]) -> Tracer:
         """Return a long array as a small matrix."""
         places = np.arange(self.size).reshape(shape)
-        if self.size > MOST:
+        if self.size > _MOST:
             raise Untraceable("reshaping a long array")
         cells = mapped(lambda k: self.graph.item(self.only, int(k)), places)
         return self._part(cells, None, 1)
@@ -361,10 +361,10 @@ def traced(graph: Graph, value: Any) -> Tracer:
 
 def _constants(graph: Graph, array: np.ndarray) -> Tracer:
     long = [i for i, n in enumerate(array.shape) if n > SMALL]
-    is_large = array.size > TABLED and array.shape[0] <= TABLED
+    is_large = array.size > _TABLED and array.shape[0] <= _TABLED
     by_rows = len(long) == 1 or is_large
     if not long or not by_rows or array.ndim > 2 or array.dtype != float:
-        if array.size > MOST:
+        if array.size > _MOST:
             raise Untraceable("a large matrix")
         return Tracer(graph, mapped(graph.const, array.astype(object)))
     moved = np.moveaxis(array, long[-1], -1)
@@ -381,7 +381,7 @@ def leaf_vector(
     numbers = np.arange(start, start + int(np.prod(shape))).reshape(shape)
     long = [i for i, n in enumerate(shape) if n > SMALL]
     if not long or len(long) > 1 or len(shape) > 2:
-        if numbers.size > MOST:
+        if numbers.size > _MOST:
             raise Untraceable("a large matrix")
         return Tracer(graph, mapped(lambda i: graph.leaf(array, int(i), None, kind), numbers))
     moved = np.moveaxis(numbers, long[0], -1)
@@ -407,7 +407,7 @@ def full(graph: Graph, shape: Any, value: Any) -> Tracer:
         raise Untraceable("an array that is filled with something else than one float")
     long = [i for i, n in enumerate(shape) if n > SMALL]
     if len(long) > 1 or len(shape) > 2:
-        if np.prod(shape) > MOST:
+        if np.prod(shape) > _MOST:
             raise Untraceable("a large matrix")
         cells = np.empty(shape, dtype=object)
         cells.fill(number.only)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import scalar
-from .differences import difference
+from .differences import opaque_difference
 from .elimination import linear_solution
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
@@ -101,7 +101,7 @@ class _Reader:
         if node.op == "solve" and node.data[0] in self.fixed_points:
             return self._of_solution(node) if any(parts) else None
         if node.op == "call" and self.differences:
-            return difference(self.graph, node, parts) if any(parts) else None
+            return opaque_difference(self.graph, node, parts) if any(parts) else None
         if node.op in ("call", "solve"):
             raise Untraceable(f"{node.data[0]} is not an expression: it has no derivative")
         if all(part is None for part in parts) or node.op in COMPARISONS or node.op in LOGIC:

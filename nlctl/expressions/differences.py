@@ -13,12 +13,14 @@ import numpy as np
 
 from .graph import Expr, Graph
 
-__all__ = ["STEP", "difference"]
+__all__ = ["RELATIVE_STEP", "opaque_difference"]
 
-STEP = float(np.cbrt(np.finfo(float).eps))  # errors of rounding and of the formula are alike
+RELATIVE_STEP = float(
+    np.cbrt(np.finfo(float).eps)
+)  # errors of rounding and of the formula are alike
 
 
-def difference(graph: Graph, call: Expr, tangents: Sequence[Expr | None]) -> Expr:
+def opaque_difference(graph: Graph, call: Expr, tangents: Sequence[Expr | None]) -> Expr:
     """Return the derivative of an opaque call along the derivatives of its arguments.
 
     Parameters
@@ -38,9 +40,9 @@ def difference(graph: Graph, call: Expr, tangents: Sequence[Expr | None]) -> Exp
     sizes = call.data[1]
     speed = op("sqrt", _squares(graph, call.args, tangents, sizes))
     moves = op("gt", speed, const(0.0))
-    h = op("select", moves, op("div", const(STEP), speed), const(0.0))
+    h = op("select", moves, op("div", const(RELATIVE_STEP), speed), const(0.0))
     ahead, behind = (_moved(graph, call, tangents, step) for step in (h, op("neg", h)))
-    factor = op("select", moves, op("div", speed, const(2.0 * STEP)), const(0.0))
+    factor = op("select", moves, op("div", speed, const(2.0 * RELATIVE_STEP)), const(0.0))
     return op("mul", op("sub", ahead, behind), factor)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from .arrays import Tracer, as_array, concatenated, full, full_index, holds_arrays, mapped, traced
 from .graph import Graph, Untraceable
 from .integers import integer_range
-from .masked import Masked, Places
+from .masked import Masked, MaskedPlaces
 from .operators import elementwise
 
 GATHERED = 64  # places among which an integer may choose
@@ -37,9 +37,9 @@ def _each(self: Tracer, places: Tracer) -> Tracer:
 
 def _settled(key: Any) -> Any:
     """Return an index with numbers for what is known."""
-    if isinstance(key, Places):
+    if isinstance(key, MaskedPlaces):
         return _settled(key.mask)
-    if isinstance(key, tuple) and len(key) == 1 and isinstance(key[0], Places):
+    if isinstance(key, tuple) and len(key) == 1 and isinstance(key[0], MaskedPlaces):
         return _settled(key[0].mask)
     if isinstance(key, tuple):
         return tuple(map(_settled, key))

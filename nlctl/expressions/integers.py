@@ -6,11 +6,11 @@ import math
 
 from .graph import Expr
 
-Range = tuple[float, float]
+_Range = tuple[float, float]
 _EVERYTHING = (-math.inf, math.inf)
 
 
-def integer_range(expr: Expr) -> Range:
+def integer_range(expr: Expr) -> _Range:
     """Return bounds of a number, infinite where none is known.
 
     Parameters
@@ -22,7 +22,7 @@ def integer_range(expr: Expr) -> Range:
     tuple of float
         The least and the largest value that it may have.
     """
-    known: dict[Expr, Range] = {}
+    known: dict[Expr, _Range] = {}
     waiting = [expr]
     while waiting:
         node = waiting[-1]
@@ -35,7 +35,7 @@ def integer_range(expr: Expr) -> Range:
     return known[expr]
 
 
-def _of_node(node: Expr, known: dict[Expr, Range]) -> Range:
+def _of_node(node: Expr, known: dict[Expr, _Range]) -> _Range:
     if node.op == "const":
         return float(node.data), float(node.data)
     if node.value is not None:
@@ -48,18 +48,20 @@ def _of_node(node: Expr, known: dict[Expr, Range]) -> Range:
     return _RULES[node.op](*parts) if node.op in _RULES else _EVERYTHING
 
 
-def _product(a: Range, b: Range) -> Range:
+def _product(a: _Range, b: _Range) -> _Range:
     ends = [0.0 if 0.0 in (x, y) else x * y for x in a for y in b]
     return min(ends), max(ends)
 
 
-def _magnitude(a: Range) -> Range:
+def _magnitude(a: _Range) -> _Range:
     inside = 0.0 if a[0] <= 0.0 <= a[1] else min(abs(a[0]), abs(a[1]))
     return inside, max(abs(a[0]), abs(a[1]))
 
 
 _RULES = {
-    "sign": lambda a: (-1.0, 1.0),
+    **dict.fromkeys(("sign", "sin", "cos", "tanh", "erf"), lambda _: (-1.0, 1.0)),
+    "arctan": lambda _: (-math.pi / 2, math.pi / 2),
+    "arctan2": lambda _, __: (-math.pi, math.pi),
     "add": lambda a, b: (a[0] + b[0], a[1] + b[1]),
     "sub": lambda a, b: (a[0] - b[1], a[1] - b[0]),
     "neg": lambda a: (-a[1], -a[0]),

@@ -72,7 +72,7 @@ def number_text(value: float) -> str:
         return r"\mathrm{NaN}"
     if value in (float("inf"), float("-inf")):
         return r"\infty" if value > 0 else r"-\infty"
-    for n in (1, 2, 3, 4, 6):
+    for n in (1, 2, 3, 4, 6) if abs(value) < 100 * math.pi else ():
         k = round(value * n / math.pi)
         if 0 < abs(k) < 100 and math.gcd(k, n) == 1 and value == k * math.pi / n:
             top = {1: r"\pi", -1: r"-\pi"}.get(k, rf"{k} \pi")

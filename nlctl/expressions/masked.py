@@ -66,7 +66,7 @@ class Masked(Special):
     __hash__ = None  # type: ignore[assignment]
 
 
-class Places(Special):
+class MaskedPlaces(Special):
     """``np.where(x > 0)[0]``: the places that a mask chooses, for use as an index."""
 
     def __init__(self, mask: Tracer) -> None:

@@ -16,7 +16,7 @@ from .arrays import Special, Tracer, as_array, is_complex, mapped, traced
 from .graph import SMALL, Ambiguous, Expr, Graph, Untraceable
 from .integers import integer_range
 
-FOLLOWED = 16  # values of an integer, each a way through a function
+_FOLLOWED = 16  # values of an integer, each a way through a function
 
 
 def elementwise(graph: Graph, name: str, *operands: Any) -> Tracer:
@@ -48,7 +48,7 @@ def _is_mixed(arrays: list[Tracer], long: tuple[int, int]) -> bool:
     return any(a.axis is None and a.ndim >= place and a.shape[-place] > 1 for a in arrays)
 
 
-def counted(array: Tracer) -> Tracer:
+def with_counts(array: Tracer) -> Tracer:
     """Return an array with 0 and 1 for truth values, as NumPy's sums take them."""
     if all(e.kind != "b" for e in array.values.flat):
         return array
@@ -57,7 +57,7 @@ def counted(array: Tracer) -> Tracer:
 
 def total(array: Tracer, axis: Any = None) -> Tracer:
     """Return the sum of all elements, or along an axis, from left to right."""
-    array = counted(array)
+    array = with_counts(array)
     graph, cells, long = array.graph, array.cells, array.axis
     along = range(array.ndim) if axis is None else [operator.index(axis) % array.ndim]
     if long in along:
@@ -87,6 +87,15 @@ def product(a: Tracer, b: Tracer) -> Tracer:
         a = a[..., None]
         return total(elementwise(a.graph, "mul", a, b), -2)
     return total(elementwise(a.graph, "mul", a, b), -1)
+
+
+def _matrix_product(graph: Graph, a: Any, b: Any) -> Any:
+    if is_complex(a) or is_complex(b):
+        assert Special.of_complex is not None
+        return Special.of_complex(graph, a) @ b
+    if isinstance(a, Special) or isinstance(b, Special):
+        return NotImplemented
+    return product(traced(graph, a), traced(graph, b))
 
 
 def _batched(a: Tracer, b: Tracer) -> Tracer:
@@ -133,7 +142,7 @@ def _integer(self: Tracer) -> int:
     if self.only.value is not None:
         return self.graph.assumed(self.only)
     low, high = integer_range(self.only)
-    if high - low >= FOLLOWED:
+    if high - low >= _FOLLOWED:
         raise Untraceable("an integer that may have too many values")
     values = range(int(low), int(high) + 1)
     equal = {k: self.graph.op("eq", self.only, self.graph.const(k)) for k in values}
@@ -237,7 +246,7 @@ for _name, _method in {
     "rfloordiv": lambda self, other: floor_quotient(self.graph, other, self),
     "divmod": lambda self, other: (self // other, self % other),
     "pos": lambda self: self,
-    "matmul": lambda self, other: product(self, traced(self.graph, other)),
-    "rmatmul": lambda self, other: product(traced(self.graph, other), self),
+    "matmul": lambda self, other: _matrix_product(self.graph, self, other),
+    "rmatmul": lambda self, other: _matrix_product(self.graph, other, self),
 }.items():
     setattr(Tracer, f"__{_name}__", _method)

@@ -27,7 +27,7 @@ from .library.python import Builtins, guard_of_math
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
-from .library.table import MAKING, OPERATIONS, OWN, Kind, plain
+from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, unwrapped
 from .operators import elementwise
 from .staged import (
     LIBRARIES,
@@ -141,7 +141,7 @@ class Stage:
         if module.startswith("scipy.interpolate"):
             enter_splines()
         try:
-            return value in OWN
+            return value in WRITTEN
         except TypeError:  # it has no hash
             return False
 
@@ -199,7 +199,7 @@ class Stage:
             return real
         if isinstance(real, np.ufunc):
             self._is_known(real)
-            known = real in OWN or real.__name__ in OPERATIONS
+            known = real in WRITTEN or real.__name__ in UFUNC_OPERATIONS
             return Ufunc(self.graph, real, self.for_numbers(real)) if known else (
                 self.for_numbers(real)
             )  # fmt: skip
@@ -207,12 +207,12 @@ class Stage:
 
     def _own(self, real: Any) -> Callable[..., Any]:
         """Return a function of the table."""
-        own, of_numbers, makes = OWN[real], self.for_numbers(real), real in MAKING
+        own, of_numbers, makes = WRITTEN[real], self.for_numbers(real), real in ARRAY_MAKERS
 
         def function(*arguments: Any, **options: Any) -> Any:
             if makes or holds_tracers([*arguments, *options.values()]):
-                options = {k: plain(v) for k, v in options.items()}
-                return own(self.graph, *map(plain, arguments), **options)
+                options = {k: unwrapped(v) for k, v in options.items()}
+                return own(self.graph, *map(unwrapped, arguments), **options)
             return of_numbers(*arguments, **options)
 
         return function
@@ -275,7 +275,7 @@ class Stage:
     def _type(self, cls: type) -> Any:
         """Return a class: of somebody a copy whose methods lead here, of a library what makes."""
         if cls is np.float64:
-            return Kind(np.float64, self._builtins["float"].make)
+            return NumberType(np.float64, self._builtins["float"].make)
         raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc, np.errstate)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
@@ -319,8 +319,8 @@ class Stage:
 def _in_python(real: Any) -> FunctionType | None:
     """Return the source of a function of a library if that is plain Python: it is traced, too."""
     function = inspect.unwrap(real) if callable(real) else real
-    plain = isinstance(function, FunctionType) and is_of_a_library(function)
-    return function if plain else None
+    unwrapped = isinstance(function, FunctionType) and is_of_a_library(function)
+    return function if unwrapped else None
 
 
 def _has_code(value: Any) -> bool:
@@ -337,6 +337,6 @@ def _title(real: Any) -> str:
 def _names(code: CodeType) -> Iterator[str]:
     """Yield the names that a function and those inside it may look up."""
     yield from code.co_names
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _names(constant)
+    for constant_value in code.co_consts:
+        if isinstance(constant_value, CodeType):
+            yield from _names(constant_value)

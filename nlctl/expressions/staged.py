@@ -14,7 +14,14 @@ import numpy as np
 from .arrays import Special, Tracer, traced
 from .graph import Graph, Untraceable
 from .library.rotations import enter_rotations
-from .library.table import OPERATIONS, OWN, applied, constant, of_ufunc, plain
+from .library.table import (
+    UFUNC_OPERATIONS,
+    WRITTEN,
+    constant_value,
+    of_ufunc,
+    unwrapped,
+    written_out,
+)
 from .operators import elementwise
 
 if TYPE_CHECKING:
@@ -35,10 +42,12 @@ def holds_tracers(value: Any) -> bool:
 def settled(value: Any) -> Any:
     """Return a value with arrays and numbers for what is constant."""
     if isinstance(value, Tracer):
-        return constant(value)
+        return constant_value(value)
     if type(value) in (list, tuple):
         return type(value)(map(settled, value))
-    return value.__dict__["_real"] if type(value) in (StagedObject, StagedType) else plain(value)
+    return (
+        value.__dict__["_real"] if type(value) in (StagedObject, StagedType) else unwrapped(value)
+    )
 
 
 def is_of_a_library(thing: Any) -> bool:
@@ -55,10 +64,10 @@ class StagedModule:
 
     def __getattr__(self, name: str) -> Any:
         real = getattr(self._real, name)
-        plain = not (callable(real) or isinstance(real, ModuleType | np.ndarray)) and (
+        unwrapped = not (callable(real) or isinstance(real, ModuleType | np.ndarray)) and (
             real is not np.r_ and real is not np.c_
         )
-        return real if plain else self._function(name, real)
+        return real if unwrapped else self._function(name, real)
 
 
 class StagedType:
@@ -68,7 +77,7 @@ class StagedType:
         self.__dict__.update(_real=real, _stage=stage)
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        own, given = OWN.get(self._real), [*arguments, *options.values()]
+        own, given = WRITTEN.get(self._real), [*arguments, *options.values()]
         if own is not None and (self._real is np.vectorize or holds_tracers(given)):
             return own(self._stage.graph, *arguments, **options)
         return self._stage.for_numbers(self._real)(*arguments, **options)
@@ -77,7 +86,7 @@ class StagedType:
         real, stage = self.__dict__["_real"], self.__dict__["_stage"]
         if real.__module__.startswith("scipy.spatial.transform"):
             enter_rotations()
-        known = OWN.get((real, name))
+        known = WRITTEN.get((real, name))
         found = getattr(real, name)
         if known is None:
             return stage.for_numbers(found) if callable(found) else found
@@ -177,19 +186,19 @@ _ACCUMULATING = {"add": np.cumsum, "multiply": np.cumprod}
 class Ufunc:
     """A function of NumPy or SciPy, element by element."""
 
-    def __init__(self, graph: Graph, real: Any, plain: Callable[..., Any]) -> None:
-        self.graph, self.real, self.plain = graph, real, plain
+    def __init__(self, graph: Graph, real: Any, unwrapped: Callable[..., Any]) -> None:
+        self.graph, self.real, self.plain = graph, real, unwrapped
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         if not holds_tracers([*arguments, *options.values()]):
             return self.plain(*arguments, **options)
-        options = {k: plain(v) for k, v in options.items()}
+        options = {k: unwrapped(v) for k, v in options.items()}
         return of_ufunc(self.graph, self.real, self._own, arguments, options)
 
     def _own(self, *arguments: Any) -> Any:
-        if self.real in OWN:
-            return OWN[self.real](self.graph, *arguments)
-        name = OPERATIONS[self.real.__name__]
+        if self.real in WRITTEN:
+            return WRITTEN[self.real](self.graph, *arguments)
+        name = UFUNC_OPERATIONS[self.real.__name__]
         if name == "power":
             return _base(self.graph, arguments[0]) ** arguments[1]
         return elementwise(self.graph, name, *arguments)
@@ -199,7 +208,7 @@ class Ufunc:
         if not holds_tracers(values):
             return self.plain_method("reduce", values, axis, **options)
         if self.real.__name__ in _REDUCING:
-            return applied(self.graph, _REDUCING[self.real.__name__], values, axis, **options)
+            return written_out(self.graph, _REDUCING[self.real.__name__], values, axis, **options)
         if options or axis != 0:
             raise Untraceable(f"{self.real.__name__}.reduce with other arguments")
         return functools.reduce(self, list(traced(self.graph, values)))
@@ -214,7 +223,7 @@ class Ufunc:
             return self.plain_method("accumulate", values, axis)
         array = traced(self.graph, values)
         if self.real.__name__ in _ACCUMULATING:
-            return applied(self.graph, _ACCUMULATING[self.real.__name__], array, axis)
+            return written_out(self.graph, _ACCUMULATING[self.real.__name__], array, axis)
         if axis != 0:
             raise Untraceable(f"{self.real.__name__}.accumulate along another axis")
         return traced(self.graph, list(itertools.accumulate(array, self)))

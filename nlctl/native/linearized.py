@@ -1,4 +1,4 @@
-"""The linear system of a diagram at a point, of whatever it is made."""
+"""Linearization of a diagram, compiled or not."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import control as ct
 
 from ..annotations import as_annotated
 from .compiled import Compiled, compile  # noqa: A004 (what it does)
+
+__all__ = ["linearize"]
 
 
 @as_annotated

@@ -15,7 +15,7 @@ from nlctl.expressions.graph import Graph
 from nlctl.expressions.library.rotations import enter_rotations
 from nlctl.expressions.library.special import enter_scipy
 from nlctl.expressions.library.splines import called_object, enter_splines
-from nlctl.expressions.library.table import OWN, applied
+from nlctl.expressions.library.table import WRITTEN, written_out
 from nlctl.expressions.stage import Stage
 from nlctl.expressions.staged import settled
 
@@ -147,7 +147,7 @@ def equal(found, wanted):
 def test_a_function_of_one_array(function, line):
     """With ties, zeros and NaN, short and long."""
     with np.errstate(all="ignore"):
-        equal(applied(GRAPH, function, traced(GRAPH, LINES[line])), function(LINES[line]))
+        equal(written_out(GRAPH, function, traced(GRAPH, LINES[line])), function(LINES[line]))
 
 
 @pytest.mark.parametrize(("function", "options"), WITH_OPTIONS)
@@ -155,14 +155,14 @@ def test_options(function, options):
     for line in LINES:
         with np.errstate(all="ignore"):
             wanted = function(line, **options)
-        equal(applied(GRAPH, function, traced(GRAPH, line), **options), wanted)
+        equal(written_out(GRAPH, function, traced(GRAPH, line), **options), wanted)
 
 
 @pytest.mark.parametrize("call", CALLS, ids=lambda call: call[0].__name__)
 def test_a_function_of_several_things(call):
     function, arguments = call
     with np.errstate(all="ignore"):
-        equal(applied(GRAPH, function, *map(staged, arguments)), function(*arguments))
+        equal(written_out(GRAPH, function, *map(staged, arguments)), function(*arguments))
 
 
 X = np.linspace(-0.5, 5.5, 25)
@@ -207,7 +207,7 @@ def test_rotations(seq):
     """Made of quaternions, vectors and angles, and read as each of these, also at gimbal lock."""
     rng = np.random.default_rng(3)
     for angles in (*rng.normal(size=(8, 3)), np.array([0.3, 0.0, 0.4])):
-        ours = OWN[Rotation, "from_euler"](GRAPH, seq, traced(GRAPH, angles))
+        ours = WRITTEN[Rotation, "from_euler"](GRAPH, seq, traced(GRAPH, angles))
         theirs = Rotation.from_euler(seq, angles)
         equal(ours.as_matrix(), theirs.as_matrix())
         equal(ours.as_rotvec(), theirs.as_rotvec())
@@ -216,9 +216,9 @@ def test_rotations(seq):
         equal(ours.apply(angles), theirs.apply(angles))
         if angles[1]:
             equal(ours.as_euler(seq), theirs.as_euler(seq))
-        again = OWN[Rotation, "from_rotvec"](GRAPH, ours.as_rotvec())
+        again = WRITTEN[Rotation, "from_rotvec"](GRAPH, ours.as_rotvec())
         equal(again.as_matrix(), theirs.as_matrix())
-        equal(OWN[Rotation, "from_quat"](GRAPH, ours.as_quat()).as_matrix(), theirs.as_matrix())
+        equal(WRITTEN[Rotation, "from_quat"](GRAPH, ours.as_quat()).as_matrix(), theirs.as_matrix())
 
 
 def test_a_stage_knows_names_as_they_are_imported():

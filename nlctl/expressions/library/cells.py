@@ -18,7 +18,7 @@ from ..graph import Expr, Graph, Untraceable
 from ..operators import elementwise
 
 
-class Cell:
+class _Cell:
     """One expression, as an element of an array of objects."""
 
     __slots__ = ("expr", "graph")
@@ -26,7 +26,7 @@ class Cell:
     def __init__(self, graph: Graph, expr: Expr) -> None:
         self.graph, self.expr = graph, expr
 
-    def conjugate(self) -> Cell:
+    def conjugate(self) -> _Cell:
         """Return itself: numbers are real."""
         return self
 
@@ -37,34 +37,34 @@ class Cell:
 def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
     function = getattr(operator, name)
 
-    def method(self: Cell, *other: Any) -> Any:
+    def method(self: _Cell, *other: Any) -> Any:
         if other and isinstance(other[0], np.ndarray):
             if other[0].ndim:
                 return NotImplemented
             other = (other[0][()],)
         mine = scalar(self.graph, self.expr)
-        theirs = [scalar(self.graph, v.expr) if isinstance(v, Cell) else v for v in other]
+        theirs = [scalar(self.graph, v.expr) if isinstance(v, _Cell) else v for v in other]
         found = function(*theirs, mine) if turned else function(mine, *theirs)
-        return Cell(self.graph, found.only)
+        return _Cell(self.graph, found.only)
 
     return method
 
 
-def _function(name: str) -> Callable[[Cell], Cell]:
-    def method(self: Cell) -> Cell:
-        return Cell(self.graph, elementwise(self.graph, name, scalar(self.graph, self.expr)).only)
+def _function(name: str) -> Callable[[_Cell], _Cell]:
+    def method(self: _Cell) -> _Cell:
+        return _Cell(self.graph, elementwise(self.graph, name, scalar(self.graph, self.expr)).only)
 
     return method
 
 
 for _name in ("add", "sub", "mul", "truediv", "pow", "mod"):
-    setattr(Cell, f"__{_name}__", _operator(f"__{_name}__"))
-    setattr(Cell, f"__r{_name}__", _operator(f"__{_name}__", turned=True))
+    setattr(_Cell, f"__{_name}__", _operator(f"__{_name}__"))
+    setattr(_Cell, f"__r{_name}__", _operator(f"__{_name}__", turned=True))
 for _name in ("lt", "le", "gt", "ge", "eq", "ne", "neg", "abs", "and", "or", "xor", "invert"):
-    setattr(Cell, f"__{_name}__", _operator(f"__{_name}__"))
+    setattr(_Cell, f"__{_name}__", _operator(f"__{_name}__"))
 for _name in ("sqrt", "exp", "log", "sin", "cos", "tan", "arctan", "floor", "ceil", "rint"):
-    setattr(Cell, _name, _function(_name))
-Cell.__hash__ = None  # type: ignore[assignment]
+    setattr(_Cell, _name, _function(_name))
+_Cell.__hash__ = None  # type: ignore[assignment]
 
 
 def unrolled(value: Any) -> Any:
@@ -72,7 +72,7 @@ def unrolled(value: Any) -> Any:
     if isinstance(value, Special):
         raise Untraceable(f"{type(value).__name__} in the place of an array")
     if isinstance(value, Tracer):
-        cells = np.frompyfunc(lambda e: Cell(value.graph, e), 1, 1)(value.elements())
+        cells = np.frompyfunc(lambda e: _Cell(value.graph, e), 1, 1)(value.elements())
         return cells if value.shape else as_array(cells)[()]
     if isinstance(value, list | tuple):
         parts = [unrolled(v) for v in value]
@@ -82,7 +82,7 @@ def unrolled(value: Any) -> Any:
 
 def rolled(graph: Graph, value: Any) -> Any:
     """Return what a function of NumPy has made of `unrolled` values as arrays of expressions."""
-    if isinstance(value, Cell):
+    if isinstance(value, _Cell):
         return scalar(graph, value.expr)
     if isinstance(value, list | tuple):
         parts = [rolled(graph, v) for v in value]
@@ -95,7 +95,7 @@ def rolled(graph: Graph, value: Any) -> Any:
 
 
 def _expression(graph: Graph, value: Any) -> Expr:
-    if isinstance(value, Cell):
+    if isinstance(value, _Cell):
         return value.expr
     if not isinstance(value, bool | int | float | np.bool_ | np.integer | np.floating):
         raise Untraceable(f"an array that holds {type(value).__name__}")

@@ -15,10 +15,10 @@ from ..graph import Graph, Untraceable
 from ..operators import elementwise, product, total
 from .table import enter
 
-__all__ = ["Pair", "is_complex", "paired"]
+__all__ = ["ComplexPair", "holds_complex", "paired"]
 
 
-class Pair(Special):
+class ComplexPair(Special):
     """An array of complex numbers: the real and the imaginary parts."""
 
     __array_ufunc__ = None
@@ -38,9 +38,9 @@ class Pair(Special):
         """Number of axes."""
         return self.real.ndim
 
-    def linear(self, function: Callable[[Tracer], Any]) -> Pair:
+    def linear(self, function: Callable[[Tracer], Any]) -> ComplexPair:
         """Return what a linear function with real coefficients makes of both parts."""
-        return Pair(self.graph, function(self.real), function(self.imag))
+        return ComplexPair(self.graph, function(self.real), function(self.imag))
 
     def operation(self, graph: Graph, name: str, operands: Sequence[Any]) -> Any:
         """Return an operation by its name."""
@@ -51,17 +51,17 @@ class Pair(Special):
             return _OPERATIONS[name](graph, condition, *(paired(graph, v) for v in values))
         return _OPERATIONS[name](graph, *(paired(graph, v) for v in operands))
 
-    def conjugate(self) -> Pair:
+    def conjugate(self) -> ComplexPair:
         """Return the conjugate complex numbers."""
-        return Pair(self.graph, self.real, elementwise(self.graph, "neg", self.imag))
+        return ComplexPair(self.graph, self.real, elementwise(self.graph, "neg", self.imag))
 
     conj = conjugate
 
-    def sum(self, axis: Any = None) -> Pair:
+    def sum(self, axis: Any = None) -> ComplexPair:
         """Return the sum."""
         return self.linear(lambda part: total(part, axis))
 
-    def mean(self, axis: Any = None) -> Pair:
+    def mean(self, axis: Any = None) -> ComplexPair:
         """Return the mean."""
         count = self.real.size if axis is None else self.shape[axis]
         return self.linear(lambda part: total(part, axis) / float(count))
@@ -69,14 +69,14 @@ class Pair(Special):
     def __len__(self) -> int:
         return len(self.real)
 
-    def __getitem__(self, key: Any) -> Pair:
+    def __getitem__(self, key: Any) -> ComplexPair:
         return self.linear(lambda part: part[key])
 
     def __setitem__(self, key: Any, value: Any) -> None:
         value = paired(self.graph, value)
         self.real[key], self.imag[key] = value.real, value.imag
 
-    def __pow__(self, exponent: Any) -> Pair:
+    def __pow__(self, exponent: Any) -> ComplexPair:
         if not isinstance(exponent, int) or not 0 <= exponent <= 64:
             raise Untraceable("a power of complex numbers that is not a small integer")
         found = paired(self.graph, 1.0)
@@ -98,71 +98,92 @@ def np_broadcast(graph: Graph, real: Any, imag: Any) -> tuple[Tracer, Tracer]:
     return a, b
 
 
-def is_complex(value: Any) -> bool:
+def holds_complex(value: Any) -> bool:
     """Whether there are complex numbers in a value, or in a list or tuple."""
     if isinstance(value, list | tuple):
-        return any(map(is_complex, value))
-    return isinstance(value, Pair) or arrays.is_complex(value)
+        return any(map(holds_complex, value))
+    return isinstance(value, ComplexPair) or arrays.is_complex(value)
 
 
-def paired(graph: Graph, value: Any) -> Pair:
+def paired(graph: Graph, value: Any) -> ComplexPair:
     """Return numbers, arrays and lists as complex numbers."""
-    if isinstance(value, Pair):
+    if isinstance(value, ComplexPair):
         return value
     if isinstance(value, list | tuple):
         parts = [paired(graph, v) for v in value]
-        return Pair(graph, [p.real for p in parts], [p.imag for p in parts])
+        return ComplexPair(graph, [p.real for p in parts], [p.imag for p in parts])
     if arrays.is_complex(value):
         array = np.asarray(value, dtype=complex)
-        return Pair(graph, np.real(array), np.imag(array))
+        return ComplexPair(graph, np.real(array), np.imag(array))
     real = traced(graph, value)
-    return Pair(graph, real, elementwise(graph, "mul", 0.0, traced(graph, np.zeros(real.shape))))
+    return ComplexPair(
+        graph, real, elementwise(graph, "mul", 0.0, traced(graph, np.zeros(real.shape)))
+    )
 
 
 Special.of_complex = staticmethod(paired)
 
 
-def _mul(graph: Graph, a: Pair, b: Pair) -> Pair:
-    return Pair(graph, a.real * b.real - a.imag * b.imag, a.real * b.imag + a.imag * b.real)
+def _mul(graph: Graph, a: ComplexPair, b: ComplexPair) -> ComplexPair:
+    return ComplexPair(graph, a.real * b.real - a.imag * b.imag, a.real * b.imag + a.imag * b.real)
 
 
-def _div(graph: Graph, a: Pair, b: Pair) -> Pair:
+def paired_product(graph: Graph, a: Any, b: Any) -> ComplexPair:
+    """Return the matrix product of complex numbers."""
+    a, b = paired(graph, a), paired(graph, b)
+    real = product(a.real, b.real) - product(a.imag, b.imag)
+    return ComplexPair(graph, real, product(a.real, b.imag) + product(a.imag, b.real))
+
+
+def _sqrt(graph: Graph, z: ComplexPair) -> ComplexPair:
+    """The root with a real part that is not negative, by the larger of both parts."""
+    op = functools.partial(elementwise, graph)
+    half = (op("absolute", z.real) + _absolute(graph, z)) / 2.0
+    large = op("sqrt", half)
+    small = op("select", op("eq", large, 0.0), 0.0, op("absolute", z.imag) / (2.0 * large))
+    right = op("ge", z.real, 0.0)
+    real, imag = op("select", right, large, small), op("select", right, small, large)
+    return ComplexPair(graph, real, op("copysign", imag, z.imag))
+
+
+def _div(graph: Graph, a: ComplexPair, b: ComplexPair) -> ComplexPair:
     size = b.real * b.real + b.imag * b.imag
     top = _mul(graph, a, b.conjugate())
-    return Pair(graph, top.real / size, top.imag / size)
+    return ComplexPair(graph, top.real / size, top.imag / size)
 
 
-def _exp(graph: Graph, z: Pair) -> Pair:
+def _exp(graph: Graph, z: ComplexPair) -> ComplexPair:
     size = elementwise(graph, "exp", z.real)
     cos, sin = (elementwise(graph, f, z.imag) for f in ("cos", "sin"))
-    return Pair(graph, size * cos, size * sin)
+    return ComplexPair(graph, size * cos, size * sin)
 
 
-def _log(graph: Graph, z: Pair) -> Pair:
-    return Pair(graph, elementwise(graph, "log", _absolute(graph, z)), _angle(graph, z))
+def _log(graph: Graph, z: ComplexPair) -> ComplexPair:
+    return ComplexPair(graph, elementwise(graph, "log", _absolute(graph, z)), _angle(graph, z))
 
 
-def _absolute(graph: Graph, z: Pair) -> Tracer:
+def _absolute(graph: Graph, z: ComplexPair) -> Tracer:
     return elementwise(graph, "hypot", z.real, z.imag)
 
 
-def _angle(graph: Graph, z: Pair) -> Tracer:
+def _angle(graph: Graph, z: ComplexPair) -> Tracer:
     return elementwise(graph, "arctan2", z.imag, z.real)
 
 
-def _select(graph: Graph, condition: Any, a: Pair, b: Pair) -> Pair:
+def _select(graph: Graph, condition: Any, a: ComplexPair, b: ComplexPair) -> ComplexPair:
     parts = ((a.real, b.real), (a.imag, b.imag))
-    return Pair(graph, *(elementwise(graph, "select", condition, *p) for p in parts))
+    return ComplexPair(graph, *(elementwise(graph, "select", condition, *p) for p in parts))
 
 
 _OPERATIONS: dict[str, Callable[..., Any]] = {
-    "add": lambda g, a, b: Pair(g, a.real + b.real, a.imag + b.imag),
-    "sub": lambda g, a, b: Pair(g, a.real - b.real, a.imag - b.imag),
+    "add": lambda g, a, b: ComplexPair(g, a.real + b.real, a.imag + b.imag),
+    "sub": lambda g, a, b: ComplexPair(g, a.real - b.real, a.imag - b.imag),
     "mul": _mul,
     "div": _div,
-    "neg": lambda g, a: Pair(g, -a.real, -a.imag),
+    "neg": lambda g, a: ComplexPair(g, -a.real, -a.imag),
     "absolute": _absolute,
     "exp": _exp,
+    "sqrt": _sqrt,
     "log": _log,
     "select": _select,
     "eq": lambda g, a, b: (a.real == b.real) & (a.imag == b.imag),
@@ -171,7 +192,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
-    def method(self: Pair, *other: Any) -> Any:
+    def method(self: ComplexPair, *other: Any) -> Any:
         operands = (*other, self) if turned else (self, *other)
         return self.operation(self.graph, name, operands)
 
@@ -179,23 +200,29 @@ def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
 
 
 for _name, _op in {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div"}.items():
-    setattr(Pair, f"__{_name}__", _operator(_op))
-    setattr(Pair, f"__r{_name}__", _operator(_op, turned=True))
+    setattr(ComplexPair, f"__{_name}__", _operator(_op))
+    setattr(ComplexPair, f"__r{_name}__", _operator(_op, turned=True))
 for _name, _op in {"neg": "neg", "abs": "absolute", "eq": "eq", "ne": "ne"}.items():
-    setattr(Pair, f"__{_name}__", _operator(_op))
+    setattr(ComplexPair, f"__{_name}__", _operator(_op))
+
+
+ComplexPair.__matmul__ = lambda self, other: paired_product(self.graph, self, other)  # type: ignore[attr-defined]
+ComplexPair.__rmatmul__ = lambda self, other: paired_product(self.graph, other, self)  # type: ignore[attr-defined]
 
 
 def made(graph: Graph, real: Any = 0.0, imag: Any = 0.0) -> Any:
     """Return ``complex(real, imag)``."""
-    if isinstance(real, Pair):
+    if isinstance(real, ComplexPair):
         return real
-    return Pair(graph, real, imag)
+    return ComplexPair(graph, real, imag)
 
 
-def rect(graph: Graph, size: Any, angle: Any) -> Pair:
+def rect(graph: Graph, size: Any, angle: Any) -> ComplexPair:
     """Return ``cmath.rect``."""
     cos, sin = (elementwise(graph, f, angle) for f in ("cos", "sin"))
-    return Pair(graph, elementwise(graph, "mul", size, cos), elementwise(graph, "mul", size, sin))
+    return ComplexPair(
+        graph, elementwise(graph, "mul", size, cos), elementwise(graph, "mul", size, sin)
+    )
 
 
 def _transform(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -208,9 +235,9 @@ def _transform(function: Callable[..., Any]) -> Callable[..., Any]:
         matrix = function(np.eye(len(z)), axis=0)
         parts = (traced(graph, np.ascontiguousarray(p)) for p in (matrix.real, matrix.imag))
         real, imag = (functools.partial(product, part) for part in parts)
-        if not is_complex(values):
-            return Pair(graph, real(z.real), imag(z.real))
-        return Pair(graph, real(z.real) - imag(z.imag), real(z.imag) + imag(z.real))
+        if not holds_complex(values):
+            return ComplexPair(graph, real(z.real), imag(z.real))
+        return ComplexPair(graph, real(z.real) - imag(z.imag), real(z.imag) + imag(z.real))
 
     return own
 

@@ -9,9 +9,9 @@ import numpy as np
 from ..arrays import Tracer, full, mapped, traced
 from ..graph import Expr, Graph, Untraceable
 from ..operators import elementwise
-from .complex_numbers import Pair, is_complex, paired
+from .complex_numbers import ComplexPair, holds_complex, paired
 from .shapes import by_moving
-from .table import METHODS, is_traced, of
+from .table import ARRAY_METHODS, is_traced, of
 
 __all__: list[str] = []
 
@@ -30,10 +30,10 @@ def holds_traced(value: Any) -> bool:
 
 
 @of(np.zeros, np.empty, makes=True)
-def zeros(graph: Graph, shape: Any, dtype: Any = float) -> Any:
+def _zeros(graph: Graph, shape: Any, dtype: Any = float) -> Any:
     """Return an array of zeros."""
     if dtype in (complex, np.complex128):
-        return Pair(graph, full(graph, shape, 0.0), full(graph, shape, 0.0))
+        return ComplexPair(graph, full(graph, shape, 0.0), full(graph, shape, 0.0))
     if dtype in (int, bool):
         return np.zeros(shape, dtype)
     only_floats(dtype)
@@ -50,7 +50,7 @@ def ones(graph: Graph, shape: Any, dtype: Any = float) -> Any:
 
 
 @of(np.full, makes=True)
-def filled(graph: Graph, shape: Any, value: Any, dtype: Any = None) -> Any:
+def _filled(graph: Graph, shape: Any, value: Any, dtype: Any = None) -> Any:
     """Return an array of equal elements."""
     if not is_traced(value):
         made = np.full(shape, value, dtype)
@@ -92,7 +92,7 @@ def array(graph: Graph, values: Any, dtype: Any = None, copy: Any = True, ndmin:
         if made.dtype != float:
             return made  # an array of integers rounds what it is assigned
         return traced(graph, made)
-    if is_complex(values):
+    if holds_complex(values):
         return paired(graph, values)
     only_floats(dtype)
     made = _of_floats(graph, traced(graph, values)).copy()
@@ -115,7 +115,7 @@ def _of_floats(graph: Graph, array: Tracer) -> Tracer:
 @of(np.asarray, np.asanyarray, np.ascontiguousarray, np.asarray_chkfinite, makes=True)
 def asarray(graph: Graph, values: Any, dtype: Any = None) -> Any:
     """Return an array as it is, anything else as an array."""
-    if isinstance(values, Pair):
+    if isinstance(values, ComplexPair):
         return values
     if not isinstance(values, Tracer):
         return array(graph, values, dtype)
@@ -146,7 +146,7 @@ def eye(graph: Graph, n: int, m: Any = None, k: int = 0, dtype: Any = float) -> 
 
 
 @of(np.identity, makes=True)
-def identity(graph: Graph, n: int, dtype: Any = float) -> Any:
+def _identity(graph: Graph, n: int, dtype: Any = float) -> Any:
     """Return the unit matrix."""
     return eye(graph, n, dtype=dtype)
 
@@ -216,4 +216,4 @@ class Joined:
         return by_moving(np.concatenate)(self.graph, [a.short() for a in arrays])
 
 
-METHODS.update(astype=as_type)
+ARRAY_METHODS.update(astype=as_type)

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
-from ..masked import Places
+from ..masked import MaskedPlaces
 from ..operators import elementwise, floor_quotient
-from .complex_numbers import Pair
-from .table import METHODS, Facade, formula, of
+from .complex_numbers import ComplexPair
+from .table import ARRAY_METHODS, Facade, formula, of
 
 __all__: list[str] = []
 
@@ -57,25 +57,25 @@ def float_power(np: Facade, x: Any, y: Any) -> Any:
 @formula(np.positive, np.real)
 def positive(np: Facade, x: Any) -> Any:
     """x."""
-    return x.real if isinstance(x, Pair) else x
+    return x.real if isinstance(x, ComplexPair) else x
 
 
 @formula(np.conj)
 def conjugate(np: Facade, x: Any) -> Any:
     """The conjugate complex number."""
-    return x.conjugate() if isinstance(x, Pair) else x
+    return x.conjugate() if isinstance(x, ComplexPair) else x
 
 
 @formula(np.imag)
 def imaginary(np: Facade, x: Any) -> Any:
     """The imaginary part."""
-    return x.imag if isinstance(x, Pair) else 0.0 * x
+    return x.imag if isinstance(x, ComplexPair) else 0.0 * x
 
 
 @formula(np.angle)
 def angle(np: Facade, x: Any, deg: bool = False) -> Any:
     """The angle of a complex number."""
-    found = np.arctan2(x.imag, x.real) if isinstance(x, Pair) else np.arctan2(0.0 * x, x)
+    found = np.arctan2(x.imag, x.real) if isinstance(x, ComplexPair) else np.arctan2(0.0 * x, x)
     return found * (180.0 / np.pi) if deg else found
 
 
@@ -157,7 +157,7 @@ of(np.fmin)(_of_two("minimum"))
 
 
 @formula(np.round, np.around)
-def rounded(np: Facade, x: Any, decimals: int = 0) -> Any:
+def _rounded(np: Facade, x: Any, decimals: int = 0) -> Any:
     """x with so many decimals, as NumPy rounds: by a power of ten there and back."""
     if decimals == 0:
         return np.rint(x)
@@ -196,22 +196,22 @@ def where(graph: Graph, condition: Any, *values: Any) -> Any:
 
 
 @of(np.nonzero)
-def nonzero(graph: Graph, condition: Any) -> tuple[Places]:
+def nonzero(graph: Graph, condition: Any) -> tuple[MaskedPlaces]:
     """Return where a condition holds."""
     return (flatnonzero(graph, condition),)
 
 
 @of(np.flatnonzero)
-def flatnonzero(graph: Graph, condition: Any) -> Places:
+def flatnonzero(graph: Graph, condition: Any) -> MaskedPlaces:
     """Return where a condition holds."""
     mask = elementwise(graph, "ne", traced(graph, condition), 0.0)
     if mask.ndim != 1:
         raise Untraceable("the places in a matrix where a condition holds")
-    return Places(mask)
+    return MaskedPlaces(mask)
 
 
 @of(np.clip)
-def clip(
+def _clip(
     graph: Graph, values: Any, low: Any = None, high: Any = None, *, min: Any = None,  # noqa: A002
     max: Any = None, out: Any = None,  # noqa: A002
 ) -> Any:  # fmt: skip
@@ -273,7 +273,7 @@ def nan_to_num(
 
 
 @formula(np.isclose)
-def isclose(np: Facade, a: Any, b: Any, rtol: Any = 1e-05, atol: Any = 1e-08) -> Any:
+def _isclose(np: Facade, a: Any, b: Any, rtol: Any = 1e-05, atol: Any = 1e-08) -> Any:
     """Whether a is next to b."""
     near = np.logical_and(np.abs(a - b) <= atol + rtol * np.abs(b), np.isfinite(b + 0.0 * a))
     return np.logical_or(near, np.equal(a, b))
@@ -296,4 +296,4 @@ def conj(graph: Graph, values: Tracer) -> Tracer:
     return values
 
 
-METHODS.update(clip=clip, round=np.round, conj=conj, conjugate=conj)
+ARRAY_METHODS.update(clip=_clip, round=np.round, conj=conj, conjugate=conj)

@@ -11,28 +11,28 @@ from ..arrays import Tracer, traced
 from ..elimination import eliminated, substituted
 from ..graph import Graph, Untraceable
 from ..operators import elementwise, product, total
-from .table import Facade, constant, of
+from .table import Facade, constant_value, of
 
 __all__: list[str] = []
 
-Rows = list[list[Any]]
-LARGEST = 12  # rows of a matrix that depends on the state
+_Rows = list[list[Any]]
+_LARGEST = 12  # rows of a matrix that depends on the state
 
 
-def _rows(graph: Graph, matrix: Any) -> Rows:
+def _rows(graph: Graph, matrix: Any) -> _Rows:
     array = traced(graph, matrix)
     if array.ndim != 2:
         raise Untraceable("many matrices at once")
     return [list(row) for row in array]
 
 
-def _square(graph: Graph, matrix: Any) -> Rows:
+def _square(graph: Graph, matrix: Any) -> _Rows:
     rows = _rows(graph, matrix)
     if any(len(row) != len(rows) for row in rows):
         raise Untraceable("a matrix that is not square")
     open_ones = any(e.op != "const" for row in rows for v in row for e in v.values.flat)
-    if open_ones and len(rows) > LARGEST:
-        raise Untraceable(f"a matrix of more than {LARGEST} rows")
+    if open_ones and len(rows) > _LARGEST:
+        raise Untraceable(f"a matrix of more than {_LARGEST} rows")
     return rows
 
 
@@ -58,7 +58,7 @@ def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
 
 
 @of(np.linalg.solve)
-def solve(graph: Graph, a: Any, b: Any) -> Tracer:
+def _solve(graph: Graph, a: Any, b: Any) -> Tracer:
     """Return the solution of linear equations."""
     return solved(graph, a, b)
 
@@ -95,7 +95,7 @@ def _any_is_zero(np_: Facade, pivots: Sequence[Any]) -> Any:
 @of(np.linalg.lstsq)
 def lstsq(graph: Graph, a: Any, b: Any, rcond: Any = None) -> tuple[Any, ...]:
     """Return the least squares solution for a matrix that is constant."""
-    matrix = constant(traced(graph, a))
+    matrix = constant_value(traced(graph, a))
     if not isinstance(matrix, np.ndarray):
         raise Untraceable("least squares with a matrix that depends on the state")
     b = traced(graph, b)
@@ -115,7 +115,7 @@ def cholesky(graph: Graph, a: Any) -> Tracer:
     """Return the lower factor of a positive definite matrix."""
     rows, np_ = _square(graph, a), Facade(graph)
     n = len(rows)
-    lower: Rows = [[0.0] * n for _ in range(n)]
+    lower: _Rows = [[0.0] * n for _ in range(n)]
     for j in range(n):
         rest = rows[j][j]
         for k in range(j):

@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Tracer, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from ..operators import elementwise
-from .table import OWN, Kind, applied, is_traced, of, plain
+from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 
 __all__ = ["Builtins", "guard_of_math"]
 
@@ -60,7 +60,7 @@ class Builtins:
         for name in ("round", "isinstance", "getattr", "hasattr", "type"):
             found[name] = getattr(self, f"_{name}")
         makers = {float: self._float, int: self._int, complex: self._complex}
-        found.update({kind.__name__: Kind(kind, make) for kind, make in makers.items()})
+        found.update({kind.__name__: NumberType(kind, make) for kind, make in makers.items()})
         found["min"] = functools.partial(self._extreme, "min")
         found["max"] = functools.partial(self._extreme, "max")
         return found
@@ -73,15 +73,14 @@ class Builtins:
     def _float(self, value: Any = 0.0) -> Any:
         if not isinstance(value, Tracer):
             return float(value)
-        if value.size != 1:
+        if value.shape:
             raise Untraceable("the float of an array")
-        return scalar(self.graph, self.graph.number(value.reshape(1)[0].only if value.shape
-                                                    else value.only))  # fmt: skip
+        return scalar(self.graph, self.graph.number(value.only))
 
     def _complex(self, *parts: Any) -> Any:
         if not any(map(is_traced, parts)):
             return complex(*parts)
-        return OWN[complex](self.graph, *parts)
+        return WRITTEN[complex](self.graph, *parts)
 
     def _int(self, value: Any = 0, *rest: Any) -> Any:
         if not isinstance(value, Tracer):
@@ -112,12 +111,14 @@ class Builtins:
             return self._whole("rint", value)
         if not is_of_arrays(value.only):
             raise Untraceable("Python's round to decimals, of one of its own floats")
-        return applied(self.graph, np.round, value, digits)
+        return written_out(self.graph, np.round, value, digits)
 
     def _isinstance(self, thing: Any, kind: Any) -> bool:
         originals = {made: real for real, made in self.stage.classes.items()}
         kinds = kind if isinstance(kind, tuple) else (kind,)
-        kinds = tuple(getattr(plain(k), "__dict__", {}).get("_real", plain(k)) for k in kinds)
+        kinds = tuple(
+            getattr(unwrapped(k), "__dict__", {}).get("_real", unwrapped(k)) for k in kinds
+        )
         both = (*kinds, *(originals[k] for k in kinds if k in originals))
         if isinstance(thing, Tracer):
             return self._is_number(thing, both)
@@ -137,9 +138,13 @@ class Builtins:
         return getattr(thing, *rest)
 
     def _hasattr(self, thing: Any, name: str) -> bool:
-        if isinstance(thing, Tracer):
-            return hasattr(np.empty(thing.shape) if thing.shape else 0.0, name)
-        return hasattr(thing, name)
+        if not isinstance(thing, Tracer):
+            return hasattr(thing, name)
+        kinds = (np.empty(thing.shape),) if thing.shape else (0.0, np.float64(0.0), 0)
+        answers = {hasattr(each, name) for each in kinds}
+        if len(answers) > 1:
+            raise Untraceable(f"a question for {name} of a number")
+        return answers.pop()
 
     def _type(self, thing: Any, *rest: Any) -> Any:
         if is_traced(thing):

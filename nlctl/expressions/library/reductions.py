@@ -13,9 +13,9 @@ import numpy as np
 from ..arrays import Tracer, as_array, traced
 from ..graph import Expr, Graph, Untraceable
 from ..masked import Masked
-from ..operators import counted, elementwise, total
-from .complex_numbers import Pair
-from .table import METHODS, Facade, constant, formula, of
+from ..operators import elementwise, total, with_counts
+from .complex_numbers import ComplexPair
+from .table import ARRAY_METHODS, Facade, constant_value, formula, of
 
 __all__: list[str] = []
 
@@ -79,8 +79,8 @@ def ignoring_nan(graph: Graph, name: str, a: Expr, b: Expr) -> Expr:
     return graph.op("select", graph.op("ne", b, b), a, known)
 
 
-largest = of(np.max, np.amax)(_extreme("maximum"))
-smallest = of(np.min, np.amin)(_extreme("minimum"))
+_largest = of(np.max, np.amax)(_extreme("maximum"))
+_smallest = of(np.min, np.amin)(_extreme("minimum"))
 of(np.nanmax)(_extreme("maximum", ignores_nan=True))
 of(np.nanmin)(_extreme("minimum", ignores_nan=True))
 
@@ -88,16 +88,16 @@ of(np.nanmin)(_extreme("minimum", ignores_nan=True))
 @of(np.ptp)
 def ptp(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
     """Return the distance between the largest and the smallest."""
-    return elementwise(graph, "sub", largest(graph, values, axis), smallest(graph, values, axis))
+    return elementwise(graph, "sub", _largest(graph, values, axis), _smallest(graph, values, axis))
 
 
 @of(np.sum)
-def summed(
+def sum_along(
     graph: Graph, values: Any, axis: Axis = None, dtype: Any = None, *, keepdims: bool = False,
     where: Any = True, initial: Any = None,
 ) -> Any:  # fmt: skip
     """Return a sum."""
-    if isinstance(values, Masked | Pair):
+    if isinstance(values, Masked | ComplexPair):
         return values.sum() if isinstance(values, Masked) else values.sum(axis)
     array = traced(graph, values)
     if where is not True:
@@ -133,10 +133,10 @@ def mean(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False
     """Return a mean."""
     if isinstance(values, Masked):
         return values.mean()
-    if isinstance(values, Pair):
+    if isinstance(values, ComplexPair):
         return values.linear(lambda part: mean(graph, part, axis, keepdims=keepdims))
     array = traced(graph, values)
-    found = summed(graph, array, axis, keepdims=keepdims)
+    found = sum_along(graph, array, axis, keepdims=keepdims)
     return elementwise(graph, "div", found, _count(array, axis))
 
 
@@ -145,10 +145,10 @@ def var(
     graph: Graph, values: Any, axis: Axis = None, *, ddof: float = 0, keepdims: bool = False
 ) -> Tracer:
     """Return a variance."""
-    array = counted(traced(graph, values))
+    array = with_counts(traced(graph, values))
     away = elementwise(graph, "sub", array, mean(graph, array, axis, keepdims=True))
     squares = elementwise(graph, "mul", away, away)
-    found = summed(graph, squares, axis, keepdims=keepdims)
+    found = sum_along(graph, squares, axis, keepdims=keepdims)
     return elementwise(graph, "div", found, max(_count(array, axis) - ddof, 0.0))
 
 
@@ -167,11 +167,11 @@ def average(graph: Graph, values: Any, axis: Axis = None, weights: Any = None) -
     if weights.shape != array.shape and axis is not None:
         shape = tuple(n if i == axis % array.ndim else 1 for i, n in enumerate(array.shape))
         weights = weights.reshape(shape)
-    weighed = summed(graph, elementwise(graph, "mul", array, weights), axis)
+    weighed = sum_along(graph, elementwise(graph, "mul", array, weights), axis)
     ones = elementwise(graph, "add", elementwise(graph, "mul", array, 0.0), 1.0)
     if weights.shape != array.shape:
         weights = elementwise(graph, "mul", ones, weights)
-    return elementwise(graph, "div", weighed, summed(graph, weights, axis))
+    return elementwise(graph, "div", weighed, sum_along(graph, weights, axis))
 
 
 @of(np.prod)
@@ -327,9 +327,9 @@ def _quantile(graph: Graph, row: Sequence[Expr], q: float) -> Expr:
 
 
 @of(np.quantile)
-def quantile(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
+def _quantiles(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
     """Return the value below which a part q lies."""
-    parts = np.asarray(constant(traced(graph, q)))
+    parts = np.asarray(constant_value(traced(graph, q)))
     if parts.dtype != float and parts.dtype.kind != "i":
         raise Untraceable("a quantile whose part depends on the state")
     found = [folded(graph, values, axis, False, functools.partial(_quantile, graph, q=float(p)))
@@ -340,7 +340,7 @@ def quantile(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
 @of(np.percentile)
 def percentile(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
     """Return the value below which q per cent lie."""
-    return quantile(graph, values, elementwise(graph, "div", q, 100.0), axis)
+    return _quantiles(graph, values, elementwise(graph, "div", q, 100.0), axis)
 
 
 @of(np.nanmean)
@@ -404,7 +404,7 @@ def norm_of(graph: Graph, values: Any) -> Tracer:
     return elementwise(graph, "sqrt", total(elementwise(graph, "mul", array, array)))
 
 
-METHODS.update(
+ARRAY_METHODS.update(
     {name: getattr(np, name) for name in ("max", "min", "sum", "mean", "var", "std", "prod", "any",
                                           "all", "argmax", "argmin", "argsort", "ptp")},
     sort=sorted_in_place,

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Special, Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise, product
-from .table import OWN
+from .table import WRITTEN
 
 __all__ = ["Turn", "enter_rotations"]
 
@@ -192,7 +192,7 @@ def from_euler(graph: Graph, seq: str, angles: Any, degrees: bool = False) -> Tu
     return Turn(graph, found or [0.0, 0.0, 0.0, 1.0])
 
 
-def identity(graph: Graph) -> Turn:
+def _identity(graph: Graph) -> Turn:
     """Return the rotation that changes nothing."""
     return Turn(graph, [0.0, 0.0, 0.0, 1.0])
 
@@ -202,8 +202,8 @@ def enter_rotations() -> Any:
     """Enter the ways to make a rotation; return SciPy's class."""
     from scipy.spatial.transform import Rotation
 
-    for own in (from_quat, from_rotvec, from_euler, identity):
-        OWN[Rotation, own.__name__] = own
+    for own in (from_quat, from_rotvec, from_euler, _identity):
+        WRITTEN[Rotation, own.__name__.strip("_")] = own
     return Rotation
 
 

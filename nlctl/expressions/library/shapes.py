@@ -13,11 +13,12 @@ from ..graph import Expr, Graph, Untraceable
 from ..masked import Masked
 from ..operators import elementwise, product
 from .cells import by_numpy
-from .table import METHODS, enter, of
+from .complex_numbers import holds_complex, paired_product
+from .table import ARRAY_METHODS, enter, of
 
 __all__: list[str] = []
 
-MOVING = (
+_MOVING = (
     np.hsplit, np.vsplit, np.dsplit, np.transpose, np.swapaxes,
     np.moveaxis, np.rollaxis, np.squeeze, np.expand_dims, np.atleast_2d, np.atleast_3d, np.flip,
     np.fliplr, np.flipud, np.rot90, np.diagonal, np.diag, np.diagflat, np.broadcast_to,
@@ -26,7 +27,7 @@ MOVING = (
     np.meshgrid, np.take_along_axis, np.choose, np.compress, np.ix_, np.matrix_transpose,
 )  # fmt: skip
 """Functions that move elements."""
-COMPUTING = (
+_COMPUTING = (
     np.convolve, np.correlate, np.kron, np.cross, np.einsum, np.trace,
     np.inner, np.vdot, np.tensordot, np.linalg.multi_dot, np.linalg.matrix_power, np.cumsum,
     np.cumprod, np.trapezoid, np.polyval, np.vander, np.polyder, np.polyadd, np.polymul,
@@ -59,6 +60,8 @@ def _opened(value: Any, owners: list[Tracer]) -> Any:
         return np.array([e.value if e.kind == "i" else e.data for e in value.values.flat]).reshape(
             value.shape
         )
+    if not value.shape and value.only.kind == "i":
+        return value.__index__()  # pyright: ignore[reportAttributeAccessIssue] (each is followed)
     owners.append(value)
     return value.elements() if value.shape else value.only
 
@@ -79,9 +82,9 @@ def _closed(graph: Graph, value: Any, long: Tracer | None) -> Any:
     return Tracer(graph, value) if long is None else long._part(value, None, 1)
 
 
-for _function in MOVING:
+for _function in _MOVING:
     enter([_function], by_moving(_function), makes=_function in (np.diag, np.tile, np.diagflat))
-for _function in COMPUTING:
+for _function in _COMPUTING:
     enter([_function], by_numpy(_function))
 
 
@@ -97,7 +100,7 @@ def concatenate(graph: Graph, parts: Any, axis: Any = 0) -> Tracer:
 
 
 @of(np.split, np.array_split)
-def split(graph: Graph, values: Any, sections: Any, axis: int = 0) -> Any:
+def _split(graph: Graph, values: Any, sections: Any, axis: int = 0) -> Any:
     """Return parts of an array, which are views."""
     array = traced(graph, values)
     if array.axis is None or array.ndim > 1:
@@ -187,8 +190,10 @@ def pad(graph: Graph, a: Any, width: Any, mode: str = "constant", **options: Any
 
 
 @of(np.dot, np.matmul, np.linalg.matmul)
-def dot(graph: Graph, a: Any, b: Any) -> Tracer:
+def dot(graph: Graph, a: Any, b: Any) -> Any:
     """Return a product of matrices."""
+    if holds_complex(a) or holds_complex(b):
+        return paired_product(graph, a, b)
     a, b = traced(graph, a), traced(graph, b)
     if not (a.shape and b.shape):
         return elementwise(graph, "mul", a, b)
@@ -222,7 +227,7 @@ def copyto(graph: Graph, target: Any, source: Any, where: Any = True) -> None:
 
 
 @of(np.put)
-def put(graph: Graph, target: Any, places: Any, values: Any) -> None:
+def _put(graph: Graph, target: Any, places: Any, values: Any) -> None:
     """Assign to places of an array in one dimension."""
     if target.ndim != 1:
         raise Untraceable("put into a matrix")
@@ -237,7 +242,7 @@ def extract(graph: Graph, condition: Any, values: Any) -> Masked:
 
 
 @of(np.place, np.putmask)
-def place(graph: Graph, target: Any, mask: Any, values: Any) -> None:
+def _place(graph: Graph, target: Any, mask: Any, values: Any) -> None:
     """Assign where a condition holds: one value, or the elements of the same condition."""
     mask = elementwise(graph, "ne", traced(graph, mask), 0.0)
     if isinstance(values, Masked):
@@ -287,25 +292,25 @@ def permuted(graph: Graph, values: Any, *axes: Any) -> Tracer:
     return by_moving(np.transpose)(graph, values, order or None)
 
 
-def filled(graph: Graph, values: Tracer, value: Any) -> None:
+def _filled(graph: Graph, values: Tracer, value: Any) -> None:
     """Assign one value to all elements."""
     values[...] = value
 
 
-def listed(graph: Graph, values: Tracer) -> Any:
+def _listed(graph: Graph, values: Tracer) -> Any:
     """Return an array as lists of numbers."""
-    return [listed(graph, v) for v in values] if values.shape else values
+    return [_listed(graph, v) for v in values] if values.shape else values
 
 
-def item(graph: Graph, values: Tracer, *place: Any) -> Any:
+def item(graph: Graph, values: Tracer, *_place: Any) -> Any:
     """Return one element as a number."""
-    if not place and values.size != 1:
+    if not _place and values.size != 1:
         raise Untraceable("the only element of an array that has more")
     flat = values.reshape(-1) if values.shape else values.reshape(1)
-    return flat[0] if not place else flat[place[0]] if len(place) == 1 else values[place]
+    return flat[0] if not _place else flat[_place[0]] if len(_place) == 1 else values[_place]
 
 
-METHODS.update(transpose=permuted, fill=filled, tolist=listed, item=item)
+ARRAY_METHODS.update(transpose=permuted, fill=_filled, tolist=_listed, item=item)
 for _name in ("squeeze", "swapaxes", "repeat", "take", "diagonal", "trace", "cumsum", "cumprod",
               "dot", "compress"):  # fmt: skip
-    METHODS[_name] = getattr(np, _name)
+    ARRAY_METHODS[_name] = getattr(np, _name)

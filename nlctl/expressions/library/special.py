@@ -12,9 +12,9 @@ from ..arrays import Tracer, concatenated, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
 from .creation import whole_numbers
-from .reductions import norm_of, prod, summed
+from .reductions import norm_of, prod, sum_along
 from .shapes import by_moving
-from .table import OWN, Facade, enter, of
+from .table import WRITTEN, Facade, enter, of
 
 __all__ = ["enter_scipy"]
 
@@ -47,7 +47,7 @@ def cumulative_trapezoid(
     width = dx if x is None else elementwise(graph, "sub", *(traced(graph, x)[s] for s in _SHIFTED))
     both = elementwise(graph, "add", *(array[s] for s in _SHIFTED))
     areas = elementwise(graph, "div", elementwise(graph, "mul", width, both), 2.0)
-    found = OWN[np.cumsum](graph, areas)
+    found = WRITTEN[np.cumsum](graph, areas)
     if initial is None:
         return found
     return concatenated(graph, [traced(graph, [initial]), found])
@@ -57,7 +57,7 @@ _SHIFTED = (slice(1, None), slice(None, -1))
 
 
 def _of_linalg(name: str) -> Any:
-    own = OWN[getattr(np.linalg, name)]
+    own = WRITTEN[getattr(np.linalg, name)]
 
     def function(graph: Graph, *arguments: Any, **options: Any) -> Any:
         if name == "cholesky":
@@ -161,11 +161,11 @@ def dist(graph: Graph, p: Any, q: Any) -> Tracer:
 @of(math.fsum)
 def fsum(graph: Graph, values: Any) -> Tracer:
     """Return a sum."""
-    return summed(graph, list(values))
+    return sum_along(graph, list(values))
 
 
 @of(math.prod)
-def product(graph: Graph, values: Any, *, start: Any = 1) -> Tracer:
+def _product(graph: Graph, values: Any, *, start: Any = 1) -> Tracer:
     """Return a product."""
     return elementwise(graph, "mul", start, prod(graph, list(values)))
 
@@ -187,7 +187,7 @@ def ieee_remainder(graph: Graph, x: Any, y: Any) -> Tracer:
 
 
 @of(math.isclose)
-def isclose(graph: Graph, a: Any, b: Any, *, rel_tol: Any = 1e-9, abs_tol: Any = 0.0) -> Any:
+def _isclose(graph: Graph, a: Any, b: Any, *, rel_tol: Any = 1e-9, abs_tol: Any = 0.0) -> Any:
     """Return whether a is next to b."""
     op = functools.partial(elementwise, graph)
     scale = op("maximum", op("absolute", a), op("absolute", b))

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from .table import enter
-from .tables import MOST_PIECES, choice, polynomial
+from .tables import MOST_PIECES, interval_choice, polynomial
 
 __all__ = ["called_object", "enter_splines"]
 
@@ -39,7 +39,7 @@ def _kinds() -> tuple[tuple[Any, Callable[..., Any]], ...]:
         (interpolate.BSpline, b_spline),
         (interpolate.interp1d, table_of_one),
         (interpolate.UnivariateSpline, fitted_spline),
-        (interpolate.RegularGridInterpolator, grid),
+        (interpolate.RegularGridInterpolator, _grid),
         (np.poly1d, lambda graph, p, x: polynomial(graph, x, _floats(p.coeffs[::-1]))),
         (np.polynomial.Polynomial, _mapped_polynomial),
     )
@@ -83,7 +83,7 @@ def piecewise_polynomial(
     def at(e: Expr) -> Expr:
         pieces = [_of_piece(graph, e, breaks[j], coefficients[:, j])
                   for j in range(breaks.size - 1)]  # fmt: skip
-        found = choice(graph, e, list(breaks[1:-1]), pieces)
+        found = interval_choice(graph, e, list(breaks[1:-1]), pieces)
         nan = graph.const(np.nan)
         return found if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), found, nan, nan)
 
@@ -123,8 +123,8 @@ def b_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, extrapolate: Any = N
     knots = np.unique(thing.t[thing.k : thing.t.size - thing.k])
     whole = PPoly.from_spline(thing)
     kept = [int(np.searchsorted(whole.x, k, side="right")) - 1 for k in knots[:-1]]
-    plain = PPoly(whole.c[:, kept], knots, extrapolate=bool(extrapolate))
-    return piecewise_polynomial(graph, plain, x, nu)
+    unwrapped = PPoly(whole.c[:, kept], knots, extrapolate=bool(extrapolate))
+    return piecewise_polynomial(graph, unwrapped, x, nu)
 
 
 def splev(graph: Graph, x: Any, tck: Any, der: int = 0, ext: int = 0) -> Any:
@@ -155,9 +155,9 @@ def splev(graph: Graph, x: Any, tck: Any, der: int = 0, ext: int = 0) -> Any:
 
 
 def _numbers(values: Any) -> Any:
-    from .table import constant
+    from .table import constant_value
 
-    found = constant(values) if isinstance(values, Tracer) else values
+    found = constant_value(values) if isinstance(values, Tracer) else values
     if isinstance(found, Tracer):
         raise Untraceable("a spline that depends on the state or on parameters")
     return found
@@ -220,10 +220,10 @@ def _line(graph: Graph, places: np.ndarray, values: np.ndarray, x: Expr) -> Expr
         slope = (values[j + 1] - values[j]) / (places[j + 1] - places[j])
         inside = op("sub", x, const(float(places[j])))
         pieces.append(op("add", op("mul", const(float(slope)), inside), const(float(values[j]))))
-    return choice(graph, x, list(map(float, places[1:-1])), pieces)
+    return interval_choice(graph, x, list(map(float, places[1:-1])), pieces)
 
 
-def grid(graph: Graph, thing: Any, xi: Any, method: Any = None) -> Any:
+def _grid(graph: Graph, thing: Any, xi: Any, method: Any = None) -> Any:
     """Return SciPy's interpolation on a grid: linear along one axis after the other."""
     values = np.asarray(thing.values, dtype=float)
     if (method or thing.method) != "linear" or values.ndim != len(thing.grid):
@@ -269,4 +269,4 @@ def _between(graph: Graph, places: np.ndarray, values: Sequence[Expr], x: Expr) 
         part = op("div", op("sub", x, const(float(places[j]))), width)
         low = op("mul", values[j], op("sub", const(1.0), part))
         pieces.append(op("add", low, op("mul", values[j + 1], part)))
-    return choice(graph, x, list(map(float, places[1:-1])), pieces)
+    return interval_choice(graph, x, list(map(float, places[1:-1])), pieces)

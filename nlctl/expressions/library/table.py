@@ -12,14 +12,14 @@ from ..functions import FUNCTIONS
 from ..graph import NUMPY, Graph, Untraceable
 from ..operators import elementwise
 
-OWN: dict[Any, Callable[..., Any]] = {}
+WRITTEN: dict[Any, Callable[..., Any]] = {}
 """Of a function of a library: the same of arrays of expressions; it takes the graph first."""
-MAKING: set[Any] = set()
+ARRAY_MAKERS: set[Any] = set()
 """Functions whose results a traced function may change: taken from here even of numbers."""
-METHODS: dict[str, Any] = {}
+ARRAY_METHODS: dict[str, Any] = {}
 """Of an array's method: the function that does the same."""
-OPERATIONS = {name: op for op, name in NUMPY.items()} | {name: name for name in FUNCTIONS}
-OPERATIONS["divide"] = "div"
+UFUNC_OPERATIONS = {name: op for op, name in NUMPY.items()} | {name: name for name in FUNCTIONS}
+UFUNC_OPERATIONS["divide"] = "div"
 """Of the name of a ufunc: the operation of expressions."""
 
 
@@ -50,12 +50,12 @@ def formula(*functions: Any) -> Callable[[Any], Any]:
 def enter(functions: Iterable[Any], own: Callable[..., Any], *, makes: bool = False) -> None:
     """Enter a function into the table under each of its names."""
     for function in functions:
-        OWN[function] = own
+        WRITTEN[function] = own
         if makes:
-            MAKING.add(function)
+            ARRAY_MAKERS.add(function)
 
 
-class Kind:
+class NumberType:
     """A type of numbers that a traced function finds: called, it takes expressions."""
 
     def __init__(self, real: type, make: Callable[..., Any]) -> None:
@@ -67,13 +67,19 @@ class Kind:
     def __getattr__(self, name: str) -> Any:
         return getattr(self.real, name)
 
+    def __eq__(self, other: object) -> bool:
+        return unwrapped(other) is self.real
 
-def plain(value: Any) -> Any:
+    def __hash__(self) -> int:
+        return hash(self.real)
+
+
+def unwrapped(value: Any) -> Any:
     """Return the type that stands behind a value, any other value as it is."""
-    return value.real if isinstance(value, Kind) else value
+    return value.real if isinstance(value, NumberType) else value
 
 
-def constant(value: Tracer) -> Any:
+def constant_value(value: Tracer) -> Any:
     """Return an array of constants as numbers, any other as it is."""
     elements = value.values.flat
     if any(e.op not in ("const", "table") for e in elements):
@@ -100,10 +106,10 @@ class Facade:
         real = getattr(np, name)
         if not callable(real):
             return real
-        return lambda *arguments, **options: applied(self.graph, real, *arguments, **options)
+        return lambda *arguments, **options: written_out(self.graph, real, *arguments, **options)
 
 
-def applied(graph: Graph, function: Any, *arguments: Any, **options: Any) -> Any:
+def written_out(graph: Graph, function: Any, *arguments: Any, **options: Any) -> Any:
     """Return a function of a library of arrays of expressions.
 
     Raises
@@ -111,9 +117,9 @@ def applied(graph: Graph, function: Any, *arguments: Any, **options: Any) -> Any
     Untraceable
         If it is not in the table.
     """
-    if function in OWN:
-        return OWN[function](graph, *arguments, **options)
-    name = OPERATIONS.get(getattr(function, "__name__", ""))
+    if function in WRITTEN:
+        return WRITTEN[function](graph, *arguments, **options)
+    name = UFUNC_OPERATIONS.get(getattr(function, "__name__", ""))
     if name is None or not isinstance(function, np.ufunc):
         raise Untraceable(f"{getattr(function, '__name__', function)} is not known here")
     return of_ufunc(graph, function, lambda *a: elementwise(graph, name, *a), arguments, options)
@@ -155,13 +161,15 @@ def is_traced(value: Any) -> bool:
 
 def _method(array: Tracer, name: str) -> Any:
     """Return a method of an array, or the part that it names."""
-    if name not in METHODS:
-        raise AttributeError(f"an array of expressions has no {name}")
-    known = METHODS[name]
-    if known in OWN:  # a function that does the same
-        return lambda *rest, **named: applied(array.graph, known, array, *rest, **named)
+    if name not in ARRAY_METHODS:
+        text = f"an array of expressions has no {name}"
+        known = hasattr(np.ndarray, name) or hasattr(np.float64, name)
+        raise Untraceable(text) if known else AttributeError(text)
+    known = ARRAY_METHODS[name]
+    if known in WRITTEN:  # a function that does the same
+        return lambda *rest, **named: written_out(array.graph, known, array, *rest, **named)
     return lambda *rest, **named: known(
-        array.graph, array, *map(plain, rest), **{k: plain(v) for k, v in named.items()}
+        array.graph, array, *map(unwrapped, rest), **{k: unwrapped(v) for k, v in named.items()}
     )
 
 

@@ -28,13 +28,13 @@ def _constants(graph: Graph, values: Any, what: str) -> np.ndarray:
     return np.array([e.data for e in elements], dtype=float)
 
 
-def choice(graph: Graph, x: Expr, bounds: Sequence[float], pieces: Sequence[Expr]) -> Expr:
+def interval_choice(graph: Graph, x: Expr, bounds: Sequence[float], pieces: Sequence[Expr]) -> Expr:
     """Return the piece of the interval of x: the first below all bounds, by halving."""
     if len(pieces) == 1:
         return pieces[0]
     middle = len(pieces) // 2
-    low = choice(graph, x, bounds[: middle - 1], pieces[:middle])
-    high = choice(graph, x, bounds[middle:], pieces[middle:])
+    low = interval_choice(graph, x, bounds[: middle - 1], pieces[:middle])
+    high = interval_choice(graph, x, bounds[middle:], pieces[middle:])
     below = graph.op("lt", x, graph.const(float(bounds[middle - 1])))
     return graph.op("select", below, low, high)
 
@@ -68,13 +68,13 @@ def _linear(
         slope = op("div", rise, const(float(places[j + 1] - places[j])))
         inside = op("sub", x, const(float(places[j])))
         pieces.append(op("add", op("mul", slope, inside), values[j]))
-    found = choice(graph, x, list(places[1:-1]), pieces) if pieces else values[0]
+    found = interval_choice(graph, x, list(places[1:-1]), pieces) if pieces else values[0]
     found = op("select", op("eq", x, const(float(places[-1]))), values[-1], found)
     found = op("select", op("gt", x, const(float(places[-1]))), right, found)
     return op("select", op("lt", x, const(float(places[0]))), left, found)
 
 
-def place(graph: Graph, x: Expr, bounds: np.ndarray, side: str) -> Expr:
+def _place(graph: Graph, x: Expr, bounds: np.ndarray, side: str) -> Expr:
     """Return how many bounds are below x; NaN is behind all."""
     x = graph.number(x)
     name = "lt" if side == "left" else "le"
@@ -93,7 +93,7 @@ def searchsorted(graph: Graph, a: Any, v: Any, side: str = "left", sorter: Any =
     if sorter is not None or np.any(np.diff(bounds) < 0):
         raise Untraceable("a table that is not in order")
     return Tracer(
-        graph, mapped(lambda e: place(graph, e, bounds, side), traced(graph, v).elements())
+        graph, mapped(lambda e: _place(graph, e, bounds, side), traced(graph, v).elements())
     )
 
 

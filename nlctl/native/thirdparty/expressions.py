@@ -329,8 +329,8 @@ class Expressions(ast.NodeVisitor):
             return result if not result.own else FRESH
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
             value = getattr(thing, name, UNKNOWN_VALUE)
-            if isinstance(value, Unknown):
-                return OUTSIDE
+            if isinstance(value, Unknown):  # it raises where it runs, if it does
+                return KnownValue(False, False, True, known=Pure())
             if isinstance(value, BuiltinFunctionType) and isinstance(thing, known_calls.CONTAINERS):
                 return captured(value)  # a method, made anew each time it is read
             return self.walk.captured(thing, name, value)

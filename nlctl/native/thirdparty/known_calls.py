@@ -139,7 +139,7 @@ def _of_python(
         rest = tuple(named.items())
         return KnownValue(True, True, known=Bound(given[0], tuple(given[1:]), rest))
     if thing is dataclasses.replace and given:
-        return made.replaced(walk, given[0], named)
+        return made.replaced_fields(walk, given[0], named)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
     return OUTSIDE if any(thing is each for each in reading) else None
 
@@ -147,7 +147,7 @@ def _of_python(
 def _made(
     walk: Walk, cls: type, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
-    """Return what is known of an object of a class that is no library's."""
+    """Return what is known of a new object of somebody's class."""
     parts, holds = [*given, *named.values()], cls in HOLDERS
     if holds:
         _call_functions(walk, parts)

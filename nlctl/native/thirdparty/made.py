@@ -109,7 +109,7 @@ def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
     return of_class(walk, base, found)
 
 
-def replaced(walk: Walk, base: KnownValue, named: dict[str, KnownValue]) -> KnownValue:
+def replaced_fields(walk: Walk, base: KnownValue, named: dict[str, KnownValue]) -> KnownValue:
     """Return what is known of what `dataclasses.replace` makes of an object."""
     thing = base.known
     known = isinstance(thing, Instance)
