@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 __all__ = [
-    "LEAST", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words", "crowd_of", "reached",
+    "AT_LEAST", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words", "crowd_of", "reached",
     "tolerance_of",
 ]  # fmt: skip
 
-LEAST = 5  # switches that are looked at
+AT_LEAST = 5  # switches that are looked at
 WITHIN = 100.0  # tolerances that what is compared changes by in between
 SECOND_ORDER = (
     "what switches does not reach the rate of what is compared, and cannot hold it at 0 (second-"
@@ -30,7 +30,7 @@ _LOCATED = 50.0  # relative tolerances by which periods fall at least; switches 
 _FALLS = 0.2  # part by which it is enough that they fall, whatever the tolerance is
 _FINITE = 0.9  # of two periods: those that fall as 1 / n do not fall so much for long
 
-Value = Callable[[float, np.ndarray], float]
+StateValue = Callable[[float, np.ndarray], float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +80,7 @@ def crowd_of(times: np.ndarray, row: int, end: float, rtol: float, most: float) 
     most : float
         Switches to come that are not too many.
     """
-    if times.size < LEAST:
+    if times.size < AT_LEAST:
         return None
     periods = times[2:] - times[:-2]
     enough = min(_FALLS, _LOCATED * rtol)
@@ -100,12 +100,12 @@ def crowd_of(times: np.ndarray, row: int, end: float, rtol: float, most: float) 
     )
 
 
-def reached(value: Value, t: float, x: np.ndarray, rates: np.ndarray, ahead: float) -> float:
+def reached(value: StateValue, t: float, x: np.ndarray, rates: np.ndarray, ahead: float) -> float:
     """Return how far from 0 what is compared comes in a time, at the rates behind a switch."""
     return abs(value(t + ahead, x + ahead * rates))
 
 
-def tolerance_of(value: Value, t: float, x: np.ndarray, away: np.ndarray) -> float:
+def tolerance_of(value: StateValue, t: float, x: np.ndarray, away: np.ndarray) -> float:
     """Return by how much a switching function changes where states change by their tolerances."""
     here = value(t, x)
     places = np.flatnonzero(away)

@@ -99,7 +99,7 @@ def reporting(
 _REPORTING = reporting(len, "len").__code__  # all of them share it
 
 
-def behind(function: Any) -> Any:
+def unreported(function: Any) -> Any:
     """Return the function that a reporting one calls, and any other as it is."""
     while getattr(function, "__code__", None) is _REPORTING:
         cells = dict(zip(function.__code__.co_freevars, function.__closure__, strict=True))

@@ -28,7 +28,7 @@ from .codegen.lower import lower
 from .codegen.program import instants_of
 from .codegen.solver import searched
 from .compiled import Compiled
-from .declared import declared_labels, declared_now, declared_rows
+from .declared import declared_labels, declared_now, declared_rows, without_nan
 from .diagram.block_inputs import block_inputs
 from .diagram.schedule import Schedule, Signal, signal_name
 from .equations.blocks import equations
@@ -155,11 +155,12 @@ def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
     events = code.lowered.rows["g"]
     declared = declared_rows(compiled.schedule, compiled.program, events - compiled.program.events)
     rows, jumping = np.array(compiled.program.sampled, dtype=int), compiled.program.resets
+    room = code.lowered.rows["s"]
 
     def several(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
         tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), code.width, axis=1) for v in (t, x, u))
         dx, y = np.empty_like(xx), np.empty((len(compiled.schedule.outputs), code.width))
-        g, after = np.empty((events, code.width)), np.empty((jumping, code.width))
+        g, after = np.empty((events, code.width)), np.empty((room, code.width))
         code.rhs(tt[0].copy(), xx, uu, c, dx, g)
         code.out(tt[0].copy(), xx, uu, c, y)
         found = [dx[:, -1], y[:, -1]]
@@ -169,7 +170,7 @@ def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
             found.append(s[:, -1])
         if code.resets is not None:
             code.resets(tt[0].copy(), xx, uu, c, after)
-        return *found, g[declared, -1], after[:, -1]
+        return *found, *without_nan(g[declared, -1], after[:jumping, -1])
 
     return several
 
@@ -243,7 +244,7 @@ def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> PointVal
             after.append(rates_now(system, *point)[rows])
     with supplying(lines), happening():
         declared = declared_now(compiled.schedule, system, point)
-    return rates, np.concatenate([outputs, *arriving]), *after, *declared
+    return rates, np.concatenate([outputs, *arriving]), *after, *without_nan(*declared)
 
 
 def _relay_outputs(compiled: Compiled, found: np.ndarray) -> dict[int, float]:

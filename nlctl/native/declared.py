@@ -79,6 +79,11 @@ def declared_now(
     return np.concatenate([np.zeros(0), *rows]), np.concatenate([np.zeros(0), *resets])
 
 
+def without_nan(*rows: np.ndarray) -> list[np.ndarray]:
+    """Return rows in which what is NaN agrees with itself: a guard or a reset may be, elsewhere."""
+    return [np.where(np.isnan(row), np.inf, row) for row in rows]
+
+
 def _each(nodes: Sequence[Node]) -> Iterator[tuple[tuple[str, int], Node]]:
     """Yield what each block declares: the function's name and its number of values."""
     for node in nodes:

@@ -13,7 +13,7 @@ from ..annotations import as_annotated
 from ..errors import ChatteringError, DivergedError, ParameterError, ZenoError
 from ..responses.arguments import evaluation_array, input_array, interpolated, state_array
 from ..responses.time_response import Response, response_of
-from ..responses.watched import Watched, check_numbers, not_a_number, numbers
+from ..responses.watched import Watched, check_numbers, nan_watchers, not_a_number
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.place import chattering_words
@@ -60,7 +60,7 @@ def respond(
         If an argument has a wrong shape, or times do not fit a discrete-time diagram.
     """
     system = compiled.system
-    compiled = _with_watched(compiled, (*watched, *numbers(watched)), params)
+    compiled = _with_watched(compiled, (*watched, *nan_watchers(watched)), params)
     wanted = evaluation_array(evaluation_times, times)
     u, x0 = input_array(system, inputs, times), state_array(system, initial_state)
     grid = times if wanted is times else _grid(system, times, wanted)

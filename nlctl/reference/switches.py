@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..accumulation import (
-    LEAST,
+    AT_LEAST,
     WITHIN,
     Crowd,
-    Value,
+    StateValue,
     accumulation_words,
     crowd_of,
     reached,
@@ -70,7 +70,9 @@ class Switches:
                 t, (f"block '{block}'" if block else f"'{which}'") + " switches over and over again"
             )
 
-    def switched(self, i: int, t: float, value: Value, x: np.ndarray, rates: np.ndarray) -> None:
+    def switched(
+        self, i: int, t: float, value: StateValue, x: np.ndarray, rates: np.ndarray
+    ) -> None:
         """Note that a condition has been at 0.
 
         Parameters
@@ -91,7 +93,9 @@ class Switches:
         """
         times, end = self._times[i], self._ends[1]
         times.append(t)
-        small = crowd_of(np.array(times[-2 * LEAST :]), i, end, np.max(self._tolerances[0]), _MORE)
+        small = crowd_of(
+            np.array(times[-2 * AT_LEAST :]), i, end, np.max(self._tolerances[0]), _MORE
+        )
         if small and self._is_small(small, t, value, x, rates):
             raise self._accumulate(small, t, "and what is compared is within tolerances of 0")
         if len(times) % _LOOKED_AT == 0 and len(times) >= _MANY:
@@ -100,7 +104,7 @@ class Switches:
                 raise self._accumulate(more, t, "too many for engine='python-control'")
 
     def _is_small(
-        self, crowd: Crowd, t: float, value: Value, x: np.ndarray, rates: np.ndarray
+        self, crowd: Crowd, t: float, value: StateValue, x: np.ndarray, rates: np.ndarray
     ) -> bool:
         """Whether from one switch to the next what is compared stays within tolerances."""
         rtol, atol = self._tolerances

@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     import pandas as pd
 
-Label = tuple[str, str, str]  # block, which, direction
+_Label = tuple[str, str, str]  # block, which, direction
 _NONE = np.zeros(0, dtype=np.int64)
 
 
@@ -31,7 +31,7 @@ class EventLog:
 
     time: np.ndarray = field(default_factory=lambda: np.zeros(0))
     label: np.ndarray = field(default_factory=lambda: _NONE)
-    labels: tuple[Label, ...] = ()
+    labels: tuple[_Label, ...] = ()
 
     def table(self) -> pd.DataFrame:
         """Return the events as rows: time, block, which, direction."""
@@ -53,13 +53,13 @@ class EventLog:
         return self.time[np.isin(self.label, own)]
 
 
-NOTHING = EventLog()
+NO_EVENTS = EventLog()
 
 
 def event_log(rows: Iterable[tuple[float, str, str, str]]) -> EventLog:
     """Return the log of rows of time, block, which, direction."""
     rows = list(rows)
-    places: dict[Label, int] = {}
+    places: dict[_Label, int] = {}
     label = [places.setdefault((b, w, d), len(places)) for _, b, w, d in rows]
     return EventLog(
         time=np.array([row[0] for row in rows], dtype=float),

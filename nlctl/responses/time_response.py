@@ -10,7 +10,7 @@ import numpy as np
 
 from ..host.notebook import table_html
 from ..wording import counted
-from .event_log import NOTHING, EventLog
+from .event_log import NO_EVENTS, EventLog
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,7 +30,7 @@ class Response(ct.TimeResponseData):
     """
 
     statistics: Any = None
-    happened: EventLog = NOTHING
+    happened: EventLog = NO_EVENTS
 
     @property
     def events(self) -> pd.DataFrame:

@@ -11,7 +11,12 @@ import numpy as np
 from ..errors import DivergedError, ParameterError
 
 __all__ = [
-    "Watched", "check_moves", "check_numbers", "nan_error", "not_a_number", "numbers",
+    "Watched",
+    "check_moves",
+    "check_numbers",
+    "nan_error",
+    "nan_watchers",
+    "not_a_number",
     "watched_functions",
 ]  # fmt: skip
 
@@ -124,7 +129,7 @@ def check_numbers(watched: Sequence[Watched], begin: Any, params: Any) -> None:
             raise nan_error(one.name, begin[0])
 
 
-def numbers(watched: Sequence[Watched]) -> tuple[Watched, ...]:
+def nan_watchers(watched: Sequence[Watched]) -> tuple[Watched, ...]:
     """Return functions that fall through 0, and end a run, where those of a run become NaN.
 
     Parameters

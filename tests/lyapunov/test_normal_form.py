@@ -7,6 +7,7 @@ import pytest
 from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import special
 
 import nlctl
 from analysis.intervals.arithmetic import Ball, as_ball
@@ -57,9 +58,10 @@ ATOMS = [n for n, row in FUNCTIONS.items() if row.enclosure is not None and n !=
 @pytest.mark.parametrize("name", ATOMS)  # NumPy's sign compares
 def test_every_function_with_an_enclosure_is_an_atom(name):
     point = 1.5 if name == "arccosh" else 0.4
-    found = getattr(np, name)(X)
-    assert float(at(found, point, 0.0).mid()) == pytest.approx(float(getattr(np, name)(point)))
-    assert not (found - getattr(np, name)(X)).terms
+    function = getattr(np, name) if hasattr(np, name) else getattr(special, name)
+    found = function(X)
+    assert float(at(found, point, 0.0).mid()) == pytest.approx(float(function(point)))
+    assert not (found - function(X)).terms
 
 
 def test_polynomials_have_one_form():

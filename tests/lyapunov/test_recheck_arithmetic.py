@@ -58,7 +58,8 @@ def test_powers_of_powers_end_and_enclose(ends, share, powers):
     nodes = [["symbol", "x"], *(["power", i, n] for i, n in enumerate(powers))]
     found = WrittenEquation(nodes).on({"x": x})
     sign = -1 if a < 0 and all(n % 2 for n in powers) else 1
-    size = math.prod(powers) * math.log2(abs(a)) if a else -math.inf
+    bits = math.log2(abs(a.numerator)) - math.log2(a.denominator) if a else -math.inf
+    size = math.prod(powers) * bits
     if size < 200:
         power = Fraction(a) ** math.prod(powers) if size > -200 and math.prod(powers) < 500 else 0
         assert found.bottom - Fraction(1, 2**60) <= power <= found.top + Fraction(1, 2**60)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...accumulation import LEAST, WITHIN, Crowd, crowd_of, reached, tolerance_of
+from ...accumulation import AT_LEAST, WITHIN, Crowd, crowd_of, reached, tolerance_of
 from ..integrate.workspace import TAYLOR
 from .steps import Attempt, Jump, LaneEquations
 
@@ -63,7 +63,7 @@ def accumulated(run: Any, end: float) -> Crowd | None:
     row = int(np.bincount(rows).argmax())
     own = times[rows == row]
     periods = own[2:] - own[:-2]
-    last = np.flatnonzero(periods > _RESOLVED * periods.max(initial=0.0))[-2 * LEAST :]
+    last = np.flatnonzero(periods > _RESOLVED * periods.max(initial=0.0))[-2 * AT_LEAST :]
     if not last.size:
         return None
     crowd = crowd_of(own[last[0] : last[-1] + 3], row, run.task.times[-1], run.task.rtol, _MORE)
@@ -79,10 +79,10 @@ def _log(run: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def _noted(run: Any, row: int, times: np.ndarray) -> np.ndarray:
     """Return the last times at which a condition was at 0."""
-    if times.size >= LEAST or not run.task.alone:
+    if times.size >= AT_LEAST or not run.task.alone:
         return times
     rows, noted = _log(run)
-    return noted[rows == row][-2 * LEAST :]
+    return noted[rows == row][-2 * AT_LEAST :]
 
 
 def _is_small(evaluated: LaneEquations, point: tuple, rates: np.ndarray, crowd: Crowd) -> bool:

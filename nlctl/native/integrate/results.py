@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...responses.event_log import NOTHING, EventLog
+from ...responses.event_log import NO_EVENTS, EventLog
 from ..chattering.detection import Jump
 from .state import Status
 
@@ -61,7 +61,7 @@ class Trajectory:
     states: np.ndarray
     statistics: Statistics
     inputs: np.ndarray  # what leaves transport delays, and rates: as the program has them
-    happened: EventLog = NOTHING  # of a single run
+    happened: EventLog = NO_EVENTS  # of a single run
     culprit: int = -1  # the guard that has fallen last, or has ended it
     guard: float = 0.0  # and its value
     since: float = np.nan  # time of the first of the jumps that have ended it

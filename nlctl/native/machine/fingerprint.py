@@ -24,7 +24,7 @@ from typing import Any, Protocol
 import numba
 import numpy as np
 
-from ...annotations import behind
+from ...annotations import unreported
 from ..thirdparty.held import LAID_OUT, OPAQUE, held_by, inherited
 from ..thirdparty.outside import asked_outside, imports_in
 
@@ -188,7 +188,7 @@ def _of_container(thing: tuple | list | dict, seen: _Seen) -> Iterator[str]:
 
 
 def _of_function(function: types.FunctionType, seen: _Seen) -> Iterator[str]:
-    if (called := behind(function)) is not function:  # which only words the errors of the other
+    if (called := unreported(function)) is not function:  # which only words the errors of the other
         yield from _fingerprint(called, seen)
         return
     if _is_library(function.__module__) or (seen.deep and _is_controls(function)):

@@ -19,7 +19,7 @@ from ..state import INNER, is_stiff
 from .location import AGAIN, CLEAR, EVENT, REFUSED
 
 NOTHING = -2  # no condition lies in the step just tried
-CLOSE = 0.01  # of the relative tolerance, of a step: how close to a condition steps end
+BEFORE_CONDITION = 0.01  # of the relative tolerance, of a step: how close to one steps end
 _TRIES = 60
 # of a step with a stage behind a condition: how much is left out
 _CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
@@ -166,7 +166,7 @@ def _bracket(task, lane, w, bad, j):
 def _next_try(task, lane, w, bad, j):
     """Say what to try next, or take the step just tried, which ends right before a condition."""
     t_end = max(abs(lane.t), abs(lane.t + lane.high))
-    close = max(CLOSE * task.rtol * lane.whole, 8e-16 * t_end)
+    close = max(BEFORE_CONDITION * task.rtol * lane.whole, 8e-16 * t_end)
     root = _foreseen(task, lane, w, bad, j)
     if lane.high <= 2.0 * close and bad:  # right behind the start
         lane.across, lane.traces, lane.tries = 1, 0, 0

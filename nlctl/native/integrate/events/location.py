@@ -18,7 +18,7 @@ import numpy as np
 
 from ..state import INNER, is_stiff
 
-SMALL = 0.01  # of the absolute tolerance
+SMALL_KINK = 0.01  # of the absolute tolerance
 STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
 REFUSED, AGAIN, CLEAR, EVENT = -1, 0, 1, 2  # what became of the step just tried
 TRIES = 30
@@ -52,7 +52,7 @@ def first_root(lane, task, every, e_start, e_low, e_high, behind, j):
     `crossing`, unless `every` event is asked for.
     """
     first, is_memory = -1.0, False
-    bending, switching, small = task.bending, task.switching, SMALL * task.atol
+    bending, switching, small = task.bending, task.switching, SMALL_KINK * task.atol
     declared = switching if every else task.declared
     for i in range(e_start.shape[0]):
         if declared <= i < switching:

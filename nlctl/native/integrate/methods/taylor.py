@@ -19,8 +19,8 @@ from ...machine.address import (
     call_step,
     call_values,
 )
-from ..events.crossing import CLOSE
-from ..events.location import SMALL, behind_event, triggered
+from ..events.crossing import BEFORE_CONDITION
+from ..events.location import SMALL_KINK, behind_event, triggered
 from ..state import INNER, RUNNING
 from ..workspace import input_rates, inputs_at
 
@@ -164,7 +164,7 @@ def _meets(task, w, i, end, j):
     """Whether an event function has changed its sign in a step, or a guard has fallen."""
     if i >= task.guarded:
         return w.above[i - task.guarded, j] != 0 and end < 0.0
-    small = abs(w.e_start[i, j]) + abs(end) <= SMALL * task.atol
+    small = abs(w.e_start[i, j]) + abs(end) <= SMALL_KINK * task.atol
     if task.bending <= i < task.declared and small:
         return False  # see `first_root`
     return triggered(w.e_start[i, j], end, False, w.behind[i, j] != 0.0)
@@ -184,7 +184,7 @@ def _rest(task, i):
     """Return by which part of a step one may end behind an event: half of what is allowed."""
     if i < task.declared:
         return 0.5 * behind_event(task.rtol)
-    return max(0.5 * CLOSE * task.rtol, 1e-15)
+    return max(0.5 * BEFORE_CONDITION * task.rtol, 1e-15)
 
 
 @numba.njit(**INNER)
