@@ -27,8 +27,8 @@ class Interval:
     __slots__ = ("high", "low")
 
     def __init__(self, low: Any, high: Any) -> None:  # rounded outward
-        self.low = low if -_FAR <= low <= _FAR else _FAR if low > 0 else -_INF
-        self.high = high if -_FAR <= high <= _FAR else _INF if high > 0 else -_FAR
+        self.low: Any = low if -_FAR <= low <= _FAR else _FAR if low > 0 else -_INF
+        self.high: Any = high if -_FAR <= high <= _FAR else _INF if high > 0 else -_FAR
 
     @staticmethod
     def of(low: Any, high: Any = None) -> Interval:

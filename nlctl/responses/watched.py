@@ -125,7 +125,8 @@ def check_numbers(watched: Sequence[Watched], begin: Any, params: Any) -> None:
         If one is NaN.
     """
     for one in watched:
-        if np.isnan(one.value(*begin, params)):
+        t, x, u = begin
+        if np.isnan(one.value(t, x, u, params)):
             raise nan_error(one.name, begin[0])
 
 

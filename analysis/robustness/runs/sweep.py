@@ -105,7 +105,7 @@ class Sweep:
         if self.folder is None:
             assert self.held is not None
             _check_columns(names, list(self.held))
-            return self.held[list(names)] if names else self.held
+            return self.held.loc[:, list(names)] if names else self.held
         store = opened(self.folder)
         _check_columns(names, list(store.columns))
         return table_of(store, names or None)
