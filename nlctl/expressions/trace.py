@@ -13,10 +13,11 @@ from .arrays import Tracer, concatenated, scalar, traced
 from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, OpenCondition, Untraceable
 from .library.python import Namespace
 from .operators import elementwise
+from .ordered import follows
 from .stage import Stage
 from .staged import LIBRARIES
 
-PATHS = 64  # ways through one function that are followed
+PATHS = 128  # ways through one function that are followed
 
 
 def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
@@ -79,6 +80,9 @@ def _followed(
         return _counted(left, result)
     if len(decisions) >= PATHS:
         raise Untraceable("a loop whose end depends on what is computed")
+    known = follows(condition, decisions)
+    if known is not None:
+        return _followed(graph, run, {**decisions, condition: known}, left)
     yes = _followed(graph, run, {**decisions, condition: True}, left)
     no = _followed(graph, run, {**decisions, condition: False}, left)
     if yes is None or no is None:

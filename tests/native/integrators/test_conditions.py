@@ -50,6 +50,28 @@ def limited(t, x, u, p):
     return [0.0 if x[0] >= 1.0 and np.cos(t) > 0 else np.cos(t)]
 
 
+def narrow(t, x, u, p):
+    return [1.0 + (30.0 if 0.5 < x[0] < 0.5003 else 0.0)]
+
+
+def pulses(t, x, u, p):
+    y = 0.0
+    for start in (3.0, 7.0, 7.5, 19.0):
+        if start <= t < start + 0.02:
+            y += 10.0
+    return [y]
+
+
+def circle(t, x, u, p):
+    """A small circle on the way of an oscillator: its distance has a corner in the middle."""
+    return [10.0 * (np.hypot(x[1] - 0.6, x[2] - 0.8) < 0.01), x[2], -x[1]]
+
+
+def slits(t, x, u, p):
+    """Corners of a diamond on the same way."""
+    return [1.0 * (max(abs(x[1] - 0.6), abs(x[2] - 0.8)) < 0.01), x[2], -x[1]]
+
+
 def fast_gaussian(t, x, u, p):
     return [np.exp(-(((t - 50.0) / 0.1) ** 2))]
 
@@ -93,6 +115,12 @@ def sawtooth_end(t):
         x, t, n = end, t - needed, n + 1
 
 
+def slits_end():
+    """Four times through the square, which the unit circle enters and leaves at y = 0.8 +- 0.01."""
+    enters, leaves = (max(np.arcsin(0.59), np.arccos(0.81)), min(np.arcsin(0.61), np.arccos(0.79)))
+    return 4 * (leaves - enters)
+
+
 CASES = {  # equations, initial state, last time, the first state there
     "duty cycle": (duty_cycle, [0.0], 10.0, 3.0),
     "window": (window, [0.0], 3.0, 0.6 + 2.5 - 0.1 / 11),
@@ -100,6 +128,10 @@ CASES = {  # equations, initial state, last time, the first state there
     "square wave": (square_wave, [0.0], 10.0, 0.25 + 2 * (0.5 - 1 / 12) + 9),
     "oscillator": (oscillator, [1.0, 0.0], 30.0, oscillator_end(30.0)),
     "load": (load, [0.0], 100.0, (1 - np.exp(-5)) * np.exp(-45)),
+    "narrow": (narrow, [0.0], 20.0, 0.5003 + 19.5 - 0.0003 / 31),
+    "pulses": (pulses, [0.0], 20.0, 0.8),
+    "circle": (circle, [0.0, 0.0, 1.0], 20.0, 4 * 10 * 4 * np.arcsin(0.005)),
+    "slits": (slits, [0.0, 0.0, 1.0], 20.0, slits_end()),
     "stairs": (stairs, [0.0], 3.5, stairs_end(3.5)),
     "sawtooth": (sawtooth, [0.0], 3.5, sawtooth_end(3.5)),
     "rounded": (rounded, [2.2], 2.0, -0.5 - 2.0 * (2.0 - 0.7 / 3 - 0.5 - 1.0)),
