@@ -179,7 +179,7 @@ _ROWS = (
          lambda x: -2.0 / np.sqrt(np.pi) * np.exp(-(x * x)), ball=lambda x: x.erfc()),
     _row("arctan2", "atan2", r"\operatorname{{atan2}}\left({0}, {1}\right)",
          lambda y, x: x / (x * x + y * y), lambda y, x: -y / (x * x + y * y), math="atan2"),
-    _row("hypot", "hypot", r"\sqrt{{{0}^2 + {1}^2}}",
+    _row("hypot", "hypot", r"\sqrt{{ {0}^{{2}} + {1}^{{2}} }}",
          lambda x, y: x / np.hypot(x, y), lambda x, y: y / np.hypot(x, y)),
     _row("power", "pow", r"{0}^{{{1}}}",
          lambda x, y: y * np.power(x, y - 1.0), lambda x, y: np.log(x) * np.power(x, y),

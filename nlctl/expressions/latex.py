@@ -139,7 +139,8 @@ class LatexWriter:
 
     def _const(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         text = number_text(float(expr.data))
-        return text, SIGNED if text.startswith("-") else FACTOR if r"\cdot" in text else ATOM
+        is_product = r"\cdot" in text or text.endswith(r" \pi")
+        return text, SIGNED if text.startswith("-") else FACTOR if is_product else ATOM
 
     def _table(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         assert index is not None

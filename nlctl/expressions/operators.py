@@ -172,8 +172,9 @@ def floor_quotient(graph: Graph, a: Any, b: Any) -> Tracer:
     op = functools.partial(elementwise, graph)
     rest = op("fmod", a, b)
     quotient = op("div", op("sub", a, rest), b)
-    turned = op("xor", op("lt", b, 0.0), op("lt", rest, 0.0))
-    down = op("and", op("ne", rest, 0.0), turned)
+    down = op("lt", rest, 0.0)
+    if not (isinstance(b, int | float) and b > 0):
+        down = op("and", op("ne", rest, 0.0), op("xor", op("lt", b, 0.0), down))
     quotient = op("select", down, op("sub", quotient, 1.0), quotient)
     whole = op("floor", quotient)
     up = op("gt", op("sub", quotient, whole), 0.5)

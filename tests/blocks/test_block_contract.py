@@ -46,9 +46,7 @@ def records():
 RECORDS = records()
 TIMES = (0.0, 0.7, 12.3)
 PRESENT = {  # others' outputs follow from a run or from a whole diagram: they have tests of theirs
-    name: spec
-    for name, spec in RECORDS.items()
-    if getattr(spec, "supplied", None) is None
+    name: spec for name, spec in RECORDS.items() if getattr(spec, "supplied", None) is None
 }
 every_record = pytest.mark.parametrize("spec", RECORDS.values(), ids=RECORDS)
 every_function = pytest.mark.parametrize("spec", PRESENT.values(), ids=PRESENT)

@@ -4,6 +4,7 @@ import math
 import re
 
 import numpy as np
+from scipy import special
 
 FUNCTIONS = {
     "sin": np.sin, "cos": np.cos, "tan": np.tan, "tanh": np.tanh, "sinh": np.sinh,
@@ -11,7 +12,8 @@ FUNCTIONS = {
     "arctan": np.arctan, "exp": np.exp,
 }  # fmt: skip
 NAMED = {"sgn": np.sign, "arsinh": np.arcsinh, "arcosh": np.arccosh, "artanh": np.arctanh,
-         "trunc": np.trunc, "round": np.rint, "atan2": np.arctan2, "fmod": np.fmod}  # fmt: skip
+         "trunc": np.trunc, "round": np.rint, "atan2": np.arctan2, "fmod": np.fmod,
+         "erf": special.erf, "erfc": special.erfc}  # fmt: skip
 RELATIONS = {"<": "__lt__", r"\le": "__le__", ">": "__gt__", r"\ge": "__ge__",
              "=": "__eq__", r"\ne": "__ne__"}  # fmt: skip
 
@@ -125,6 +127,10 @@ class Reader:
         found = re.match(r"\\operatorname\{(\w+)\}", self.text)
         if found:
             self.text = self.text[found.end() :].lstrip()
+            if found[1] == "H":  # its index is the value at 0
+                self.need("_")
+                at_0 = self.braced()
+                return np.heaviside(self.atom(), at_0)
             two = found[1] in ("atan2", "fmod")
             return NAMED[found[1]](*(self.arguments() if two else [self.atom()]))
         found = re.match(r"\\([a-z]+)", self.text)
@@ -172,7 +178,8 @@ class Reader:
             try:
                 value = self.condition()
                 self.need(r"\right)")
-                if not self.text.lstrip().startswith(tuple(RELATIONS)) and value in (True, False):
+                number = (*RELATIONS, r"\bmod", "+", "-", "^")  # is made of what is in brackets
+                if not self.text.lstrip().startswith(number) and value in (True, False):
                     return value
             except AssertionError:
                 pass
