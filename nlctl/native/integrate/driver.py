@@ -55,6 +55,7 @@ METHODS = {
     "rodas5p": IMPLICIT,
     "taylor": TAYLOR,
 }
+_NOTED = 1000  # events of a run for which there is room from the beginning
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
 
 
@@ -294,7 +295,7 @@ def prepared(
         x0, times, read.ninputs, code.lowered.rows["g"], len(read.outputs),
         code.lowered.rows["s"], len(program.guards), len(read.lines),
         2 if terms else settings.pair.stages, terms or (1, 0),
-        log_room(task, code.lowered.rows["g"], 2 * task.jumps.shape[1]),
+        log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.jumps.shape[1]),
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"
     work = with_past(compiled, task, work, p)
