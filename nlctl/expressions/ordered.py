@@ -12,13 +12,13 @@ from collections.abc import Mapping
 
 from .graph import Expr
 
-__all__ = ["follows"]
+__all__ = ["implied_by"]
 
 _TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le"}
 _OPPOSITE = {"lt": "ge", "le": "gt", "gt": "le", "ge": "lt"}
 
 
-def follows(condition: Expr, decisions: Mapping[Expr, bool]) -> bool | None:
+def implied_by(condition: Expr, decisions: Mapping[Expr, bool]) -> bool | None:
     """Return whether a condition holds where others do or do not; None if that is not known."""
     asked = _with_number(condition)
     if asked is None:

@@ -13,7 +13,7 @@ from .arrays import Tracer, concatenated, scalar, traced
 from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, OpenCondition, Untraceable
 from .library.python import Namespace
 from .operators import elementwise
-from .ordered import follows
+from .ordered import implied_by
 from .stage import Stage
 from .staged import LIBRARIES
 
@@ -80,7 +80,7 @@ def _followed(
         return _counted(left, result)
     if len(decisions) >= PATHS:
         raise Untraceable("a loop whose end depends on what is computed")
-    known = follows(condition, decisions)
+    known = implied_by(condition, decisions)
     if known is not None:
         return _followed(graph, run, {**decisions, condition: known}, left)
     yes = _followed(graph, run, {**decisions, condition: True}, left)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlctl.expressions.graph import Graph
-from nlctl.expressions.ordered import follows
+from nlctl.expressions.ordered import implied_by
 
 ORDERS = {"lt": operator.lt, "le": operator.le, "gt": operator.gt, "ge": operator.ge}
 NUMBERS = (1.0, 2.0, 3.0)
@@ -34,7 +34,7 @@ def test_what_follows_is_so(array, before, asked):
     places = [value for value in PLACES if array == "x" or value == value]
     for value in places:
         decisions = {written(graph, thing, *each): holds(value, *each) for each in before}
-        found = follows(written(graph, thing, *asked), decisions)
+        found = implied_by(written(graph, thing, *asked), decisions)
         assert found is None or found == holds(value, *asked)
         alike = [
             holds(other, *asked)
@@ -54,7 +54,7 @@ def test_thresholds_in_a_row_have_few_ways():
         decisions = {}
         for order, number in itertools.chain(*((("ge", a), ("lt", b)) for a, b in windows)):
             condition = graph.op(order, time, graph.const(number))
-            if follows(condition, decisions) is None:
+            if implied_by(condition, decisions) is None:
                 decisions[condition] = ORDERS[order](value, number)
         ways.add(tuple(decisions.items()))
     assert len(ways) == 2 * len(windows) + 1
