@@ -390,6 +390,12 @@ def guard_count(made: Block) -> int:
     return _count(made, "guard")
 
 
+def equation_now(made: Any, what: str, t: float, x: Any, u: Any) -> np.ndarray:
+    """Return what an equation of a block says, of shape (k,), with the parameters it has now."""
+    found = getattr(made.spec, what)(t, x, u, current_parameters(made))
+    return np.asarray(found, dtype=float).reshape(-1)
+
+
 def _count(made: Block, what: str) -> int:
     """Return how many numbers an equation of a block returns, 0 if there is none."""
     if not hasattr(made.spec, what):

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ..blocks import equation_now
 from ..sliding.blocks import slides
-from ..upstream.control_internals import current_parameters, parts_now
+from ..upstream.control_internals import parts_now
 from ..wording import numbered
 from .codegen.program import Program, count_guards, count_switching_functions, memory
 from .diagram.schedule import Node, Schedule
@@ -67,8 +68,7 @@ def declared_now(
 
     def value(what: str, node: Node) -> np.ndarray:
         block, own, given = parts[id(node)]
-        found = getattr(block.spec, what)(t, own, given, current_parameters(block))
-        return np.asarray(found, dtype=float).reshape(-1)
+        return equation_now(block, what, t, own, given)
 
     found: dict[str, list[np.ndarray]] = {what: [] for what in _DECLARED}
     for (what, _), node in _each(schedule.nodes):

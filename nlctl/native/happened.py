@@ -11,8 +11,7 @@ from ..wording import numbered
 from .codegen.program import count_guards, count_switching_functions
 from .compiled import Compiled
 from .integrate.log import OF_TIME, log_room
-from .integrate.memory import with_table
-from .integrate.workspace import WORK, Work
+from .integrate.workspace import grown
 
 _WORDS = {
     "lt": "comparison", "le": "comparison", "gt": "comparison", "ge": "comparison",
@@ -34,13 +33,7 @@ def with_log(task: Any, work: Any) -> Any:
     least = log_room(task, work.g.shape[0])
     if not least or free >= least:
         return work
-    room, given = 2 * work.log_t.size + 2 * least, work._asdict()
-    del given["table"]
-    for name in ("log_t", "log_row"):
-        before = given[name]
-        given[name] = np.zeros(room, dtype=before.dtype)
-        given[name][: before.size] = before
-    return with_table(Work, like=WORK, **given)
+    return grown(work, ("log_t", "log_row"), 2 * work.log_t.size + 2 * least)
 
 
 def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:

@@ -11,8 +11,7 @@ from ..delays.pieces import smooth_pieces
 from ..delays.variation import Variation, check_positive, variation, variation_table
 from ..errors import ParameterError
 from .integrate.delays import SMOOTH
-from .integrate.memory import with_table
-from .integrate.workspace import WORK, Work
+from .integrate.workspace import grown
 
 if TYPE_CHECKING:
     from .compiled import Compiled
@@ -62,7 +61,7 @@ def with_past(compiled: Compiled, task: Any, work: Any, p: np.ndarray) -> Any:
         return before(t, earliest)[told]
 
     found = list(smooth_pieces(histories, float(earliest.min()), begin, len(told)))
-    work = _with_capacity(work, max(_ROOM, 2 * len(found)))
+    work = grown(work, _KEPT, max(_ROOM, 2 * len(found)))
     work.level[: len(found)] = SMOOTH
     for row, line in enumerate(read):
         slot = compiled.program.layout[line.block or 0]["before"]
@@ -104,18 +103,7 @@ def with_room(task: Any, work: Any) -> Any:
         work.kept[j] = kept - gone
         work.first[:, j] = np.maximum(work.first[:, j] - gone, 0)
         work.next[:, j] = np.where(work.next[:, j] >= 0, work.next[:, j] - gone, -1)
-    return work if work.kept.max() <= room // 2 else _with_capacity(work, 2 * room)
-
-
-def _with_capacity(work: Any, room: int) -> Any:
-    """Return a workspace with places for so many steps."""
-    given = work._asdict()
-    del given["table"]
-    for name in _KEPT:
-        before = given[name]
-        given[name] = np.zeros((room, *before.shape[1:]), dtype=before.dtype)
-        given[name][: before.shape[0]] = before
-    return with_table(Work, like=WORK, **given)
+    return work if work.kept.max() <= room // 2 else grown(work, _KEPT, 2 * room)
 
 
 def _direct(read: Schedule) -> np.ndarray:

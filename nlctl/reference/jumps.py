@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..blocks import Block, memory_states
+from ..blocks import Block, equation_now, memory_states
 from ..diagrams import leaves
 from ..errors import BlockError, DivergedError, ZenoError
 from ..responses.watched import Watched, nan_error
 from ..sampling.system import Happening, Sampled, happening
-from ..upstream.control_internals import current_parameters, parts_now, rates_now
+from ..upstream.control_internals import parts_now, rates_now
 from ..wording import counted, numbered
 from .known import Known
 
@@ -285,6 +285,5 @@ def _values(
     found = []
     for one in parts:
         _, x, u = signals[one.number]
-        value = getattr(one.block.spec, what)(t, x, u, current_parameters(one.block))
-        found.append((one.path, np.asarray(value, dtype=float).reshape(-1)))
+        found.append((one.path, equation_now(one.block, what, t, x, u)))
     return found

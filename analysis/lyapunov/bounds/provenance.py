@@ -204,14 +204,19 @@ class Shown:
         raise NotImplementedError
 
     @property
+    def examined(self) -> Any:
+        """The loop as the proof has read it, with its starts and disturbance."""
+        raise NotImplementedError
+
+    @property
     def starts(self) -> Starts:
         """The initial states that the bounds hold for."""
-        raise NotImplementedError
+        return self.examined.starts
 
     @property
     def disturbance(self) -> float:
         """Bound of what external inputs add to the plant's v."""
-        raise NotImplementedError
+        return self.examined.disturbance
 
     @property
     def status(self) -> Literal["proved", "undecided"]:

@@ -30,7 +30,6 @@ from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition, decompose, only_declared
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
 from ..bounds.provenance import FROM_STARTS, Constant, Shown, per_second
-from ..bounds.starts import Starts
 from ..loop.external_inputs import disturbed
 from .known_sign import KnownSignLoop, read_loop
 from .plant_bounds import Demand, demand, feedforward
@@ -134,14 +133,9 @@ class Certificate(Shown):
         )
 
     @property
-    def starts(self) -> Starts:
-        """The initial states that the bounds hold for."""
-        return self.loop.starts
-
-    @property
-    def disturbance(self) -> float:
-        """Bound of what external inputs add to the plant's v."""
-        return self.loop.disturbance
+    def examined(self) -> Any:
+        """The loop as the proof has read it."""
+        return self.loop
 
     def _saved(self, file: Any) -> Path:
         gains, law = self.loop.parts.gains, self.loop.law

@@ -188,14 +188,9 @@ class SlidingModeCertificate(Shown):
         yield "limsup |e|", self.ultimate_e, "1", "proved", "filters of r", "t -> infinity"
 
     @property
-    def starts(self) -> Starts:
-        """The initial states that the bounds hold for."""
-        return self.loop.starts
-
-    @property
-    def disturbance(self) -> float:
-        """Bound of what external inputs add to the plant's v."""
-        return self.loop.disturbance
+    def examined(self) -> Any:
+        """The loop as the proof has read it."""
+        return self.loop
 
     def _saved(self, file: Any) -> Path:
         loop, numbers = self.loop, {"K": self.loop.law.K, "phi": self.loop.law.phi}

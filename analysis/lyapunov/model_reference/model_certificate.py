@@ -15,7 +15,6 @@ from nlctl.wording import counted
 
 from ..bounds.decomposition import Decomposition
 from ..bounds.provenance import FROM_STARTS, Constant, Shown, per_second
-from ..bounds.starts import Starts
 from ..certificate.saved import save_certificate
 from ..loop.external_inputs import ADDED
 from .matching import Matching
@@ -176,14 +175,9 @@ class ModelReferenceCertificate(Shown):
         return save_certificate(file, "reference model", self.name, attempts)
 
     @property
-    def starts(self) -> Starts:
-        """The initial states that the bounds hold for."""
-        return self.matching.loop.starts
-
-    @property
-    def disturbance(self) -> float:
-        """Bound of what external inputs add to the plant's v."""
-        return self.matching.loop.disturbance
+    def examined(self) -> Any:
+        """The loop as the proof has read it."""
+        return self.matching.loop
 
     @property
     def bound(self) -> str:

@@ -239,6 +239,17 @@ def new_work(
     return with_table(Work, lanes=new_lanes(times, lanes), **arrays, **flat)
 
 
+def grown(work: Work, names: tuple[str, ...], room: int) -> Work:
+    """Return a workspace with so many rows in some of its arrays; what they hold stays."""
+    given = work._asdict()
+    del given["table"]
+    for name in names:
+        before = given[name]
+        given[name] = np.zeros((room, *before.shape[1:]), dtype=before.dtype)
+        given[name][: before.shape[0]] = before
+    return with_table(Work, like=WORK, **given)
+
+
 def _of_the_stiff_method(n: int, inputs: int) -> dict[str, tuple[int, ...]]:
     """Return the shapes of the arrays of the stiff method."""
     return {

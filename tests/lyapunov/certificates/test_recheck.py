@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from planted_loops import wired
-from tampering import leaves_of, put, scaled
+from tampering import answers, put, scaled
 
 import nlctl
 from analysis import recheck as package
@@ -180,17 +180,9 @@ def test_another_true_claim_is_another_file(content, what):
 
 def test_nonsense_is_answered_with_no(content, tmp_path, capsys):
     """Any entry replaced by anything, and files that are none."""
-    rng, ways = random.Random(0), [way for way in leaves_of(content) if way]
     things = [None, True, -1, "1/0", "1e999999999", "x", [], {}, ["1", "2"], "0", 1.5, {"a": "1"}]
     file = tmp_path / "nonsense.json"
-    for _ in range(150):
-        made, way = copy.deepcopy(content), rng.choice(ways)
-        put(way, rng.choice(things))(made)
-        if seal_of(made) == seal_of(content):
-            continue
-        made["seal"] = made["seal"] if way == ("seal",) else seal_of(made)
-        file.write_text(json.dumps(made))
-        answer, said = main([str(file)]), capsys.readouterr().out
+    for way, answer, said in answers(content, random.Random(0), things, 150, file, capsys):
         assert (answer, said[:4]) in ((1, "no: "), (0, "yes:"))
         if answer == 0:  # an unread entry, a claim left out, or premises from which it follows, too
             assert way[0] in ("claim", "loop", "premises")

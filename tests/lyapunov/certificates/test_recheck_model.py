@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from mrac_loops import SINE, e_modification, first_order, half_sine, projection, sigma, wing_rock
-from tampering import leaves_of, put, scaled
+from tampering import answers, leaves_of, put, scaled
 
 import nlctl
 from analysis.lyapunov import certify
@@ -217,17 +217,9 @@ def test_another_true_claim_is_another_file(contents, which, what):
 def test_nonsense_is_answered_with_no(contents, which, tmp_path, capsys):
     """Any entry replaced by anything; yes only where it is a premise, or weakens the claim."""
     content, rng = contents[which], random.Random(which)
-    ways = [way for way in leaves_of(content) if way]
     things = [None, True, -1, "1/0", "1e9", "x", [], {}, ["1", "2"], "0", 1.5, {"a": "1"}, "1"]
     file = tmp_path / "nonsense.json"
-    for _ in range(100):
-        made, way = copy.deepcopy(content), rng.choice(ways)
-        put(way, rng.choice(things))(made)
-        if seal_of(made) == seal_of(content):
-            continue
-        made["seal"] = made["seal"] if way == ("seal",) else seal_of(made)
-        file.write_text(json.dumps(made))
-        answer, said = main([str(file)]), capsys.readouterr().out
+    for way, answer, said in answers(content, rng, things, 100, file, capsys):
         assert (answer, said[:4]) in ((1, "no: "), (0, "yes:")), way
         assert answer or way[0] in ("claim", "loop", "premises"), way
 
