@@ -12,7 +12,7 @@ import control as ct
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..diagrams import override
+from ..diagrams import overridden
 from ..upstream.control_internals import outputs_now, rates_now
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ def own_error(
         return None  # what these do depends on more than the present
     if not finite.size or not ct.isctime(compiled.system):
         return None
-    system, k, left = compiled.schedule.system, finite[-1], [_CALLS]
-    override(system, params)
+    system = overridden(compiled.schedule.system, params)
+    k, left = finite[-1], [_CALLS]
 
     def rates(t: float, x: np.ndarray) -> np.ndarray:
         left[0] -= 1

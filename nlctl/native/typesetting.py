@@ -18,7 +18,7 @@ import numpy as np
 
 from ..annotations import as_annotated
 from ..blocks import Block
-from ..diagrams import apart, known_system, override
+from ..diagrams import known_system, overridden
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
 from ..expressions.graph import Expr, Graph, needed
@@ -108,9 +108,7 @@ def typeset(
     """
     system = known_system("typeset", system)
     system = ct.ss(system) if isinstance(system, ct.TransferFunction) else system
-    system = apart(system).system
-    override(system, params)
-    read = schedule(system, solve_loops=True)
+    read = schedule(overridden(system, params), solve_loops=True)
     return tuple(_block(read, node, values) for node in read.nodes)
 
 

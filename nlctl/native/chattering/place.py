@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...accumulation import SECOND_ORDER, Crowd, accumulation_words
-from ...diagrams import apart, override
+from ...diagrams import overridden
 from ...upstream.control_internals import rates_now
 from ..audit import block_outputs
 from ..codegen.program import count_switching_functions, memory
@@ -104,8 +104,7 @@ def _changed(
 ) -> str:
     """Return the block whose values change most for what changes at its inputs and states."""
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
-        system = apart(compiled.schedule.system).system
-        override(system, params)
+        system = overridden(compiled.schedule.system, params)
         for wider in _WIDER:  # it rounds otherwise than machine code
             before, after = (list(_blocks(compiled, system, p, side)) for side in jump.sides(wider))
             found = _sharpest(compiled, p, jump, before, after)
