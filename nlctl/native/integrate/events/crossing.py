@@ -20,6 +20,8 @@ from .location import AGAIN, CLEAR, EVENT, REFUSED
 
 NOTHING = -2  # no condition lies in the step just tried
 BEFORE_CONDITION = 0.01  # of the relative tolerance, of a step: how close to one steps end
+_CLOSEST = 8e-16  # of the time: no condition can be told closer than that
+_ROUNDING = 1e-14  # of what is integrated, in the error of a step
 _TRIES = 60
 # of a step with a stage behind a condition: how much is left out
 _CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
@@ -44,10 +46,21 @@ def crossing(task, lane, w, j):
         return _shortened(lane, beyond)
     if not inside and lane.traces == 0:
         return NOTHING
-    # a step that is wrong has seen a jump at a stage, whatever it says of its end
-    bad = inside or (task.fixed == 0.0 and not w.error[j] <= 1.0)
+    bad = inside or (task.fixed == 0.0 and _has_seen_a_jump(task, lane, w, j))
     _bracket(task, lane, w, bad, j)
     return _next_try(task, lane, w, bad, j)
+
+
+@numba.njit(**INNER)
+def _has_seen_a_jump(task, lane, w, j):
+    """Whether a step is wrong: one of its stages has looked behind, whatever is said of its end.
+
+    On the near side the error of a shorter step is smaller at least by the cube of its part.
+    """
+    most = 1.0
+    if lane.traces > 0 and not task.highest:
+        most = min(1.0, 10.0 * (lane.step / lane.whole) ** 3 + _ROUNDING / task.rtol)
+    return not w.error[j] <= most
 
 
 @numba.njit(**INNER)
@@ -110,13 +123,34 @@ def _beyond(task, lane, w, j):
 
 @numba.njit(**INNER)
 def _across(task, lane, w, j):
-    """Accept the step across a condition, unless its end is not finite."""
+    """Accept the step across a condition, unless its end is not finite or what jumps is too much.
+
+    In that case it is tried again as any other: what is close is then a part of this short step.
+    """
     if not np.isfinite(w.error[j]):
         return NOTHING
+    if task.fixed == 0.0 and _costs_too_much(task, lane, w, j):
+        shorten(lane, 1.0)
+        return REFUSED
     for i in range(task.declared, task.switching):
         if _crossed(task, w, i, w.e[i, j], j) or left_to_other_side(task, w, i, j):
             return EVENT
     return CLEAR
+
+
+@numba.njit(**INNER)
+def _costs_too_much(task, lane, w, j):
+    """Whether a step across is wrong by more than a local error: by the jump of the rates in it."""
+    least = _LEAST if lane.stiff else 2.0 * _CLOSEST  # see `_shortened`
+    if not lane.step > least * max(abs(lane.t), lane.last):
+        return False
+    for i in range(w.x.shape[0]):
+        apart = 0.0
+        for s in range(1, w.k.shape[0]):  # it may have led across two of them
+            apart = max(apart, abs(w.k[s, i, j] - w.k[0, i, j]))
+        if lane.step * apart > task.atol + task.rtol * abs(w.x[i, j]):
+            return True
+    return False
 
 
 @numba.njit(**INNER)
@@ -166,7 +200,7 @@ def _bracket(task, lane, w, bad, j):
 def _next_try(task, lane, w, bad, j):
     """Say what to try next, or take the step just tried, which ends right before a condition."""
     t_end = max(abs(lane.t), abs(lane.t + lane.high))
-    close = max(BEFORE_CONDITION * task.rtol * lane.whole, 8e-16 * t_end)
+    close = max(BEFORE_CONDITION * task.rtol * lane.whole, _CLOSEST * t_end)
     root = _foreseen(task, lane, w, bad, j)
     if lane.high <= 2.0 * close and bad:  # right behind the start
         lane.across, lane.traces, lane.tries = 1, 0, 0
