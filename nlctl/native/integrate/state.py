@@ -25,6 +25,7 @@ class Status(IntEnum):
 OK, DIVERGED, STEP_LIMIT, STEP_TOO_SMALL, STOPPED, CHATTERING, ZENO, ENDED = map(int, Status)
 RUNNING, STIFF = -1, -2  # STIFF: to be finished by a method that only single runs have
 DERIVATIVES = -3  # to go on once it is known where the stiff method has its Jacobian from
+AUTO, EXPLICIT, IMPLICIT, TAYLOR = 0, 1, 2, 3  # methods
 FIRST_PATIENCE = 15
 DIRECTIONS = 8  # in which derivatives are taken together
 # for functions that only machine code calls: without a way in from Python, which would have to be

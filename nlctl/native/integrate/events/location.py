@@ -45,19 +45,19 @@ def behind_event(rtol):
 
 
 @numba.njit(**INNER)
-def first_root(lane, task, every, e_start, e_low, e_high, behind, j):
+def first_root(lane, task, every, events, e_low, e_high, j):
     """Return where the first event between the lengths low and high lies, -1 if there is none.
 
     And whether it is a memory's.  Conditions at which something may jump, and guards, are for
     `crossing`, unless `every` event is asked for.
     """
-    first, is_memory = -1.0, False
-    bending, switching, small = task.bending, task.switching, SMALL_KINK * task.atol
-    declared = switching if every else task.declared
+    first, is_memory, e_start, behind = -1.0, False, events.e_start, events.behind
+    bending, switching, small = task.rows.bending, task.rows.switching, SMALL_KINK * task.atol
+    declared = switching if every else task.rows.declared
     for i in range(e_start.shape[0]):
         if declared <= i < switching:
             continue
-        if bending <= i < task.declared and abs(e_start[i, j]) + abs(e_high[i, j]) <= small:
+        if bending <= i < task.rows.declared and abs(e_start[i, j]) + abs(e_high[i, j]) <= small:
             continue  # rounding of what is 0: a kink that small is seen by nobody
         if triggered(e_start[i, j], e_high[i, j], i >= switching, behind[i, j] != 0.0):
             low, high = e_low[i, j], e_high[i, j]
@@ -71,16 +71,16 @@ def first_root(lane, task, every, e_start, e_low, e_high, behind, j):
 
 
 @numba.njit(**INNER)
-def locate(lane, task, e_start, e_low, e_high, e, behind, j):
+def locate(lane, task, events, j):
     """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT.
 
     With AGAIN, ``lane.step`` is the next length to try.
     """
     if lane.tries == 0:
         lane.low, lane.high = 0.0, lane.step
-        for i in range(e.shape[0]):
-            e_low[i, j], e_high[i, j] = e_start[i, j], e[i, j]
-    root, memory = _narrowed(lane, task, e_start, e_low, e_high, e, behind, j)
+        for i in range(events.e.shape[0]):
+            events.e_low[i, j], events.e_high[i, j] = events.e_start[i, j], events.e[i, j]
+    root, memory = _narrowed(lane, task, events, j)
     if root < 0.0:
         return CLEAR
     lane.tries += 1
@@ -103,12 +103,12 @@ def locate(lane, task, e_start, e_low, e_high, e, behind, j):
 
 
 @numba.njit(**INNER)
-def _narrowed(lane, task, e_start, e_low, e_high, e, behind, j):
+def _narrowed(lane, task, events, j):
     """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
-    before = lane.high
+    before, e, e_low, e_high = lane.high, events.e, events.e_low, events.e_high
     if lane.tries > 0:
         lane.high = lane.step
-        inside = first_root(lane, task, False, e_start, e_low, e, behind, j)[0] >= 0.0
+        inside = first_root(lane, task, False, events, e_low, e, j)[0] >= 0.0
         if not inside:
             lane.low, lane.high = lane.step, before
             lane.same_side = min(lane.same_side, 0) - 1
@@ -122,7 +122,7 @@ def _narrowed(lane, task, e_start, e_low, e_high, e, behind, j):
                 e_low[i, j], e_high[i, j] = e[i, j], e_high[i, j] * weight
     else:
         lane.same_side = 0
-    return first_root(lane, task, False, e_start, e_low, e_high, behind, j)
+    return first_root(lane, task, False, events, e_low, e_high, j)
 
 
 @numba.njit(**INNER)
@@ -132,16 +132,17 @@ def jumped(task, lane, w, j):
     And no event of the step says why.  Where such a jump is being located, one at a stage counts:
     it is the first that is sought.
     """
-    for i in range(task.memory.size):
-        row, before = task.switching + i, w.x_new[task.memory[i], j]
-        if w.e_start[row, j] != 0.0 or w.slope[row, j] != 0.0:
+    events = w.events
+    for i in range(task.rows.memory.size):
+        row, before = task.rows.switching + i, w.x_new[task.rows.memory[i], j]
+        if events.e_start[row, j] != 0.0 or events.slope[row, j] != 0.0:
             continue  # it is carried along, also while memories are committed step by step
-        changed = _apart(task, before, w.g[row, j])
-        if lane.seeks > 0 and task.inside[1 if is_stiff(lane) else 0, 0] != 0.0:
+        changed = _apart(task, before, events.g[row, j])
+        if lane.seeks > 0 and task.pair.inside[1 if is_stiff(lane) else 0, 0] != 0.0:
             for n in range(3):
-                changed |= _apart(task, before, w.g_inside[n, row, j])
+                changed |= _apart(task, before, events.g_inside[n, row, j])
         if changed:
-            own = first_root(lane, task, True, w.e_start, w.e_start, w.e, w.behind, j)[0]
+            own = first_root(lane, task, True, events, events.e_start, events.e, j)[0]
             return lane.seeks > 0 or own < 0.0
     return False
 

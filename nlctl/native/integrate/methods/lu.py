@@ -148,14 +148,17 @@ place = numba.njit(**INNER)(jacobian_place)
 @numba.njit(**INNER)
 def factorise(task, diagonal, w):
     """Factorise diagonal * I - J; return whether only where there are entries."""
-    if task.order.size and _factorise_entries(task, diagonal, w.jacobian_flat, w.factors):
+    stiff = w.stiff
+    if task.stiff.order.size and _factorise_entries(
+        task, diagonal, stiff.jacobian_flat, stiff.factors
+    ):
         return True
-    n, columns = w.columns.shape[0], w.columns
+    n, columns = stiff.columns.shape[0], stiff.columns
     for j in range(n):
         for i in range(n):
-            columns[j, i] = -w.jacobian_flat[place(i, j, n)]
+            columns[j, i] = -stiff.jacobian_flat[place(i, j, n)]
         columns[j, j] += diagonal
-    _factorise_all(columns, w.pivots)
+    _factorise_all(columns, stiff.pivots)
     return False
 
 
@@ -163,9 +166,9 @@ def factorise(task, diagonal, w):
 def solve(task, only_entries, w, b):
     """Solve with the factors of `factorise`; `b` becomes the solution."""
     if only_entries:
-        _solve_entries(task, w.factors, b)
+        _solve_entries(task, w.stiff.factors, b)
     else:
-        _solve_all(w.columns, w.pivots, b)
+        _solve_all(w.stiff.columns, w.stiff.pivots, b)
 
 
 @numba.njit(**INNER)
@@ -175,8 +178,14 @@ def _factorise_entries(task, diagonal, jacobian, factors):
     Row by row: what is subtracted is on the right of pivots that are done.  Of these their
     inverses are kept.
     """
-    start, pivot, column, rank = task.start, task.pivot, task.column, task.rank
-    source, target, done = task.source, task.target, INDEX(0)
+    stiff = task.stiff
+    start, pivot, column, rank = (
+        stiff.start,
+        stiff.pivot,
+        stiff.column,
+        stiff.rank,
+    )
+    source, target, done = stiff.source, stiff.target, INDEX(0)
     for e in range(source.size):
         factors[e] = -jacobian[source[e]]
     for k in range(pivot.size):
@@ -199,7 +208,12 @@ def _factorise_entries(task, diagonal, jacobian, factors):
 @numba.njit(**INNER)
 def _solve_entries(task, factors, b):
     """Solve with the factors of `_factorise_entries`, both times by sums over rows."""
-    order, start, pivot, column = task.order, task.start, task.pivot, task.column
+    order, start, pivot, column = (
+        task.stiff.order,
+        task.stiff.start,
+        task.stiff.pivot,
+        task.stiff.column,
+    )
     for k in range(order.size):
         total = b[order[k]]
         for e in range(start[k], pivot[k]):
@@ -215,14 +229,15 @@ def _solve_entries(task, factors, b):
 @numba.njit(**INNER)
 def multiply(task, jacobian, v, product):
     """Fill `product` with J v."""
-    n, source, column = v.size, task.source, task.column
+    stiff = task.stiff
+    n, source, column = v.size, stiff.source, stiff.column
     for i in range(n):
         product[i] = 0.0
-        for j in range(0 if task.order.size else n):
+        for j in range(0 if stiff.order.size else n):
             product[i] += jacobian[place(i, j, n)] * v[j]
-    for k in range(task.order.size):
-        for e in range(task.start[k], task.start[k + 1]):  # also where only factors have entries
-            product[task.order[k]] += jacobian[source[e]] * v[column[e]]
+    for k in range(stiff.order.size):
+        for e in range(stiff.start[k], stiff.start[k + 1]):  # also where only factors have entries
+            product[stiff.order[k]] += jacobian[source[e]] * v[column[e]]
 
 
 @numba.njit(**INNER)
