@@ -16,6 +16,7 @@ from .delays import is_full, keep, look_within, unresolved
 from .evaluate import inputs_at
 from .events.crossing import NOTHING, crossing, left_to_other_side
 from .events.excursions import look_between
+from .events.functions import begins, has_events
 from .events.location import (
     AGAIN,
     CLEAR,
@@ -55,7 +56,6 @@ def _sample(lane, j, task, t_new, w):
 @numba.njit(**INNER)
 def _judge(task, lanes, w, found):
     """Say what became of the step just tried in every lane: refused, tried AGAIN, CLEAR, EVENT."""
-    events = w.events
     for j in range(lanes.size):
         lane = lanes[j]
         found[j] = REFUSED
@@ -74,8 +74,8 @@ def _judge(task, lanes, w, found):
         is_behind = task.rows.memory.size > 0 and jumped(task, lane, w, j)
         if is_behind or lane.seeks > 0:
             found[j] = locate_jump(lane, task.rtol, is_behind)
-        elif events.e.shape[0]:
-            found[j] = locate(lane, task, events, j)
+        elif has_events(w):
+            found[j] = locate(lane, task, w, j)
         if found[j] == AGAIN:
             lane.rejected += 1
             lane.cross = 0.0
@@ -88,7 +88,7 @@ def _accept(task, lanes, w, found, done, passed):
     ``done`` becomes whether one was accepted, ``passed`` whether it ended with an event or set a
     memory in motion.  Return whether any lane has passed.
     """
-    any_passed, switching, memories = False, task.rows.switching, task.rows.memory.size
+    any_passed, memories = False, task.rows.memory.size
     for j in range(lanes.size):
         lane, event = lanes[j], found[j] == EVENT
         done[j] = passed[j] = False
@@ -109,12 +109,12 @@ def _accept(task, lanes, w, found, done, passed):
         else:
             lane.left_zero = lane.left_zero and _was_zero(task, w, j)
             next_step(lane, w.error[j], w.rate[j], task)
-        if task.fixed == 0.0 and w.events.e.shape[0]:
+        if task.fixed == 0.0 and has_events(w):
             lane.h = min(lane.h, w.inside.resolved[j])
         done[j] = True
         if memories:  # at a break point of the inputs memories may reverse as well
             at_break_point = lane.ends and w.u.shape[0] > 0
-            passed[j] = at_break_point or _began_to_move(switching, w.events.e_start, w.events.e, j)
+            passed[j] = at_break_point or _began_to_move(w, j)
         passed[j] |= event
         any_passed |= passed[j]
         if task.method == AUTO:
@@ -126,7 +126,7 @@ def _accept(task, lanes, w, found, done, passed):
 def _was_zero(task, w, j):
     """Whether a step began where a condition was exactly 0."""
     for i in range(task.rows.declared, task.rows.guarded):
-        if w.events.e_start[i, j] == 0.0:
+        if w.events.g_start[i, j] == 0.0:
             return 1
     return 0
 
@@ -141,10 +141,11 @@ def _rests(task, w, j):
 
 
 @numba.njit(**INNER)
-def _began_to_move(switching, e_start, e, j):
+def _began_to_move(w, j):
     """Whether a memory that stood still at the start of the accepted step moves at its end."""
-    for i in range(switching, e.shape[0]):  # noqa: SIM110 (no generators in machine code)
-        if e_start[i, j] == 0.0 and e[i, j] != 0.0:
+    rate_start, rate = w.memories.rate_start, w.memories.rate
+    for i in range(rate.shape[0]):  # noqa: SIM110 (no generators in machine code)
+        if rate_start[i, j] == 0.0 and rate[i, j] != 0.0:
             return True
     return False
 
@@ -152,8 +153,7 @@ def _began_to_move(switching, e_start, e, j):
 @numba.njit(**INNER)
 def _take(task, w, done):
     """Make the ends of the accepted steps the states, and commit the memories."""
-    events, rows = w.events, task.rows
-    x, k, switching, last = w.x, w.k, rows.switching, w.k.shape[0] - 1
+    x, k, events, rows, last = w.x, w.k, w.events, task.rows, w.k.shape[0] - 1
     for j in range(done.size):
         if not done[j]:
             continue
@@ -162,36 +162,26 @@ def _take(task, w, done):
             x[i, j] = w.x_new[i, j]
             k[0, i, j] = k[last, i, j]
         for i in range(rows.declared):
-            events.behind[i, j] = events.e_start[i, j] * events.e[i, j] < 0.0
+            events.behind[i, j] = events.g_start[i, j] * events.g[i, j] < 0.0
         for i in range(rows.declared, rows.guarded):
-            if events.e[i, j] != 0.0 or events.e_start[i, j] != 0.0:
-                events.behind[i, j] = (
-                    np.sign(events.e_start[i, j]) if events.e[i, j] == 0.0 else 0.0
-                )
+            before, now = events.g_start[i, j], events.g[i, j]
+            if now != 0.0 or before != 0.0:
+                events.behind[i, j] = np.sign(before) if now == 0.0 else 0.0
         for i in range(rows.memory.size):
-            m, become = rows.memory[i], events.g[switching + i, j]
-            if events.e_start[switching + i, j] == 0.0 and x[m, j] != become:  # otherwise locked
+            m, become = rows.memory[i], w.memories.m[i, j]
+            if w.memories.rate_start[i, j] == 0.0 and x[m, j] != become:  # otherwise locked
                 x[m, j] = become
                 for c in range(rows.declared):
                     events.behind[c, j] = 0.0  # with another memory the way back is an event
-        for i in range(events.e.shape[0]):
-            events.e_start[i, j] = events.e[i, j]
-            events.g_start[i, j], events.slope_start[i, j] = (
-                events.g[i, j],
-                events.slope[i, j],
-            )
+        begins(w, j)
 
 
 @numba.njit(**INNER)
-def _event_functions(rhs, task, lanes, w):
-    """Fill w.events.e at the ends of the steps just tried."""
-    if task.rows.memory.size:
-        for j in range(lanes.size):
-            w.ahead.begin[j] = lanes[j].t + lanes[j].step
-        memory_rates(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1])
-    for i in range(task.rows.switching):
-        for j in range(lanes.size):
-            w.events.e[i, j] = w.events.g[i, j]
+def _look_ahead(rhs, task, lanes, w):
+    """Fill the rates of memories at the ends of the steps just tried."""
+    for j in range(lanes.size):
+        w.ahead.begin[j] = lanes[j].t + lanes[j].step
+    memory_rates(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1])
 
 
 @numba.njit(**INNER)
@@ -239,9 +229,10 @@ def advance(rhs, point, along, task, w, rounds):
         _attempt(rhs, point, along, task, lanes, w)
         if task.lines.delays.shape[0]:
             look_within(task, lanes, w)
-        _event_functions(rhs, task, lanes, w)
+        if task.rows.memory.size:
+            _look_ahead(rhs, task, lanes, w)
         _judge(task, lanes, w, found)
-        if w.events.e.shape[0] and not task.taylor.highest:
+        if has_events(w) and not task.taylor.highest:
             look_between(rhs, task, lanes, w, found)
         if rows.memory.size:
             look_before(rhs, task, lanes, w, found)
@@ -298,12 +289,12 @@ def _note_events(task, lanes, w, found, done):
             continue
         turns = 1 if rows.memory.size else 0
         for i in range(rows.guarded):
-            if events.e_start[i, j] * events.e[i, j] < 0.0 or left_to_other_side(task, w, i, j):
+            if events.g_start[i, j] * events.g[i, j] < 0.0 or left_to_other_side(task, w, i, j):
                 turns = 0
-                if _counts(task, lanes[j], i, events.e[i, j]):
-                    note(task, lanes[j], w, i, events.e[i, j] > 0.0, j)
+                if _counts(task, lanes[j], i, events.g[i, j]):
+                    note(task, lanes[j], w, i, events.g[i, j] > 0.0, j)
         for i in range(rows.guarded, rows.switching):
-            if w.guards.above[i - rows.guarded, j] != 0 and events.e[i, j] < 0.0:
+            if w.guards.above[i - rows.guarded, j] != 0 and events.g[i, j] < 0.0:
                 turns = 0
         lanes[j].turns += turns
 

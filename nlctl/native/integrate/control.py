@@ -60,23 +60,23 @@ def limit_step(task, lane, j):
 
 
 @numba.njit(**INNER)
-def memory_error(task, x, g, g_other, j):
+def memory_error(task, x, m, m_other, j):
     """Return the largest difference of what a lane's memories would become, over its tolerance.
 
     A memory that is carried along is a state like any other, and follows from the others by an
     equation that may amplify their errors: in Example 2 that of r by 6000, and with it the time
-    at which the memory is seen to reverse.  So `g` is of a step's solution and `g_other` of one
+    at which the memory is seen to reverse.  So `m` is of a step's solution and `m_other` of one
     that differs from it by the error.
 
     What only one of them moves does not count: where a relay switches, or a memory begins to move,
     is an event, and is located as one.
     """
     largest, spoilt = 0.0, 0.0
-    for m in range(task.rows.memory.size):
-        i, before = task.rows.switching + m, x[task.rows.memory[m], j]
-        if g[i, j] == before or g_other[i, j] == before:
+    for i in range(m.shape[0]):
+        before = x[task.rows.memory[i], j]
+        if m[i, j] == before or m_other[i, j] == before:
             continue
-        part = abs(g[i, j] - g_other[i, j]) / (task.atol + task.rtol * abs(g[i, j]))
+        part = abs(m[i, j] - m_other[i, j]) / (task.atol + task.rtol * abs(m[i, j]))
         largest = part if part > largest else largest
         spoilt += 0.0 * part  # NaN or infinity: no maximum keeps it
     return largest + spoilt

@@ -293,7 +293,7 @@ def prepared(
     if method == "taylor":
         task, terms = with_taylor(task, compiled, p, settings)
     work = new_work(
-        x0, times, read.ninputs, code.lowered.rows["g"], len(read.outputs),
+        x0, times, read.ninputs, code.lowered.rows["g"], code.lowered.rows["m"], len(read.outputs),
         code.lowered.rows["s"], len(program.guards), len(read.lines),
         2 if terms else settings.pair.stages, terms or (1, 0),
         log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
@@ -305,7 +305,7 @@ def prepared(
 
 def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> Rows:
     """Return how many rows are whose: declared, located, memories."""
-    located = code.lowered.rows["g"] - len(program.memory)
+    located = code.lowered.rows["g"]
     bending = code.lowered.conditions.bending
     return with_table(
         Rows,

@@ -24,18 +24,19 @@ class Ahead(NamedTuple):
     x: Reals2  # (states, lanes)
     dx: Reals2
     g: Reals2  # see `Events.g`
+    m: Reals2  # and `Memories.m`
     x_flat: Reals1  # the same memory as x
     dx_flat: Reals1
     begin: Reals1  # (lanes,): the time from which it is looked ahead (s)
     table: Places2
 
 
-def new_ahead(n: int, rows: int, lanes: int) -> Ahead:
-    """Return the arrays for n states and so many rows of g."""
+def new_ahead(n: int, rows: int, memories: int, lanes: int) -> Ahead:
+    """Return the arrays for n states, so many rows of g, and of m."""
     x, dx = np.zeros((n, lanes)), np.zeros((n, lanes))
     return with_table(
-        Ahead, x=x, dx=dx, g=np.zeros((rows, lanes)), x_flat=x.reshape(-1), dx_flat=dx.reshape(-1),
-        begin=np.zeros(lanes),
+        Ahead, x=x, dx=dx, g=np.zeros((rows, lanes)), m=np.zeros((memories, lanes)),
+        x_flat=x.reshape(-1), dx_flat=dx.reshape(-1), begin=np.zeros(lanes),
     )  # fmt: skip
 
 
@@ -77,13 +78,13 @@ def input_rates(task, segment, first, rates, j):
 
 
 @numba.njit(**INNER)
-def evaluate(rhs, task, lanes, w, x, dx, g):
+def evaluate(rhs, task, lanes, w, x, dx, g, m):
     """Evaluate the right-hand side at the times w.t; memory stands still within a step."""
     if task.timed.jumps.shape[1]:
         on_this_side(lanes, w)
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
-    call_rhs(rhs, w.t, x, w.u, task.p, dx, g)
+    call_rhs(rhs, w.t, x, w.u, task.p, dx, g, m)
     for i in task.rows.memory:
         for j in range(lanes.size):
             dx[i, j] = 0.0
@@ -104,8 +105,8 @@ def outputs(rhs, out, task, w):
                 w.u[task.inputs.shape[0] + i, j] = w.past.shown[m, i, j]
             input_rates(task, m, task.inputs.shape[0] + task.lines.delays.shape[0], w.u, j)
         if task.rows.memory.size:
-            call_rhs(rhs, w.t, states[m], w.u, task.p, w.ahead.dx, w.events.g)
+            call_rhs(rhs, w.t, states[m], w.u, task.p, w.ahead.dx, w.ahead.g, w.ahead.m)
             for i in range(task.rows.memory.size):
                 for j in range(w.t.size):
-                    states[m, task.rows.memory[i], j] = w.events.g[task.rows.switching + i, j]
+                    states[m, task.rows.memory[i], j] = w.ahead.m[i, j]
         call_out(out, w.t, states[m], w.u, task.p, y[m])

@@ -51,7 +51,7 @@ def begin_guards(task, lanes, w):
     """See which guards are not negative where a run begins: none of them falls there."""
     for i in range(task.rows.switching - task.rows.guarded):
         for j in range(lanes.size):
-            w.guards.above[i, j] = _above(lanes[j], w.events.e[task.rows.guarded + i, j], i)
+            w.guards.above[i, j] = _above(lanes[j], w.events.g[task.rows.guarded + i, j], i)
             w.guards.rising[i, j] = np.nan
 
 
@@ -97,7 +97,7 @@ def _fallen(task, lanes, w, seen, fallen):
             if not seen[j] or lanes[j].status != RUNNING:
                 continue
             before = w.guards.above[i, j]
-            w.guards.above[i, j] = _above(lanes[j], w.events.e[task.rows.guarded + i, j], i)
+            w.guards.above[i, j] = _above(lanes[j], w.events.g[task.rows.guarded + i, j], i)
             if before and not w.guards.above[i, j] and lanes[j].status == RUNNING:
                 fallen[i, j] = chosen[j] = found = True
     return chosen, found
@@ -154,10 +154,10 @@ def _rises(rhs, task, lanes, w, jumped):
         w.t[j] = lanes[j].t + ahead
         for i in range(w.x.shape[0]):
             w.ahead.x[i, j] = w.x[i, j] + ahead * w.k[0, i, j]
-    evaluate(rhs, task, lanes, w, w.ahead.x, w.ahead.dx, w.ahead.g)
+    evaluate(rhs, task, lanes, w, w.ahead.x, w.ahead.dx, w.ahead.g, w.ahead.m)
     for i in range(jumped.shape[0]):
         for j in range(lanes.size):
-            now, later = w.events.e[task.rows.guarded + i, j], w.ahead.g[task.rows.guarded + i, j]
+            now, later = w.events.g[task.rows.guarded + i, j], w.ahead.g[task.rows.guarded + i, j]
             if jumped[i, j] and lanes[j].fell_at == lanes[j].t and now < 0.0 and later > now:
                 w.guards.rising[i, j] = now
 
@@ -168,6 +168,6 @@ def _check_rising(task, lane, w, j):
     guards = w.guards
     for i in range(guards.rising.shape[0]):
         if guards.rising[i, j] == guards.rising[i, j] and lane.t > lane.fell_at:
-            if w.events.e[task.rows.guarded + i, j] < guards.rising[i, j]:
+            if w.events.g[task.rows.guarded + i, j] < guards.rising[i, j]:
                 lane.status, lane.culprit = ZENO, i
             guards.rising[i, j] = np.nan

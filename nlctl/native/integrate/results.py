@@ -102,7 +102,7 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         inputs=_every_input(run, j, done),
         culprit=int(lane["culprit"]),
         since=float(lane["since"]),
-        guard=float(run.work.events.e[run.task.rows.guarded + lane["culprit"], j])
+        guard=float(run.work.events.g[run.task.rows.guarded + lane["culprit"], j])
         if lane["culprit"] >= 0
         else 0.0,
     )

@@ -31,7 +31,7 @@ def _first_step(rhs, task, lanes, w):
         w.t[j] = lanes[j].t + lanes[j].h
         for i in range(n):
             ahead.x[i, j] = w.x[i, j] + lanes[j].h * w.k[0, i, j]
-    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g)
+    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
     for i in range(n):
         for j in range(lanes.size):
             scale = task.atol + task.rtol * abs(w.x[i, j])

@@ -12,7 +12,15 @@ import numpy as np
 
 from .delayed import Lines, Past, new_past
 from .evaluate import Ahead, new_ahead
-from .events.functions import Events, Inside, Rows, new_events, new_inside
+from .events.functions import (
+    Events,
+    Inside,
+    Memories,
+    Rows,
+    new_events,
+    new_inside,
+    new_memories,
+)
 from .log import Log, new_log
 from .memory import Places2, Reals1, Reals2, Reals3, type_of, with_table
 from .methods.stiff import StiffArrays, StiffMethod, new_stiff
@@ -71,6 +79,7 @@ class Work(NamedTuple):
     resume: Reals2  # states at the last time, before a sample that is due there
     ahead: Ahead
     events: Events
+    memories: Memories
     inside: Inside
     stiff: StiffArrays
     taylor: TaylorArrays
@@ -88,6 +97,7 @@ def new_work(
     times: np.ndarray,
     inputs: int,
     events: int,
+    memories: int,
     outputs: int,
     sampled: int = 0,
     guards: int = 0,
@@ -119,8 +129,9 @@ def new_work(
         k_flat=k.reshape(stages, n * lanes),
         s=np.zeros((sampled, lanes)),
         resume=np.zeros((n, lanes)),
-        ahead=new_ahead(n, events, lanes),
+        ahead=new_ahead(n, events, memories, lanes),
         events=new_events(events, lanes),
+        memories=new_memories(memories, lanes),
         inside=new_inside(lanes),
         stiff=new_stiff(n if lanes == 1 else 0, inputs),  # that method is for single runs
         taylor=new_terms(*terms, inputs, lanes),

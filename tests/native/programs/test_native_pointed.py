@@ -188,31 +188,31 @@ def test_an_array_with_gaps_or_in_another_order_is_refused(array):
 
 class Outer(NamedTuple):
     number: float
-    record: Record
+    inner: Record
     last: Reals1
     table: Places2
 
 
 def scaled_inside(outer):
-    inside = outer.record
+    inside = outer.inner
     for i in range(inside.line.size):
         inside.line[i] *= outer.number * inside.number
-    outer.last[0] = outer.record.line[inside.line.size - 1]
+    outer.last[0] = outer.inner.line[inside.line.size - 1]
 
 
 def test_a_record_in_a_record_is_the_same_memory():
     """Machine code reads and writes what is inside as Python does."""
-    outer = with_table(Outer, number=3.0, record=sample(), last=np.zeros(1))
+    outer = with_table(Outer, number=3.0, inner=sample(), last=np.zeros(1))
     run(scaled_inside, outer)
-    assert outer.record.line.tolist() == [1.5, 1.5]
+    assert outer.inner.line.tolist() == [1.5, 1.5]
     assert outer.last.tolist() == [1.5]
-    assert type_of(Outer).fields["record"] == type_of(Record)
+    assert type_of(Outer).fields["inner"] == type_of(Record)
 
 
 def test_another_record_inside_is_refused():
-    other = with_table(Outer, number=3.0, record=sample(), last=np.zeros(1))
-    with pytest.raises(TypeError, match="'record' of Outer needs"):
-        replaced(other, record=other)
+    other = with_table(Outer, number=3.0, inner=sample(), last=np.zeros(1))
+    with pytest.raises(TypeError, match="'inner' of Outer needs"):
+        replaced(other, inner=other)
 
 
 def test_a_record_with_more_room_holds_what_it_held():

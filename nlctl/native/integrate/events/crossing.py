@@ -87,8 +87,8 @@ def _shortened(lane, beyond):
 def _is_behind(task, lane, w, j):
     """Whether the step just tried ends behind a condition."""
     for i in range(task.rows.declared, task.rows.switching):
-        if _crossed(task, w, i, w.events.e[i, j], j) or (
-            _leaves(task, lane, w, i, j) and w.events.e[i, j] != 0
+        if _crossed(task, w, i, w.events.g[i, j], j) or (
+            _leaves(task, lane, w, i, j) and w.events.g[i, j] != 0
         ):
             return True
     return False
@@ -101,7 +101,7 @@ def _leaves(task, lane, w, i, j):
     What the right-hand side is at 0 need not be what it is on the side to which the step leads.
     That counts once in a row: what comes back to 0 and leaves it with every step is rounding.
     """
-    return i < task.rows.guarded and w.events.e_start[i, j] == 0.0 and not lane.left_zero
+    return i < task.rows.guarded and w.events.g_start[i, j] == 0.0 and not lane.left_zero
 
 
 @numba.njit(**INNER)
@@ -116,7 +116,7 @@ def _beyond(task, lane, w, j):
         return 0.0
     farthest = 0.0
     for i in range(task.rows.declared, task.rows.guarded):
-        start = w.events.e_start[i, j]
+        start = w.events.g_start[i, j]
         for n in range(3):
             if start * w.events.g_inside[n, i, j] < 0.0:
                 farthest = max(farthest, -w.events.g_inside[n, i, j] / start)
@@ -135,7 +135,7 @@ def _across(task, lane, w, j):
         shorten(lane, 1.0)
         return REFUSED
     for i in range(task.rows.declared, task.rows.switching):
-        if _crossed(task, w, i, w.events.e[i, j], j) or left_to_other_side(task, w, i, j):
+        if _crossed(task, w, i, w.events.g[i, j], j) or left_to_other_side(task, w, i, j):
             return EVENT
     return CLEAR
 
@@ -161,8 +161,8 @@ def left_to_other_side(task, w, i, j):
     is_condition = task.rows.declared <= i < task.rows.guarded
     return (
         is_condition
-        and w.events.e_start[i, j] == 0.0
-        and w.events.behind[i, j] * w.events.e[i, j] < 0.0
+        and w.events.g_start[i, j] == 0.0
+        and w.events.behind[i, j] * w.events.g[i, j] < 0.0
     )
 
 
@@ -171,7 +171,7 @@ def _crossed(task, w, i, end, j):
     """Whether a condition has changed its sign since the start of the step, or a guard fallen."""
     if i >= task.rows.guarded:
         return w.guards.above[i - task.rows.guarded, j] != 0 and end < 0.0
-    return w.events.e_start[i, j] * end < 0.0
+    return w.events.g_start[i, j] * end < 0.0
 
 
 @numba.njit(**INNER)
@@ -195,15 +195,15 @@ def _bracket(task, lane, w, bad, j):
     weight = 0.5 if lane.right_high and abs(lane.same_side) > 1 else 1.0  # Illinois
     for i in range(task.rows.declared, task.rows.switching):
         if first:
-            events.e_low[i, j] = events.e_before[i, j] = events.e_start[i, j]
+            events.g_low[i, j] = events.g_before[i, j] = events.g_start[i, j]
         if bad or first:
-            events.e_high[i, j], events.e_low[i, j] = (
-                events.e[i, j],
-                events.e_low[i, j] * weight,
+            events.g_high[i, j], events.g_low[i, j] = (
+                events.g[i, j],
+                events.g_low[i, j] * weight,
             )
         else:
-            events.e_before[i, j], events.e_low[i, j] = events.e_low[i, j], events.e[i, j]
-            events.e_high[i, j] *= weight
+            events.g_before[i, j], events.g_low[i, j] = events.g_low[i, j], events.g[i, j]
+            events.g_high[i, j] *= weight
 
 
 @numba.njit(**INNER)
@@ -244,8 +244,8 @@ def _foreseen(task, lane, w, bad, j):
     first = -1.0
     for i in range(task.rows.declared, task.rows.switching):
         root = -1.0
-        if _crossed(task, w, i, w.events.e_high[i, j], j) and (lane.right_high or lane.low == 0.0):
-            now, end = w.events.e_low[i, j], w.events.e_high[i, j]
+        if _crossed(task, w, i, w.events.g_high[i, j], j) and (lane.right_high or lane.low == 0.0):
+            now, end = w.events.g_low[i, j], w.events.g_high[i, j]
             root = lane.low + (lane.high - lane.low) * min(max(now / (now - end), 0.0), 1.0)
         elif lane.low > 0.0:
             root = _extrapolated(lane, w, i, j)
@@ -263,13 +263,13 @@ def _extrapolated(lane, w, i, j):
     By a secant, and where there are three values by the parabola through them, one step of Newton's
     method from there.
     """
-    before, now, length = w.events.e_before[i, j], w.events.e_low[i, j], lane.low - lane.low_before
+    before, now, length = w.events.g_before[i, j], w.events.g_low[i, j], lane.low - lane.low_before
     if before * now <= 0.0 or abs(now) >= abs(before):
         return -1.0
     slope = (now - before) / length
     root = lane.low - now / slope
     if lane.low_before > 0.0:
-        bend = (slope - (before - w.events.e_start[i, j]) / lane.low_before) / lane.low
+        bend = (slope - (before - w.events.g_start[i, j]) / lane.low_before) / lane.low
         steeper = slope + bend * (2.0 * root - lane.low - lane.low_before)
         if steeper * slope > 0.0:
             nearer = root - bend * (root - lane.low) * (root - lane.low_before) / steeper

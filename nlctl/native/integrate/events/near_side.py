@@ -18,21 +18,21 @@ _HALVINGS = 24  # of the way to a break point that is farther back
 
 @numba.njit(**INNER)
 def look_before(rhs, task, lanes, w, found):
-    """Make memories in w.events.g what they are just before the break point at which a step ends.
+    """Make memories in w.memories.m what they are just before a break point that ends a step.
 
     Behind it, what carries a memory along may have jumped back: it keeps what it was before.
     """
-    events, inside = w.events, w.inside
-    wanted, any_wanted, nearer = inside.wanted, False, events.g_inside[3]
+    inside, ahead, memories = w.inside, w.ahead, w.memories
+    wanted, any_wanted, nearer = inside.wanted, False, w.events.g_inside[3]
     back = 2.5 * min(10.0 * task.rtol, 1e-4)  # see `locate`: the break point is not so far back
     for j in range(lanes.size):
-        wanted[j] = found[j] == EVENT and _crosses(task, w, events.e, j)
+        wanted[j] = found[j] == EVENT and _crosses(task, w, w.events.g, j)
         any_wanted |= wanted[j]
     if not any_wanted:
         return
     for j in range(lanes.size):
         inside.part[j] = 1.0 - back
-    events_at_parts(rhs, task, lanes, w, nearer)
+    events_at_parts(rhs, task, lanes, w, nearer, memories.m_inside[3])
     any_far = False
     for j in range(lanes.size):
         inside.part[j] = 1.0 - 2.0 * back
@@ -40,14 +40,14 @@ def look_before(rhs, task, lanes, w, found):
         any_far |= inside.sought[j] > 0
     if any_far:
         _halve(rhs, task, lanes, w, back)
-    events_at_parts(rhs, task, lanes, w, w.ahead.g)
+    events_at_parts(rhs, task, lanes, w, ahead.g, ahead.m)
     for j in range(lanes.size):
         far = inside.sought[j] > 0
-        ahead = 0.0 if far else 1.0 + _until_break_point(task, w, nearer, j)
-        for i in range(task.rows.switching, events.g.shape[0]):
-            if wanted[j] and events.e_start[i, j] != 0.0:
-                change = 0.0 if far else nearer[i, j] - w.ahead.g[i, j]
-                events.g[i, j] = w.ahead.g[i, j] + ahead * change
+        on = 0.0 if far else 1.0 + _until_break_point(task, w, nearer, j)
+        for i in range(memories.m.shape[0]):
+            if wanted[j] and memories.rate_start[i, j] != 0.0:
+                change = 0.0 if far else memories.m_inside[3, i, j] - ahead.m[i, j]
+                memories.m[i, j] = ahead.m[i, j] + on * change
 
 
 @numba.njit(**INNER)
@@ -65,7 +65,7 @@ def _halve(rhs, task, lanes, w, back):
             )
             inside.part[j] = 0.5 * (inside.bracket[0, j] + inside.bracket[2, j])
     for _ in range(_HALVINGS):
-        events_at_parts(rhs, task, lanes, w, w.ahead.g)
+        events_at_parts(rhs, task, lanes, w, w.ahead.g, w.ahead.m)
         for j in range(lanes.size):
             if inside.sought[j] > 0:
                 inside.bracket[2 if _crosses(task, w, w.ahead.g, j) else 0, j] = inside.part[j]
@@ -80,15 +80,15 @@ def _until_break_point(task, w, nearer, j):
     """Return how far it is to the first break point, in distances between the last two looks."""
     first = np.inf
     for i in range(task.rows.switching):
-        if w.events.e_start[i, j] * w.events.e[i, j] < 0.0:
+        if w.events.g_start[i, j] * w.events.g[i, j] < 0.0:
             first = min(first, nearer[i, j] / (w.ahead.g[i, j] - nearer[i, j]))
     return min(max(first, 0.0), 1.0)
 
 
 @numba.njit(**INNER)
-def _crosses(task, w, e, j):
+def _crosses(task, w, g, j):
     """Whether a switching function has another sign than at the start of a step."""
     for i in range(task.rows.switching):  # noqa: SIM110 (no generators in machine code)
-        if w.events.e_start[i, j] * e[i, j] < 0.0:
+        if w.events.g_start[i, j] * g[i, j] < 0.0:
             return True
     return False

@@ -21,9 +21,9 @@ def solution_at(theta, task, lane, w, j, result):
 
 
 @numba.njit(**INNER)
-def events_at_parts(rhs, task, lanes, w, g):
-    """Fill `g` with switching functions and memories at w.inside.part of the steps just tried."""
+def events_at_parts(rhs, task, lanes, w, g, m):
+    """Fill `g` and `m` at the parts w.inside.part of the steps just tried."""
     for j in range(lanes.size):
         w.t[j] = lanes[j].t + w.inside.part[j] * lanes[j].step
         solution_at(w.inside.part[j], task, lanes[j], w, j, w.ahead.x)
-    evaluate(rhs, task, lanes, w, w.ahead.x, w.ahead.dx, g)
+    evaluate(rhs, task, lanes, w, w.ahead.x, w.ahead.dx, g, m)

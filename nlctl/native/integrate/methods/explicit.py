@@ -34,10 +34,11 @@ def explicit_attempt(rhs, task, lanes, w):
             inputs_at(task, lanes, w)
         if s < last:
             combined(x, hh, pair.A, k, s, w.x_stage_flat)
-            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.events.g_inside[pair.kept[s]])
+            g, m = w.events.g_inside[pair.kept[s]], w.memories.m_inside[pair.kept[s]]
+            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], g, m)
         else:
             combined(x, hh, pair.A, k, s, w.x_new_flat)
-            call_rhs(rhs, w.t, w.x_new, w.u, task.p, w.k[s], w.events.g)
+            call_rhs(rhs, w.t, w.x_new, w.u, task.p, w.k[s], w.events.g, w.memories.m)
         for i in task.rows.memory:
             for j in range(count):
                 w.k[s, i, j] = 0.0

@@ -146,46 +146,42 @@ place = numba.njit(**INNER)(jacobian_place)
 
 
 @numba.njit(**INNER)
-def factorise(task, diagonal, w):
+def factorise(method, diagonal, work):
     """Factorise diagonal * I - J; return whether only where there are entries."""
-    stiff = w.stiff
-    if task.stiff.order.size and _factorise_entries(
-        task, diagonal, stiff.jacobian_flat, stiff.factors
-    ):
+    if method.order.size and _factorise_entries(method, diagonal, work.jacobian_flat, work.factors):
         return True
-    n, columns = stiff.columns.shape[0], stiff.columns
+    n, columns = work.columns.shape[0], work.columns
     for j in range(n):
         for i in range(n):
-            columns[j, i] = -stiff.jacobian_flat[place(i, j, n)]
+            columns[j, i] = -work.jacobian_flat[place(i, j, n)]
         columns[j, j] += diagonal
-    _factorise_all(columns, stiff.pivots)
+    _factorise_all(columns, work.pivots)
     return False
 
 
 @numba.njit(**INNER)
-def solve(task, only_entries, w, b):
+def solve(method, only_entries, work, b):
     """Solve with the factors of `factorise`; `b` becomes the solution."""
     if only_entries:
-        _solve_entries(task, w.stiff.factors, b)
+        _solve_entries(method, work.factors, b)
     else:
-        _solve_all(w.stiff.columns, w.stiff.pivots, b)
+        _solve_all(work.columns, work.pivots, b)
 
 
 @numba.njit(**INNER)
-def _factorise_entries(task, diagonal, jacobian, factors):
+def _factorise_entries(method, diagonal, jacobian, factors):
     """Factorise with the pivots of an `Elimination`; return whether all are large enough.
 
     Row by row: what is subtracted is on the right of pivots that are done.  Of these their
     inverses are kept.
     """
-    stiff = task.stiff
     start, pivot, column, rank = (
-        stiff.start,
-        stiff.pivot,
-        stiff.column,
-        stiff.rank,
+        method.start,
+        method.pivot,
+        method.column,
+        method.rank,
     )
-    source, target, done = stiff.source, stiff.target, INDEX(0)
+    source, target, done = method.source, method.target, INDEX(0)
     for e in range(source.size):
         factors[e] = -jacobian[source[e]]
     for k in range(pivot.size):
@@ -206,13 +202,13 @@ def _factorise_entries(task, diagonal, jacobian, factors):
 
 
 @numba.njit(**INNER)
-def _solve_entries(task, factors, b):
+def _solve_entries(method, factors, b):
     """Solve with the factors of `_factorise_entries`, both times by sums over rows."""
     order, start, pivot, column = (
-        task.stiff.order,
-        task.stiff.start,
-        task.stiff.pivot,
-        task.stiff.column,
+        method.order,
+        method.start,
+        method.pivot,
+        method.column,
     )
     for k in range(order.size):
         total = b[order[k]]
@@ -227,17 +223,18 @@ def _solve_entries(task, factors, b):
 
 
 @numba.njit(**INNER)
-def multiply(task, jacobian, v, product):
+def multiply(method, jacobian, v, product):
     """Fill `product` with J v."""
-    stiff = task.stiff
-    n, source, column = v.size, stiff.source, stiff.column
+    n, source, column = v.size, method.source, method.column
     for i in range(n):
         product[i] = 0.0
-        for j in range(0 if stiff.order.size else n):
+        for j in range(0 if method.order.size else n):
             product[i] += jacobian[place(i, j, n)] * v[j]
-    for k in range(stiff.order.size):
-        for e in range(stiff.start[k], stiff.start[k + 1]):  # also where only factors have entries
-            product[stiff.order[k]] += jacobian[source[e]] * v[column[e]]
+    for k in range(method.order.size):
+        for e in range(
+            method.start[k], method.start[k + 1]
+        ):  # also where only factors have entries
+            product[method.order[k]] += jacobian[source[e]] * v[column[e]]
 
 
 @numba.njit(**INNER)

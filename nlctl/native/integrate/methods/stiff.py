@@ -160,12 +160,12 @@ def _differences(rhs, task, lanes, w):
     for c in range(n):
         ahead.x[c, 0] += RELATIVE * max(abs(w.x[c, 0]), FLOOR)
         delta = ahead.x[c, 0] - w.x[c, 0]
-        evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g)
+        evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
         for i in range(n):
             w.stiff.jacobian_flat[place(i, c, n)] = (ahead.dx[i, 0] - w.k[0, i, 0]) / delta
         ahead.x[c, 0] = w.x[c, 0]
     w.t[0] = lane.t + max(AHEAD * lane.step, 1e-12 * abs(lane.t))
-    evaluate(rhs, task, lanes, w, w.x, ahead.dx, ahead.g)
+    evaluate(rhs, task, lanes, w, w.x, ahead.dx, ahead.g, ahead.m)
     for i in range(n):
         w.stiff.f_t[i] = (ahead.dx[i, 0] - w.k[0, i, 0]) / (w.t[0] - lane.t)
 
@@ -179,7 +179,7 @@ def _spectral_radius(task, w):
         v[i] = 0.5 + (0.6180339887 * (i + 1)) % 1.0  # like no matrix's null space
     for _ in range(8):
         before, after = 0.0, 0.0
-        lu.multiply(task, w.stiff.jacobian_flat, v, product)
+        lu.multiply(task.stiff, w.stiff.jacobian_flat, v, product)
         for i in range(n):
             before += v[i] * v[i]
             after += product[i] * product[i]
@@ -204,11 +204,11 @@ def _memory_error(rhs, task, lanes, w, only_entries):
     rodas5p.end_slope(lanes[0].step, w.x_flat, w.x_new_flat, w.stiff.U, error)
     for i in range(error.size):
         error[i] = w.k[w.k.shape[0] - 1, i, 0] - error[i]
-    lu.solve(task, only_entries, w, error)
+    lu.solve(task.stiff, only_entries, w.stiff, error)
     for i in range(error.size):
         ahead.x[i, 0] = w.x_new[i, 0] + error[i]
-    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g)
-    return SHARE * memory_error(task, w.x, w.events.g, ahead.g, 0)
+    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
+    return SHARE * memory_error(task, w.x, w.memories.m, ahead.m, 0)
 
 
 @numba.njit(**INNER)
@@ -220,7 +220,7 @@ def stiff_attempt(rhs, point, along, task, lanes, w):
         _jacobian(rhs, point, along, task, lanes, w)
         if (lane.stiff + 1) % TRIAL == 0:  # when the methods are compared
             w.rate[0] = _spectral_radius(task, w)
-    only_entries = lu.factorise(task, 1.0 / (h * rodas5p.GAMMA), w)
+    only_entries = lu.factorise(task.stiff, 1.0 / (h * rodas5p.GAMMA), stiff)
     for s in range(rodas5p.STAGES):
         w.t[0] = lane.t + rodas5p.NODES[s] * h
         if s == 0:
@@ -228,14 +228,14 @@ def stiff_attempt(rhs, point, along, task, lanes, w):
                 w.ahead.dx[i, 0] = w.k[0, i, 0]
         else:
             rodas5p.stage(s, w.x_flat, stiff.U, w.x_stage_flat)
-            kept = w.events.g_inside[rodas5p.KEPT[s]]
-            evaluate(rhs, task, lanes, w, w.x_stage, w.ahead.dx, kept)
+            g, m = w.events.g_inside[rodas5p.KEPT[s]], w.memories.m_inside[rodas5p.KEPT[s]]
+            evaluate(rhs, task, lanes, w, w.x_stage, w.ahead.dx, g, m)
         rodas5p.right_side(s, h, w.ahead.dx_flat, stiff.f_t, stiff.U)
-        lu.solve(task, only_entries, w, stiff.U[s])
+        lu.solve(task.stiff, only_entries, stiff, stiff.U[s])
     for i in range(n):
         w.x_new[i, 0] = w.x_stage[i, 0] + stiff.U[7, i]
     w.t[0] = lane.t + h
-    evaluate(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1], w.events.g)
+    evaluate(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1], w.events.g, w.memories.m)
     w.error[0] = rodas5p.error_norm(w.x, w.x_new, stiff.U, task.rtol, task.atol)
     if task.rows.memory.size:
         error = _memory_error(rhs, task, lanes, w, only_entries)

@@ -146,7 +146,7 @@ def taylor_attempt(rhs, task, lanes, w):
     call_step(series[_STEP], w.h, task.taylor.c, w.taylor.terms, w.x_new, w.ahead.dx)
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
-    call_rhs(rhs, w.t, w.x_new, w.u, task.p, dx, w.events.g)
+    call_rhs(rhs, w.t, w.x_new, w.u, task.p, dx, w.events.g, w.memories.m)
     call_judge(
         series[_JUDGE],
         w.h,
@@ -214,10 +214,10 @@ def _meets(task, w, i, end, j):
     """Whether an event function has changed its sign in a step, or a guard has fallen."""
     if i >= task.rows.guarded:
         return w.guards.above[i - task.rows.guarded, j] != 0 and end < 0.0
-    small = abs(w.events.e_start[i, j]) + abs(end) <= SMALL_KINK * task.atol
+    small = abs(w.events.g_start[i, j]) + abs(end) <= SMALL_KINK * task.atol
     if task.rows.bending <= i < task.rows.declared and small:
         return False  # see `first_root`
-    return triggered(w.events.e_start[i, j], end, False, w.events.behind[i, j] != 0.0)
+    return triggered(w.events.g_start[i, j], end, w.events.behind[i, j] != 0.0)
 
 
 @numba.njit(**INNER)
@@ -241,7 +241,7 @@ def _rest(task, i):
 def _root(task, w, i, h, j):
     """Return the part of a step h at which the polynomial of an event function is 0."""
     low, high, row, p = 0.0, 1.0, w.x.shape[0] + i, task.taylor.highest - 1
-    f_low, f_high = w.events.e_start[i, j], w.ahead.g[i, j]
+    f_low, f_high = w.events.g_start[i, j], w.ahead.g[i, j]
     for n in range(60):
         part = f_low / (f_low - f_high)
         middle = low + (high - low) * (0.5 if n % 3 == 2 else min(max(part, 0.01), 0.99))
@@ -305,15 +305,15 @@ def _compare(task, lane, w, j):
         return
     until, p, n = 1.0, task.taylor.highest - 1, w.x.shape[0]
     for i in range(task.rows.switching):
-        before, now = events.e_start[i, j], events.g[i, j]
+        before, now = events.g_start[i, j], events.g[i, j]
         if _meets(task, w, i, now, j):
             part = min(max(before / (before - now), 0.0), 1.0)
             until = min(until, lane.low / lane.step if lane.tries else part)
     for i in range(task.rows.switching):
         if not _is_followed(p, w.h[j], taylor.terms, n + i, j):
             inside.looked[j], inside.foreseen[j] = -1.0, 0.5
-        elif not events.e_start[i, j] * events.g[i, j] < 0.0:
-            side = events.e_start[i, j]
+        elif not events.g_start[i, j] * events.g[i, j] < 0.0:
+            side = events.g_start[i, j]
             if i >= task.rows.guarded and w.guards.above[i - task.rows.guarded, j] != 0:
                 side = 1.0
             first, farthest = _crossing(p, w.h[j], taylor.terms, n + i, side, until, j)
@@ -333,11 +333,11 @@ def _compare(task, lane, w, j):
 def _ends_at_event(task, lane, w, j):
     """Whether a step may end right behind an event, so that it is accepted."""
     for i in range(task.rows.declared):
-        before, now = w.events.e_start[i, j], w.events.g[i, j]
-        if triggered(before, now, False, w.events.behind[i, j] != 0.0):
+        before, now = w.events.g_start[i, j], w.events.g[i, j]
+        if triggered(before, now, w.events.behind[i, j] != 0.0):
             low = 0.0
             if lane.tries:
-                low, before = lane.low / lane.step, w.events.e_low[i, j]
+                low, before = lane.low / lane.step, w.events.g_low[i, j]
             root = low + (1.0 - low) * before / (before - now)
             if not 1.0 - root > 0.8 * _BEFORE * behind_event(task.rtol):
                 return True
@@ -415,7 +415,7 @@ def _look_across(rhs, task, lanes, w):
                 w.ahead.x[i, j] = w.x[i, j]
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
-    call_rhs(rhs, w.t, w.ahead.x, w.u, task.p, dx, w.ahead.g)
+    call_rhs(rhs, w.t, w.ahead.x, w.u, task.p, dx, w.ahead.g, w.ahead.m)
     for j in range(lanes.size):
         limit = p + 1.0 if inside.wanted[j] else 1.0
         if inside.looked[j] > 0.0 and _defect(task, w, dx, j) <= limit:
