@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from ...accumulation import AT_LEAST, WITHIN, Crowd, crowd_of, reached, tolerance_of
-from ..integrate.state import TAYLOR
 from .steps import Attempt, Jump, LaneEquations
 
 __all__ = ["accumulated", "accumulating"]
@@ -30,7 +29,7 @@ def accumulating(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | No
     """Return the last switch of a lane whose switches accumulate in the steps that it has tried."""
     run, j = evaluated.run, evaluated.j
     lane = run.lanes[j]
-    if run.task.method != TAYLOR and lane["accepted"] > _STEPS * lane["events"]:
+    if not run.task.taylor.highest and lane["accepted"] > _STEPS * lane["events"]:
         return None  # at once: what usual runs take must not cost them anything
     t = np.array([a.t[j] for a in attempts])
     first = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0)  # rejected steps begin where others do

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from ..integrate.state import RUNNING, TAYLOR
+from ..integrate.state import RUNNING
 from .accumulation import accumulated, accumulating
 from .steps import Attempt, Jump, LaneEquations, parameters_of
 
@@ -74,7 +74,7 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
 
 def probe_of(task: Any) -> int:
     """Return how many steps are looked at, at the end of a window of a run."""
-    return PROBE * (_PROBES if task.method == TAYLOR else 1)
+    return PROBE * (_PROBES if task.taylor.highest else 1)
 
 
 def snapshot(work: Any, advance: Callable[[], Any]) -> tuple[Any, Attempt]:

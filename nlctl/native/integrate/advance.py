@@ -35,7 +35,7 @@ from .methods.stiff import UNKNOWN, stiff_attempt
 from .resets import fall
 from .restart import memory_rates, restart
 from .samples import begin_afresh, next_stop, pass_jumps, take_samples
-from .state import AUTO, DERIVATIVES, ENDED, INNER, RUNNING, is_stiff
+from .state import AUTO, DERIVATIVES, ENDED, INNER, METHOD, RUNNING, is_stiff
 
 
 @numba.njit(**INNER)
@@ -212,7 +212,7 @@ def advance(rhs, point, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
     A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
-    before the stiff method knows where to get its Jacobian from.
+    before the stiff method knows where to get its Jacobian from, or METHOD where another one pays.
     """
     rows = task.rows
     lanes = w.lanes
@@ -253,6 +253,9 @@ def advance(rhs, point, along, task, w, rounds):
             fall(rhs, task, lanes, w, done)
         if rows.ways.size:
             _look_at_inputs(task, lanes, w)
+        if lanes[0].status == RUNNING and taylor.is_to_change(task, lanes[0]):
+            lanes[0].status = METHOD
+            return
 
 
 @numba.njit(**INNER)

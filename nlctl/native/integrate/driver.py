@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -26,6 +25,7 @@ from ..histories import lines_of, variations, with_past, with_room
 from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
 from ..taylor.method import with_taylor
+from ..taylor.turns import turned, with_turns
 from ..timed.ahead import ahead
 from .discrete import simulate_discrete
 from .events.functions import Rows
@@ -34,7 +34,7 @@ from .memory import replaced, with_table
 from .methods import EXPLICIT_PAIRS
 from .methods.lu import WHOLE
 from .methods.stiff import DIFFERENCES, EXACT, UNKNOWN, stiff_method
-from .methods.tableau import Pair, Tableau
+from .methods.tableau import Tableau, pair_of
 from .methods.taylor import OTHER_METHOD
 from .methods.tsit5 import TSIT5
 from .resets import Resets
@@ -122,12 +122,14 @@ def trajectory(
         return _sampled(compiled, times, inputs, x0, p)
     varied = variations(compiled, times) if varied is None else varied
     run = prepared(compiled, times, inputs, x0[:, None], p[:, None], settings, varied)
+    run = with_turns(compiled, run, settings)
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         try:
             begin(run)
             paces = new_paces(run.lanes)
             while run.lanes["status"][0] == RUNNING:
                 run = differentiated(compiled, watched(run, paces), p)
+                run = turned(compiled, run, p, settings)
                 if progress is not None:
                     progress(float(run.lanes["t"][0]))
         except KeyboardInterrupt:
@@ -171,6 +173,8 @@ class Run:
         Exact derivatives, if the stiff method has asked for them and there are any.
     jumps : mapping
         Of members that chatter, by their lanes: where.
+    series : Task or None
+        With Taylor's method, if it has had its turn: see `nlctl.native.taylor.turns`.
     """
 
     machine: Machine
@@ -178,6 +182,7 @@ class Run:
     work: Any
     along: Along | None = None
     jumps: Mapping[int, Jump] = field(default_factory=dict)
+    series: Any = None
 
     @property
     def lanes(self) -> np.ndarray:
@@ -277,7 +282,7 @@ def prepared(
         fixed=float(settings.step),
         max_steps=int(settings.max_steps),
         method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
-        pair=_pair(settings.pair),
+        pair=pair_of(settings.pair),
         stiff=stiff_method(len(x0), UNKNOWN, np.zeros((1, 1)), WHOLE),
         taylor=OTHER_METHOD,
         rows=_rows(program, code, read.watched),
@@ -330,12 +335,6 @@ def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
             f"method={settings.method!r}"
         )
     return "tsit5"
-
-
-@functools.cache
-def _pair(pair: Tableau) -> Pair:
-    """Return the arrays of a pair, made once."""
-    return pair.pair()
 
 
 def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Clocks:

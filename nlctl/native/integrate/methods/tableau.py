@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -143,3 +144,9 @@ class Tableau:
         B[0] += [1.0, -2.0, 1.0]
         B[-1] += [0.0, -1.0, 1.0]
         return B
+
+
+@functools.cache
+def pair_of(tableau: Tableau) -> Pair:
+    """Return the arrays that steps are made with, laid out once."""
+    return tableau.pair()

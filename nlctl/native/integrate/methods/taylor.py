@@ -27,6 +27,8 @@ from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals2, Reals3, with_table, zeros
 from ..state import INNER, RUNNING
 
+TRIAL = 20  # steps after which it is judged whether this method pays
+MEASURED = 50  # the last explicit steps before that
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
 _LOOKS = 16  # parts of a step
@@ -44,6 +46,8 @@ class TaylorMethod(NamedTuple):
     functions: Places1
     sides: Places2  # rows of comparisons, see `taylor.recurrences.Recurrences`
     c: Reals2  # what the functions read besides their arguments
+    span: int  # steps of its turn where it pays, 0 if it is not compared with the explicit method
+    cost: float  # of a step, in explicit ones
     table: Places2
 
 
@@ -59,7 +63,7 @@ class TaylorArrays(NamedTuple):
 
 OTHER_METHOD = with_table(
     TaylorMethod, highest=0, functions=np.zeros(0, dtype=np.int64),
-    sides=np.zeros((0, 2), dtype=np.int64), c=np.zeros((1, 1)),
+    sides=np.zeros((0, 2), dtype=np.int64), c=np.zeros((1, 1)), span=0, cost=0.0,
 )  # fmt: skip
 
 
@@ -99,6 +103,32 @@ def expand(task, lanes, w):
             if _begins_at_jump(task, lanes[j], taylor.terms, j):
                 lanes[j].h = _shortest(task)
         taylor.expanded[j] = 1
+
+
+@numba.njit(**INNER)
+def is_to_change(task, lane):
+    """Whether a run of the method "auto" is to go on by Taylor's method, or not any more.
+
+    Both are measured in turn, see `nlctl.native.taylor.turns`.
+    """
+    if task.taylor.span == 0:
+        return False
+    if lane.stiff:
+        lane.from_t, lane.from_tried = lane.t, lane.accepted + lane.rejected
+        return False
+    tried = lane.accepted + lane.rejected - lane.from_tried
+    if task.taylor.highest == 0 and lane.span - tried >= MEASURED:
+        lane.from_t = lane.t
+    if lane.tries > 0 or lane.cross > 0.0 or tried < lane.span:
+        return False
+    work = task.taylor.cost * tried if task.taylor.highest else min(tried, MEASURED)
+    lane.pace = (lane.t - lane.from_t) / work
+    if task.taylor.highest == 0:
+        return lane.slow == 0
+    if lane.span > TRIAL or lane.pace < lane.other_pace:
+        return True
+    lane.span = task.taylor.span
+    return False
 
 
 @numba.njit(**INNER)
