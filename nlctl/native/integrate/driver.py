@@ -64,9 +64,9 @@ class Settings:
     max_steps : int
         Attempted steps after which a run ends as STEP_LIMIT.
     method : {"auto", "tsit5", "rodas5p", "taylor"} or Tableau
-        Explicit pair of orders 5(4), stiff method of orders 5(4), or whichever is faster;
-        Taylor's method, of an order that follows from rtol, for equations that can be written as
-        expressions and have no memories; an explicit pair of your own as its tableau.
+        Explicit pair of orders 5(4); stiff method of orders 5(4); Taylor's method, of an order
+        that follows from rtol, for equations that can be written as expressions and have no
+        memories; whichever is faster; an explicit pair of your own as its tableau.
     step : float
         Fixed step (s) instead of error control; 0 for error control.
     max_step : float
