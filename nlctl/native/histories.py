@@ -10,9 +10,9 @@ import numpy as np
 from ..delays.pieces import smooth_pieces
 from ..delays.variation import Variation, check_positive, variation, variation_table
 from ..errors import ParameterError
-from .integrate.delayed import Lines
+from .integrate.delayed import DelayLines
 from .integrate.delays import SMOOTH
-from .integrate.memory import grown, replaced, with_table
+from .integrate.memory import grown, with_fields, with_table
 
 if TYPE_CHECKING:
     from .compiled import Compiled
@@ -33,7 +33,7 @@ def variations(compiled: Compiled, times: np.ndarray) -> list[Variation | None]:
 
 def lines_of(
     compiled: Compiled, p: np.ndarray, varied: list[Variation | None], signals: np.ndarray
-) -> Lines:
+) -> DelayLines:
     """Return the delays of all lines, how they vary, what acts on what, and where signals are."""
     read = compiled.schedule
     delays = np.zeros((len(read.lines), p.shape[1]))
@@ -41,7 +41,7 @@ def lines_of(
         delays[row] = p[compiled.program.layout[line.block or 0]["delay"].offset]
         check_positive(varied[row], delays[row], read.nodes[line.block or 0].path)
     return with_table(
-        Lines, delays=delays, direct=_direct(read).astype(np.int64), signals=signals,
+        DelayLines, delays=delays, direct=_direct(read).astype(np.int64), signals=signals,
         **variation_table(varied),
     )  # fmt: skip
 
@@ -110,7 +110,7 @@ def with_room(task: Any, work: Any) -> Any:
 
 def _with_places(work: Any, room: int) -> Any:
     """Return the workspace with places for so many steps."""
-    return replaced(work, past=grown(work.past, _KEPT, room))
+    return with_fields(work, past=grown(work.past, _KEPT, room))
 
 
 def _direct(read: Schedule) -> np.ndarray:

@@ -16,7 +16,7 @@ from .delays import is_full, keep, look_within, unresolved
 from .evaluate import inputs_at
 from .events.crossing import NOTHING, crossing, left_to_other_side
 from .events.excursions import look_between
-from .events.functions import begins, has_events
+from .events.functions import begin_next, has_events
 from .events.location import (
     AGAIN,
     CLEAR,
@@ -173,7 +173,7 @@ def _take(task, w, done):
                 x[m, j] = become
                 for c in range(rows.declared):
                     events.behind[c, j] = 0.0  # with another memory the way back is an event
-        begins(w, j)
+        begin_next(w, j)
 
 
 @numba.njit(**INNER)

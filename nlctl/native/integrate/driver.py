@@ -28,18 +28,18 @@ from ..taylor.method import with_taylor
 from ..taylor.turns import turned, with_turns
 from ..timed.ahead import ahead
 from .discrete import simulate_discrete
-from .events.functions import Rows
+from .events.functions import EventRows
 from .log import log_room
-from .memory import replaced, with_table
+from .memory import with_fields, with_table
 from .methods import EXPLICIT_PAIRS
 from .methods.lu import WHOLE
 from .methods.stiff import DIFFERENCES, EXACT, UNKNOWN, stiff_method
 from .methods.tableau import Tableau, pair_of
-from .methods.taylor import OTHER_METHOD, STAGES
+from .methods.taylor import OTHER_METHOD, SLOPES
 from .methods.tsit5 import TSIT5
 from .resets import Resets
 from .results import Statistics, Trajectory, at_its_end, made
-from .samples import Clocks, Timed
+from .samples import Ticks, Timed
 from .state import AUTO, DERIVATIVES, EXPLICIT, IMPLICIT, RUNNING, TAYLOR, Status
 from .workspace import Task, new_work
 
@@ -243,7 +243,7 @@ def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
         along.elimination if along else WHOLE,
     )
     run.lanes["status"] = RUNNING
-    return replace(run, task=replaced(run.task, stiff=stiff), along=along)
+    return replace(run, task=with_fields(run.task, stiff=stiff), along=along)
 
 
 def finish(run: Run) -> np.ndarray:
@@ -300,7 +300,7 @@ def prepared(
     work = new_work(
         x0, times, read.ninputs, code.lowered.rows["g"], code.lowered.rows["m"], len(read.outputs),
         code.lowered.rows["s"], len(program.guards), len(read.lines),
-        STAGES if terms else settings.pair.stages, terms or (1, 0),
+        SLOPES if terms else settings.pair.stages, terms or (1, 0),
         log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"
@@ -308,12 +308,12 @@ def prepared(
     return Run(machine=code, task=task, work=work)
 
 
-def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> Rows:
+def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> EventRows:
     """Return how many rows are whose: declared, located, memories."""
     located = code.lowered.rows["g"]
     bending = code.lowered.conditions.bending
     return with_table(
-        Rows,
+        EventRows,
         bending=program.switching,
         declared=program.switching + bending,
         guarded=located - len(program.guards),
@@ -337,7 +337,7 @@ def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
     return "tsit5"
 
 
-def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Clocks:
+def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Ticks:
     """Return when something happens to sampled blocks of each lane, and what."""
     sampled, places = compiled.program.sampled, {what: k for k, what in enumerate(code.meetings)}
     ticks = np.full((len(due), max(one.times.size for one in due)), np.inf)
@@ -352,7 +352,7 @@ def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Clocks:
             if store.array == "s":
                 written[k, store.row : store.row + store.size] = 1
     return with_table(
-        Clocks, ticks=ticks, which=which, functions=code.sample_entries, due=written,
+        Ticks, ticks=ticks, which=which, functions=code.sample_entries, due=written,
         states=np.array(sampled, dtype=np.int64),
     )  # fmt: skip
 

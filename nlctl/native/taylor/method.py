@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import ParameterError
-from ..integrate.memory import replaced
+from ..integrate.memory import with_fields
 from ..machine.routine import entry
 from ..sliding.reading import relay_places
 from .routine import series
@@ -57,7 +57,7 @@ def with_taylor(
     order, made = order_for(settings.rtol), series(compiled, p, p.shape[1])
     found = [entry(function) for function in made.functions]
     plain = any(callable(each) for each in found)
-    taylor = replaced(
+    taylor = with_fields(
         task.taylor,
         highest=order,
         functions=np.array(found, dtype=object if plain else np.int64),
@@ -67,8 +67,8 @@ def with_taylor(
     )
     # the power of the step size in its error; there are no stages at parts of a step
     inside = task.pair.inside * [[0.0], [1.0], [1.0]]
-    pair = replaced(task.pair, order=order + 1.0, stable=np.inf, inside=inside)
-    return replaced(task, taylor=taylor, pair=pair), (order + 1, made.layout.rows)
+    pair = with_fields(task.pair, order=order + 1.0, stable=np.inf, inside=inside)
+    return with_fields(task, taylor=taylor, pair=pair), (order + 1, made.layout.rows)
 
 
 def _check(compiled: Compiled) -> None:

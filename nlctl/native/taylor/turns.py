@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import ParameterError
-from ..integrate.memory import replaced
+from ..integrate.memory import with_fields
 from ..integrate.methods.tableau import pair_of
-from ..integrate.methods.taylor import MEASURED, OTHER_METHOD, STAGES, TRIAL, new_terms
+from ..integrate.methods.taylor import MEASURED, OTHER_METHOD, SLOPES, FIRST_TURN, new_terms
 from ..integrate.state import METHOD, RUNNING
 from ..integrate.workspace import with_stages
 from .method import order_for, with_taylor
@@ -42,7 +42,7 @@ def with_turns(compiled: Compiled, run: Run, settings: Settings) -> Run:
         return run
     steps = max(_STEPS, len(compiled.lowered.functions["rhs"].plan.nodes))
     run.lanes["span"] = run.lanes["wait"] = steps
-    return replace(run, task=replaced(run.task, taylor=replaced(OTHER_METHOD, span=_SPAN)))
+    return replace(run, task=with_fields(run.task, taylor=with_fields(OTHER_METHOD, span=_SPAN)))
 
 
 def turned(compiled: Compiled, run: Run, p: np.ndarray, settings: Settings) -> Run:
@@ -54,29 +54,29 @@ def turned(compiled: Compiled, run: Run, p: np.ndarray, settings: Settings) -> R
     lane["from_t"], lane["from_tried"] = lane["t"], lane["accepted"] + lane["rejected"]
     if run.task.taylor.highest:
         return _by_pair(run, settings)
-    lane["span"] = TRIAL
+    lane["span"] = FIRST_TURN
     if run.series is not None:  # it has had its turn before
-        taylor = replaced(run.series.taylor, span=run.task.taylor.span)
+        taylor = with_fields(run.series.taylor, span=run.task.taylor.span)
         run.work.taylor.expanded[:] = 0
-        task = replaced(run.task, taylor=taylor, pair=run.series.pair)
-        return replace(run, task=task, work=with_stages(run.work, STAGES))
+        task = with_fields(run.task, taylor=taylor, pair=run.series.pair)
+        return replace(run, task=task, work=with_stages(run.work, SLOPES))
     try:
         task, terms = with_taylor(run.task, compiled, p[:, None], settings)
     except ParameterError:  # there is what it cannot do
-        return replace(run, task=replaced(run.task, taylor=OTHER_METHOD))
+        return replace(run, task=with_fields(run.task, taylor=OTHER_METHOD))
     arrays = new_terms(*terms, run.work.u.shape[0], 1)
-    work = replaced(with_stages(run.work, STAGES), taylor=arrays)
+    work = with_fields(with_stages(run.work, SLOPES), taylor=arrays)
     return replace(run, task=task, work=work, series=task)
 
 
 def _by_pair(run: Run, settings: Settings) -> Run:
     """Return a run that goes on by the explicit pair: to be measured, or for longer each time."""
     lane, span = run.lanes[0], run.task.taylor.span
-    if lane["span"] > TRIAL:
+    if lane["span"] > FIRST_TURN:
         lane["span"], span = MEASURED, min(2 * span, _MOST)
     else:
         lane["wait"] *= 2
         lane["span"], span = lane["wait"], _SPAN
     lane["h"] = lane["pace"]
-    task = replaced(run.task, taylor=replaced(OTHER_METHOD, span=span), pair=pair_of(settings.pair))
+    task = with_fields(run.task, taylor=with_fields(OTHER_METHOD, span=span), pair=pair_of(settings.pair))
     return replace(run, task=task, work=with_stages(run.work, settings.pair.stages))

@@ -27,8 +27,8 @@ from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals2, Reals3, with_table, zeros
 from ..state import INNER, RUNNING
 
-TRIAL = 20  # steps after which it is judged whether this method pays
-STAGES = 2  # slopes at both ends of a step
+FIRST_TURN = 20  # steps after which it is judged whether this method pays
+SLOPES = 2  # slopes at both ends of a step
 MEASURED = 50  # the last explicit steps before that
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
@@ -126,7 +126,7 @@ def is_to_change(task, lane):
     lane.pace = (lane.t - lane.from_t) / work
     if task.taylor.highest == 0:
         return lane.slow == 0
-    if lane.span > TRIAL or lane.pace < lane.other_pace:
+    if lane.span > FIRST_TURN or lane.pace < lane.other_pace:
         return True
     lane.span = task.taylor.span
     return False
