@@ -13,6 +13,7 @@ through time, each with its own steps.  `response` makes of one run what python-
 """
 
 from ..errors import CompileError
+from .ahead import compile_ahead
 from .audit import AuditError
 from .compiled import Compiled, compile  # noqa: A004 (what it does)
 from .diagram.schedule import AlgebraicLoopError
@@ -22,7 +23,6 @@ from .integrate.methods.tableau import Tableau
 from .integrate.results import Statistics
 from .integrate.state import Status
 from .linearized import linearize
-from .machine.ahead import compile_ahead
 from .machine.store import CacheWarning
 from .response import Response, uninterrupted
 from .typesetting import BlockEquations, typeset

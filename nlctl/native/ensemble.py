@@ -21,6 +21,7 @@ from ..names import unknown
 from ..params import checked_times, integer
 from ..responses.arguments import checked_params, input_array
 from ..wording import counted
+from .ahead import compile_for
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.detection import new_paces
@@ -39,7 +40,6 @@ from .integrate.driver import (
 from .integrate.methods.tableau import Tableau
 from .integrate.results import Trajectory, made
 from .integrate.state import RUNNING, STIFF, Status
-from .machine.ahead import compile_for
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
 from .members import Members, members
 

@@ -24,14 +24,14 @@ from numba.core import config, event
 
 import nlctl
 from nlctl.native import CompileError
-from nlctl.native.codegen.calls import Source
+from nlctl.native.integrators import integrator_key
 from nlctl.native.machine import finish, store
-from nlctl.native.machine.called import TAUGHT
 from nlctl.native.machine.fingerprint import function_key, module_key, program_key
-from nlctl.native.machine.integrators import integrator_key
 from nlctl.native.machine.machine_code import Wanted, kept, machine_code
 from nlctl.native.machine.module import loaded
 from nlctl.native.machine.store import CacheWarning
+from nlctl.native.opaque.called import TAUGHT
+from nlctl.native.opaque.calls import Source
 
 PACKAGE = Path(nlctl.__file__).parent
 REAL = numba.float64(numba.float64)
@@ -531,7 +531,7 @@ class TestSources:
     def test_an_edit_of_a_code_generator(self, tmp_path):
         """Machine code of programs: nothing in them names what generates it."""
         first = "from __future__ import annotations\n"
-        edits = {"thirdparty/vectors.py": (first, f"{first}\nEDITED = True\n")}
+        edits = {"purity/vectors.py": (first, f"{first}\nEDITED = True\n")}
         integrators, taught = keys_of_copy(tmp_path, edits)
         assert integrators == integrator_key()
         assert taught != module_key(*TAUGHT)

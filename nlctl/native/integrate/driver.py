@@ -17,14 +17,14 @@ from ...errors import ParameterError
 from ...names import unknown
 from ...responses.watched import Watched
 from ...sampling.clock import Instants
+from ..along import Along, derivatives
 from ..chattering.detection import Jump, asked, jump_of, new_paces, probe_of, snapshot
-from ..codegen.along import Along, derivatives
-from ..codegen.program import Program, instants_of
 from ..compiled import Compiled
+from ..diagram.program import Program, instants_of
 from ..happened import happened, with_log
 from ..histories import lines_of, variations, with_past, with_room
+from ..integrators import integrators
 from ..machine.evaluations import Machine, machine
-from ..machine.integrators import integrators
 from ..taylor.method import taylor_task
 from ..timed.ahead import ahead
 from .discrete import simulate_discrete
@@ -264,7 +264,9 @@ def prepared(
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, count, read = compiled.program, x0.shape[1], compiled.schedule
     method = _method(compiled, settings)
-    expansion, terms = taylor_task(compiled, p, settings) if method == "taylor" else ({}, ())
+    expansion, terms = (
+        taylor_task(compiled, p, settings.rtol, settings.atol) if method == "taylor" else ({}, ())
+    )
     due = instants_of(compiled.schedule, program, times, p)
     code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     c = np.zeros((code.rows, count))
@@ -282,7 +284,7 @@ def prepared(
         alone=int(count == 1),
         **_instants(compiled, code, due),
         **_jumping(program, code),
-        **ahead(code.lowered, p, times, settings.max_step),
+        **ahead(code.lowered.timed, p, times, settings.max_step),
         opaque=int(bool(code.lowered.calls)),
         derivatives=UNKNOWN,
         c_along=np.zeros((1, 1)),

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...errors import ParameterError
+from ..equations.relays import relay_places
 from ..machine.routine import entry
-from ..sliding.reading import relay_places
+from ..reading import Reading
 from .routine import series
-
-if TYPE_CHECKING:
-    from ..compiled import Compiled
-    from ..integrate.driver import Settings
 
 LEAST, MOST = 4, 30  # orders
 
@@ -34,24 +31,25 @@ def order_for(rtol: float) -> int:
 
 
 def taylor_task(
-    compiled: Compiled, p: np.ndarray, settings: Settings
+    reading: Reading, p: np.ndarray, rtol: float, atol: float
 ) -> tuple[dict[str, Any], Any]:
     """Return what `Task` has for Taylor's method, and the shape of the coefficients.
 
     Parameters
     ----------
-    compiled : Compiled
+    reading : Reading
     p : ndarray
         Parameter vectors, shape (parameters, members).
-    settings : Settings
+    rtol, atol : float
+        Tolerances.
 
     Raises
     ------
     ParameterError
         If there is what it cannot do.
     """
-    _check(compiled)
-    order, made = order_for(settings.rtol), series(compiled, p, p.shape[1])
+    _check(reading)
+    order, made = order_for(rtol), series(reading, p, p.shape[1])
     found = [entry(function) for function in made.functions]
     plain = any(callable(each) for each in found)
     task = {
@@ -60,19 +58,19 @@ def taylor_task(
         "stable": np.inf,
         "series": np.array(found, dtype=object if plain else np.int64),
         "sides": made.sides,
-        "c_series": made.parameters(p, order=order, rtol=settings.rtol, atol=settings.atol),
+        "c_series": made.parameters(p, order=order, rtol=rtol, atol=atol),
     }
     return task, (order + 1, made.layout.rows)
 
 
-def _check(compiled: Compiled) -> None:
+def _check(reading: Reading) -> None:
     """Refuse what has no coefficients, whatever its equations are."""
-    name, schedule = compiled.system.name, compiled.schedule
-    if not compiled.system.nstates:
+    name, schedule = reading.system.name, reading.schedule
+    if not reading.system.nstates:
         raise ParameterError(
             f"'{name}' has no states, which method='taylor' needs: use method='tsit5'"
         )
-    memories = [compiled.state_labels[i] for i in compiled.program.memory]
+    memories = [reading.system.state_labels[i] for i in reading.program.memory]
     relays = [schedule.nodes[i].path for i in relay_places(schedule.nodes)]
     for what, found in (("memory", memories), ("an ideal relay", relays)):
         if found:

@@ -14,7 +14,7 @@ from stiff_problems import PROBLEMS
 
 import nlctl
 from nlctl.expressions.dependence import structure
-from nlctl.native.codegen.along import derivatives
+from nlctl.native.along import derivatives
 from nlctl.native.integrate.methods.lu import (
     WHOLE,
     Elimination,

@@ -14,9 +14,9 @@ from ...errors import CompileError
 from ...params import as_numbers
 from ...upstream.control_internals import current_parameters, outputs_now, rates_now, set_parameters
 from ...wording import counted
-from ..parameters import current_values
-from .purity import Reading, check_pure
-from .values import FRESH, VECTOR, Impure, captured
+from ..purity.check import Reading, check_pure
+from ..purity.values import FRESH, VECTOR, Impure, captured
+from .parameters import current_values
 
 
 def check_sizes(system: Any, blocks: Iterable[Any]) -> None:
