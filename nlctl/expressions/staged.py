@@ -44,6 +44,7 @@ class OnStage(Protocol):
 
     def for_numbers(self, real: Callable[..., Any]) -> Callable[..., Any]:
         """Return a function that takes constants, and refuses tracers."""
+        ...
 
 
 def holds_tracers(value: Any) -> bool:

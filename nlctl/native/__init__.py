@@ -3,9 +3,9 @@
 `compile` reads a diagram (`diagram/`).  The blocks' functions are run once on symbols
 (`equations/`), and what they compute is planned for one member or several; one generator writes
 LLVM IR from the plan (`codegen/`), and its object code is kept on disk (`machine/`).  What cannot
-be traced is called as it stands, as numba compiles it or back in Python (`machine.called`,
-`thirdparty/`); algebraic loops are refused, or solved by Newton's method with the derivatives of
-their own expressions.
+be traced is called as it stands, as numba compiles it or back in Python (`opaque/`), if it depends
+on its arguments alone (`purity/`).  Algebraic loops are refused, or solved by Newton's method with
+the derivatives of their own expressions.
 
 `timed/` knows before a run when functions of t alone jump, `integrate/` moves batched members
 through time, each with its own steps.  `response` makes of one run what python-control returns,

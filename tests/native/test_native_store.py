@@ -428,7 +428,7 @@ class TestKeys:
         """Whatever the order of sets and the addresses of objects there are."""
         script = (
             "import hashlib, nlctl\n"
-            "from nlctl.native.codegen.lower import lower\n"
+            "from nlctl.native.lower import lower\n"
             "compiled = nlctl.compile(nlctl.paper.example_2())\n"
             "lowered = lower(compiled.schedule, compiled.program)\n"
             "text = hashlib.sha256(lowered.text.encode()).hexdigest()\n"
@@ -483,8 +483,8 @@ def keys_of_copy(path, edits):
         assert source.count(before) == 1
         module.write_text(source.replace(before, after), encoding="utf-8")
     script = (
-        "import nlctl; from nlctl.native.machine.integrators import integrator_key\n"
-        "from nlctl.native.machine.called import TAUGHT\n"
+        "import nlctl; from nlctl.native.integrators import integrator_key\n"
+        "from nlctl.native.opaque.called import TAUGHT\n"
         "from nlctl.native.machine.fingerprint import module_key\n"
         "print(nlctl.__file__, integrator_key(), module_key(*TAUGHT))"
     )
