@@ -52,7 +52,7 @@ class Along:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _AnyPoint:
+class AlongCode:
     """The functions of `Along` for all parameters that they hold for."""
 
     lowered: Lowered
@@ -68,7 +68,7 @@ def derivatives(reading: Reading, p: np.ndarray) -> Along | None:
     None if there are none: an equation was differentiated for an integer parameter that has
     another value now.  Opaque functions have differences in them.
     """
-    known = reading.cache.of(_AnyPoint)
+    known = reading.cache.of(AlongCode)
     with _ONCE:
         if not known:
             known.append(_made(reading))
@@ -80,13 +80,13 @@ def derivatives(reading: Reading, p: np.ndarray) -> Along | None:
     return Along(point=made.point, function=made.function, c=c, elimination=made.elimination)
 
 
-def _made(reading: Reading) -> _AnyPoint:
+def _made(reading: Reading) -> AlongCode:
     equations = reading.equations
     n, m = reading.system.nstates or 0, reading.schedule.ninputs
     rows = along(equations, "dx", {"x": 0, "u": n, "t": n + m})
     lowered = lower_along(reading.schedule, reading.program, equations, rows, DIRECTIONS)
     prepare, point, function = lowered_code(lowered)
     order = elimination(structure(equations.pieces("dx"), "x", n))
-    return _AnyPoint(
+    return AlongCode(
         lowered=lowered, prepare=prepare, point=point, function=function, elimination=order
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 class Cache:
@@ -17,6 +17,6 @@ class Cache:
     def __init__(self) -> None:
         self._kept: dict[type, list[Any]] = {}
 
-    def of(self, kind: type[T]) -> list[T]:
+    def of(self, kind: type[_T]) -> list[_T]:
         """Return all things of a class; what is appended to the list is kept."""
         return self._kept.setdefault(kind, [])

@@ -45,7 +45,7 @@ _BUDGET = 400  # bodies that are walked for one function, before it is too much 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class FunctionReading:
     """What was found in a function and in all that it calls.
 
     Attributes
@@ -61,7 +61,7 @@ class Reading:
     unbound: tuple[str, ...]
 
 
-def check_pure(function: Any, arguments: Sequence[KnownValue]) -> Reading:
+def check_pure(function: Any, arguments: Sequence[KnownValue]) -> FunctionReading:
     """Check that a function depends on its arguments alone and changes nothing.
 
     Parameters
@@ -72,7 +72,7 @@ def check_pure(function: Any, arguments: Sequence[KnownValue]) -> Reading:
 
     Returns
     -------
-    Reading
+    FunctionReading
 
     Raises
     ------
@@ -86,7 +86,9 @@ def check_pure(function: Any, arguments: Sequence[KnownValue]) -> Reading:
         raise error
     walk = FunctionWalk()
     walk.call(captured(function), list(arguments), {})
-    return Reading(captured=tuple(walk.read.values()), unbound=tuple(dict.fromkeys(walk.unbound)))
+    return FunctionReading(
+        captured=tuple(walk.read.values()), unbound=tuple(dict.fromkeys(walk.unbound))
+    )
 
 
 class FunctionWalk(Walk):
