@@ -76,6 +76,11 @@ class Compiled(Reading, StandIn):
                 f"reads what cannot be pickled ({error}): let it read numbers and arrays"
             ) from error
 
+    @property
+    def system(self) -> Any:
+        """The diagram that was compiled; runs write their parameters into a copy of it."""
+        return super().system
+
     def _refused(self, *_: Any, **__: Any) -> Any:
         raise UsageError(
             f"'{self.system.name}' is compiled already: copy or rename its diagram, .system, and "
@@ -101,6 +106,31 @@ class Compiled(Reading, StandIn):
         With NUMBA_DISABLE_JIT=1 the plan that it is made from is carried out in plain Python.
         """
         return evaluations(self)
+
+    @as_annotated
+    def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
+        """Return the flat vector `p` that the program takes.
+
+        Overrides are resolved by python-control itself.
+
+        Parameters
+        ----------
+        params : mapping, optional
+            Overrides by qualified name.
+
+        Returns
+        -------
+        ndarray of shape (k,)
+            The values of all k parameters, those of arrays one after the other.
+
+        Raises
+        ------
+        UnknownNameError, ParameterError
+            If a name or a value is refused.
+        UsageError
+            If a value that a function reads from around it has changed since.
+        """
+        return super().parameter_vector(params)
 
     @as_annotated
     def dynamics(

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ..annotations import as_annotated
 from ..diagrams import Apart, override
 from ..errors import UsageError
 from .cache import Cache
@@ -50,7 +49,7 @@ class Reading:
 
     @property
     def system(self) -> Any:
-        """The diagram that was compiled; runs write their parameters into a copy of it."""
+        """The diagram itself, or in another process the copy of it that was read."""
         return self.schedule.system if self.original is None else self.original
 
     @cached_property
@@ -63,29 +62,8 @@ class Reading:
         """The plan of a program for one member."""
         return lower(self.schedule, self.program, 1, self.equations)
 
-    @as_annotated
     def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
-        """Return the flat vector `p` that the program takes.
-
-        Overrides are resolved by python-control itself.
-
-        Parameters
-        ----------
-        params : mapping, optional
-            Overrides by qualified name.
-
-        Returns
-        -------
-        ndarray of shape (k,)
-            The values of all k parameters, those of arrays one after the other.
-
-        Raises
-        ------
-        UnknownNameError, ParameterError
-            If a name or a value is refused.
-        UsageError
-            If a value that a function reads from around it has changed since.
-        """
+        """Return the vector `p` of shape (k,) that the program takes."""
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks
             if self.apart is not None and not self.apart.refreshed():
                 raise UsageError(
