@@ -18,13 +18,13 @@ from .audit import AuditError
 from .compiled import Compiled, compile  # noqa: A004 (what it does)
 from .diagram.schedule import AlgebraicLoopError
 from .ensemble import Ensemble, ensemble_response
-from .integrate.driver import Settings
 from .integrate.methods.tableau import Tableau
 from .integrate.results import Statistics
 from .integrate.state import Status
 from .linearized import linearize
 from .machine.store import CacheWarning
 from .response import Response, uninterrupted
+from .settings import Settings
 from .typesetting import BlockEquations, typeset
 
 __all__ = [

@@ -86,7 +86,7 @@ def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
         found = equations(reading.schedule, reading.program.layout, p[:, 0])
     lowered, wanted = _lowered(reading, found, width)
     layout = _layout(lowered)
-    switching = _located(reading, found)
+    switching = reading.program.events + found.conditions.rows
     if is_jit_disabled():
         prepare, *functions = plain_series(lowered, wanted, switching, layout)
     else:
@@ -108,12 +108,6 @@ def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
     )
 
 
-def _located(reading: Reading, found: Any) -> int:
-    """Return how many switching functions are followed: all rows of g but those of memories."""
-    program = reading.program
-    return program.events + found.conditions.rows - len(program.memory)
-
-
 def _layout(lowered: Lowered) -> SeriesLayout:
     """Give what a step needs its rows behind the parameters in `c`."""
     at, row = {}, lowered.size
@@ -125,7 +119,6 @@ def _layout(lowered: Lowered) -> SeriesLayout:
 def _lowered(reading: Reading, found: Any, width: int) -> tuple[Lowered, Recurrences]:
     program, n, m = reading.program, reading.system.nstates or 0, reading.schedule.ninputs
     asked = stores_of(found, ("dx", "g"))
-    asked["g"] = [s for s in asked["g"] if s.row < _located(reading, found)]
     stores, exact, graph = rewritten(found.graph, asked)
     try:
         wanted = recurrences(
