@@ -26,7 +26,7 @@ from .diagram.schedule import Schedule
 from .equations.blocks import Equations, equations
 from .equations.located import Conditions
 from .opaque.calls import Call
-from .timed.ahead import Timed
+from .timed.ahead import OfTime
 
 PREPARE = {"prepare": ("p", "c")}
 EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g", "m"), "out": ("t", "x", "u", "c", "y")}
@@ -85,9 +85,9 @@ class Lowered:
         return (self.lanes,) if array == "t" else (self.rows[array], self.lanes)
 
     @cached_property
-    def timed(self) -> Timed:
+    def timed(self) -> OfTime:
         """Its functions of time alone."""
-        return Timed(conditions=self.conditions)
+        return OfTime(conditions=self.conditions)
 
     @property
     def opaque(self) -> dict[str, str]:

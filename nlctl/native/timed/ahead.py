@@ -36,7 +36,7 @@ class Ahead:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Timed:
+class OfTime:
     """Functions of time alone in a program.
 
     Attributes
@@ -56,7 +56,9 @@ class Timed:
         return read_parameters(self.conditions)
 
 
-def ahead(timed: Timed, p: np.ndarray, times: np.ndarray, max_step: float) -> dict[str, np.ndarray]:
+def ahead(
+    timed: OfTime, p: np.ndarray, times: np.ndarray, max_step: float
+) -> dict[str, np.ndarray]:
     """Return what integrators take of that for each column of `p`."""
     count = p.shape[1]
     span = float(times[0]), float(times[-1])
@@ -73,7 +75,7 @@ def ahead(timed: Timed, p: np.ndarray, times: np.ndarray, max_step: float) -> di
     return {"jumps": jumps, "longest": longest, "reach": limits}
 
 
-def _of(timed: Timed, p: np.ndarray, span: tuple[float, float]) -> Ahead:
+def _of(timed: OfTime, p: np.ndarray, span: tuple[float, float]) -> Ahead:
     """Return it for one parameter vector, from what is known of the program already."""
     known, key = timed.known, (span, p[timed.parameters].tobytes())
     if key not in known:
