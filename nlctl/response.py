@@ -304,9 +304,9 @@ def _asks_for_scipy(run: RunArguments) -> bool:
 def _native(run: RunArguments) -> ct.TimeResponseData:
     """Run a compiled diagram, or one that is compiled for this run, as machine code."""
     from .native import compile as compile_diagram
+    from .native.diagram.checks import sized
     from .native.response import respond
     from .native.settings import solver_settings
-    from .native.thirdparty.checks import sized
 
     settings = solver_settings(**run.solver)
     compiled = run.system

@@ -22,7 +22,7 @@ from nlctl.wording import counted
 from .file.parse import StudyFile
 from .file.schema import keyed
 from .folder import load_finding, load_rows, load_run
-from .kind import Setup
+from .kind import Setup, kind_of
 from .run import reopened
 from .sealed import RunFolderError, as_json, origin_key
 
@@ -184,10 +184,11 @@ def _table(folder: Path, part: str) -> pd.DataFrame:
 def _widened(file: StudyFile, part: str) -> Experiment | None:
     """Return what the rows of a part were run with, where it is not the study's experiment."""
     asked = keyed(file.study).get(part)
-    if asked is None or asked.definition.experiment is None:
+    experiment = None if asked is None else kind_of(asked).experiment
+    if experiment is None:
         return None
     setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
-    return asked.definition.experiment(asked, setup)
+    return experiment(asked, setup)
 
 
 def _same(one: Any, other: Any) -> bool:

@@ -29,7 +29,7 @@ from .file.toml import read_toml
 from .file.written import to_toml
 from .finding import Finding
 from .folder import METRIC_COLUMNS, checked, load_finding, load_run, load_study, save_finding
-from .kind import Ground, answer, unanswered
+from .kind import Ground, answer, kind_of, unanswered
 from .origin import (
     compared_differences,
     loop_differences,
@@ -205,13 +205,13 @@ def _main_rows(study: Study, prepared: Prepared, folder: Path, way: _Way) -> Swe
     """Run the main table, or as much of it as the analyses need."""
     assert study.runs is not None
     design = main_design(study.runs, prepared.experiment.space, study.study.seed)
-    users = [(key, a) for key, a in keyed(study).items() if a.definition.needs_rows]
+    users = [(key, a) for key, a in keyed(study).items() if kind_of(a).needs_rows]
     key, only = users[0] if len(users) == 1 else ("", None)
-    if only is not None and only.definition.stop is not None:
+    if only is not None and (stop := kind_of(only).stop) is not None:
         if load_finding(folder, key, way.key) is not None:
             return replace(load(folder / "rows", design), decided=True)
-        stop = only.definition.stop(only, design)
-        return _swept(prepared, design, folder / "rows", way, "rows", stop=stop)
+        ends = stop(only, design)
+        return _swept(prepared, design, folder / "rows", way, "rows", stop=ends)
     return _swept(prepared, design, folder / "rows", way, "rows")
 
 
@@ -279,7 +279,7 @@ def _claim(file: StudyFile, folder: Path, resume: bool, force: bool) -> None:
                 f"'{folder}' holds a run already: continue it with --resume, or take another "
                 "folder with --out"
             )
-        own = {asked.kind: asked.definition for asked in file.study.analysis if ":" in asked.kind}
+        own = {asked.kind: kind_of(asked) for asked in file.study.analysis if ":" in asked.kind}
         changed = _changed(load_study(folder, own), file.study)
         if changed:
             raise RunFolderError(

@@ -21,27 +21,21 @@ from ..names import unknown
 from ..params import checked_times, integer
 from ..responses.arguments import checked_params, input_array
 from ..wording import counted
+from .ahead import compile_for
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
 from .histories import variations
-from .integrate.driver import (
-    Run,
-    Settings,
-    begin,
-    finish,
-    prepared,
-    trajectory,
-    watched,
-)
+from .integrate.driver import begin, finish, prepared, trajectory, watched
 from .integrate.methods.tableau import Tableau
 from .integrate.results import Trajectory, made
 from .integrate.state import RUNNING, STIFF, Status
-from .machine.ahead import compile_for
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
 from .members import Members, members
+from .run import Run
+from .settings import Settings
 
 if TYPE_CHECKING:
     import pandas as pd

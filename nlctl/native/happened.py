@@ -8,8 +8,8 @@ import numpy as np
 
 from ..responses.event_log import EventLog
 from ..wording import numbered
-from .codegen.program import count_guards, count_switching_functions
 from .compiled import Compiled
+from .diagram.program import count_guards, count_switching_functions
 from .integrate.log import OF_TIME, log_room
 from .integrate.memory import grown, with_fields
 

@@ -39,7 +39,7 @@ def known_conditions(system: Any, params: Any, times: np.ndarray) -> Known:
         lowered = compiled.lowered
     except (CompileError, AlgebraicLoopError, UsageError):
         return Known()
-    found = {k: v[0] for k, v in ahead(lowered, p[:, None], times, np.inf).items()}
+    found = {k: v[0] for k, v in ahead(lowered.timed, p[:, None], times, np.inf).items()}
     jumps = found["jumps"][np.isfinite(found["jumps"])]
     located = lowered.conditions.rows
     if not located:

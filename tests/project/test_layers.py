@@ -5,6 +5,7 @@ import subprocess
 import sys
 from graphlib import TopologicalSorter
 
+import pytest
 from places import ROOT
 
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
@@ -35,6 +36,40 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["analysis.cli"],
 ]
 BLOCK_MODULES = LAYERS[3]
+INSIDE = {  # the same within large packages: their rooms and single modules, from the bottom
+    "nlctl.native": [
+        ["cache", "codegen", "purity", "rounding", "sliding"],  # know no diagram
+        ["codegen.ir"],
+        ["diagram"],
+        ["declared", "opaque"],
+        ["equations"],
+        ["timed", "typesetting"],
+        ["lower"],
+        ["reading"],
+        ["machine"],
+        ["jacobians"],
+        ["describe"],
+        ["compiled"],
+        ["integrate", "linearized", "members"],
+        ["along", "audit", "happened", "histories", "integrators", "settings"],
+        ["ahead", "chattering", "known", "ship"],
+        ["run"],
+        ["taylor"],
+        ["integrate.results"],
+        ["integrate.driver", "own_errors"],
+        ["ensemble", "response"],
+    ],
+    "nlctl.expressions": [
+        ["graph"],
+        ["functions", "elimination"],
+        ["arrays", "integers", "operators", "masked", "indexing"],
+        ["conditions", "continuity", "dependence", "differences", "evaluate", "latex", "ordered"],
+        ["library"],
+        ["staged", "stage"],
+        ["derivatives", "trace"],
+    ],
+    "analysis.robustness": [["stl", "uncertainty"], ["statistics"], ["runs"], ["search"]],
+}
 FILES = sorted(p for package in ("nlctl", "analysis") for p in (ROOT / package).rglob("*.py"))
 
 
@@ -48,19 +83,10 @@ PACKAGES = {module_name(path) for path in FILES if path.name == "__init__.py"}
 MEMBERS = [name for name in MODULES if name not in ("nlctl", "analysis")]  # these only re-export
 
 
-def runtime_nodes(tree):
-    """Yield the nodes of a module, but not what stands under `if TYPE_CHECKING:`."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
-            continue
-        yield node
-        yield from runtime_nodes(node)
-
-
 def imports(name):
-    """Return the modules of this project that a module imports, also inside functions."""
+    """Return the modules of this project that a module imports, also in functions and for types."""
     found = set()
-    for node in runtime_nodes(MODULES[name]):
+    for node in ast.walk(MODULES[name]):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -79,22 +105,58 @@ def within(name, prefixes):
     return any(name == prefix or name.startswith(f"{prefix}.") for prefix in prefixes)
 
 
-def layer(name):
-    """Return the number of a module's layer."""
+def entry(name, layers=LAYERS):
+    """Return the number of a module's layer, and the longest name in it that the module is in."""
     fits = [
-        (len(prefix), number)
-        for number, prefixes in enumerate(LAYERS)
+        (len(prefix), number, prefix)
+        for number, prefixes in enumerate(layers)
         for prefix in prefixes
         if within(name, [prefix])
     ]
-    assert fits, f"{name} belongs to no layer: give it a place in LAYERS"
-    return max(fits)[1]
+    assert fits, f"{name} belongs to no layer: give it a place in the layers of this test"
+    return max(fits)[1:]
 
 
-def test_imports_go_downwards_only():
-    """No module imports one of a higher layer, not even lazily inside a function."""
-    upwards = {n: {m for m in imports(n) if layer(m) > layer(n)} for n in MEMBERS}
+def layer(name, layers=LAYERS):
+    """Return the number of a module's layer."""
+    return entry(name, layers)[0]
+
+
+def order_inside(package):
+    """Return the layers of a package with full names, and its modules without the package."""
+    layers = [[f"{package}.{name}" for name in names] for names in INSIDE[package]]
+    return layers, [m for m in MEMBERS if m.startswith(f"{package}.")]
+
+
+ORDERS = {"all": (LAYERS, MEMBERS), **{name: order_inside(name) for name in INSIDE}}
+
+
+@pytest.mark.parametrize("where", ORDERS)
+def test_imports_go_downwards_only(where):
+    """No module imports one of a higher layer: not lazily inside a function, nor for its types."""
+    layers, members = ORDERS[where]
+    known = {n: layer(n, layers) for n in members}
+    upwards = {n: {m for m in imports(n) if known.get(m, -1) > known[n]} for n in members}
     assert {name: found for name, found in upwards.items() if found} == {}
+
+
+@pytest.mark.parametrize("where", ORDERS)
+def test_rooms_know_each_other_in_one_direction(where):
+    """Also those of one layer: there is an order of the names that stand in it."""
+    layers, members = ORDERS[where]
+    rooms = {n: entry(n, layers)[1] for n in members}
+    below = {room: set() for room in rooms.values()}
+    for name, room in rooms.items():
+        below[room] |= {rooms[m] for m in imports(name) if m in rooms} - {room}
+    assert len(list(TopologicalSorter(below).static_order())) == len(below)
+
+
+@pytest.mark.parametrize("where", ORDERS)
+def test_names_of_layers_are_those_of_modules(where):
+    """A name that no module has any more would hold nothing."""
+    layers, members = ORDERS[where]
+    named = {prefix for prefixes in layers for prefix in prefixes}
+    assert named == {entry(n, layers)[1] for n in members}
 
 
 def test_there_are_imports_to_look_at():
@@ -102,6 +164,7 @@ def test_there_are_imports_to_look_at():
     assert "nlctl.params" in imports("nlctl.plants")
     assert "nlctl.functions" in imports("nlctl.controllers.rbf")
     assert "nlctl.controllers" in imports("nlctl.paper")
+    assert "nlctl.native" in imports("nlctl.response")  # for types, and for engines
     assert layer("nlctl.controllers.rbf") == 3
 
 

@@ -29,7 +29,7 @@ from analysis.robustness import Space, Uncertain, confidence_sequence, independe
 from analysis.robustness.search.radius import size_of
 from analysis.robustness.stl.spec import FAILED
 from analysis.studies import load_result, read_study, run
-from analysis.studies.kind import unanswered
+from analysis.studies.kind import kind_of, unanswered
 from analysis.studies.kinds import KINDS
 from analysis.studies.page.claims import claims, refusal, verdict
 from analysis.studies.page.deviations import deviations_table
@@ -222,7 +222,7 @@ def test_every_analysis_has_a_section_that_is_not_empty(result, report, page):
 
 def test_every_kind_of_analysis_has_title_and_methods(result):
     """The study of this module asks for all of them, and none has an empty text."""
-    assert {asked.definition for asked in result.study.analysis} == set(KINDS)
+    assert {kind_of(asked) for asked in result.study.analysis} == set(KINDS)
     assert all(kind.title and kind.answers and kind.method for kind in KINDS)
     assert len({kind.title for kind in KINDS}) == len({kind.name for kind in KINDS}) == len(KINDS)
 

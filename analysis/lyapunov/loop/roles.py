@@ -21,8 +21,8 @@ from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
 from nlctl.diagrams import Place, initial_state, interconnect, overridden
 from nlctl.diagrams.points import values_now
 from nlctl.errors import CompileError, DiagramError
+from nlctl.native.diagram.checks import check_functions, check_sizes
 from nlctl.native.diagram.wiring import Combination, Signal, Wiring
-from nlctl.native.thirdparty.checks import check_functions, check_sizes
 from nlctl.plants import coordinate_names
 from nlctl.upstream.control_internals import Around
 

@@ -18,7 +18,7 @@ from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.native import Compiled, Ensemble, Status, ensemble_response
 from nlctl.native import compile as compiled
-from nlctl.native.integrate.driver import Settings
+from nlctl.native.settings import Settings
 from nlctl.params import as_numbers, checked_times
 from nlctl.responses.arguments import input_array
 

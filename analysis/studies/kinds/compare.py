@@ -31,11 +31,12 @@ from ... import figures as figures
 from ...figures.labels import plain
 from ...report.document import Figure
 from ..build import choice, inputs_of, metrics_of
+from ..file.asked import Asked
 from ..file.field_types import Confidence, Names, Whole
 from ..file.resolve import option
 from ..file.schema import Choices
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from .context import CLOPPER, HOLM

@@ -14,9 +14,10 @@ from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure, Table
+from ..file.asked import Varied
 from ..file.field_types import Confidence, Flag, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, Varied, made
+from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.text import margin_text
 from .context import CLOPPER

@@ -17,9 +17,10 @@ from nlctl.wording import counted, some_of
 
 from ... import figures as figures
 from ...report.document import Figure, Paragraph
+from ..file.asked import Asked
 from ..file.field_types import Pair, Whole
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, made
 from ..page.rows import known
 
 if TYPE_CHECKING:

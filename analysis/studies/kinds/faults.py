@@ -28,9 +28,10 @@ from nlctl.wording import some_of
 from ... import figures as figures
 from ...report.document import Figure, Paragraph, Table
 from ..build import faults_of
+from ..file.asked import Asked
 from ..file.field_types import Flag, Names, Size
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.text import DID_NOT_END, margin_text
 

@@ -13,9 +13,10 @@ from analysis.robustness.search.radius import robustness_radius
 
 from ... import figures as figures
 from ...report.document import Figure
+from ..file.asked import Varied
 from ..file.field_types import Confidence, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, Varied, made
+from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import margin_text

@@ -12,9 +12,10 @@ from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure
+from ..file.asked import Asked
 from ..file.field_types import Confidence, Whole
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, made
+from ..kind import Ground, Kind, made
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from .context import response

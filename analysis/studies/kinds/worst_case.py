@@ -19,9 +19,10 @@ from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure, Paragraph, Table
+from ..file.asked import Varied
 from ..file.field_types import Flag, Number, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, Varied, made
+from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.rows import status_text

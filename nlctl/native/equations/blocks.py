@@ -12,14 +12,14 @@ import numpy as np
 from ...expressions.arrays import Tracer, as_array, scalar
 from ...expressions.graph import Expr, Graph
 from ...sampling.system import Happening
-from ..codegen.calls import Call
-from ..codegen.program import count_guards, count_switching_functions, memory
 from ..codegen.solver import Solver
+from ..diagram.parameters import length
+from ..diagram.program import count_guards, count_switching_functions, memory
 from ..diagram.schedule import Schedule, during
-from ..parameters import length
-from ..sliding.reading import with_sliding
+from ..opaque.calls import Call
 from .located import Conditions, found_conditions
 from .reader import Reader
+from .relays import with_sliding
 from .watched import watched_conditions
 
 

@@ -11,8 +11,8 @@ from ...expressions.arrays import Tracer
 from ...expressions.conditions import conditions, switching_function
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, needed
-from ..codegen.program import count_switching_functions, memory
-from ..diagram.schedule import Node
+from ..diagram.nodes import Node
+from ..diagram.program import count_switching_functions, memory
 
 if TYPE_CHECKING:
     from .reader import Reader

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
-from numbers import Real
-from typing import Any
 
 import control as ct
 import numpy as np
 
 from ...delays.variation import Variation
 from ...errors import ParameterError
-from ...names import unknown
 from ...responses.watched import Watched
 from ...sampling.clock import Instants
-from ..chattering.detection import Jump, asked, jump_of, new_paces, probe_of, snapshot
-from ..codegen.along import Along, derivatives
-from ..codegen.program import Program, instants_of
+from ..along import derivatives
+from ..chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
 from ..compiled import Compiled
+from ..diagram.program import Program, instants_of
 from ..happened import happened, with_log
 from ..histories import lines_of, variations, with_past, with_room
+from ..integrators import integrators
 from ..machine.evaluations import Machine, machine
-from ..machine.integrators import integrators
+from ..run import Run
+from ..settings import METHODS, Settings
 from ..taylor.method import with_taylor
 from ..taylor.turns import turned, with_turns
 from ..timed.ahead import ahead
@@ -31,80 +30,18 @@ from .discrete import simulate_discrete
 from .events.functions import EventRows
 from .log import log_room
 from .memory import with_fields, with_table
-from .methods import EXPLICIT_PAIRS
 from .methods.lu import WHOLE
 from .methods.stiff import DIFFERENCES, EXACT, UNKNOWN, stiff_method
 from .methods.tableau import Tableau, pair_of
 from .methods.taylor import OTHER_METHOD, SLOPES
-from .methods.tsit5 import TSIT5
 from .resets import Resets
 from .results import Statistics, Trajectory, at_its_end, made
 from .samples import Ticks, Timed
-from .state import AUTO, DERIVATIVES, EXPLICIT, IMPLICIT, RUNNING, TAYLOR, Status
+from .state import DERIVATIVES, EXPLICIT, RUNNING, Status
 from .workspace import Task, new_work
 
-METHODS = {
-    "auto": AUTO,
-    **dict.fromkeys(EXPLICIT_PAIRS, EXPLICIT),
-    "rodas5p": IMPLICIT,
-    "taylor": TAYLOR,
-}
 _NOTED = 1000  # events of a run for which there is room from the beginning
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """How a run is integrated.
-
-    Attributes
-    ----------
-    rtol, atol : float
-        Tolerances; the error of a step is weighed with atol + rtol |x|.
-    max_steps : int
-        Attempted steps after which a run ends as STEP_LIMIT.
-    method : {"auto", "tsit5", "rodas5p", "taylor"} or Tableau
-        Explicit pair of orders 5(4); stiff method of orders 5(4); Taylor's method, of an order
-        that follows from rtol, for equations that can be written as expressions and have no
-        memories; whichever is faster; an explicit pair of your own as its tableau.
-    step : float
-        Fixed step (s) instead of error control; 0 for error control.
-    max_step : float
-        Longest step (s), under error control too.
-    """
-
-    rtol: float = 1e-8
-    atol: float = 1e-10
-    max_steps: int = 10_000_000_000
-    method: str | Tableau = "auto"
-    step: float = 0.0
-    max_step: float = np.inf
-
-    @property
-    def pair(self) -> Tableau:
-        """The explicit pair that is used, alone or in turn with the stiff method."""
-        return (
-            self.method
-            if isinstance(self.method, Tableau)
-            else EXPLICIT_PAIRS.get(self.method, TSIT5)
-        )
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.method, Tableau) and self.method not in METHODS:
-            raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
-        for name in ("rtol", "atol", "step", "max_steps", "max_step"):
-            if not isinstance(getattr(self, name), Real):
-                raise ParameterError(f"{name} must be one number, got {getattr(self, name)!r}")
-        for name, most in (("rtol", 1), ("atol", np.inf)):
-            if not 0 < getattr(self, name) < most:
-                rule = "> 0 and < 1" if most == 1 else "> 0"
-                raise ParameterError(f"{name} must be {rule}, got {getattr(self, name)!r}")
-        if not 0 <= self.step < np.inf:
-            raise ParameterError(f"step must be > 0, or 0 for error control, got {self.step!r}")
-        if not self.max_step > 0:
-            raise ParameterError(f"max_step must be > 0, got {self.max_step!r}")
-        if self.max_steps < 1:
-            raise ParameterError(f"max_steps must be >= 1, got {self.max_steps!r}")
 
 
 def trajectory(
@@ -158,36 +95,6 @@ def _sampled(
         statistics=run,
         inputs=inputs[:, :done],
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Run:
-    """Members that are integrated in a batch, and all arrays that this needs.
-
-    Attributes
-    ----------
-    machine : Machine
-    task, work : Task, Work
-        See `workspace`.
-    along : Along or None
-        Exact derivatives, if the stiff method has asked for them and there are any.
-    jumps : mapping
-        Of members that chatter, by their lanes: where.
-    series : Task or None
-        With Taylor's method, if it has had its turn: see `nlctl.native.taylor.turns`.
-    """
-
-    machine: Machine
-    task: Any
-    work: Any
-    along: Along | None = None
-    jumps: Mapping[int, Jump] = field(default_factory=dict)
-    series: Any = None
-
-    @property
-    def lanes(self) -> np.ndarray:
-        """One record per member, see `state`."""
-        return self.work.lanes
 
 
 def begin(run: Run) -> None:
@@ -288,7 +195,7 @@ def prepared(
         rows=_rows(program, code, read.watched),
         timed=with_table(
             Timed,
-            **ahead(code.lowered, p, times, settings.max_step),
+            **ahead(code.lowered.timed, p, times, settings.max_step),
             opaque=int(bool(code.lowered.calls)),
         ),
         clocks=_clocks(compiled, code, due),

@@ -13,16 +13,16 @@ import numpy as np
 from .delayed import DelayLines, KeptSignals, new_past
 from .evaluate import Scratch, new_ahead
 from .events.functions import (
+    EventRows,
     Events,
     Inside,
     Memories,
-    EventRows,
     new_events,
     new_inside,
     new_memories,
 )
 from .log import Log, new_log
-from .memory import Places2, Reals1, Reals2, Reals3, with_fields, type_of, with_table
+from .memory import Places2, Reals1, Reals2, Reals3, type_of, with_fields, with_table
 from .methods.stiff import StiffArrays, StiffMethod, new_stiff
 from .methods.tableau import ExplicitPair
 from .methods.taylor import TaylorArrays, TaylorMethod, new_terms
