@@ -1,7 +1,8 @@
 """What a kind of analysis is: one record, from its table in a study file to its part of the page.
 
-nlctl's own kinds are the modules of `analysis.studies.kinds`.  A kind of one's own is a `Kind` in a
-file beside the study, or in an installed package; a study names it as it names its loop::
+nlctl's own kinds are the modules of `nlctl.analysis.studies.kinds`.  A kind of one's own is a
+`Kind` in a file beside the study, or in an installed package; a study names it as it names its
+loop::
 
     [[analysis]]
     kind = "spread.py:spread"     # or "module:spread"
@@ -24,12 +25,12 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, create_model
 
-from analysis.robustness import Design, Experiment, Prepared, Space
-from analysis.robustness.runs.progress import Progress
-from analysis.robustness.runs.sweep import Sweep
 from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError, UsageError
 
+from ..robustness import Design, Experiment, Prepared, Space
+from ..robustness.runs.progress import Progress
+from ..robustness.runs.sweep import Sweep
 from .file.field_types import Names, Strict
 from .finding import Finding
 
@@ -63,7 +64,7 @@ class Asked(Strict):
     The keys of a table of one's own, checked as those of nlctl's kinds are:
 
     >>> from pydantic import Field
-    >>> from analysis.studies import Asked
+    >>> from nlctl.analysis.studies import Asked
     >>> class Spread(Asked):
     ...     of: str = Field("spec", description="Column of the main table.")
     ...     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
@@ -99,7 +100,7 @@ class Varied(Asked):
 
     Examples
     --------
-    >>> from analysis.studies import Varied
+    >>> from nlctl.analysis.studies import Varied
     >>> class Corners(Varied):
     ...     levels: int = 2
     >>> Corners(kind="corners", quantities=["lag.T"]).quantities
@@ -134,7 +135,7 @@ class Setup:
     What Morris' screening takes is known before anything runs: with r trajectories of k quantities
     r (k + 1) simulations.
 
-    >>> from analysis.studies import Setup, read_study, shipped
+    >>> from nlctl.analysis.studies import Setup, read_study, shipped
     >>> file = read_study(shipped("example-1-quick"))
     >>> setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
     >>> (asked,) = [asked for asked in file.study.analysis if asked.kind == "morris"]
@@ -163,8 +164,8 @@ class Ground:
     rows : Sweep or None
         The main table, with its design.
     simulate : callable
-        Runs rows here, see `analysis.robustness.search.evaluation.Evaluate`; what a table leaves
-        out is nominal.
+        Runs rows here, see `nlctl.analysis.robustness.search.evaluation.Evaluate`; what a table
+        leaves out is nominal.
     run_design : RunDesign
 
     Examples
@@ -255,7 +256,7 @@ class Kind:
         numbers have ``runs`` and ``confidence``.
     stop : callable, optional
         ``stop(asked, design)`` returns what ends the main table early, where no other analysis
-        needs it; see `analysis.robustness.runs.sweep`.
+        needs it; see `nlctl.analysis.robustness.runs.sweep`.
     columns, quantities, keywords : tuple of str
         Keys of its table that name a column of its rows, quantities of the space, a keyword of the
         loop: they are checked before anything runs.
@@ -299,9 +300,9 @@ class Kind:
 
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import read_study, run
+    >>> from nlctl.analysis.studies import read_study, run
     >>> code = '''
-    ... from analysis.studies import Asked, Kind, made
+    ... from nlctl.analysis.studies import Asked, Kind, made
     ...
     ... class Failures(Asked):
     ...     pass
@@ -438,7 +439,7 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
 
     Examples
     --------
-    >>> from analysis.studies import Asked, made
+    >>> from nlctl.analysis.studies import Asked, made
     >>> asked = Asked(kind="spread")
     >>> found = made(asked, "The spread is 0.5.", runs=100, numbers={"spread": 0.5})
     >>> found.kind, found.numbers["spread"], found.holds

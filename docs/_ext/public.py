@@ -76,7 +76,7 @@ class StudyKeys(SphinxDirective):
     """``.. study-keys::``: every table and key of a study file, from its schema."""
 
     def run(self):
-        from analysis.studies import Study
+        from nlctl.analysis.studies import Study
 
         schema = Study.model_json_schema()
         tables = {"A study": schema, **schema.get("$defs", {})}
@@ -106,7 +106,7 @@ class CommandLine(SphinxDirective):
     option_spec = {"program": directives.unchanged}
 
     def run(self):
-        from analysis.cli.main import app
+        from nlctl.analysis.cli.main import app
 
         program = typer.main.get_command(app)
         context = click.Context(program, info_name="nlctl")

@@ -15,8 +15,8 @@ from command_line import nlctl, nlctl_here
 from places import ROOT
 from rows import each_row
 
-from analysis.catalogue import block_records, block_summaries
-from analysis.cli.report import _other_process
+from nlctl.analysis.catalogue import block_records, block_summaries
+from nlctl.analysis.cli.report import _other_process
 
 
 def refused(*arguments, cwd=None):
@@ -39,7 +39,7 @@ def test_help_imports_nothing_heavy():
     """Help is instant, since nothing that computes is imported for it."""
     code = (
         "import sys\n"
-        "from analysis.cli.main import main\n"
+        "from nlctl.analysis.cli.main import main\n"
         "sys.argv = ['nlctl', '--help']\n"
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
         "heavy = {'control', 'numba', 'scipy', 'numpy', 'matplotlib', 'pandas'}\n"

@@ -12,10 +12,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from analysis.robustness import Experiment
 from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError, UsageError
 
+from ...robustness import Experiment
 from ..code.record import study_digest
 from ..code.rule import Grant, Reach, named_in, remember_code, untrusted
 from .errors import KeyPath, Problem, StudyError, line_numbers, located, place_text, schema_problems
@@ -108,7 +108,7 @@ def read_study(
 
     Examples
     --------
-    >>> from analysis.studies import read_study, shipped
+    >>> from nlctl.analysis.studies import read_study, shipped
     >>> file = read_study(shipped("example-1-quick"), ["runs.size=10"])
     >>> file.study.runs.size, file.experiment.space.names[0]
     (10, 'actuator.b_r')

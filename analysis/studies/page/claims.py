@@ -11,9 +11,9 @@ from ...robustness.statistics.guarantee import check_iid
 from .text import without_assumptions
 
 if TYPE_CHECKING:
-    from analysis.studies.finding import Finding
-    from analysis.studies.kind import Asked
-    from analysis.studies.result import Result
+    from ..finding import Finding
+    from ..kind import Asked
+    from ..result import Result
 
 __all__ = ["claims", "refusal", "verdict"]
 

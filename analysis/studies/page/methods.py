@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from nlctl.wording import counted
 
 if TYPE_CHECKING:
-    from analysis.studies.result import Result
-
+    from ..result import Result
     from .loop import Published
 
 __all__ = ["limits", "methods"]

@@ -97,7 +97,7 @@ def verify(folder: Path) -> Wholeness:
     >>> import shutil
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import read_study, run, verify
+    >>> from nlctl.analysis.studies import read_study, run, verify
     >>> text = '''
     ... loop = "nlctl:block"
     ... options = { spec = { block = "Lag" }, name = "lag" }
