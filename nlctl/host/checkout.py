@@ -19,13 +19,13 @@ from types import ModuleType
 
 __all__ = ["SOURCES", "find_analysis"]
 
-NAME = "nlctl.analysis"
-INSIDE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-NEXT_TO_IT = os.path.join(os.path.dirname(INSIDE), "analysis")
-_IS_CHECKOUT = not os.path.isfile(os.path.join(INSIDE, "analysis", "__init__.py")) and (
+ANALYSIS = "nlctl.analysis"
+NLCTL_FOLDER = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+NEXT_TO_IT = os.path.join(os.path.dirname(NLCTL_FOLDER), "analysis")
+_IS_CHECKOUT = not os.path.isfile(os.path.join(NLCTL_FOLDER, "analysis", "__init__.py")) and (
     os.path.isfile(os.path.join(NEXT_TO_IT, "__init__.py"))
 )
-SOURCES = (INSIDE, NEXT_TO_IT) if _IS_CHECKOUT else (INSIDE,)
+SOURCES = (NLCTL_FOLDER, NEXT_TO_IT) if _IS_CHECKOUT else (NLCTL_FOLDER,)
 """The folders with all of nlctl's modules."""
 
 
@@ -36,7 +36,7 @@ class _NextToIt:
     def find_spec(
         name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        if name != NAME:
+        if name != ANALYSIS:
             return None
         file = os.path.join(NEXT_TO_IT, "__init__.py")
         return spec_from_file_location(name, file, submodule_search_locations=[NEXT_TO_IT])

@@ -7,6 +7,7 @@ first, as the folder of a script does on ``sys.path``.
 
 from __future__ import annotations
 
+import functools
 import sys
 import warnings
 from collections.abc import Sequence
@@ -17,9 +18,9 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from .checkout import INSIDE, NAME
+from .checkout import ANALYSIS, NLCTL_FOLDER
 
-__all__ = ["FORMER", "is_former", "present_name", "use_former_name", "warn_of"]
+__all__ = ["FORMER", "is_former", "present_name", "use_former_name", "warn_of_it"]
 
 FORMER = "analysis"
 GONE_IN = "0.2"
@@ -44,7 +45,7 @@ class _SameModules:
         module = import_module(f"nlctl.{spec.name}")
         spec.loader_state = module.__spec__
         for name, loaded in list(sys.modules.items()):  # Python would bind them in their package,
-            if name.startswith(f"{NAME}."):  # where functions have their names: lyapunov.ledger
+            if name.startswith(f"{ANALYSIS}."):  # where functions have their names: lyapunov.ledger
                 sys.modules.setdefault(name.removeprefix("nlctl."), loaded)
         return module
 
@@ -61,16 +62,16 @@ class _SameModules:
 
 def use_former_name() -> None:
     """Make ``import analysis`` mean `nlctl.analysis`, with a warning at the line that imports."""
-    warn_of(FORMER, stacklevel=4)
-    sys.modules[FORMER] = import_module(NAME)
+    warn_of_it(stacklevel=4)
+    sys.modules[FORMER] = import_module(ANALYSIS)
     sys.meta_path.insert(0, _SameModules)
 
 
 def is_former(spec: ModuleSpec | None) -> bool:
     """Whether a module that is called ``analysis`` is nlctl's, and not one of a user."""
-    if spec is None or spec.name == NAME:
+    if spec is None or spec.name == ANALYSIS:
         return spec is not None
-    ours = Path(INSIDE).parent / FORMER / "__init__.py"
+    ours = Path(NLCTL_FOLDER).parent / FORMER / "__init__.py"
     return spec.origin is not None and Path(spec.origin).resolve() == ours.resolve()
 
 
@@ -80,10 +81,11 @@ def present_name(module: str) -> str:
     return f"nlctl.{module}" if of_ours else module
 
 
-def warn_of(name: str, stacklevel: int = 2) -> None:
-    """Warn of a module's former name, at the line of a caller's caller or further up."""
+@functools.cache
+def warn_of_it(stacklevel: int = 2) -> None:
+    """Warn of the former name, once in a process, at the line of the caller or further up."""
     warnings.warn(
-        f"'{name}' is 'nlctl.{name}' now: write that, the old name goes in version {GONE_IN}",
+        f"'{FORMER}' is '{ANALYSIS}' now: write that, the old name goes in version {GONE_IN}",
         FutureWarning,
         stacklevel=stacklevel,
     )

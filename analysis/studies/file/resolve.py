@@ -11,7 +11,7 @@ from typing import Any
 from scipy import stats
 
 from nlctl.errors import ParameterError, UnknownNameError, UsageError
-from nlctl.host.former_name import present_name, warn_of
+from nlctl.host.former_name import present_name, warn_of_it
 from nlctl.names import unknown
 from nlctl.paper import named_example
 
@@ -147,7 +147,7 @@ def _place(name: str, folder: Path, admits: Admits | None = None) -> tuple[Any, 
 def _from_module(name: str) -> Any:
     present = present_name(name)
     if present != name:
-        warn_of(name)
+        warn_of_it()
     try:
         return importlib.import_module(present)
     except ModuleNotFoundError as error:
