@@ -1,7 +1,6 @@
 """The command line, run as a user runs it."""
 
 import multiprocessing
-import os
 import subprocess
 import sys
 import time
@@ -277,18 +276,3 @@ def test_the_list_imports_no_library_of_numbers():
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", program], check=True, capture_output=True)
-
-
-@pytest.mark.parametrize("name", ["analysis.py", "analysis/__init__.py"])
-def test_a_file_that_hides_the_analysis_package_is_named(name, tmp_path):
-    """A module or package of the user's own, found first: one sentence, no traceback."""
-    (tmp_path / name).parent.mkdir(exist_ok=True)
-    (tmp_path / name).write_text("", encoding="utf-8")
-    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-    told = subprocess.run(
-        [sys.executable, "-P", "-m", "nlctl", "check", "example-1"],
-        capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": path},
-    )  # fmt: skip
-    assert told.returncode == 2
-    assert len(told.stderr.strip().splitlines()) == 1
-    assert f"'{tmp_path / name}' hides nlctl's package 'analysis'" in told.stderr
