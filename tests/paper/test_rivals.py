@@ -166,7 +166,8 @@ def test_a_record_of_another_study_or_loop_is_refused(tmp_path, column):
     record.loc[record.index[-1], column] = other
     record.to_csv(tmp_path / "record.csv", index=False)
     with pytest.raises(
-        ValueError, match=rf"example_2' is of another {kind}.*python -m analysis\.paper\.limits\.r"
+        ValueError,
+        match=rf"example_2' is of another {kind}.*python -m nlctl\.analysis\.paper\.limits\.r",
     ):
         checked_rivals(tmp_path / "record.csv")
 
