@@ -235,7 +235,7 @@ def read_through(folder: Path) -> None:
 
 
 @as_annotated
-def load_result(folder: Path, *, trust: bool = False) -> Result:
+def load_result(folder: str | Path, *, trust: bool = False) -> Result:
     """Return what is in the folder of a run, finished or not.
 
     Nothing is simulated.  Kinds of analysis of one's own are imported, to draw what they found; a
@@ -243,7 +243,7 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         Where `run` has kept its results.
     trust : bool, optional
         As in `read_study`.
@@ -262,6 +262,7 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
     --------
     See `run`.
     """
+    folder = Path(folder)
     checked(folder)
     return _result_in(folder, *_own_kinds(folder, trust))
 

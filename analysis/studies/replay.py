@@ -92,12 +92,12 @@ class Replay:
 
 
 @as_annotated
-def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Replay:
+def replay(folder: str | Path, row: int, part: str = "", *, trust: bool = False) -> Replay:
     """Run one row of a run folder again.
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         Where `run` has kept its results.
     row : int
         Number of the row, from 0.
@@ -147,6 +147,7 @@ def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Re
     >>> replay_figure(last).axes[0].get_title(loc="left")
     'rises: always from 1 s on v >= 0.9'
     """
+    folder = Path(folder)
     run = reopened(folder, trust=trust)
     table = _table(folder, part)
     if row not in table.index:

@@ -75,7 +75,7 @@ class _Way:
 @as_annotated
 def run(
     file: StudyFile,
-    folder: Path,
+    folder: str | Path,
     *,
     resume: bool = False,
     force: bool = False,
@@ -92,7 +92,7 @@ def run(
     ----------
     file : StudyFile
         What `read_study` returns.
-    folder : Path
+    folder : str or Path
         See `folder` for what is in it.
     resume : bool, optional
         Whether to take up what the folder holds.  It must be of the same study, loop and versions.
@@ -150,6 +150,7 @@ def run(
     >>> result.verdict, again.verdict
     ('The claim is shown.', 'The claim is shown.')
     """
+    folder = Path(folder)
     with locked(folder, RunFolderError):
         _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)

@@ -3,7 +3,6 @@
 import importlib
 import inspect
 
-import click
 import typer
 from docutils.parsers.rst import directives
 from sphinx.util.docutils import SphinxDirective
@@ -109,13 +108,13 @@ class CommandLine(SphinxDirective):
         from nlctl.analysis.cli.main import app
 
         program = typer.main.get_command(app)
-        context = click.Context(program, info_name="nlctl")
+        context = typer.Context(program, info_name="nlctl")
         lines = []
         for name in program.list_commands(context):
             command = program.get_command(context, name)
             if command.hidden:
                 continue
-            inner = click.Context(command, info_name=name, parent=context)
+            inner = typer.Context(command, info_name=name, parent=context)
             usage = " ".join(command.collect_usage_pieces(inner))
             lines += [name, "-" * len(name), "", "::", "", f"    nlctl {name} {usage}", ""]
             lines += [_text(part) + "\n" for part in (command.help or "").split("\n\n")]
