@@ -35,7 +35,7 @@ from .methods import EXPLICIT_PAIRS
 from .methods.lu import WHOLE
 from .methods.stiff import DIFFERENCES, EXACT, UNKNOWN, stiff_method
 from .methods.tableau import Tableau, pair_of
-from .methods.taylor import OTHER_METHOD
+from .methods.taylor import OTHER_METHOD, STAGES
 from .methods.tsit5 import TSIT5
 from .resets import Resets
 from .results import Statistics, Trajectory, at_its_end, made
@@ -300,7 +300,7 @@ def prepared(
     work = new_work(
         x0, times, read.ninputs, code.lowered.rows["g"], code.lowered.rows["m"], len(read.outputs),
         code.lowered.rows["s"], len(program.guards), len(read.lines),
-        2 if terms else settings.pair.stages, terms or (1, 0),
+        STAGES if terms else settings.pair.stages, terms or (1, 0),
         log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"

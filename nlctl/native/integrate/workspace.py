@@ -22,7 +22,7 @@ from .events.functions import (
     new_memories,
 )
 from .log import Log, new_log
-from .memory import Places2, Reals1, Reals2, Reals3, type_of, with_table
+from .memory import Places2, Reals1, Reals2, Reals3, replaced, type_of, with_table
 from .methods.stiff import StiffArrays, StiffMethod, new_stiff
 from .methods.tableau import Pair
 from .methods.taylor import TaylorArrays, TaylorMethod, new_terms
@@ -139,3 +139,10 @@ def new_work(
         log=new_log(log),
         past=new_past(times.size, outputs, lines, lanes),
     )
+
+
+def with_stages(work: Work, stages: int) -> Work:
+    """Return a workspace for a method with so many stages, where the next step begins."""
+    k = np.zeros((stages, *work.k.shape[1:]))
+    k[0] = work.k[0]
+    return replaced(work, k=k, k_flat=k.reshape(stages, -1))

@@ -65,8 +65,9 @@ def with_taylor(
         c=made.parameters(p, order=order, rtol=settings.rtol, atol=settings.atol),
         cost=_COST * order,
     )
-    # the power of the step size in its error
-    pair = replaced(task.pair, order=order + 1.0, stable=np.inf)
+    # the power of the step size in its error; there are no stages at parts of a step
+    inside = task.pair.inside * [[0.0], [1.0], [1.0]]
+    pair = replaced(task.pair, order=order + 1.0, stable=np.inf, inside=inside)
     return replaced(task, taylor=taylor, pair=pair), (order + 1, made.layout.rows)
 
 

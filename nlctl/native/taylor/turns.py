@@ -17,8 +17,9 @@ import numpy as np
 from ...errors import ParameterError
 from ..integrate.memory import replaced
 from ..integrate.methods.tableau import pair_of
-from ..integrate.methods.taylor import MEASURED, OTHER_METHOD, TRIAL, new_terms
+from ..integrate.methods.taylor import MEASURED, OTHER_METHOD, STAGES, TRIAL, new_terms
 from ..integrate.state import METHOD, RUNNING
+from ..integrate.workspace import with_stages
 from .method import order_for, with_taylor
 
 if TYPE_CHECKING:
@@ -57,13 +58,15 @@ def turned(compiled: Compiled, run: Run, p: np.ndarray, settings: Settings) -> R
     if run.series is not None:  # it has had its turn before
         taylor = replaced(run.series.taylor, span=run.task.taylor.span)
         run.work.taylor.expanded[:] = 0
-        return replace(run, task=replaced(run.task, taylor=taylor, pair=run.series.pair))
+        task = replaced(run.task, taylor=taylor, pair=run.series.pair)
+        return replace(run, task=task, work=with_stages(run.work, STAGES))
     try:
         task, terms = with_taylor(run.task, compiled, p[:, None], settings)
     except ParameterError:  # there is what it cannot do
         return replace(run, task=replaced(run.task, taylor=OTHER_METHOD))
     arrays = new_terms(*terms, run.work.u.shape[0], 1)
-    return replace(run, task=task, work=replaced(run.work, taylor=arrays), series=task)
+    work = replaced(with_stages(run.work, STAGES), taylor=arrays)
+    return replace(run, task=task, work=work, series=task)
 
 
 def _by_pair(run: Run, settings: Settings) -> Run:
@@ -76,4 +79,4 @@ def _by_pair(run: Run, settings: Settings) -> Run:
         lane["span"], span = lane["wait"], _SPAN
     lane["h"] = lane["pace"]
     task = replaced(run.task, taylor=replaced(OTHER_METHOD, span=span), pair=pair_of(settings.pair))
-    return replace(run, task=task)
+    return replace(run, task=task, work=with_stages(run.work, settings.pair.stages))

@@ -28,6 +28,7 @@ from ..memory import Places1, Places2, Reals2, Reals3, with_table, zeros
 from ..state import INNER, RUNNING
 
 TRIAL = 20  # steps after which it is judged whether this method pays
+STAGES = 2  # slopes at both ends of a step
 MEASURED = 50  # the last explicit steps before that
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
