@@ -30,7 +30,6 @@ from nlctl.analysis.studies import (
     replay_figure,
     run,
     run_differences,
-    verify,
 )
 from nlctl.analysis.studies.file.schema import keyed
 from nlctl.analysis.studies.folder import load_finding, load_run, save_finding
@@ -113,21 +112,6 @@ def result(folder):
 def decays(table):
     """Margin of the requirement, in closed form: y falls, so the first second decides."""
     return (0.5 - table["lag.x(0)"] * np.exp(-table["lag.rate"])) / 0.5
-
-
-@pytest.mark.slow
-def test_folders_and_files_may_be_texts(tmp_path, monkeypatch):
-    """As in a notebook: relative to where one is."""
-    monkeypatch.chdir(tmp_path)
-    path = write(tmp_path, HEAD, "[runs]\nsize = 3\n")
-    made = run(read_study(path.name), "reports/three", threads=1)
-    assert made.rows.table.shape[0] == 3
-    again = load_result("reports/three")
-    assert again.rows.table.equals(load_result(tmp_path / "reports" / "three").rows.table)
-    assert verify("reports/three").problems == ()
-    assert replay("reports/three", 2).differences == ()
-    with pytest.raises(ParameterError, match="load_result needs folder to be text or of type Path"):
-        load_result(3)
 
 
 @pytest.mark.slow
