@@ -2,7 +2,7 @@
 
 study.toml           the study as it was run, with the settings of the command line
 run.json             where the files that it refers to are, and what all is computed from: `origin`
-rows/                the main table, see `analysis.robustness.runs.store`
+rows/                the main table, see `nlctl.analysis.robustness.runs.store`
 KEY/finding.json     what one analysis found, its tables beside it in Parquet
 KEY/rows/            the rows that it ran itself, where their number is known in advance
 results.json         everything but the tables, for other programs
@@ -23,13 +23,13 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.robustness import Design, Space
-from analysis.robustness.runs.store import opened, read_parquet
-from analysis.robustness.runs.sweep import Sweep, load
 from nlctl.annotations import as_annotated
 from nlctl.host.files import replace_file
 from nlctl.wording import counted
 
+from ..robustness import Design, Space
+from ..robustness.runs.store import opened, read_parquet
+from ..robustness.runs.sweep import Sweep, load
 from .build import labels, main_design
 from .code.record import study_digest
 from .code.rule import Grant
@@ -235,7 +235,7 @@ def read_through(folder: Path) -> None:
 
 
 @as_annotated
-def load_result(folder: Path, *, trust: bool = False) -> Result:
+def load_result(folder: str | Path, *, trust: bool = False) -> Result:
     """Return what is in the folder of a run, finished or not.
 
     Nothing is simulated.  Kinds of analysis of one's own are imported, to draw what they found; a
@@ -243,7 +243,7 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         Where `run` has kept its results.
     trust : bool, optional
         As in `read_study`.
@@ -262,6 +262,7 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
     --------
     See `run`.
     """
+    folder = Path(folder)
     checked(folder)
     return _result_in(folder, *_own_kinds(folder, trust))
 

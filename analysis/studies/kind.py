@@ -1,7 +1,8 @@
 """What a kind of analysis is: one record, from its table in a study file to its part of the page.
 
-nlctl's own kinds are the modules of `analysis.studies.kinds`.  A kind of one's own is a `Kind` in a
-file beside the study, or in an installed package; a study names it as it names its loop::
+nlctl's own kinds are the modules of `nlctl.analysis.studies.kinds`.  A kind of one's own is a
+`Kind` in a file beside the study, or in an installed package; a study names it as it names its
+loop::
 
     [[analysis]]
     kind = "spread.py:spread"     # or "module:spread"
@@ -24,12 +25,12 @@ import numpy as np
 import pandas as pd
 from pydantic import create_model
 
-from analysis.robustness import Design, Experiment, Prepared, Space
-from analysis.robustness.runs.progress import Progress
-from analysis.robustness.runs.sweep import Sweep
 from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError, UsageError
 
+from ..robustness import Design, Experiment, Prepared, Space
+from ..robustness.runs.progress import Progress
+from ..robustness.runs.sweep import Sweep
 from .file.asked import Asked
 from .file.schema import Study
 from .finding import Finding
@@ -77,8 +78,8 @@ class Setup:
     What Morris' screening takes is known before anything runs: with r trajectories of k quantities
     r (k + 1) simulations.
 
-    >>> from analysis.studies import Setup, read_study, shipped
-    >>> from analysis.studies.kind import kind_of
+    >>> from nlctl.analysis.studies import Setup, read_study, shipped
+    >>> from nlctl.analysis.studies.kind import kind_of
     >>> file = read_study(shipped("example-1-quick"))
     >>> setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
     >>> (asked,) = [asked for asked in file.study.analysis if asked.kind == "morris"]
@@ -107,8 +108,8 @@ class Ground:
     rows : Sweep or None
         The main table, with its design.
     simulate : callable
-        Runs rows here, see `analysis.robustness.search.evaluation.Evaluate`; what a table leaves
-        out is nominal.
+        Runs rows here, see `nlctl.analysis.robustness.search.evaluation.Evaluate`; what a table
+        leaves out is nominal.
     run_design : RunDesign
 
     Examples
@@ -199,7 +200,7 @@ class Kind:
         numbers have ``runs`` and ``confidence``.
     stop : callable, optional
         ``stop(asked, design)`` returns what ends the main table early, where no other analysis
-        needs it; see `analysis.robustness.runs.sweep`.
+        needs it; see `nlctl.analysis.robustness.runs.sweep`.
     columns, quantities, keywords : tuple of str
         Keys of its table that name a column of its rows, quantities of the space, a keyword of the
         loop: they are checked before anything runs.
@@ -243,9 +244,9 @@ class Kind:
 
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import read_study, run
+    >>> from nlctl.analysis.studies import read_study, run
     >>> code = '''
-    ... from analysis.studies import Asked, Kind, made
+    ... from nlctl.analysis.studies import Asked, Kind, made
     ...
     ... class Failures(Asked):
     ...     pass
@@ -388,7 +389,7 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
 
     Examples
     --------
-    >>> from analysis.studies import Asked, made
+    >>> from nlctl.analysis.studies import Asked, made
     >>> asked = Asked(kind="spread")
     >>> found = made(asked, "The spread is 0.5.", runs=100, numbers={"spread": 0.5})
     >>> found.kind, found.numbers["spread"], found.holds

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from analysis.json_values import as_json, from_json
-from analysis.loop_record import (
+from ..json_values import as_json, from_json
+from ..loop_record import (
     difference_text,
     fact_differences,
     loop_facts,
@@ -20,9 +20,8 @@ from analysis.loop_record import (
     unseen_parts,
     values_differ,
 )
-from analysis.robustness import Prepared, diagrams
-from analysis.robustness.runs.identity import differences_of, experiment_facts, labels_text
-
+from ..robustness import Prepared, diagrams
+from ..robustness.runs.identity import differences_of, experiment_facts, labels_text
 from .file.parse import StudyFile
 from .file.schema import Study, keyed
 from .kind import Setup, kind_of

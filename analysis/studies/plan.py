@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from analysis.robustness import Prepared, evaluate, independent, prepare
-from analysis.robustness.runs.experiment import columns_of
 from nlctl.annotations import as_annotated
 
+from ..robustness import Prepared, evaluate, independent, prepare
+from ..robustness.runs.experiment import columns_of
 from .build import main_design
 from .file.parse import StudyFile
 from .file.schema import keyed
@@ -74,13 +74,13 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
     Raises
     ------
     UsageError
-        As in `analysis.robustness.prepare`.
+        As in `nlctl.analysis.robustness.prepare`.
 
     Examples
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import plan, read_study
+    >>> from nlctl.analysis.studies import plan, read_study
     >>> text = '''
     ... loop = "nlctl:block"
     ... options = { spec = { block = "Lag" }, name = "lag" }

@@ -12,14 +12,14 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.robustness import Design, Prepared, evaluate, nominal, prepare
-from analysis.robustness.runs.progress import Progress
-from analysis.robustness.runs.store import StoreError, locked
-from analysis.robustness.runs.sweep import Sweep, load, sweep
 from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
+from ..robustness import Design, Prepared, evaluate, nominal, prepare
+from ..robustness.runs.progress import Progress
+from ..robustness.runs.store import StoreError, locked
+from ..robustness.runs.sweep import Sweep, load, sweep
 from .build import main_design
 from .code.record import study_digest
 from .code.rule import remember_code
@@ -75,7 +75,7 @@ class _Way:
 @as_annotated
 def run(
     file: StudyFile,
-    folder: Path,
+    folder: str | Path,
     *,
     resume: bool = False,
     force: bool = False,
@@ -92,7 +92,7 @@ def run(
     ----------
     file : StudyFile
         What `read_study` returns.
-    folder : Path
+    folder : str or Path
         See `folder` for what is in it.
     resume : bool, optional
         Whether to take up what the folder holds.  It must be of the same study, loop and versions.
@@ -101,7 +101,7 @@ def run(
     executor : concurrent.futures.Executor, optional
         Where rows are run whose number is known in advance; searches run here.
     threads : int, optional
-        As in `analysis.robustness.runs.sweep`.
+        As in `nlctl.analysis.robustness.runs.sweep`.
     watch : callable, optional
         See `Watch`.
 
@@ -128,7 +128,7 @@ def run(
 
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import load_result, read_study, run
+    >>> from nlctl.analysis.studies import load_result, read_study, run
     >>> text = '''
     ... loop = "nlctl:block"
     ... options = { spec = { block = "Lag" }, name = "lag" }  # T v' = u - v
@@ -150,6 +150,7 @@ def run(
     >>> result.verdict, again.verdict
     ('The claim is shown.', 'The claim is shown.')
     """
+    folder = Path(folder)
     with locked(folder, RunFolderError):
         _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 class MetricLike(Protocol):
-    """What an ensemble asks of a metric; see `analysis.metrics.Metric`."""
+    """What an ensemble asks of a metric; see `nlctl.analysis.metrics.Metric`."""
 
     @property
     def key(self) -> str: ...
@@ -143,8 +143,8 @@ def ensemble_response(
     initial_state, params : mapping, optional
         ``{"plant.p1": array of shape (members,)}``; a number holds for all members.
     metrics : sequence, optional
-        Numbers to take of each member, such as `analysis.metrics.Metric`.  A function that was
-        compiled with ``numba.njit(nogil=True)`` keeps no thread waiting.
+        Numbers to take of each member, such as `nlctl.analysis.metrics.Metric`.  A function that
+        was compiled with ``numba.njit(nogil=True)`` keeps no thread waiting.
     keep : sequence of str, optional
         Outputs whose samples are kept.
     threads : int, optional
@@ -200,7 +200,8 @@ def ensemble_response(
     for metric in metrics:
         if not (hasattr(metric, "signals") and hasattr(metric, "function")):
             raise ParameterError(
-                f"ensemble_response needs metrics such as analysis.metrics.Metric, got {metric!r}"
+                "ensemble_response needs metrics such as nlctl.analysis.metrics.Metric, "
+                f"got {metric!r}"
             )
     states = {} if initial_state is None else initial_state
     every = members(compiled, checked_params(params) or {}, states)

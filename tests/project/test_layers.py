@@ -26,14 +26,19 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.expressions"],
     ["nlctl.native"],
     ["nlctl.response", "nlctl.__main__"],
-    ["analysis.json_values", "analysis.catalogue", "analysis.metrics", "analysis.intervals"]
-    + ["analysis.loop_record", "analysis.response_of_loop", "analysis.recheck"],
-    ["analysis.lyapunov", "analysis.robustness"],
-    ["analysis.figures", "analysis.report"],
-    ["analysis.studies"],
-    ["analysis.paper"],
-    ["analysis.loop_report"],
-    ["analysis.cli"],
+    [
+        "nlctl.analysis.json_values",
+        "nlctl.analysis.catalogue",
+        "nlctl.analysis.metrics",
+        "nlctl.analysis.intervals",
+    ]
+    + ["nlctl.analysis.loop_record", "nlctl.analysis.response_of_loop", "nlctl.analysis.recheck"],
+    ["nlctl.analysis.lyapunov", "nlctl.analysis.robustness"],
+    ["nlctl.analysis.figures", "nlctl.analysis.report"],
+    ["nlctl.analysis.studies"],
+    ["nlctl.analysis.paper"],
+    ["nlctl.analysis.loop_report"],
+    ["nlctl.analysis.cli"],
 ]
 BLOCK_MODULES = LAYERS[3]
 INSIDE = {  # the same within large packages: their rooms and single modules, from the bottom
@@ -68,19 +73,21 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["staged", "stage"],
         ["derivatives", "trace"],
     ],
-    "analysis.robustness": [["stl", "uncertainty"], ["statistics"], ["runs"], ["search"]],
+    "nlctl.analysis.robustness": [["stl", "uncertainty"], ["statistics"], ["runs"], ["search"]],
 }
 FILES = sorted(p for package in ("nlctl", "analysis") for p in (ROOT / package).rglob("*.py"))
 
 
 def module_name(path):
     parts = path.relative_to(ROOT).with_suffix("").parts
+    parts = parts if parts[0] == "nlctl" else ("nlctl", *parts)
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 MODULES = {module_name(path): ast.parse(path.read_text(encoding="utf-8")) for path in FILES}
 PACKAGES = {module_name(path) for path in FILES if path.name == "__init__.py"}
-MEMBERS = [name for name in MODULES if name not in ("nlctl", "analysis")]  # these only re-export
+ROOTS = ("nlctl", "nlctl.analysis")  # these only re-export
+MEMBERS = [name for name in MODULES if name not in ROOTS]
 
 
 def imports(name):
@@ -97,7 +104,7 @@ def imports(name):
             source = ".".join([*base, *([node.module] if node.module else [])])
             members = {f"{source}.{alias.name}" for alias in node.names}
             found |= (members & set(MODULES)) or {source}
-    return {module for module in found if module.split(".")[0] in ("nlctl", "analysis")}
+    return {module for module in found if module.split(".")[0] == "nlctl"}
 
 
 def within(name, prefixes):
@@ -177,13 +184,13 @@ def test_no_module_imports_itself_in_a_ring():
 
 def test_nlctl_knows_nothing_of_analysis():
     """Blocks, diagrams and the engine can be used without it; the command is looked up by name."""
-    upwards = {n for n in MEMBERS if n.startswith("nlctl.") for m in imports(n) if "analysis" in m}
-    assert upwards == set()
+    below = [n for n in MEMBERS if not within(n, ["nlctl.analysis"])]
+    assert {n for n in below for m in imports(n) if within(m, ["nlctl.analysis"])} == set()
 
 
 def test_the_recheck_knows_nothing_of_the_prover():
     """Nor of any third-party package: it stands on Python's own library."""
-    own = [m for m in MEMBERS if within(m, ["analysis.recheck"])]
+    own = [m for m in MEMBERS if within(m, ["nlctl.analysis.recheck"])]
     assert {m: found for m in own if (found := imports(m) - set(own))} == {}
     taken = {name.partition(".")[0] for m in own for name in imported(m)}
     assert taken <= set(sys.stdlib_module_names)
@@ -222,7 +229,7 @@ PRIVATE = ("numba.core", "numba.np", "numba.misc", "numba.typed", "numba.cpython
 
 def is_private_of_others(module):
     """Whether a name of another library is none that it documents."""
-    return within(module, PRIVATE) or ("._" in module and not within(module, ["nlctl", "analysis"]))
+    return within(module, PRIVATE) or ("._" in module and not within(module, ["nlctl"]))
 
 
 def test_private_names_of_numba_stand_in_one_module():
@@ -275,7 +282,7 @@ def test_rooms_say_what_is_in_them():
 def test_importing_is_cheap():
     """`nlctl --help` and `import nlctl` load none of the heavy libraries."""
     heavy = ["control", "scipy", "numba", "matplotlib", "pandas"]
-    for module in ("nlctl", "analysis.cli.main"):
+    for module in ("nlctl", "nlctl.analysis.cli.main"):
         code = f"import {module}, sys; print(*(m for m in {heavy} if m in sys.modules))"
         run = subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True

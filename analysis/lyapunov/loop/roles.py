@@ -423,12 +423,12 @@ def read_parts(
     Raises
     ------
     DiagramError
-        As `analysis.lyapunov.loop.roles.read_roles` does, or if there are external inputs.
+        As `nlctl.analysis.lyapunov.loop.roles.read_roles` does, or if there are external inputs.
 
     Examples
     --------
     >>> import nlctl
-    >>> from analysis.lyapunov import read_parts
+    >>> from nlctl.analysis.lyapunov import read_parts
     >>> parts = read_parts(nlctl.paper.example_1(), params={"law.beta": 3.0})
     >>> type(parts.actuator).__name__, parts.gains.beta
     ('DeadZone', 3.0)

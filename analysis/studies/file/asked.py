@@ -17,7 +17,7 @@ class Asked(Strict):
     The keys of a table of one's own, checked as those of nlctl's kinds are:
 
     >>> from pydantic import Field
-    >>> from analysis.studies import Asked
+    >>> from nlctl.analysis.studies import Asked
     >>> class Spread(Asked):
     ...     of: str = Field("spec", description="Column of the main table.")
     ...     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
@@ -52,7 +52,7 @@ class Varied(Asked):
 
     Examples
     --------
-    >>> from analysis.studies import Varied
+    >>> from nlctl.analysis.studies import Varied
     >>> class Corners(Varied):
     ...     levels: int = 2
     >>> Corners(kind="corners", quantities=["lag.T"]).quantities

@@ -11,17 +11,17 @@ from typing import Any, TypeVar
 
 import control as ct
 
-from analysis.metrics import Metric
-from analysis.robustness import Choice, Design, Experiment, Requirement, Space, Uncertain, resolved
-from analysis.robustness.search.largest_scale import refusal_of
-from analysis.robustness.statistics.guarantee import check_iid
-from analysis.robustness.uncertainty.binding import check_keyword
-from analysis.robustness.uncertainty.space import combinations
 from nlctl.errors import ParameterError, UsageError
 from nlctl.faults import with_faults
 from nlctl.names import unknown
 from nlctl.upstream.control_internals import is_system
 
+from ...metrics import Metric
+from ...robustness import Choice, Design, Experiment, Requirement, Space, Uncertain, resolved
+from ...robustness.search.largest_scale import refusal_of
+from ...robustness.statistics.guarantee import check_iid
+from ...robustness.uncertainty.binding import check_keyword
+from ...robustness.uncertainty.space import combinations
 from ..build import (
     SIGNALS,
     choice,

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.robustness import regional
 from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure
+from ...robustness import regional
 from ..file.asked import Asked
 from ..finding import Finding
 from ..kind import Ground, Kind, made

@@ -12,9 +12,9 @@ from ..kind import kind_of
 from .text import without_assumptions
 
 if TYPE_CHECKING:
-    from analysis.studies.file.asked import Asked
-    from analysis.studies.finding import Finding
-    from analysis.studies.result import Result
+    from ..file.asked import Asked
+    from ..finding import Finding
+    from ..result import Result
 
 __all__ = ["claims", "refusal", "verdict"]
 

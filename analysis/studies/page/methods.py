@@ -9,8 +9,7 @@ from nlctl.wording import counted
 from ..kind import kind_of
 
 if TYPE_CHECKING:
-    from analysis.studies.result import Result
-
+    from ..result import Result
     from .loop import Published
 
 __all__ = ["limits", "methods"]

@@ -25,7 +25,7 @@ def loop_again(
     ----------
     result : Result
     trust : bool, optional
-        As in `analysis.studies.read_study`.
+        As in `nlctl.analysis.studies.read_study`.
     tell : callable
         Takes a sentence on what the page will lack, or on versions that differ.
 

@@ -26,8 +26,8 @@ from .rows import fan_items, margin_items, row_items, setup_items
 from .running import running
 
 if TYPE_CHECKING:
-    from analysis.studies.finding import Finding
-    from analysis.studies.result import Result
+    from ..finding import Finding
+    from ..result import Result
 
 __all__ = ["study_part", "study_report", "study_sections"]
 
@@ -50,7 +50,7 @@ def study_report(
     Parameters
     ----------
     result : Result
-        Of `analysis.studies`, also an incomplete one.  If ``result.rows`` has its design, the
+        Of `nlctl.analysis.studies`, also an incomplete one.  If ``result.rows`` has its design, the
         report can say why the rows support no guarantee.
     kept : Histories, optional
         Signals of some rows; without them there are no fans.

@@ -208,14 +208,31 @@ def _chosen(task, lanes, w):
     return running
 
 
+@numba.njit(**INNER)
+def _jump(rhs, task, lanes, w, done, passed, sampled, any_passed):
+    """Let happen what is due at the ends of accepted steps, and begin again behind that."""
+    memories = task.rows.memory.size > 0
+    again = memories and any_passed
+    if task.lines.delays.shape[0]:
+        again |= keep(task, lanes, w, done, passed)
+    elif not memories:
+        passed[:] = False
+    again |= _happens(task, lanes, w, passed, sampled)
+    if again:
+        restart(rhs, task, lanes, w, passed)
+    if task.rows.guarded < task.rows.switching:
+        for j in range(lanes.size):
+            done[j] |= passed[j]
+        fall(rhs, task, lanes, w, done)
+
+
 def advance(rhs, point, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
     A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
     before the stiff method knows where to get its Jacobian from, or METHOD where another one pays.
     """
-    rows = task.rows
-    lanes = w.lanes
+    lanes, rows = w.lanes, task.rows
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     sampled, found = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.int64)
     for _ in range(rounds):
@@ -229,7 +246,7 @@ def advance(rhs, point, along, task, w, rounds):
         _attempt(rhs, point, along, task, lanes, w)
         if task.lines.delays.shape[0]:
             look_within(task, lanes, w)
-        if task.rows.memory.size:
+        if rows.memory.size:
             _look_ahead(rhs, task, lanes, w)
         _judge(task, lanes, w, found)
         if has_events(w) and not task.taylor.highest:
@@ -239,18 +256,7 @@ def advance(rhs, point, along, task, w, rounds):
         any_passed = _accept(task, lanes, w, found, done, passed)
         _note_events(task, lanes, w, found, done)
         _take(task, w, done)
-        again = rows.memory.size > 0 and any_passed
-        if task.lines.delays.shape[0]:
-            again |= keep(task, lanes, w, done, passed)
-        elif not rows.memory.size:
-            passed[:] = False
-        again |= _happens(task, lanes, w, passed, sampled)
-        if again:
-            restart(rhs, task, lanes, w, passed)
-        if rows.guarded < rows.switching:
-            for j in range(lanes.size):
-                done[j] |= passed[j]
-            fall(rhs, task, lanes, w, done)
+        _jump(rhs, task, lanes, w, done, passed, sampled, any_passed)
         if rows.ways.size:
             _look_at_inputs(task, lanes, w)
         if lanes[0].status == RUNNING and taylor.is_to_change(task, lanes[0]):

@@ -171,8 +171,7 @@ def prepared(
 ) -> Run:
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, count, read = compiled.program, x0.shape[1], compiled.schedule
-    method = _method(compiled, settings)
-    terms = ()
+    method, terms = _method(compiled, settings), ()
     due = instants_of(compiled.schedule, program, times, p)
     code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     c = np.zeros((code.rows, count))
@@ -184,10 +183,7 @@ def prepared(
         outputs=compiled.system.noutputs or 0,
         p=c,
         alone=int(count == 1),
-        rtol=float(settings.rtol),
-        atol=float(settings.atol),
-        fixed=float(settings.step),
-        max_steps=int(settings.max_steps),
+        **_bounds(settings),
         method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
         pair=pair_of(settings.pair),
         stiff=stiff_method(len(x0), UNKNOWN, np.zeros((1, 1)), WHOLE),
@@ -213,6 +209,14 @@ def prepared(
     work.lanes["stiff"] = method == "rodas5p"
     work = with_past(compiled, task, work, p)
     return Run(machine=code, task=task, work=work)
+
+
+def _bounds(settings: Settings) -> dict[str, Any]:
+    """Return what errors and numbers of steps are bounded by."""
+    return {
+        "rtol": float(settings.rtol), "atol": float(settings.atol),
+        "fixed": float(settings.step), "max_steps": int(settings.max_steps),
+    }  # fmt: skip
 
 
 def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> EventRows:

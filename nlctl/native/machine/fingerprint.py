@@ -399,7 +399,7 @@ def _defined(module: types.ModuleType) -> Iterator[str]:
 
 def _is_named(module: str) -> bool:
     """Whether the version of a module stands beside every key."""
-    return module.partition(".")[0] in ("nlctl", "analysis", "control") or _is_library(module)
+    return module.partition(".")[0] in ("nlctl", "control") or _is_library(module)
 
 
 @functools.cache

@@ -21,8 +21,8 @@ from nlctl.native.integrate.memory import (
     Reals3,
     arrays_of,
     grown,
-    with_fields,
     type_of,
+    with_fields,
     with_table,
 )
 
