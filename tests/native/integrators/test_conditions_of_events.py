@@ -127,8 +127,8 @@ def test_event_functions_with_pulses(method, engine, rtol):
 def test_a_run_ends_at_a_pulse(method, engine):
     """Where the state is first within 0.1 ms of 3, and where t is: a jump of the function."""
     for stop_when in (
-        lambda t, x, u, p: -1.0 if abs(x[0] - 3.0) < 1e-4 else 1.0,
-        lambda t, x, u, p: -1.0 if abs(t - 3.0) < 1e-4 else 1.0,
+        lambda t, x, u, p: -1.0 if 2.9999 < x[0] < 3.0001 else 1.0,
+        lambda t, x, u, p: -1.0 if 2.9999 < t < 3.0001 else 1.0,
     ):
         found = nlctl.input_output_response(
             nlctl.interconnect({"s": ramp(lambda v: v)}, outputs=["watched"]), TIMES,
