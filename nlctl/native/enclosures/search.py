@@ -1,0 +1,216 @@
+"""Boxes divided in machine code: a claim proved or refuted, a supremum enclosed.
+
+Boxes are taken from a stack, or a heap, as many together as there are lanes.  What comes out
+depends on no thread and on no other search.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..machine.machine_code import kept
+from .address import call_judge
+
+PROVED, REFUTED, LEFT, FULL = range(4)
+_INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True}
+
+
+@kept(**_INNER)
+def best_side(x, o, lane, weight, whole):
+    """Return the side that matters most and can be divided; -1 for none."""
+    best, side, n, known = -1.0, -1, whole.size, True
+    for i in range(n):
+        known = known and math.isfinite(o[weight + i, lane])
+    for i in range(n):
+        low, high = x[2 * i, lane], x[2 * i + 1, lane]
+        middle, width = 0.5 * low + 0.5 * high, high - low
+        if math.isfinite(width) and low < middle < high:
+            value = o[weight + i, lane] if known else width / whole[i] if whole[i] > 0.0 else 0.0
+            if value > best:
+                best, side = value, i
+    return side
+
+
+@kept(nogil=True, error_model="numpy")
+def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
+    """Prove or refute that the least of some functions is at most a bound on boxes.
+
+    Parameters
+    ----------
+    judge : int
+        Address of machine code.
+    places : tuple of 2 int
+        In `o`, where the centre and the weights of sides begin.
+    x, o : ndarray of shape (rows, lanes)
+        Room for what it is given and what it writes.
+    stack : ndarray of shape (boxes, 2 sides)
+        Boxes: lower and upper end of each side.
+    whole : ndarray of shape (sides,)
+        Widths that sides are compared with.
+    bound : float
+    most : int
+        Number of boxes after which the rest is left.
+    counts : ndarray of 3 int
+        Boxes on the stack, boxes judged, boxes that cannot be divided; they are counted on.
+    point : ndarray of shape (sides + 1,)
+        Where it is refuted, and the value there; or the centre of such a box.
+
+    Returns
+    -------
+    int
+        `PROVED`, `REFUTED`, `LEFT`, or `FULL` where the stack has no room for more.
+    """
+    n, lanes, centre, weight = whole.size, x.shape[1], places[0], places[1]
+    top = counts[0]
+    while top > 0 and counts[1] < most:
+        if top + lanes > stack.shape[0]:
+            counts[0] = top
+            return FULL
+        taken = min(lanes, top)
+        for lane in range(lanes):
+            j = top - 1 - min(lane, taken - 1)
+            for i in range(2 * n):
+                x[i, lane] = stack[j, i]
+        call_judge(judge, x, o)
+        top -= taken
+        counts[1] += taken
+        for lane in range(taken):
+            if o[0, lane] <= bound:
+                continue
+            if o[1, lane] > bound:
+                for i in range(n):
+                    point[i] = o[centre + i, lane]
+                point[n] = o[1, lane]
+                counts[0] = top
+                return REFUTED
+            side = best_side(x, o, lane, weight, whole)
+            if side < 0:
+                if counts[2] == 0:
+                    for i in range(n):
+                        point[i] = 0.5 * x[2 * i, lane] + 0.5 * x[2 * i + 1, lane]
+                counts[2] += 1
+                continue
+            middle = 0.5 * x[2 * side, lane] + 0.5 * x[2 * side + 1, lane]
+            for half in range(2):
+                for i in range(2 * n):
+                    stack[top, i] = x[i, lane]
+                stack[top, 2 * side + 1 - half] = middle
+                top += 1
+    counts[0] = top
+    return LEFT if top > 0 or counts[2] > 0 else PROVED
+
+
+@kept(nogil=True, error_model="numpy")
+def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, found):
+    """Enclose the supremum of the least of some functions on a box.
+
+    Parameters
+    ----------
+    judge, places, x, o, whole
+        As for `prove_below`.
+    nodes : ndarray of shape (boxes, 2 sides)
+        Boxes, the first of which is there to begin with.
+    index : ndarray of shape (3, boxes)
+        Of each box the side that is divided next; the heap's places in `nodes`; boxes that wait.
+    keys : ndarray of shape (boxes,)
+        The heap's bounds.
+    limits : tuple of (float, int, int)
+        How far the bound may be from a value that is attained; boxes after which the rest is
+        left, the second while there is no bound at all.
+    counts : ndarray of 5 int
+        Boxes that wait, boxes in the heap, places in use, boxes judged, boxes without a bound
+        that are left.
+    found : ndarray of 2 floats
+        The bound of boxes that cannot be divided, in the end that of all, and the largest lower
+        bound of a value at a point; where sides have no end, the largest upper bound at the
+        centres of the others.
+
+    Returns
+    -------
+    int
+        `FULL` where there is no room for more boxes, or `PROVED`.
+    """
+    n, lanes, centre, weight = whole.size, x.shape[1], places[0], places[1]
+    tol, most, hopeless = limits
+    waiting, size, stored = counts[0], counts[1], counts[2]
+    while True:
+        if waiting > 0:
+            for lane in range(lanes):
+                j = index[2, min(lane, waiting - 1)]
+                for i in range(2 * n):
+                    x[i, lane] = nodes[j, i]
+            call_judge(judge, x, o)
+            counts[3] += waiting
+        for lane in range(waiting):
+            value = o[1, lane]
+            for i in range(n):
+                if math.isnan(o[centre + i, lane]):
+                    value = o[2, lane]
+            if math.isfinite(value) and value > found[1]:
+                found[1] = value
+            j = index[2, lane]
+            index[0, j] = best_side(x, o, lane, weight, whole)
+            size = enter(keys, index, size, o[0, lane], j)
+        waiting = 0
+        if stored + lanes > nodes.shape[0]:
+            counts[0], counts[1], counts[2] = 0, size, stored
+            return FULL
+        while waiting + 2 <= lanes and size > 0:
+            end, j = keys[0], index[1, 0]
+            limit = most if end < math.inf else min(most, hopeless)
+            if end - found[1] <= tol or counts[3] + waiting >= limit:
+                break
+            size = leave(keys, index, size)
+            side = index[0, j]
+            if side < 0:
+                found[0] = max(found[0], end)
+                counts[4] += end == math.inf
+                continue
+            middle = 0.5 * nodes[j, 2 * side] + 0.5 * nodes[j, 2 * side + 1]
+            for i in range(2 * n):
+                nodes[stored, i] = nodes[j, i]
+            nodes[j, 2 * side + 1] = middle
+            nodes[stored, 2 * side] = middle
+            index[2, waiting], index[2, waiting + 1] = j, stored
+            stored += 1
+            waiting += 2
+        if waiting == 0:
+            break
+    for k in range(size):
+        found[0] = max(found[0], keys[k])
+        counts[4] += keys[k] == math.inf
+    counts[1], counts[2] = size, stored
+    return PROVED
+
+
+@kept(**_INNER)
+def enter(keys, index, size, key, what):
+    """Put a box into the heap, the largest bound first, and return its size."""
+    at = size
+    while at > 0:
+        up = (at - 1) // 2
+        if keys[up] >= key:
+            break
+        keys[at], index[1, at] = keys[up], index[1, up]
+        at = up
+    keys[at], index[1, at] = key, what
+    return size + 1
+
+
+@kept(**_INNER)
+def leave(keys, index, size):
+    """Take the first box out of the heap, and return its size."""
+    size -= 1
+    key, what, at = keys[size], index[1, size], 0
+    while True:
+        down = 2 * at + 1
+        if down >= size:
+            break
+        if down + 1 < size and keys[down + 1] > keys[down]:
+            down += 1
+        if key >= keys[down]:
+            break
+        keys[at], index[1, at] = keys[down], index[1, down]
+        at = down
+    keys[at], index[1, at] = key, what
+    return size
