@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -80,7 +81,18 @@ class Enclosed:
         return flat[..., 0], flat[..., 1]
 
 
-def expressions_of(function: Callable[..., Any], sides: int) -> list[Expr]:
+def side_leaves(graph: Graph, sides: int) -> tuple[Tracer, ...]:
+    """Return the sides of a box as numbers that a traced function may take.
+
+    Parameters
+    ----------
+    graph : Graph
+    sides : int
+    """
+    return tuple(scalar(graph, graph.leaf("x", i, None)) for i in range(sides))
+
+
+def expressions_of(function: Callable[..., Any], sides: int) -> tuple[Graph, list[Expr]]:
     """Return what a function of a tuple of numbers computes, as expressions of its numbers.
 
     Raises
@@ -89,21 +101,54 @@ def expressions_of(function: Callable[..., Any], sides: int) -> list[Expr]:
         If it is not a function of its arguments alone, or does what expressions cannot say.
     """
     graph = Graph({"x": sides})
+    return graph, numbers_at(graph, function, side_leaves(graph, sides))
+
+
+def numbers_at(
+    graph: Graph, function: Callable[..., Any], sides: tuple[Tracer, ...]
+) -> list[Expr]:
+    """Return what anybody's function of one tuple computes; see `expressions_of`.
+
+    Parameters
+    ----------
+    graph : Graph
+    function : callable
+    sides : tuple of Tracer
+
+    Raises
+    ------
+    Untraceable
+        If it is not a function of its arguments alone, or does what expressions cannot say.
+    """
     try:
         check_pure(function, [FRESH])
     except Impure as error:
         raise Untraceable(f"it {error.reason}") from None
-    given = lambda: (tuple(scalar(graph, graph.leaf("x", i, None)) for i in range(sides)),)  # noqa: E731
+    return traced_numbers(graph, function, lambda: (sides,))
+
+
+def traced_numbers(
+    graph: Graph, function: Callable[..., Any], arguments: Callable[[], tuple[Any, ...]]
+) -> list[Expr]:
+    """Return the numbers that a pure function computes.
+
+    Parameters
+    ----------
+    graph : Graph
+    function : callable
+    arguments : callable
+        Makes its arguments, see `nlctl.expressions.trace`.
+
+    Raises
+    ------
+    Untraceable
+        If it does what expressions cannot say, or what they understand in another way.
+    """
     try:
         with np.errstate(all="ignore"):
-            found = trace(graph, function, given)
+            found = trace(graph, function, arguments)
     except Ambiguous as error:
         raise Untraceable(str(error)) from None
-    return numbers_of(found)
-
-
-def numbers_of(found: Tracer) -> list[Expr]:
-    """Return the elements of an array of one dimension."""
     return [found[i].only for i in range(found.size)]
 
 
@@ -124,13 +169,17 @@ def enclosed(results: Sequence[Expr], sides: int) -> Enclosed:
     """
     graph, numbers = scalar_expressions(results)
     gradients = [_gradient(graph, expr, sides) for expr in numbers]
-    text = enclosure_text(numbers, gradients, sides)
     return Enclosed(
         sides=sides,
         expressions=tuple(numbers),
         rows=Rows(sides=sides, results=len(numbers)),
-        loaded=finished(text, ("values", "judge")),
+        loaded=_loaded(enclosure_text(numbers, gradients, sides)),
     )
+
+
+@functools.lru_cache(maxsize=64)
+def _loaded(text: str) -> Loaded:
+    return finished(text, ("values", "judge"))
 
 
 def _gradient(graph: Graph, expr: Expr, sides: int) -> list[Expr]:

@@ -169,6 +169,7 @@ def greatest(
     tol: float,
     max_boxes: int,
     hopeless: int,
+    relative: float = 1e-10,
 ) -> Supremum:
     """Enclose the supremum of the least of the functions on a box.
 
@@ -180,13 +181,15 @@ def greatest(
         How far the bound may be from a value that is attained.
     max_boxes, hopeless : int
         Boxes after which the rest is left as it is, the second while there is no bound at all.
+    relative : float, optional
+        A smaller tolerance that is tried, relative to the bound.
     """
     box = np.stack([low, high], axis=1).reshape(-1)
     nodes, index, keys = np.empty((_ROOM, box.size)), np.zeros((3, _ROOM), dtype=np.int64), None
     nodes[0], keys = box, np.empty(_ROOM)
     counts, found = np.array([1, 0, 1, 0, 0]), np.array([-np.inf, -np.inf])
     rows, room, whole = code.rows, _room(code), _widths(box)
-    limits = (float(tol), int(max_boxes), int(hopeless))
+    limits = (float(tol), float(relative), int(max_boxes), int(hopeless))
     while True:
         status = supremum(
             code.judge, (rows.centre, rows.weight), *room, nodes, index, keys, whole, limits,

@@ -12,6 +12,7 @@ from ..machine.machine_code import kept
 from .address import call_judge
 
 PROVED, REFUTED, LEFT, FULL = range(4)
+FINEST = 1e-6  # of a tolerance: where the bound is near 0, nothing finer is tried
 _INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True}
 
 
@@ -114,9 +115,10 @@ def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, fou
         Of each box the side that is divided next; the heap's places in `nodes`; boxes that wait.
     keys : ndarray of shape (boxes,)
         The heap's bounds.
-    limits : tuple of (float, int, int)
-        How far the bound may be from a value that is attained; boxes after which the rest is
-        left, the second while there is no bound at all.
+    limits : tuple of (float, float, int, int)
+        How far the bound may be from a value that is attained, and a smaller number, relative to
+        the bound, that is tried; boxes after which the rest is left, the second while there is no
+        bound at all.
     counts : ndarray of 5 int
         Boxes that wait, boxes in the heap, places in use, boxes judged, boxes without a bound
         that are left.
@@ -131,7 +133,7 @@ def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, fou
         `FULL` where there is no room for more boxes, or `PROVED`.
     """
     n, lanes, centre, weight = whole.size, x.shape[1], places[0], places[1]
-    tol, most, hopeless = limits
+    tol, relative, most, hopeless = limits
     waiting, size, stored = counts[0], counts[1], counts[2]
     while True:
         if waiting > 0:
@@ -158,7 +160,8 @@ def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, fou
         while waiting + 2 <= lanes and size > 0:
             end, j = keys[0], index[1, 0]
             limit = most if end < math.inf else min(most, hopeless)
-            if end - found[1] <= tol or counts[3] + waiting >= limit:
+            close = min(tol, max(relative * abs(end), FINEST * tol))
+            if end - found[1] <= close or counts[3] + waiting >= limit:
                 break
             size = leave(keys, index, size)
             side = index[0, j]

@@ -23,6 +23,7 @@ from .arithmetic import (
     add,
     compare,
     div,
+    finite,
     logic,
     logic_not,
     maximum,
@@ -201,7 +202,7 @@ def _values(module: Module, results: Sequence[Expr], lanes: int) -> str:
     w = Writer(b, lanes)
     w.write(results)
     for k, expr in enumerate(results):
-        w.keep("v", 2 * k, *w.names[expr].values)
+        w.keep("v", 2 * k, *finite(w.names[expr]).values)
     b.write("ret void")
     return _function(b, "values", "x", "v")
 
@@ -276,7 +277,7 @@ def _bound(
 
     The latter holds where nothing jumps; infinite where there is no value.
     """
-    b, value, mean = w.b, w.names[expr], at_centre
+    b, value, mean = w.b, finite(w.names[expr]), at_centre
     for slope, (step, moves) in zip(slopes, steps, strict=True):
         if slope.point != 0:
             change = mul(b, slope, step)
