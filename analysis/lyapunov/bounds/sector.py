@@ -11,12 +11,16 @@ import numpy as np
 from nlctl.annotations import as_annotated
 from nlctl.arguments import of_type
 from nlctl.errors import DiagramError, ParameterError
+from nlctl.expressions.arrays import Tracer
+from nlctl.expressions.graph import Expr, Graph, Untraceable
+from nlctl.expressions.quotients import difference_quotient
 from nlctl.params import equation_arguments
 from nlctl.plants import PureFeedback, coordinate_names
 
 from ...intervals.agreement import agreeing
 from ...intervals.box import Box
 from ...intervals.branch_and_bound import Range, enclose
+from ...intervals.machine import Readable
 from ...intervals.quotient import slope_in
 
 __all__ = ["Sector", "plant_terms", "quotient_range", "sector"]
@@ -155,7 +159,12 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
 
 
 def quotient_range(
-    function: Callable[[tuple[Any, ...], Any], Any], box: Box, *, tol: float, max_boxes: int
+    function: Callable[[tuple[Any, ...], Any], Any],
+    box: Box,
+    *,
+    tol: float,
+    max_boxes: int,
+    expression: Callable[[Graph, tuple[Tracer, ...]], Expr] | None = None,
 ) -> Sector:
     """Prove the range of (q(x, v) - q(x, 0)) / v over a box whose last side is v.
 
@@ -166,15 +175,23 @@ def quotient_range(
     box : Box
     tol, max_boxes
         As for `sector`.
+    expression : callable, optional
+        ``expression(graph, sides)``: q of symbols, v being the last.
     """
 
     def gain(point: tuple[Any, ...]) -> Any:
         *x, v = point
         return slope_in(lambda v: function(tuple(x), v), v)
 
+    def quotient(graph: Graph, sides: tuple[Tracer, ...]) -> list[Expr]:
+        if expression is None:
+            raise Untraceable("no expression is known")
+        return [difference_quotient(graph, expression(graph, sides), sides[-1].only)]
+
+    known = Readable(of_balls=gain, expressions=quotient)
     (low, high), rest = box["v"], box.only(*box.names[:-1])
     halves: list[Range | None] = []
     for a, b in ((max(low, 0.0), high), (low, min(high, 0.0))):
         part = rest.times("v", a, b) if a < b or (a == b and low == high) else None
-        halves.append(enclose(gain, part, tol=tol, max_boxes=max_boxes) if part else None)
+        halves.append(enclose(known, part, tol=tol, max_boxes=max_boxes) if part else None)
     return Sector(positive=halves[0], negative=halves[1], box=box)

@@ -14,6 +14,7 @@ from nlctl.references import SumOfSines
 from ...intervals.arithmetic import as_ball
 from ...intervals.box import Box
 from ...intervals.branch_and_bound import enclose, upper
+from ...intervals.machine import Readable
 from ..bounds.decomposition import Decomposition
 from ..bounds.error_bounds import error_bounds, reference_bounds
 from ..bounds.final_bound import total_error
@@ -109,18 +110,20 @@ def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1
             whole = whole.times(name, *sides[name])
         return whole
 
-    def matched(point: tuple[Any, ...]) -> Any:
-        *x, t = point
-        return loop.acceleration(t, x, 0.0)
-
+    rate = loop.acceleration
+    matched = Readable(
+        of_balls=lambda point: rate(point[-1], list(point[:-1]), 0.0),
+        expressions=lambda graph, s: [rate.expression(graph, s[-1], s[:-1], 0.0)],
+    )
     rough = enclose(matched, over_all("t"), max_boxes=1).magnitude
     fineness = tol * rough if 0 < rough < np.inf else tol
     fine = enclose(matched, over_all("t"), tol=fineness, max_boxes=20_000)
     gain = quotient_range(
-        lambda x, v: loop.acceleration(x[-1], x[:-1], v),
+        lambda x, v: rate(x[-1], x[:-1], v),
         over_all("t", "v"),
         tol=tol,
         max_boxes=2_000,
+        expression=lambda graph, s: rate.expression(graph, s[-2], s[:-2], s[-1]),
     )
     return Demand(
         C=C,
