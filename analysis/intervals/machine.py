@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -44,11 +44,15 @@ class Readable:
     of_balls : callable
         Of a tuple of balls.
     expressions : callable
-        ``expressions(graph, sides)``: the same of symbols, as expressions of the graph.
+        ``expressions(graph, sides)``: the same of symbols, as expressions of the graph.  Several
+        are conditions, and the function their least.
+    codes : dict
+        Machine code that has been made of it, by sides and sign; None where there is none.
     """
 
     of_balls: Callable[..., Any]
     expressions: Callable[[Graph, tuple[Tracer, ...]], Sequence[Expr]]
+    codes: dict[tuple[int, int], Enclosed | None] = field(default_factory=dict, compare=False)
 
     def __call__(self, *given: Any) -> Any:
         return self.of_balls(*given)
@@ -82,19 +86,26 @@ def machine_code(function: Any, box: Box, sign: int, bound: float = 0.0) -> Cond
     """
     if is_jit_disabled() or not box.names:
         return None
+    known = function.codes if isinstance(function, Readable) else {}
+    key = (len(box.names), sign)
+    if key not in known:
+        code = _made(function, *key)
+        known[key] = code if code is not None and _agrees(code, function, box, sign) else None
+    code = known[key]
+    return None if code is None else Conditions(code=code, bound=bound)
+
+
+def _made(function: Any, sides: int, sign: int) -> Enclosed | None:
+    """Return the code of sign f, None if it has none."""
     try:
-        graph, results = _expressions(function, len(box.names))
+        graph, results = _expressions(function, sides)
         if isinstance(function, Readable) and len(results) > 1:
-            numbers = list(results)
-        elif len(results) == 1:
-            numbers = _apart(graph, graph.number(results[0]), sign)
-        else:
+            return enclosed(results, sides)
+        if len(results) != 1:
             return None
-        code = enclosed(numbers, len(box.names))
+        return enclosed(_apart(graph, graph.number(results[0]), sign), sides)
     except Untraceable:
         return None
-    found = Conditions(code=code, bound=bound)
-    return found if _agrees(found, function, box, sign) else None
 
 
 def _expressions(function: Any, sides: int) -> tuple[Graph, Sequence[Expr]]:
@@ -116,10 +127,10 @@ def _apart(graph: Graph, expr: Expr, sign: int) -> list[Expr]:
     return [expr if sign > 0 else graph.op("neg", expr)]
 
 
-def _agrees(found: Conditions, function: Any, box: Box, sign: int) -> bool:
+def _agrees(code: Enclosed, function: Any, box: Box, sign: int) -> bool:
     """Whether code and balls meet at points of the box."""
     points = np.array([_point(box, k) for k in range(_POINTS)])
-    low, high = (v.min(axis=1) for v in found.code.values(points, points))
+    low, high = (v.min(axis=1) for v in code.values(points, points))
     for point, a, b in zip(points, low, high, strict=True):
         try:
             value = sign * as_ball(function(tuple(Ball(arb(float(v))) for v in point))).value

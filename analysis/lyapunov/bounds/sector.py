@@ -159,12 +159,7 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
 
 
 def quotient_range(
-    function: Callable[[tuple[Any, ...], Any], Any],
-    box: Box,
-    *,
-    tol: float,
-    max_boxes: int,
-    expression: Callable[[Graph, tuple[Tracer, ...]], Expr] | None = None,
+    function: Callable[[tuple[Any, ...], Any], Any], box: Box, *, tol: float, max_boxes: int
 ) -> Sector:
     """Prove the range of (q(x, v) - q(x, 0)) / v over a box whose last side is v.
 
@@ -175,6 +170,20 @@ def quotient_range(
     box : Box
     tol, max_boxes
         As for `sector`.
+    """
+    return range_of_quotient(quotient_function(function), box, tol=tol, max_boxes=max_boxes)
+
+
+def quotient_function(
+    function: Callable[[tuple[Any, ...], Any], Any],
+    expression: Callable[[Graph, tuple[Tracer, ...]], Expr] | None = None,
+) -> Readable:
+    """Return (q(x, v) - q(x, 0)) / v as a function of x and v together.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(x, v)``, x the coordinates of the other sides.
     expression : callable, optional
         ``expression(graph, sides)``: q of symbols, v being the last.
     """
@@ -188,10 +197,14 @@ def quotient_range(
             raise Untraceable("no expression is known")
         return [difference_quotient(graph, expression(graph, sides), sides[-1].only)]
 
-    known = Readable(of_balls=gain, expressions=quotient)
+    return Readable(of_balls=gain, expressions=quotient)
+
+
+def range_of_quotient(gain: Readable, box: Box, *, tol: float, max_boxes: int) -> Sector:
+    """Prove the range of a quotient over a box whose last side is v, see `quotient_range`."""
     (low, high), rest = box["v"], box.only(*box.names[:-1])
     halves: list[Range | None] = []
     for a, b in ((max(low, 0.0), high), (low, min(high, 0.0))):
         part = rest.times("v", a, b) if a < b or (a == b and low == high) else None
-        halves.append(enclose(known, part, tol=tol, max_boxes=max_boxes) if part else None)
+        halves.append(enclose(gain, part, tol=tol, max_boxes=max_boxes) if part else None)
     return Sector(positive=halves[0], negative=halves[1], box=box)

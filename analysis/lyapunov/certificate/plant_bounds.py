@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -18,7 +19,7 @@ from ...intervals.machine import Readable
 from ..bounds.decomposition import Decomposition
 from ..bounds.error_bounds import error_bounds, reference_bounds
 from ..bounds.final_bound import total_error
-from ..bounds.sector import quotient_range
+from ..bounds.sector import quotient_function, range_of_quotient
 from ..loop.plant_form import Acceleration
 
 __all__ = ["Demand", "FilteredLoop", "demand", "feedforward"]
@@ -110,21 +111,11 @@ def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1
             whole = whole.times(name, *sides[name])
         return whole
 
-    rate = loop.acceleration
-    matched = Readable(
-        of_balls=lambda point: rate(point[-1], list(point[:-1]), 0.0),
-        expressions=lambda graph, s: [rate.expression(graph, s[-1], s[:-1], 0.0)],
-    )
+    matched, gain_of_v = _terms(loop.acceleration)
     rough = enclose(matched, over_all("t"), max_boxes=1).magnitude
     fineness = tol * rough if 0 < rough < np.inf else tol
     fine = enclose(matched, over_all("t"), tol=fineness, max_boxes=20_000)
-    gain = quotient_range(
-        lambda x, v: rate(x[-1], x[:-1], v),
-        over_all("t", "v"),
-        tol=tol,
-        max_boxes=2_000,
-        expression=lambda graph, s: rate.expression(graph, s[-2], s[:-2], s[-1]),
-    )
+    gain = range_of_quotient(gain_of_v, over_all("t", "v"), tol=tol, max_boxes=2_000)
     return Demand(
         C=C,
         box=box,
@@ -135,6 +126,20 @@ def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1
         delta_star=upper(total_error(as_ball(gain.G_max), split.eps_star, fine.magnitude, 0.0)),
         boxes=fine.boxes + gain.boxes,
     )
+
+
+@functools.lru_cache(maxsize=8)
+def _terms(rate: Acceleration) -> tuple[Readable, Readable]:
+    """Return g + d, of states and time, and F/v, of these and v: as long as the plant is known."""
+    matched = Readable(
+        of_balls=lambda point: rate(point[-1], list(point[:-1]), 0.0),
+        expressions=lambda graph, s: [rate.expression(graph, s[-1], s[:-1], 0.0)],
+    )
+    gain = quotient_function(
+        lambda x, v: rate(x[-1], x[:-1], v),
+        lambda graph, s: rate.expression(graph, s[-2], s[:-2], s[-1]),
+    )
+    return matched, gain
 
 
 def feedforward(loop: FilteredLoop, need: Demand) -> arb:

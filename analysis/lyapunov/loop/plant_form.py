@@ -40,7 +40,7 @@ class Acceleration(Protocol):
         ...
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class _Acceleration:
     """The last rate of a plant's own update."""
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..codegen.ir.text import Body, Value, constant
+from ..codegen.ir.text import Body, Value, constant, llvm_type
 from .rounding import (
     downwards,
     greatest,
@@ -46,6 +47,54 @@ def number(x: float, width: int) -> Interval:
     """Return a constant."""
     v = constant(x, width)
     return Interval(low=v, high=v, point=x, not_negative=x >= 0)
+
+
+def routine(b: Body, name: str, make: Callable[..., Interval], *args: Interval) -> Interval:
+    """Return what a rule makes of intervals; it is written once, as a function of a module.
+
+    Parameters
+    ----------
+    b : Body
+        Where it is used.
+    name : str
+        Of the rule, where no constant and no known sign is among its arguments.
+    make : callable
+        ``make(b, *args)``, the rule.
+    *args : Interval
+        Of numbers.
+    """
+    known = "".join("c" if x.point is not None else "n" if x.not_negative else "p" for x in args)
+    if "c" in known:
+        return make(b, *args)
+    width = args[0].low.width
+    full, kind = f"@enclosures.{name}.{known}", llvm_type(width)
+    pair = f"{{{kind}, {kind}}}"
+    if full not in b.module.functions:
+        b.module.functions[full] = ""  # before those that it calls
+        inner = Body(b.module)
+        given = [
+            Interval(
+                low=Value(f"%l{i}", width), high=Value(f"%h{i}", width), not_negative=x.not_negative
+            )
+            for i, x in enumerate(args)
+        ]
+        result = make(inner, *given)
+        half = inner.new(f"insertvalue {pair} poison, {result.low}, 0").text
+        inner.write(f"ret {pair} {inner.new(f'insertvalue {pair} {half}, {result.high}, 1').text}")
+        taken = ", ".join(str(v) for x in given for v in x.values)
+        signed = "; not negative\n" if result.not_negative else ""
+        b.module.functions[full] = (
+            f"{signed}define internal {pair} {full}({taken}) {_how(b)} nounwind {{\n"
+            f"entry:\n{inner.text()}}}\n"
+        )
+    found = b.new(f"call {pair} {full}({', '.join(str(v) for x in args for v in x.values)})")
+    low, high = (b.new(f"extractvalue {pair} {found.text}, {i}", width) for i in (0, 1))
+    signed = b.module.functions[full].startswith("; not negative")
+    return Interval(low=low, high=high, not_negative=signed)
+
+
+def _how(b: Body) -> str:
+    return "alwaysinline" if b.module.inlined else "noinline"
 
 
 def finite(x: Interval) -> Interval:

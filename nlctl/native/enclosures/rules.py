@@ -26,6 +26,7 @@ from .arithmetic import (
     mul,
     neg,
     number,
+    routine,
     size,
     sqrt,
     sub,
@@ -94,9 +95,12 @@ def interval_of(b: Body, name: str, *args: Interval) -> Result:
         return (minimum if name == "minimum" else maximum)(b, *args), None
     args = tuple(map(finite, args))
     if name in MONOTONE:
-        return _by_ends(b, name, MONOTONE[name], args[0]), None
+        known = MONOTONE[name]
+        return routine(b, name, lambda c, x: _by_ends(c, name, known, x), *args), None
     if name in STEPS:
         return _steps(b, name, args[0])
+    if name in _SMOOTH:
+        return routine(b, name, lambda c, *given: RULES[name](c, *given)[0], *args), None
     return RULES[name](b, *args)
 
 
@@ -321,3 +325,5 @@ RULES: dict[str, Callable[..., Result]] = {
     "heaviside": _heaviside,
     "logaddexp": _logaddexp,
 }
+_SMOOTH = ("sqrt", "cosh", "sin", "cos", "tan", "hypot", "power", "logaddexp")
+"""Those that never jump."""

@@ -31,6 +31,7 @@ from .arithmetic import (
     mul,
     neg,
     number,
+    routine,
     select,
     select_truth,
     size,
@@ -42,7 +43,7 @@ from .rounding import greatest, least
 from .rules import interval_of
 
 LANES = 8
-_ARITHMETIC = {"add": add, "sub": sub, "mul": mul, "div": div}
+_ARITHMETIC = {"sub": sub, "mul": mul, "div": div}
 _INF = float("inf")
 
 
@@ -141,8 +142,12 @@ class Writer:
             return known(node.data, self.lanes)
         if node.op == "leaf":
             return self.side("x", node.data[1])
-        if node.op in _ARITHMETIC:
-            return _ARITHMETIC[node.op](b, *args)
+        if node.op == "add":
+            return add(b, *args)
+        if node.op in _ARITHMETIC and args[0] is not args[1]:
+            return routine(b, node.op, _ARITHMETIC[node.op], *args)
+        if node.op in _ARITHMETIC:  # of one quantity: less than of two in one range
+            return routine(b, f"{node.op}.same", lambda c, x: _ARITHMETIC[node.op](c, x, x), args[0])
         if node.op == "neg":
             return neg(b, args[0])
         if node.op in COMPARISONS:
@@ -280,7 +285,7 @@ def _bound(
     b, value, mean = w.b, finite(w.names[expr]), at_centre
     for slope, (step, moves) in zip(slopes, steps, strict=True):
         if slope.point != 0:
-            change = mul(b, slope, step)
+            change = routine(b, "mul", mul, slope, step)
             low, high = (b.select(moves, v, 0.0) for v in change.values)
             mean = add(b, mean, Interval(low=low, high=high))
     jumps = w.may_jump(expr)
