@@ -104,7 +104,12 @@ def prove_decrease(
     plain, V, rhs = (V, rhs), _compared("V", V), _compared("rhs", rhs)
     _check_continuous(V, box)
     fixed = _parameters(V, rhs, box)
-    open_face = _check_faces(Readable(of_balls=V, expressions=partial(_value, plain[0])), box, high, [i for i in range(len(fixed)) if not fixed[i]])
+    open_face = _check_faces(
+        Readable(of_balls=V, expressions=partial(_value, plain[0])),
+        box,
+        high,
+        [i for i in range(len(fixed)) if not fixed[i]],
+    )
     if open_face is not None:
         return open_face
 
@@ -134,7 +139,7 @@ def _conditions(
     """Return what is positive at once where V' is not negative in the level set."""
     (value,), rates = (numbers_at(graph, function, sides) for function in (V, rhs))
     if len(rates) != len(sides) or may_jump([value]):
-        raise Untraceable("it is no continuous function with as many rates as sides")
+        raise Untraceable("V may jump, or there are not as many rates as sides")
     (rate,) = tangents(graph, [value], lambda leaf: graph.number(rates[leaf.data[1]]))
     rate, op = graph.const(0.0) if rate is None else rate, graph.op
     return [

@@ -8,7 +8,9 @@ them at points of the box, and where a claim is refuted they have the last word.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,13 +28,28 @@ from .arithmetic import Ball, as_ball
 from .box import Box
 from .paths import Undecided
 
-__all__ = ["Conditions", "Readable", "decided_by_code", "machine_code", "supremum_by_code"]
+__all__ = [
+    "Conditions", "Readable", "decided_by_code", "machine_code", "only_balls", "supremum_by_code",
+]  # fmt: skip
 
 FEW = 16  # boxes, for which code does not pay
 _POINTS = 8  # at which code is compared with balls
 _GOLDEN = 0.6180339887498949
 _LARGE = 5.0  # scale of points along sides without an end
 _ROUNDING = 1e-9  # relative
+
+
+_ONLY_BALLS: ContextVar[bool] = ContextVar("only_balls", default=False)
+
+
+@contextmanager
+def only_balls() -> Iterator[None]:
+    """Prove by balls alone what is proved meanwhile, whatever machine code there is."""
+    token = _ONLY_BALLS.set(True)
+    try:
+        yield
+    finally:
+        _ONLY_BALLS.reset(token)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,11 +65,14 @@ class Readable:
         are conditions, and the function their least.
     codes : dict
         Machine code that has been made of it, by sides and sign; None where there is none.
+    read : dict
+        The expressions, by sides.
     """
 
     of_balls: Callable[..., Any]
     expressions: Callable[[Graph, tuple[Tracer, ...]], Sequence[Expr]]
     codes: dict[tuple[int, int], Enclosed | None] = field(default_factory=dict, compare=False)
+    read: dict[int, tuple[Graph, Sequence[Expr]]] = field(default_factory=dict, compare=False)
 
     def __call__(self, *given: Any) -> Any:
         return self.of_balls(*given)
@@ -84,7 +104,7 @@ def machine_code(function: Any, box: Box, sign: int, bound: float = 0.0) -> Cond
     sign : {1, -1}
     bound : float, optional
     """
-    if is_jit_disabled() or not box.names:
+    if is_jit_disabled() or not box.names or _ONLY_BALLS.get():
         return None
     known = function.codes if isinstance(function, Readable) else {}
     key = (len(box.names), sign)
@@ -110,8 +130,11 @@ def _made(function: Any, sides: int, sign: int) -> Enclosed | None:
 
 def _expressions(function: Any, sides: int) -> tuple[Graph, Sequence[Expr]]:
     if isinstance(function, Readable):
-        graph = Graph({"x": sides})
-        return graph, function.expressions(graph, side_leaves(graph, sides))
+        if sides not in function.read:
+            graph = Graph({"x": sides})
+            found = function.expressions(graph, side_leaves(graph, sides))
+            function.read[sides] = graph, found
+        return function.read[sides]
     return expressions_of(function, sides)
 
 

@@ -28,6 +28,7 @@ from ...intervals.paths import Undecided, every_way
 
 __all__ = ["Acceleration", "acceleration", "check_chain", "on_intervals"]
 
+
 class Acceleration(Protocol):
     """x_n' of a plant."""
 
@@ -52,7 +53,7 @@ class _Acceleration:
         return self.update(t, _objects(x), _objects((v,)), self.p)[-1]
 
     def expression(self, graph: Graph, t: Tracer, x: Sequence[Tracer], v: Any) -> Expr:
-        """Return it of symbols; Untraceable if it is no expression."""
+        """Return it of symbols; Untraceable if there is none."""
         system = self.plant.system
         try:
             check_functions(self.plant.path, system)

@@ -31,5 +31,7 @@ def _by_address(typing_context: Any, judge: Any, x: Any, o: Any) -> Any:
 
 infer_global(
     call_judge,
-    types.Function(make_intrinsic_template(call_judge, _by_address, "call_judge", prefer_literal=False)),
+    types.Function(
+        make_intrinsic_template(call_judge, _by_address, "call_judge", prefer_literal=False)
+    ),
 )

@@ -98,7 +98,7 @@ def _how(b: Body) -> str:
 
 
 def finite(x: Interval) -> Interval:
-    """Return what can be computed with: an infinite constant is no number."""
+    """Return what can be computed with: an infinite constant becomes NaN."""
     return number(NAN, x.low.width) if x.point in (float("inf"), -float("inf")) else x
 
 

@@ -104,9 +104,7 @@ def expressions_of(function: Callable[..., Any], sides: int) -> tuple[Graph, lis
     return graph, numbers_at(graph, function, side_leaves(graph, sides))
 
 
-def numbers_at(
-    graph: Graph, function: Callable[..., Any], sides: tuple[Tracer, ...]
-) -> list[Expr]:
+def numbers_at(graph: Graph, function: Callable[..., Any], sides: tuple[Tracer, ...]) -> list[Expr]:
     """Return what anybody's function of one tuple computes; see `expressions_of`.
 
     Parameters
@@ -167,8 +165,9 @@ def enclosed(results: Sequence[Expr], sides: int) -> Enclosed:
     Untraceable
         If there is no enclosure of what they are made of.
     """
-    graph, numbers = scalar_expressions(results)
-    gradients = [_gradient(graph, expr, sides) for expr in numbers]
+    with np.errstate(all="ignore"):  # of constants
+        graph, numbers = scalar_expressions(results)
+        gradients = [_gradient(graph, expr, sides) for expr in numbers]
     return Enclosed(
         sides=sides,
         expressions=tuple(numbers),

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from ..codegen.ir.functions import applied
 from ..codegen.ir.text import Body, Value, constant
 from .arithmetic import (
-    NAN,
     Interval,
     add,
     defined,
@@ -259,10 +258,7 @@ def _rest(name: str) -> Callable[..., Result]:
         q, jumps = _quotient_rounded(b, name, x, y)
         one = sub(b, x, mul(b, y, q))
         zero = number(0.0, x.low.width)
-        if name == "floor":
-            bound = hull(b, zero, y)
-        else:
-            bound = hull(b, size(b, y), neg(b, size(b, y)))
+        bound = hull(b, zero, y) if name == "floor" else hull(b, size(b, y), neg(b, size(b, y)))
         single = _within(b, one, bound)
         low = b.select(jumps, bound.low, single.low)
         high = b.select(jumps, bound.high, single.high)

@@ -54,10 +54,14 @@ def _elements(graph: Graph, node: Expr, made: Mapping[Expr, list[Expr]]) -> list
         return [part[i if len(part) > 1 else 0] for part, n in widths for i in range(n)]
     if node.op == "sum":
         return [reduce(lambda a, b: graph.op("add", a, b), parts[0])]
-    return [_of_numbers(graph, node, [p[i if len(p) > 1 else 0] for p in parts]) for i in range(size)]
+    return [
+        _of_numbers(graph, node, [p[i if len(p) > 1 else 0] for p in parts]) for i in range(size)
+    ]
 
 
 def _of_numbers(graph: Graph, node: Expr, args: list[Expr]) -> Expr:
     """Return an operation, which is a float's even of integers: none is larger than 2^53."""
-    floats = [graph.number(a) if node.op not in ("select",) and node.kind != "b" else a for a in args]
+    floats = [
+        graph.number(a) if node.op not in ("select",) and node.kind != "b" else a for a in args
+    ]
     return graph.op(node.op, *floats)

@@ -132,58 +132,68 @@ def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, fou
     int
         `FULL` where there is no room for more boxes, or `PROVED`.
     """
-    n, lanes, centre, weight = whole.size, x.shape[1], places[0], places[1]
-    tol, relative, most, hopeless = limits
-    waiting, size, stored = counts[0], counts[1], counts[2]
     while True:
-        if waiting > 0:
-            for lane in range(lanes):
-                j = index[2, min(lane, waiting - 1)]
-                for i in range(2 * n):
-                    x[i, lane] = nodes[j, i]
-            call_judge(judge, x, o)
-            counts[3] += waiting
-        for lane in range(waiting):
-            value = o[1, lane]
-            for i in range(n):
-                if math.isnan(o[centre + i, lane]):
-                    value = o[2, lane]
-            if math.isfinite(value) and value > found[1]:
-                found[1] = value
-            j = index[2, lane]
-            index[0, j] = best_side(x, o, lane, weight, whole)
-            size = enter(keys, index, size, o[0, lane], j)
-        waiting = 0
-        if stored + lanes > nodes.shape[0]:
-            counts[0], counts[1], counts[2] = 0, size, stored
+        judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, found)
+        if counts[2] + x.shape[1] > nodes.shape[0]:
             return FULL
-        while waiting + 2 <= lanes and size > 0:
-            end, j = keys[0], index[1, 0]
-            limit = most if end < math.inf else min(most, hopeless)
-            close = min(tol, max(relative * abs(end), FINEST * tol))
-            if end - found[1] <= close or counts[3] + waiting >= limit:
-                break
-            size = leave(keys, index, size)
-            side = index[0, j]
-            if side < 0:
-                found[0] = max(found[0], end)
-                counts[4] += end == math.inf
-                continue
-            middle = 0.5 * nodes[j, 2 * side] + 0.5 * nodes[j, 2 * side + 1]
-            for i in range(2 * n):
-                nodes[stored, i] = nodes[j, i]
-            nodes[j, 2 * side + 1] = middle
-            nodes[stored, 2 * side] = middle
-            index[2, waiting], index[2, waiting + 1] = j, stored
-            stored += 1
-            waiting += 2
-        if waiting == 0:
+        divide_first(nodes, index, keys, x.shape[1], limits, counts, found)
+        if counts[0] == 0:
             break
-    for k in range(size):
+    for k in range(counts[1]):
         found[0] = max(found[0], keys[k])
         counts[4] += keys[k] == math.inf
-    counts[1], counts[2] = size, stored
     return PROVED
+
+
+@kept(**_INNER)
+def judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, found):
+    """Judge the boxes that wait, and put them into the heap."""
+    n, lanes, waiting = whole.size, x.shape[1], counts[0]
+    counts[0] = 0
+    if waiting == 0:
+        return
+    for lane in range(lanes):
+        j = index[2, min(lane, waiting - 1)]
+        for i in range(2 * n):
+            x[i, lane] = nodes[j, i]
+    call_judge(judge, x, o)
+    counts[3] += waiting
+    for lane in range(waiting):
+        value = o[1, lane]
+        for i in range(n):
+            if math.isnan(o[places[0] + i, lane]):
+                value = o[2, lane]
+        if math.isfinite(value) and value > found[1]:
+            found[1] = value
+        j = index[2, lane]
+        index[0, j] = best_side(x, o, lane, places[1], whole)
+        counts[1] = enter(keys, index, counts[1], o[0, lane], j)
+
+
+@kept(**_INNER)
+def divide_first(nodes, index, keys, lanes, limits, counts, found):
+    """Divide the boxes with the largest bounds: their halves wait."""
+    tol, relative, most, hopeless = limits
+    while counts[0] + 2 <= lanes and counts[1] > 0:
+        end, j, stored, waiting = keys[0], index[1, 0], counts[2], counts[0]
+        limit = most if end < math.inf else min(most, hopeless)
+        close = min(tol, max(relative * abs(end), FINEST * tol))
+        if end - found[1] <= close or counts[3] + waiting >= limit:
+            break
+        counts[1] = leave(keys, index, counts[1])
+        side = index[0, j]
+        if side < 0:
+            found[0] = max(found[0], end)
+            counts[4] += end == math.inf
+            continue
+        middle = 0.5 * nodes[j, 2 * side] + 0.5 * nodes[j, 2 * side + 1]
+        for i in range(nodes.shape[1]):
+            nodes[stored, i] = nodes[j, i]
+        nodes[j, 2 * side + 1] = middle
+        nodes[stored, 2 * side] = middle
+        index[2, waiting], index[2, waiting + 1] = j, stored
+        counts[2] += 1
+        counts[0] += 2
 
 
 @kept(**_INNER)

@@ -147,7 +147,9 @@ class Writer:
         if node.op in _ARITHMETIC and args[0] is not args[1]:
             return routine(b, node.op, _ARITHMETIC[node.op], *args)
         if node.op in _ARITHMETIC:  # of one quantity: less than of two in one range
-            return routine(b, f"{node.op}.same", lambda c, x: _ARITHMETIC[node.op](c, x, x), args[0])
+            return routine(
+                b, f"{node.op}.same", lambda c, x: _ARITHMETIC[node.op](c, x, x), args[0]
+            )
         if node.op == "neg":
             return neg(b, args[0])
         if node.op in COMPARISONS:
@@ -255,9 +257,7 @@ def _centre(w: Writer, rows: Rows, i: int, side: Interval, slope: Interval) -> _
     """
     b, (low, high) = w.b, side.values
     ends = b.compare("one", b.intrinsic("fabs", b.sub(high, low, exact=True)), _INF)
-    over = b.sub(
-        b.mul(slope.high, high, exact=True), b.mul(slope.low, low, exact=True), exact=True
-    )
+    over = b.sub(b.mul(slope.high, high, exact=True), b.mul(slope.low, low, exact=True), exact=True)
     point = b.op("fdiv", over, b.sub(slope.high, slope.low, exact=True), exact=True)
     middle = b.add(b.mul(low, 0.5, exact=True), b.mul(high, 0.5, exact=True), exact=True)
     point = b.select(b.compare("ord", point, point), point, middle)
