@@ -74,7 +74,9 @@ def decrease(table: Table) -> None:
     rate = on_balls.boxes / on_balls.seconds
     name = "V' < 0 of a pendulum"
     table.add_row(f"{name}: balls", on_balls.status, f"{rate:,.0f} boxes/s", f"{before:.3f} s", "1")
-    table.add_row(f"{name}: all of the proof", found.status, "", f"{after:.3f} s", f"{before / after:.0f}")
+    table.add_row(
+        f"{name}: all of the proof", found.status, "", f"{after:.3f} s", f"{before / after:.0f}"
+    )
     code = enclosed(expressions_of(conditions, 2)[1], 2)
     ends = np.array(box.low), np.array(box.high)
     judge = lambda: decide(code, *ends, 0.0, max_boxes=10_000_000)  # noqa: E731

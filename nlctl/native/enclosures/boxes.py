@@ -37,6 +37,8 @@ class Enclosed:
     loaded : Loaded
     lanes : int
         Boxes at a time.
+    fixed : int
+        So many of the last sides are numbers, and have no width.
     """
 
     sides: int
@@ -44,6 +46,7 @@ class Enclosed:
     rows: Rows
     loaded: Loaded
     lanes: int = LANES
+    fixed: int = 0
 
     @property
     def judge(self) -> int:
@@ -150,7 +153,7 @@ def traced_numbers(
     return [found[i].only for i in range(found.size)]
 
 
-def enclosed(results: Sequence[Expr], sides: int) -> Enclosed:
+def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> Enclosed:
     """Make the machine code that encloses functions of a box.
 
     Parameters
@@ -159,6 +162,8 @@ def enclosed(results: Sequence[Expr], sides: int) -> Enclosed:
         Numbers, made of the leaves ``x[0], ..., x[sides - 1]``.
     sides : int
         Of the box, at least one.
+    fixed : int, optional
+        So many of the last sides are numbers, such as a level, which may be others for each box.
 
     Raises
     ------
@@ -167,12 +172,13 @@ def enclosed(results: Sequence[Expr], sides: int) -> Enclosed:
     """
     with np.errstate(all="ignore"):  # of constants
         graph, numbers = scalar_expressions(results)
-        gradients = [_gradient(graph, expr, sides) for expr in numbers]
+        gradients = [_gradient(graph, expr, sides, fixed) for expr in numbers]
     return Enclosed(
         sides=sides,
         expressions=tuple(numbers),
         rows=Rows(sides=sides, results=len(numbers)),
         loaded=_loaded(enclosure_text(numbers, gradients, sides)),
+        fixed=fixed,
     )
 
 
@@ -181,12 +187,12 @@ def _loaded(text: str) -> Loaded:
     return finished(text, ("values", "judge"))
 
 
-def _gradient(graph: Graph, expr: Expr, sides: int) -> list[Expr]:
-    """Return the derivatives along each side."""
+def _gradient(graph: Graph, expr: Expr, sides: int, fixed: int) -> list[Expr]:
+    """Return the derivatives along each side; 0 for those without width, which nobody asks for."""
     zero, one = graph.const(0.0), graph.const(1.0)
 
     def along(i: int) -> Expr:
         (found,) = tangents(graph, [expr], lambda leaf: one if leaf.data[1] == i else None)
         return zero if found is None else found
 
-    return [along(i) for i in range(sides)]
+    return [along(i) if i < sides - fixed else zero for i in range(sides)]

@@ -80,6 +80,7 @@ def decide(
     threads : int, optional
         The result is the same for any number of them.
     """
+    _check_fixed(code, low, high)
     begun = _Search(code, np.stack([low, high], axis=1).reshape(1, -1), bound)
     begun.run(min(max_boxes, _ALONE))
     if begun.finished or begun.boxes >= max_boxes:
@@ -184,6 +185,7 @@ def greatest(
     relative : float, optional
         A smaller tolerance that is tried, relative to the bound.
     """
+    _check_fixed(code, low, high)
     box = np.stack([low, high], axis=1).reshape(-1)
     nodes, index, keys = np.empty((_ROOM, box.size)), np.zeros((3, _ROOM), dtype=np.int64), None
     nodes[0], keys = box, np.empty(_ROOM)
@@ -204,6 +206,12 @@ def greatest(
         high=float(found[0]), attained=float(found[1]), boxes=int(counts[3]),
         unbounded=int(counts[4]),
     )  # fmt: skip
+
+
+def _check_fixed(code: Enclosed, low: np.ndarray, high: np.ndarray) -> None:
+    first = code.sides - code.fixed
+    if not np.array_equal(low[first:], high[first:]):
+        raise ValueError(f"the last {code.fixed} sides are numbers: they have no width")
 
 
 def _room(code: Enclosed) -> tuple[np.ndarray, np.ndarray]:
