@@ -26,7 +26,7 @@ REPEATS = 5
 FLOOR, LEVEL = 1e-3, 10.095  # of V, between which V' < 0 is claimed: 10.096 is too much
 
 
-def V(x: Any) -> Any:
+def form(x: Any) -> Any:
     """A quadratic form of a pendulum's state."""
     return 1.5 * x[0] ** 2 + x[0] * x[1] + x[1] ** 2
 
@@ -40,7 +40,7 @@ def conditions(x: Any) -> Any:
     """What is positive at once where V' is not negative between two levels."""
     x1, x2 = x
     rate = (3 * x1 + x2) * x2 + (x1 + 2 * x2) * (-np.sin(x1) - x2)
-    return np.array([rate + 1e-9, LEVEL - V(x), V(x) - FLOOR])
+    return np.array([rate + 1e-9, LEVEL - form(x), form(x) - FLOOR])
 
 
 def best(call: Callable[[], Any], repeats: int = REPEATS) -> tuple[float, Any]:
@@ -66,7 +66,7 @@ def known_sign(order: int) -> Any:
 def decrease(table: Table) -> None:
     """Measure V' < 0 of a pendulum."""
     box = Box.of(x1=(-6.0, 6.0), x2=(-6.0, 6.0))
-    call = lambda: prove_decrease(V, pendulum, box, level=LEVEL, floor=FLOOR)  # noqa: E731
+    call = lambda: prove_decrease(form, pendulum, box, level=LEVEL, floor=FLOOR)  # noqa: E731
     with only_balls():
         before, on_balls = best(call, 1)
     call()

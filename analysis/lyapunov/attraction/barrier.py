@@ -285,11 +285,9 @@ def _polynomial(
 
 def _face(box: Box, i: int, end: int) -> Box:
     value = box.cell[i][end]
-    sides = {
-        n: (value, value) if j == i else c
-        for j, (n, c) in enumerate(zip(box.names, box.cell, strict=True))
-    }
-    return Box.of(**sides)
+    ends = (tuple(value if j == i else a for j, a in enumerate(s)) for s in (box.low, box.high))
+    low, high = ends
+    return Box(names=box.names, low=low, high=high)
 
 
 def _first_samples(problem: _Problem) -> None:
@@ -379,10 +377,9 @@ def _proposal(problem: _Problem, k: float) -> np.ndarray | None:
     size = np.maximum(np.max(np.abs(falls), axis=1, keepdims=True, initial=0.0), 1e-3)
     rows = np.concatenate([at["start"], -at["unsafe"], falls / size])
     good = np.all(np.isfinite(rows), axis=1)
-    weights = np.concatenate(
-        [np.ones(len(at["start"]) + len(at["unsafe"])), np.full(len(falls), 0.1)]
-    )
-    matrix = np.column_stack([rows, weights])[good]
+    apart = len(at["start"]) + len(at["unsafe"])
+    margins = np.where(np.arange(len(rows)) < apart, 1.0, 0.1)
+    matrix = np.column_stack([rows, margins])[good]
     result = linprog(
         np.append(np.zeros(len(problem.terms)), -1.0), A_ub=matrix, b_ub=np.zeros(len(matrix)),
         bounds=[(-1, 1)] * len(problem.terms) + [(0, 1)], method="highs",

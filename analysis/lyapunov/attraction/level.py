@@ -67,9 +67,12 @@ def quadratic(motion: Motion, P: np.ndarray, at: np.ndarray) -> Quadratic:
     rise = graph.op("add", rate, graph.const(STRICT))
     below, above = graph.op("sub", level, V), graph.op("sub", V, floor)
     return Quadratic(
-        motion=motion, P=P, at=at,
-        falls=enclosed([rise, below, above], n + 2, fixed=2), inside=enclosed([below], n + 2, fixed=2),
-    )  # fmt: skip
+        motion=motion,
+        P=P,
+        at=at,
+        falls=enclosed([rise, below, above], n + 2, fixed=2),
+        inside=enclosed([below], n + 2, fixed=2),
+    )
 
 
 def _form(graph: Graph, P: np.ndarray, at: np.ndarray, x: list[Expr]) -> Expr:
