@@ -88,11 +88,13 @@ class Barrier:
 
         Parameters
         ----------
-        x : sequence of float
+        x : sequence of n floats
+            A value of every state.
 
         Returns
         -------
         float
+            B there, rounded as any number.
         """
         z = (np.asarray(x, dtype=float) - self.middle) / self.half
         return float(_monomials(z[None], self.terms)[0] @ self.coefficients)

@@ -10,7 +10,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-import nlctl
+from nlctl import native
 from nlctl.diagrams import state_names
 from nlctl.errors import ParameterError
 from nlctl.expressions.continuity import may_jump
@@ -100,7 +100,7 @@ def motion_of(who: str, system: Any, box: Box, params: Mapping[str, Any] | None 
     """
     try:
         if isinstance(system, ct.InputOutputSystem | Compiled):
-            compiled = system if isinstance(system, Compiled) else nlctl.compile(system)
+            compiled = system if isinstance(system, Compiled) else native.compile(system)
             names: Sequence[str] = state_names(compiled.system)
             rates = state_rates(compiled, dict(params or {}))
         elif isinstance(system, Callable):  # type: ignore[arg-type]

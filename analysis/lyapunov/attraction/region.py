@@ -80,11 +80,13 @@ class Region:
 
         Parameters
         ----------
-        x : sequence of float
+        x : sequence of n floats
+            A value of every state.
 
         Returns
         -------
         float
+            V there, rounded as any number.
         """
         z = np.asarray(x, dtype=float) - self.at
         return float(z @ self.P @ z)
@@ -207,7 +209,9 @@ def _equilibrium(motion: Motion, at: Sequence[float] | None, box: Box) -> np.nda
     """Return where nothing moves, inside of the box; the rates may not jump."""
     point = np.zeros(motion.order) if at is None else np.asarray(at, dtype=float)
     if point.shape != (motion.order,):
-        raise ParameterError(f"region_of_attraction needs at with {motion.order} numbers")
+        raise ParameterError(
+            f"region_of_attraction needs at with {counted(motion.order, 'number')}, got {at}"
+        )
     if motion.jumps:
         raise ParameterError(
             "region_of_attraction needs rates that do not jump: write cases as np.minimum, "

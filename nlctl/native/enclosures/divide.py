@@ -211,7 +211,7 @@ def greatest(
 def _check_fixed(code: Enclosed, low: np.ndarray, high: np.ndarray) -> None:
     first = code.sides - code.fixed
     if not np.array_equal(low[first:], high[first:]):
-        raise ValueError(f"the last {code.fixed} sides are numbers: they have no width")
+        raise ValueError(f"sides from {first} on are numbers, and have no width")
 
 
 def _room(code: Enclosed) -> tuple[np.ndarray, np.ndarray]:
