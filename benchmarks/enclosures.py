@@ -20,7 +20,7 @@ import nlctl
 from analysis.intervals.machine import only_balls
 from analysis.lyapunov import Box, certify, prove_decrease
 from nlctl.native.enclosures.boxes import enclosed, expressions_of
-from nlctl.native.enclosures.divide import decide
+from nlctl.native.enclosures.divide import decide_claim
 
 REPEATS = 5
 FLOOR, LEVEL = 1e-3, 10.095  # of V, between which V' < 0 is claimed: 10.096 is too much
@@ -79,7 +79,7 @@ def decrease(table: Table) -> None:
     )
     code = enclosed(expressions_of(conditions, 2)[1], 2)
     ends = np.array(box.low), np.array(box.high)
-    judge = lambda: decide(code, *ends, 0.0, max_boxes=10_000_000)  # noqa: E731
+    judge = lambda: decide_claim(code, *ends, 0.0, max_boxes=10_000_000)  # noqa: E731
     judge()
     seconds, verdict = best(judge)
     fast = verdict.boxes / seconds

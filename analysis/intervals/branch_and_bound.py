@@ -31,7 +31,7 @@ from nlctl.wording import counted
 from .agreement import one_number
 from .arithmetic import Ball, as_ball, common
 from .box import Box, Cell
-from .machine import FEW, Readable, decided_by_code, machine_code, supremum_by_code
+from .machine import TOO_FEW, Readable, code_for, decided_by_code, supremum_by_code
 from .paths import Undecided, every_way
 from .type_questions import is_of_library
 
@@ -260,10 +260,10 @@ def _proved_by_code(
     """Return what machine code finds, if there is any; balls confirm a point that refutes."""
     boxes = 0
     claims = [(s, e) for s, e in zip((-1, 1), (-ends[0], ends[1]), strict=True) if e < np.inf]
-    if max_boxes <= FEW or not claims:
+    if max_boxes <= TOO_FEW or not claims:
         return None
     for sign, bound in claims:
-        code = machine_code(known, box, sign, bound)
+        code = code_for(known, box, sign, bound)
         if code is None:
             return None
         found = decided_by_code(code, box, max(max_boxes - boxes, 1))
@@ -323,7 +323,7 @@ def _end(
     known: Any, function: _Function, box: Box, sign: int, tol: float, max_boxes: int
 ) -> tuple[float, float, int, int, bool]:
     """Return what `_supremum` does of sign f, and whether machine code has found it."""
-    code = machine_code(known, box, sign) if max_boxes > FEW else None
+    code = code_for(known, box, sign) if max_boxes > TOO_FEW else None
     if code is None:
         mirrored = function if sign > 0 else lambda x: -as_ball(function(x))
         return *_supremum(mirrored, box, tol, max_boxes), False

@@ -20,8 +20,8 @@ from flint import arb
 from nlctl.expressions.arrays import Tracer
 from nlctl.expressions.continuity import is_an_extreme
 from nlctl.expressions.graph import Expr, Graph, Untraceable
-from nlctl.native.enclosures.boxes import Enclosed, enclosed, expressions_of, side_leaves
-from nlctl.native.enclosures.divide import Supremum, Verdict, decide, greatest
+from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of, side_leaves
+from nlctl.native.enclosures.divide import BoxVerdict, Supremum, decide_claim, enclose_supremum
 from nlctl.upstream.numba_internals import is_jit_disabled
 
 from .arithmetic import Ball, as_ball
@@ -29,10 +29,15 @@ from .box import Box
 from .paths import Undecided
 
 __all__ = [
-    "Conditions", "Readable", "decided_by_code", "machine_code", "only_balls", "supremum_by_code",
+    "CodedClaim",
+    "Readable",
+    "code_for",
+    "decided_by_code",
+    "only_balls",
+    "supremum_by_code",
 ]  # fmt: skip
 
-FEW = 16  # boxes, for which code does not pay
+TOO_FEW = 16  # boxes, for which code does not pay
 _POINTS = 8  # at which code is compared with balls
 _GOLDEN = 0.6180339887498949
 _LARGE = 5.0  # scale of points along sides without an end
@@ -71,7 +76,7 @@ class Readable:
 
     of_balls: Callable[..., Any]
     expressions: Callable[[Graph, tuple[Tracer, ...]], Sequence[Expr]]
-    codes: dict[tuple[int, int], Enclosed | None] = field(default_factory=dict, compare=False)
+    codes: dict[tuple[int, int], BoxCode | None] = field(default_factory=dict, compare=False)
     read: dict[int, tuple[Graph, Sequence[Expr]]] = field(default_factory=dict, compare=False)
 
     def __call__(self, *given: Any) -> Any:
@@ -79,21 +84,21 @@ class Readable:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Conditions:
+class CodedClaim:
     """What a claim excludes: that all these numbers are positive at a point of the box.
 
     Attributes
     ----------
-    code : Enclosed
+    code : BoxCode
     bound : float
         What their least is compared with.
     """
 
-    code: Enclosed
+    code: BoxCode
     bound: float
 
 
-def machine_code(function: Any, box: Box, sign: int, bound: float = 0.0) -> Conditions | None:
+def code_for(function: Any, box: Box, sign: int, bound: float = 0.0) -> CodedClaim | None:
     """Return code for sign f <= bound; None for a function that has none, or on no such machine.
 
     Parameters
@@ -112,10 +117,10 @@ def machine_code(function: Any, box: Box, sign: int, bound: float = 0.0) -> Cond
         code = _made(function, *key)
         known[key] = code if code is not None and _agrees(code, function, box, sign) else None
     code = known[key]
-    return None if code is None else Conditions(code=code, bound=bound)
+    return None if code is None else CodedClaim(code=code, bound=bound)
 
 
-def _made(function: Any, sides: int, sign: int) -> Enclosed | None:
+def _made(function: Any, sides: int, sign: int) -> BoxCode | None:
     """Return the code of sign f, None if it has none."""
     try:
         graph, results = _expressions(function, sides)
@@ -150,7 +155,7 @@ def _apart(graph: Graph, expr: Expr, sign: int) -> list[Expr]:
     return [expr if sign > 0 else graph.op("neg", expr)]
 
 
-def _agrees(code: Enclosed, function: Any, box: Box, sign: int) -> bool:
+def _agrees(code: BoxCode, function: Any, box: Box, sign: int) -> bool:
     """Whether code and balls meet at points of the box."""
     points = np.array([_point(box, k) for k in range(_POINTS)])
     low, high = (v.min(axis=1) for v in code.values(points, points))
@@ -181,31 +186,31 @@ def _ends(box: Box) -> tuple[np.ndarray, np.ndarray]:
     return np.array(box.low, dtype=float), np.array(box.high, dtype=float)
 
 
-def decided_by_code(found: Conditions, box: Box, max_boxes: int) -> Verdict:
+def decided_by_code(found: CodedClaim, box: Box, max_boxes: int) -> BoxVerdict:
     """Return what becomes of the claim; the same whatever the number of processors.
 
     Parameters
     ----------
-    found : Conditions
+    found : CodedClaim
     box : Box
     max_boxes : int
     """
     low, high = _ends(box)
     threads = os.cpu_count() or 1
-    return decide(found.code, low, high, found.bound, max_boxes=max_boxes, threads=threads)
+    return decide_claim(found.code, low, high, found.bound, max_boxes=max_boxes, threads=threads)
 
 
 def supremum_by_code(
-    found: Conditions, box: Box, tol: float, max_boxes: int, hopeless: int
+    found: CodedClaim, box: Box, tol: float, max_boxes: int, hopeless: int
 ) -> Supremum:
     """Return the supremum of the least of the numbers.
 
     Parameters
     ----------
-    found : Conditions
+    found : CodedClaim
     box : Box
     tol : float
     max_boxes, hopeless : int
     """
     low, high = _ends(box)
-    return greatest(found.code, low, high, tol=tol, max_boxes=max_boxes, hopeless=hopeless)
+    return enclose_supremum(found.code, low, high, tol=tol, max_boxes=max_boxes, hopeless=hopeless)

@@ -4,7 +4,7 @@ from ..intervals.box import Box, visited_box
 from ..intervals.branch_and_bound import Proof, Range, enclose, prove
 from ..intervals.level_set import prove_decrease
 from .attraction.barrier import Barrier, barrier
-from .attraction.region import Region, region_of_attraction
+from .attraction.region import AttractionRegion, region_of_attraction
 from .bounds.clipped import clipped_split
 from .bounds.constants import constants, disturbance, kappa
 from .bounds.decomposition import Decomposition, DecompositionError, decompose
@@ -35,6 +35,7 @@ from .tighten import Tightened, tighten
 
 __all__ = [
     "Aftermath",
+    "AttractionRegion",
     "Barrier",
     "Box",
     "Certificate",
@@ -56,7 +57,6 @@ __all__ = [
     "Premises",
     "Proof",
     "Range",
-    "Region",
     "Sector",
     "Signals",
     "SlidingModeCertificate",

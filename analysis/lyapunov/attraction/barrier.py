@@ -16,17 +16,17 @@ from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.graph import Expr, Graph
-from nlctl.native.enclosures.boxes import Enclosed, enclosed
-from nlctl.native.enclosures.divide import Verdict, decide
+from nlctl.native.enclosures.boxes import BoxCode, enclosed
+from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 from nlctl.upstream.numba_internals import is_jit_disabled
 from nlctl.wording import counted
 
 from ...intervals.box import Box
-from .motion import Motion, motion_of
+from .motion import StateRates, motion_of
 
 __all__ = ["Barrier", "barrier"]
 
-STRICT = 1e-9  # B' < 0 and B > 0 are proved with this margin
+_STRICT = 1e-9  # B' < 0 and B > 0 are proved with this margin
 _RATES = (0.0, 1.0, -1.0, 5.0)  # k of the proposals' B' + k B < 0
 _ROUNDS = 60  # proposals for each of them
 _SAMPLES = 300  # in each set
@@ -109,7 +109,7 @@ class Barrier:
 class _Claim:
     """Numbers that are not positive at once on a box, and which samples a refutation adds to."""
 
-    code: Enclosed
+    code: BoxCode
     box: Box
     kind: str
     what: str
@@ -119,7 +119,7 @@ class _Claim:
 class _Problem:
     """What is to be kept apart, and the samples at which proposals do so."""
 
-    motion: Motion
+    motion: StateRates
     box: Box
     terms: tuple[_Term, ...]
     middle: np.ndarray
@@ -233,7 +233,9 @@ def _check_boxes(box: Box, start: Box, unsafe: Sequence[Any]) -> None:
         raise ParameterError(f"barrier needs start inside of the box, got {start} and {box}")
 
 
-def _problem(motion: Motion, box: Box, start: Box, unsafe: Sequence[Box], degree: int) -> _Problem:
+def _problem(
+    motion: StateRates, box: Box, start: Box, unsafe: Sequence[Box], degree: int
+) -> _Problem:
     n = motion.order
     powers = itertools.product(range(degree + 1), repeat=n)
     terms = tuple(sorted((p for p in powers if sum(p) <= degree), key=lambda p: (sum(p), p)))
@@ -243,7 +245,7 @@ def _problem(motion: Motion, box: Box, start: Box, unsafe: Sequence[Box], degree
     )
     graph, rates, leaves = motion.in_graph(more=len(terms))
     B, rate = _polynomial(graph, rates, leaves, problem)
-    op, margin, sides = graph.op, graph.const(STRICT), n + len(terms)
+    op, margin, sides = graph.op, graph.const(_STRICT), n + len(terms)
     code = lambda *exprs: enclosed(list(exprs), sides, fixed=len(terms))  # noqa: E731
     above, below = B, op("sub", margin, B)
     rises = op("add", rate, margin)
@@ -346,9 +348,9 @@ def _mistakes(problem: _Problem, coefficients: np.ndarray) -> bool:
     return bool(len(wrong))
 
 
-def _decided(claim: _Claim, coefficients: np.ndarray, max_boxes: int) -> Verdict:
+def _decided(claim: _Claim, coefficients: np.ndarray, max_boxes: int) -> BoxVerdict:
     low, high = (np.append(side, coefficients) for side in (claim.box.low, claim.box.high))
-    return decide(claim.code, low, high, 0.0, max_boxes=max_boxes)
+    return decide_claim(claim.code, low, high, 0.0, max_boxes=max_boxes)
 
 
 def _monomials(z: np.ndarray, terms: Sequence[_Term]) -> np.ndarray:

@@ -9,15 +9,15 @@ from flint import arb, arb_mat
 
 from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.graph import Expr, Graph
-from nlctl.native.enclosures.boxes import Enclosed, enclosed
-from nlctl.native.enclosures.divide import Verdict, decide
+from nlctl.native.enclosures.boxes import BoxCode, enclosed
+from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 
 from ...intervals.box import Box
-from .motion import Motion
+from .motion import StateRates
 
-__all__ = ["Level", "Quadratic", "largest_level"]
+__all__ = ["ProvedLevel", "Quadratic", "largest_level"]
 
-STRICT = 1e-9  # V' < 0 is proved as V' <= -1e-9 where V is not small
+_STRICT = 1e-9  # V' < 0 is proved as V' <= -1e-9 where V is not small
 _FACE = 20_000  # boxes on a face
 _SMALLEST = 2.0**-40  # of the level that fits into the box: an inner set below it is none
 _INSIDE = 1 - 1e-6  # of that level, so that the faces can be proved
@@ -29,21 +29,21 @@ class Quadratic:
 
     Attributes
     ----------
-    motion : Motion
+    motion : StateRates
     P : ndarray of shape (n, n)
     at : ndarray of shape (n,)
-    falls : Enclosed
+    falls : BoxCode
         Positive at once where V' > -1e-9, V <= level and V >= floor: the sides are the states,
         then level and floor.
-    inside : Enclosed
+    inside : BoxCode
         level - V, of the same sides.
     """
 
-    motion: Motion
+    motion: StateRates
     P: np.ndarray
     at: np.ndarray
-    falls: Enclosed
-    inside: Enclosed
+    falls: BoxCode
+    inside: BoxCode
 
     def largest_in(self, box: Box) -> float:
         """Return the largest level whose set lies in a box, to rounding."""
@@ -56,7 +56,7 @@ class Quadratic:
         return float(np.linalg.det(self.P) ** -0.5)
 
 
-def quadratic(motion: Motion, P: np.ndarray, at: np.ndarray) -> Quadratic:
+def quadratic_of(motion: StateRates, P: np.ndarray, at: np.ndarray) -> Quadratic:
     """Return V with the code of what is claimed about it."""
     graph, rates, leaves = motion.in_graph(more=2)
     n = motion.order
@@ -64,7 +64,7 @@ def quadratic(motion: Motion, P: np.ndarray, at: np.ndarray) -> Quadratic:
     V = _form(graph, P, at, leaves[:n])
     (rate,) = tangents(graph, [V], lambda e: rates[e.data[1]] if e.data[1] < n else None)
     assert rate is not None
-    rise = graph.op("add", rate, graph.const(STRICT))
+    rise = graph.op("add", rate, graph.const(_STRICT))
     below, above = graph.op("sub", level, V), graph.op("sub", V, floor)
     return Quadratic(
         motion=motion,
@@ -89,7 +89,7 @@ def _form(graph: Graph, P: np.ndarray, at: np.ndarray, x: list[Expr]) -> Expr:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Level:
+class ProvedLevel:
     """What is known of the levels of one V.
 
     Attributes
@@ -122,7 +122,7 @@ class Level:
         return float(self.level ** (self.V.motion.order / 2) * self.V.size)
 
 
-def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> Level:
+def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedLevel:
     """Return the largest level that is proved, to a relative tolerance.
 
     Parameters
@@ -138,9 +138,9 @@ def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> Level:
     low, boxes = _floor(V, fits, box), 0
     nothing = {"V": V, "level": 0.0, "floor": low, "above": fits, "refuted": None}
     if low == 0.0:
-        return Level(**nothing, boxes=0, reason="the linear part decides nothing next to it")
+        return ProvedLevel(**nothing, boxes=0, reason="the linear part decides nothing next to it")
     if not _holds(V, fits, box):
-        return Level(**nothing, boxes=0, reason="the box does not hold a level set")
+        return ProvedLevel(**nothing, boxes=0, reason="the box does not hold a level set")
     floor, high, trial = low, fits, fits
     refuted, reason = None, "the box: take a larger one"
     while True:
@@ -155,7 +155,7 @@ def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> Level:
             break
         trial = 0.5 * (low + high) if high < 4 * low else float(np.sqrt(low * high))
     level = low if low > floor else 0.0
-    return Level(
+    return ProvedLevel(
         V=V, level=level, floor=floor, above=high, refuted=refuted, boxes=boxes, reason=reason
     )
 
@@ -169,10 +169,10 @@ def _sides(V: Quadratic, level: float, floor: float, box: Box) -> tuple[np.ndarr
     return np.append(low, ends), np.append(high, ends)
 
 
-def _fall(V: Quadratic, level: float, floor: float, box: Box, max_boxes: int) -> Verdict:
+def _fall(V: Quadratic, level: float, floor: float, box: Box, max_boxes: int) -> BoxVerdict:
     """Return whether V' < 0 between two levels, on the box: it holds the level set."""
     low, high = np.append(box.low, [level, floor]), np.append(box.high, [level, floor])
-    return decide(V.falls, low, high, 0.0, max_boxes=max_boxes)
+    return decide_claim(V.falls, low, high, 0.0, max_boxes=max_boxes)
 
 
 def _holds(V: Quadratic, level: float, box: Box) -> bool:
@@ -181,7 +181,7 @@ def _holds(V: Quadratic, level: float, box: Box) -> bool:
         for end in box.cell[i]:
             low, high = (np.append(side, [level, 0.0]) for side in (box.low, box.high))
             low[i] = high[i] = end
-            if not decide(V.inside, low, high, 0.0, max_boxes=_FACE).holds:
+            if not decide_claim(V.inside, low, high, 0.0, max_boxes=_FACE).holds:
                 return False
     return True
 

@@ -18,16 +18,16 @@ from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.compiled import Compiled
-from nlctl.native.enclosures.boxes import Enclosed, enclosed, expressions_of
-from nlctl.native.enclosures.rates import state_rates, substituted
+from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of
+from nlctl.native.enclosures.rates import state_rates, with_leaves
 
 from ...intervals.box import Box
 
-__all__ = ["Motion", "motion_of"]
+__all__ = ["StateRates", "motion_of"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class StateRates:
     """Rates x' = f(x).
 
     Attributes
@@ -48,7 +48,7 @@ class Motion:
 
     def in_graph(self, more: int = 0) -> tuple[Graph, list[Expr], list[Expr]]:
         """Return a graph with the rates, and the leaves of states and of so many more sides."""
-        graph, rates = substituted(self.rates, lambda g, leaf: g.leaf("x", leaf.data[1], None))
+        graph, rates = with_leaves(self.rates, lambda g, leaf: g.leaf("x", leaf.data[1], None))
         leaves = [graph.leaf("x", i, None) for i in range(self.order + more)]
         return graph, rates, leaves
 
@@ -58,7 +58,7 @@ class Motion:
         return np.stack([np.broadcast_to(v, len(points)) for v in found], axis=1)
 
     @cached_property
-    def slopes(self) -> Enclosed:
+    def slopes(self) -> BoxCode:
         """Code of all df_i/dx_j, row by row."""
         graph, rates, leaves = self.in_graph()
         one, zero, found = graph.const(1.0), graph.const(0.0), []
@@ -79,7 +79,9 @@ class Motion:
         return may_jump(self.rates)
 
 
-def motion_of(who: str, system: Any, box: Box, params: Mapping[str, Any] | None = None) -> Motion:
+def motion_of(
+    who: str, system: Any, box: Box, params: Mapping[str, Any] | None = None
+) -> StateRates:
     """Return the rates of a diagram or of a function as expressions.
 
     Parameters
@@ -105,7 +107,7 @@ def motion_of(who: str, system: Any, box: Box, params: Mapping[str, Any] | None 
             rates = state_rates(compiled, dict(params or {}))
         elif isinstance(system, Callable):  # type: ignore[arg-type]
             names, rates = box.names, expressions_of(system, len(box.names))[1]
-            rates = substituted(rates, lambda g, leaf: g.leaf("x", leaf.data[1], None))[1]
+            rates = with_leaves(rates, lambda g, leaf: g.leaf("x", leaf.data[1], None))[1]
         else:
             raise ParameterError(
                 f"{who} needs a diagram or a function of states, got {type(system).__name__}"
@@ -121,4 +123,4 @@ def motion_of(who: str, system: Any, box: Box, params: Mapping[str, Any] | None 
         )
     if not np.all(np.isfinite(box.cell)):
         raise ParameterError(f"{who} needs a box with finite sides, got {box}")
-    return Motion(names=tuple(names), rates=tuple(rates))
+    return StateRates(names=tuple(names), rates=tuple(rates))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
-from .motion import Motion
+from .motion import StateRates
 
 __all__ = ["fitted", "from_linear_part"]
 
@@ -27,7 +27,7 @@ def from_linear_part(A: np.ndarray) -> np.ndarray:
     return 0.5 * (P + P.T)
 
 
-def fitted(motion: Motion, at: np.ndarray, P: np.ndarray, level: float) -> Iterator[np.ndarray]:
+def fitted(motion: StateRates, at: np.ndarray, P: np.ndarray, level: float) -> Iterator[np.ndarray]:
     """Yield P for which V falls at samples of sets ever larger than (x - at)^T P (x - at) <= level.
 
     The program is convex: V' = 2 (x - at)^T P f(x) is linear in P.  Of all P >= 1 that fall at the
@@ -36,7 +36,7 @@ def fitted(motion: Motion, at: np.ndarray, P: np.ndarray, level: float) -> Itera
 
     Parameters
     ----------
-    motion : Motion
+    motion : StateRates
     at : ndarray of shape (n,)
     P : ndarray of shape (n, n)
     level : float

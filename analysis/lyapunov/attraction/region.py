@@ -16,18 +16,18 @@ from nlctl.upstream.numba_internals import is_jit_disabled
 from nlctl.wording import counted
 
 from ...intervals.box import Box
-from .level import Level, largest_level, quadratic
-from .motion import Motion, motion_of
+from .level import ProvedLevel, largest_level, quadratic_of
+from .motion import StateRates, motion_of
 from .proposals import fitted, from_linear_part
 
-__all__ = ["Region", "region_of_attraction"]
+__all__ = ["AttractionRegion", "region_of_attraction"]
 
 _AT_REST = 1e-9  # of the rates at an equilibrium
 _ROUNDS = 3  # of proposals that grow
 
 
 @dataclass(frozen=True, kw_only=True)
-class Region:
+class AttractionRegion:
     """A set {(x - at)^T P (x - at) <= level} from which everything goes to `at`.
 
     Attributes
@@ -110,7 +110,7 @@ def region_of_attraction(
     params: Mapping[str, Any] | None = None,
     tol: float = 1e-4,
     max_boxes: int = 1_000_000,
-) -> Region:
+) -> AttractionRegion:
     """Prove a region of attraction of an equilibrium: an ellipsoid, as large as can be.
 
     V = (x - at)^T P (x - at) is given, or proposed: by Lyapunov's equation of the linear part, then
@@ -137,7 +137,7 @@ def region_of_attraction(
 
     Returns
     -------
-    Region
+    AttractionRegion
         Proved, or undecided.
 
     Raises
@@ -174,7 +174,7 @@ def region_of_attraction(
     _check_linear_part(A)
     given = None if P is None else _positive_definite(P, motion.order)
     first = from_linear_part(A) if given is None else given
-    best = largest_level(quadratic(motion, first, point), box, tol, max_boxes)
+    best = largest_level(quadratic_of(motion, first, point), box, tol, max_boxes)
     boxes = best.boxes
     if given is None:
         best, more = _grown(best, box, tol, max_boxes)
@@ -182,14 +182,14 @@ def region_of_attraction(
     where = None
     if best.refuted is not None:
         where = dict(zip(motion.names, map(float, best.refuted), strict=True))
-    return Region(
+    return AttractionRegion(
         names=motion.names, at=point, P=best.V.P, level=best.level, above=best.above,
         refuted=where, reason=best.reason, floor=best.floor, boxes=boxes,
         seconds=time.perf_counter() - start,
     )  # fmt: skip
 
 
-def _grown(best: Level, box: Box, tol: float, max_boxes: int) -> tuple[Level, int]:
+def _grown(best: ProvedLevel, box: Box, tol: float, max_boxes: int) -> tuple[ProvedLevel, int]:
     """Return the largest set of those that are proposed, and the boxes that it has cost."""
     boxes = 0
     for _ in range(_ROUNDS):
@@ -197,7 +197,7 @@ def _grown(best: Level, box: Box, tol: float, max_boxes: int) -> tuple[Level, in
             break
         before = best
         for P in fitted(best.V.motion, best.V.at, before.V.P, before.level):
-            found = largest_level(quadratic(best.V.motion, P, best.V.at), box, tol, max_boxes)
+            found = largest_level(quadratic_of(best.V.motion, P, best.V.at), box, tol, max_boxes)
             boxes += found.boxes
             best = found if found.volume > best.volume else best
         if best.volume <= 1.01 * before.volume:
@@ -205,7 +205,7 @@ def _grown(best: Level, box: Box, tol: float, max_boxes: int) -> tuple[Level, in
     return best, boxes
 
 
-def _equilibrium(motion: Motion, at: Sequence[float] | None, box: Box) -> np.ndarray:
+def _equilibrium(motion: StateRates, at: Sequence[float] | None, box: Box) -> np.ndarray:
     """Return where nothing moves, inside of the box; the rates may not jump."""
     point = np.zeros(motion.order) if at is None else np.asarray(at, dtype=float)
     if point.shape != (motion.order,):

@@ -10,7 +10,7 @@ from numba import types
 from ...upstream.numba_internals import infer_global, make_intrinsic_template
 
 
-def call_judge(judge, x, o):
+def call_enclosure(judge, x, o):
     """Judge boxes: machine code at an address, and nothing else."""
     raise NotImplementedError
 
@@ -30,8 +30,8 @@ def _by_address(typing_context: Any, judge: Any, x: Any, o: Any) -> Any:
 
 
 infer_global(
-    call_judge,
+    call_enclosure,
     types.Function(
-        make_intrinsic_template(call_judge, _by_address, "call_judge", prefer_literal=False)
+        make_intrinsic_template(call_enclosure, _by_address, "call_enclosure", prefer_literal=False)
     ),
 )

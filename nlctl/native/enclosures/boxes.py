@@ -19,11 +19,11 @@ from ..machine.finish import Loaded, finished
 from ..thirdparty.purity import check_pure
 from ..thirdparty.values import FRESH, Impure
 from .scalars import scalar_expressions
-from .writer import LANES, Rows, enclosure_text
+from .writer import LANES, JudgedRows, enclosure_text
 
 
 @dataclass(frozen=True, kw_only=True)
-class Enclosed:
+class BoxCode:
     """Machine code for functions of a box.
 
     Attributes
@@ -32,7 +32,7 @@ class Enclosed:
         Of the box.
     expressions : tuple of Expr
         Numbers, each a function of the sides.
-    rows : Rows
+    rows : JudgedRows
         Of what `judge` writes.
     loaded : Loaded
     lanes : int
@@ -43,7 +43,7 @@ class Enclosed:
 
     sides: int
     expressions: tuple[Expr, ...]
-    rows: Rows
+    rows: JudgedRows
     loaded: Loaded
     lanes: int = LANES
     fixed: int = 0
@@ -153,7 +153,7 @@ def traced_numbers(
     return [found[i].only for i in range(found.size)]
 
 
-def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> Enclosed:
+def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> BoxCode:
     """Make the machine code that encloses functions of a box.
 
     Parameters
@@ -173,10 +173,10 @@ def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> Enclosed:
     with np.errstate(all="ignore"):  # of constants
         graph, numbers = scalar_expressions(results)
         gradients = [_gradient(graph, expr, sides, fixed) for expr in numbers]
-    return Enclosed(
+    return BoxCode(
         sides=sides,
         expressions=tuple(numbers),
-        rows=Rows(sides=sides, results=len(numbers)),
+        rows=JudgedRows(sides=sides, results=len(numbers)),
         loaded=_loaded(enclosure_text(numbers, gradients, sides)),
         fixed=fixed,
     )

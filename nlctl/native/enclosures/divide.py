@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .boxes import Enclosed
-from .search import FULL, PROVED, REFUTED, prove_below, supremum
+from .boxes import BoxCode
+from .search import ALL_PROVED, FULL, REFUTED, prove_below, supremum
 
 _ROOM = 2_048  # boxes for which there is room to begin with
 _ALONE = 20_000  # boxes after which the rest is divided among threads
@@ -16,7 +16,7 @@ _PARTS = 16  # into which it is divided, whatever their number
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
+class BoxVerdict:
     """What became of the claim that the least of some functions is at most a bound on a box.
 
     Attributes
@@ -59,20 +59,20 @@ class Supremum:
     unbounded: int
 
 
-def decide(
-    code: Enclosed,
+def decide_claim(
+    code: BoxCode,
     low: np.ndarray,
     high: np.ndarray,
     bound: float,
     *,
     max_boxes: int,
     threads: int = 1,
-) -> Verdict:
+) -> BoxVerdict:
     """Prove or refute that the least of the functions is at most `bound` on a box.
 
     Parameters
     ----------
-    code : Enclosed
+    code : BoxCode
     low, high : ndarray of shape (sides,)
     bound : float
     max_boxes : int
@@ -103,7 +103,7 @@ class _Search:
     """A search that can be continued."""
 
     def __init__(
-        self, code: Enclosed, boxes: np.ndarray, bound: float, whole: np.ndarray | None = None
+        self, code: BoxCode, boxes: np.ndarray, bound: float, whole: np.ndarray | None = None
     ) -> None:
         n = code.sides
         self.code, self.bound, self.status = code, bound, FULL
@@ -137,7 +137,7 @@ class _Search:
                 return self.status
             self.stack = np.concatenate([self.stack, np.empty_like(self.stack)])
 
-    def verdict(self, parts: list[_Search]) -> Verdict:
+    def verdict(self, parts: list[_Search]) -> BoxVerdict:
         """Return what was found, by this search and by others that went on with its boxes.
 
         The first that is refuted counts, and those before it.
@@ -149,9 +149,9 @@ class _Search:
         last = every[-1]
         if last.status == REFUTED:
             point, value = last.point[:-1], float(last.point[-1])
-            return Verdict(holds=False, boxes=boxes, undecided=0, point=point, value=value)
+            return BoxVerdict(holds=False, boxes=boxes, undecided=0, point=point, value=value)
         if not open_:
-            return Verdict(
+            return BoxVerdict(
                 holds=True, boxes=boxes, undecided=0, point=self.point[:-1], value=np.nan
             )
         where = next(p for p in every if p.counts[0] or p.counts[2])
@@ -159,11 +159,11 @@ class _Search:
         if not where.counts[2]:
             ends = where.stack[where.counts[0] - 1].reshape(-1, 2)
             point = 0.5 * ends[:, 0] + 0.5 * ends[:, 1]
-        return Verdict(holds=None, boxes=boxes, undecided=open_, point=point, value=np.nan)
+        return BoxVerdict(holds=None, boxes=boxes, undecided=open_, point=point, value=np.nan)
 
 
-def greatest(
-    code: Enclosed,
+def enclose_supremum(
+    code: BoxCode,
     low: np.ndarray,
     high: np.ndarray,
     *,
@@ -176,7 +176,7 @@ def greatest(
 
     Parameters
     ----------
-    code : Enclosed
+    code : BoxCode
     low, high : ndarray of shape (sides,)
     tol : float
         How far the bound may be from a value that is attained.
@@ -197,7 +197,7 @@ def greatest(
             code.judge, (rows.centre, rows.weight), *room, nodes, index, keys, whole, limits,
             counts, found,
         )  # fmt: skip
-        if status == PROVED:
+        if status == ALL_PROVED:
             break
         nodes = np.concatenate([nodes, np.empty_like(nodes)])
         index = np.concatenate([index, np.zeros_like(index)], axis=1)
@@ -208,13 +208,13 @@ def greatest(
     )  # fmt: skip
 
 
-def _check_fixed(code: Enclosed, low: np.ndarray, high: np.ndarray) -> None:
+def _check_fixed(code: BoxCode, low: np.ndarray, high: np.ndarray) -> None:
     first = code.sides - code.fixed
     if not np.array_equal(low[first:], high[first:]):
         raise ValueError(f"sides from {first} on are numbers, and have no width")
 
 
-def _room(code: Enclosed) -> tuple[np.ndarray, np.ndarray]:
+def _room(code: BoxCode) -> tuple[np.ndarray, np.ndarray]:
     return np.zeros((2 * code.sides, code.lanes)), np.zeros((code.rows.count, code.lanes))
 
 

@@ -44,7 +44,7 @@ def state_rates(compiled: Compiled, params: dict[str, object] | None = None) -> 
             raise Untraceable("its rates depend on time")
         return graph.const(0.0 if array == "u" else float(p[row]))
 
-    return substituted(rates, instead)[1]
+    return with_leaves(rates, instead)[1]
 
 
 def _numbers(array: object) -> list[Expr]:
@@ -68,7 +68,7 @@ def _check(compiled: Compiled) -> None:
             raise Untraceable(f"it {reason}")
 
 
-def substituted(
+def with_leaves(
     exprs: Sequence[Expr], instead: Callable[[Graph, Expr], Expr]
 ) -> tuple[Graph, list[Expr]]:
     """Return expressions of numbers with something else in the place of what is read.

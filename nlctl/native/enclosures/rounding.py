@@ -18,7 +18,7 @@ from ..codegen.ir.text import Body, Operand, Value
 
 UNIT = 2.0**-52
 TINY = 2.0**-1074
-LARGEST = float.fromhex("0x1.fffffffffffffp1023")
+LARGEST_FLOAT = float.fromhex("0x1.fffffffffffffp1023")
 FUNCTION_ERROR = 2.0**-49
 """Relative error of a function of one number, of this package or of the C library.
 
@@ -35,13 +35,13 @@ FUNCTION_FLOOR = 2.0**-1068  # the same where the result is not normal
 
 def upwards(b: Body, s: Value) -> Value:
     """Return an upper bound of what a sum or root was before it was rounded to s."""
-    s = b.select(b.compare("olt", s, -LARGEST), -LARGEST, s)
+    s = b.select(b.compare("olt", s, -LARGEST_FLOAT), -LARGEST_FLOAT, s)
     return b.fma(b.intrinsic("fabs", s), UNIT, s)
 
 
 def downwards(b: Body, s: Value) -> Value:
     """Return a lower bound of what a sum or root was before it was rounded to s."""
-    s = b.select(b.compare("ogt", s, LARGEST), LARGEST, s)
+    s = b.select(b.compare("ogt", s, LARGEST_FLOAT), LARGEST_FLOAT, s)
     return b.fma(b.intrinsic("fabs", s), -UNIT, s)
 
 
@@ -57,23 +57,23 @@ def product_downwards(b: Body, s: Value) -> Value:
 
 def function_upwards(b: Body, y: Value) -> Value:
     """Return an upper bound of a function whose computed value is y."""
-    y = b.select(b.compare("olt", y, -LARGEST), -LARGEST, y)
+    y = b.select(b.compare("olt", y, -LARGEST_FLOAT), -LARGEST_FLOAT, y)
     return b.add(b.fma(b.intrinsic("fabs", y), FUNCTION_ERROR, y), FUNCTION_FLOOR, exact=True)
 
 
 def function_downwards(b: Body, y: Value) -> Value:
     """Return a lower bound of a function whose computed value is y."""
-    y = b.select(b.compare("ogt", y, LARGEST), LARGEST, y)
+    y = b.select(b.compare("ogt", y, LARGEST_FLOAT), LARGEST_FLOAT, y)
     return b.sub(b.fma(b.intrinsic("fabs", y), -FUNCTION_ERROR, y), FUNCTION_FLOOR, exact=True)
 
 
-def least(b: Body, x: Operand, y: Value) -> Value:
+def smaller(b: Body, x: Operand, y: Value) -> Value:
     """Return the smaller one; the second where one is not a number, as the processor has it."""
     x, y = b.same(x, y) if isinstance(x, Value) else (b.wide(x, y.width), y)
     return b.select(b.compare("olt", x, y), x, y)
 
 
-def greatest(b: Body, x: Operand, y: Value) -> Value:
+def larger(b: Body, x: Operand, y: Value) -> Value:
     """Return the larger one; the second where one is not a number."""
     x, y = b.same(x, y) if isinstance(x, Value) else (b.wide(x, y.width), y)
     return b.select(b.compare("ogt", x, y), x, y)

@@ -14,25 +14,25 @@ from dataclasses import dataclass
 from ..codegen.ir.functions import applied
 from ..codegen.ir.text import Body, Value, constant
 from .arithmetic import (
-    Interval,
+    Ends,
+    absolute_of,
     add,
     defined,
     div,
     finite,
-    hull,
+    hull_of,
     maximum,
     minimum,
     mul,
     neg,
-    number,
+    point_of,
+    root_of,
     routine,
-    size,
-    sqrt,
     sub,
 )
-from .rounding import function_downwards, function_upwards, greatest, least
+from .rounding import function_downwards, function_upwards, larger, smaller
 
-Result = tuple[Interval, Value | None]
+_Result = tuple[Ends, Value | None]
 _INF = float("inf")
 _PI_UP = math.nextafter(math.pi, 4.0)
 
@@ -79,7 +79,7 @@ MONOTONE = {
 STEPS = ("floor", "ceil", "trunc", "rint", "sign")
 
 
-def interval_of(b: Body, name: str, *args: Interval) -> Result:
+def interval_of(b: Body, name: str, *args: Ends) -> _Result:
     """Return what a function of the table makes of intervals, and where it may jump.
 
     Parameters
@@ -88,7 +88,7 @@ def interval_of(b: Body, name: str, *args: Interval) -> Result:
         Where it is written.
     name : str
         NumPy's name.
-    *args : Interval
+    *args : Ends
     """
     if name in ("minimum", "maximum"):  # which know an infinite constant
         return (minimum if name == "minimum" else maximum)(b, *args), None
@@ -106,20 +106,20 @@ def interval_of(b: Body, name: str, *args: Interval) -> Result:
 # -- functions of one argument ---------------------------------------------------------------------
 
 
-def _by_ends(b: Body, name: str, known: Monotone, x: Interval) -> Interval:
+def _by_ends(b: Body, name: str, known: Monotone, x: Ends) -> Ends:
     first, last = x.values if known.rises else reversed(x.values)
     low = function_downwards(b, applied(b, name, first))
     high = function_upwards(b, applied(b, name, last))
     if known.values[0] > -_INF:
-        low = greatest(b, known.values[0], low)
+        low = larger(b, known.values[0], low)
     if known.values[1] < _INF:
-        high = least(b, known.values[1], high)
+        high = smaller(b, known.values[1], high)
     if known.odd:
         low = b.select(b.logic("and", _at_least(b, x.low), _below(b, low)), 0.0, low)
         falls = b.logic("and", b.compare("ole", x.high, 0.0), b.compare("ogt", high, 0.0))
         high = b.select(falls, 0.0, high)
     signed = known.values[0] >= 0 or (known.odd and x.not_negative)
-    found = Interval(low=low, high=high, not_negative=signed)
+    found = Ends(low=low, high=high, not_negative=signed)
     if known.domain == (-_INF, _INF):
         return found
     inside = b.compare("oge", x.low, known.domain[0])
@@ -134,22 +134,22 @@ def _below(b: Body, v: Value) -> Value:
     return b.compare("olt", v, 0.0)
 
 
-def _steps(b: Body, name: str, x: Interval) -> Result:
+def _steps(b: Body, name: str, x: Ends) -> _Result:
     low, high = (applied(b, name, v) for v in x.values)
-    found = Interval(low=low, high=high, not_negative=x.not_negative)
+    found = Ends(low=low, high=high, not_negative=x.not_negative)
     return found, b.compare("one", low, high)
 
 
-def _absolute(b: Body, x: Interval) -> Result:
-    return size(b, x), None
+def _absolute(b: Body, x: Ends) -> _Result:
+    return absolute_of(b, x), None
 
 
-def _sqrt(b: Body, x: Interval) -> Result:
-    return sqrt(b, x), None
+def _sqrt(b: Body, x: Ends) -> _Result:
+    return root_of(b, x), None
 
 
-def _cosh(b: Body, x: Interval) -> Result:
-    return _by_ends(b, "cosh", Monotone(values=(1.0, _INF)), size(b, x)), None
+def _cosh(b: Body, x: Ends) -> _Result:
+    return _by_ends(b, "cosh", Monotone(values=(1.0, _INF)), absolute_of(b, x)), None
 
 
 _TURN = 1 / (2 * math.pi)
@@ -165,49 +165,49 @@ def _turns(b: Body, v: Value, per: float, shift: float, side: int) -> Value:
     return b.add(b.fma(v, per, shift), room, exact=True)
 
 
-def _meets(b: Body, x: Interval, per: float, shift: float) -> Value:
+def _meets(b: Body, x: Ends, per: float, shift: float) -> Value:
     """Return where an integer may lie among x per + shift."""
     low, high = _turns(b, x.low, per, shift, -1), _turns(b, x.high, per, shift, 1)
     return b.compare("oge", b.intrinsic("floor", high), low)
 
 
-def _circular(name: str, top: float) -> Callable[..., Result]:
+def _circular(name: str, top: float) -> Callable[..., _Result]:
     """Return the rule of sine or cosine, whose maxima are `top` turns from 0."""
 
-    def rule(b: Body, x: Interval) -> Result:
+    def rule(b: Body, x: Ends) -> _Result:
         first, last = (applied(b, name, v) for v in x.values)
-        low = greatest(b, -1.0, function_downwards(b, least(b, first, last)))
-        high = least(b, 1.0, function_upwards(b, greatest(b, first, last)))
+        low = larger(b, -1.0, function_downwards(b, smaller(b, first, last)))
+        high = smaller(b, 1.0, function_upwards(b, larger(b, first, last)))
         low = b.select(_meets(b, x, _TURN, 0.5 - top), -1.0, low)
         high = b.select(_meets(b, x, _TURN, -top), 1.0, high)
         is_number = b.logic("and", b.compare("ord", x.low, x.high), b.compare("ord", low, high))
-        return defined(b, is_number, Interval(low=low, high=high)), None
+        return defined(b, is_number, Ends(low=low, high=high)), None
 
     return rule
 
 
-def _tan(b: Body, x: Interval) -> Result:
+def _tan(b: Body, x: Ends) -> _Result:
     low = function_downwards(b, applied(b, "tan", x.low))
     high = function_upwards(b, applied(b, "tan", x.high))
     pole = _meets(b, x, 1 / math.pi, -0.5)
     exists = b.logic("xor", pole, constant(True, pole.width, "b"))
     exists = b.logic("and", exists, b.compare("ole", low, high))
-    return defined(b, exists, Interval(low=low, high=high)), None
+    return defined(b, exists, Ends(low=low, high=high)), None
 
 
 # -- functions of two arguments --------------------------------------------------------------------
 
 
-def _hypot(b: Body, x: Interval, y: Interval) -> Result:
-    x, y = size(b, x), size(b, y)
+def _hypot(b: Body, x: Ends, y: Ends) -> _Result:
+    x, y = absolute_of(b, x), absolute_of(b, y)
     low = function_downwards(b, applied(b, "hypot", x.low, y.low))
     high = function_upwards(b, applied(b, "hypot", x.high, y.high))
     is_number = b.logic("and", b.compare("ord", x.low, y.low), b.compare("ord", low, high))
-    found = Interval(low=greatest(b, 0.0, low), high=high, not_negative=True)
+    found = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
     return defined(b, is_number, found), None
 
 
-def _corners(b: Body, name: str, x: Interval, y: Interval) -> Interval:
+def _corners(b: Body, name: str, x: Ends, y: Ends) -> Ends:
     """Return the least and the greatest value at the corners of a rectangle."""
     ends = [(v, w) for v in set(x.values) for w in set(y.values)]
     ends = sorted(ends, key=lambda pair: (pair[0].text, pair[1].text))
@@ -215,97 +215,101 @@ def _corners(b: Body, name: str, x: Interval, y: Interval) -> Interval:
     low = high = found[0]
     numbers = b.compare("ord", low, high)
     for value in found[1:]:
-        low, high = least(b, value, low), greatest(b, value, high)
+        low, high = smaller(b, value, low), larger(b, value, high)
         numbers = b.logic("and", numbers, b.compare("ord", value, value))
-    bounds = Interval(low=function_downwards(b, low), high=function_upwards(b, high))
+    bounds = Ends(low=function_downwards(b, low), high=function_upwards(b, high))
     return defined(b, numbers, bounds)
 
 
-def _power(b: Body, x: Interval, y: Interval) -> Result:
+def _power(b: Body, x: Ends, y: Ends) -> _Result:
     """x^y = e^(y ln x), which is largest and least at corners; it needs x >= 0."""
     at_zero = b.logic("and", _at_least(b, x.low), b.compare("ogt", y.low, 0.0))
     exists = b.logic("or", b.compare("ogt", x.low, 0.0), at_zero)
     found = _corners(b, "power", x, y)
-    found = Interval(low=greatest(b, 0.0, found.low), high=found.high, not_negative=True)
+    found = Ends(low=larger(b, 0.0, found.low), high=found.high, not_negative=True)
     return defined(b, exists, found), None
 
 
-def _arctan2(b: Body, y: Interval, x: Interval) -> Result:
+def _arctan2(b: Body, y: Ends, x: Ends) -> _Result:
     """Off its cut the angle is largest and least at corners."""
     level = b.logic("and", b.compare("ole", y.low, 0.0), b.compare("oge", y.high, 0.0))
     cut = b.logic("and", level, b.compare("ole", x.low, 0.0))
     found = _corners(b, "arctan2", y, x)
     low, high = b.select(cut, -_PI_UP, found.low), b.select(cut, _PI_UP, found.high)
-    return Interval(low=low, high=high), cut
+    return Ends(low=low, high=high), cut
 
 
-def _quotient_rounded(b: Body, name: str, x: Interval, y: Interval) -> tuple[Interval, Value]:
+def _quotient_rounded(b: Body, name: str, x: Ends, y: Ends) -> tuple[Ends, Value]:
     quotient = div(b, x, y)
     low, high = (applied(b, name, v) for v in quotient.values)
-    return Interval(low=low, high=high), b.compare("une", low, high)
+    return Ends(low=low, high=high), b.compare("une", low, high)
 
 
-def _within(b: Body, x: Interval, y: Interval) -> Interval:
+def _within(b: Body, x: Ends, y: Ends) -> Ends:
     """Return what two intervals that hold one number have in common."""
-    low, high = greatest(b, y.low, x.low), least(b, y.high, x.high)
-    return Interval(low=low, high=high)
+    low, high = larger(b, y.low, x.low), smaller(b, y.high, x.high)
+    return Ends(low=low, high=high)
 
 
-def _rest(name: str) -> Callable[..., Result]:
+def _rest(name: str) -> Callable[..., _Result]:
     """Return the rule of a remainder: x - y q, where q is x / y rounded by `name`."""
 
-    def rule(b: Body, x: Interval, y: Interval) -> Result:
+    def rule(b: Body, x: Ends, y: Ends) -> _Result:
         q, jumps = _quotient_rounded(b, name, x, y)
         one = sub(b, x, mul(b, y, q))
-        zero = number(0.0, x.low.width)
-        bound = hull(b, zero, y) if name == "floor" else hull(b, size(b, y), neg(b, size(b, y)))
+        zero = point_of(0.0, x.low.width)
+        bound = (
+            hull_of(b, zero, y)
+            if name == "floor"
+            else hull_of(b, absolute_of(b, y), neg(b, absolute_of(b, y)))
+        )
         single = _within(b, one, bound)
         low = b.select(jumps, bound.low, single.low)
         high = b.select(jumps, bound.high, single.high)
         is_number = b.logic("and", b.compare("ord", q.low, q.high), b.compare("ord", low, high))
-        return defined(b, is_number, Interval(low=low, high=high)), jumps
+        return defined(b, is_number, Ends(low=low, high=high)), jumps
 
     return rule
 
 
-def _copysign(b: Body, x: Interval, y: Interval) -> Result:
-    a = size(b, x)
+def _copysign(b: Body, x: Ends, y: Ends) -> _Result:
+    a = absolute_of(b, x)
     turned = neg(b, a)
     positive, negative = b.compare("ogt", y.low, 0.0), b.compare("olt", y.high, 0.0)
     low = b.select(positive, a.low, turned.low)
     high = b.select(negative, turned.high, a.high)
     open_ = b.logic("xor", b.logic("or", positive, negative), constant(True, low.width, "b"))
-    return defined(b, b.compare("ord", y.low, y.high), Interval(low=low, high=high)), open_
+    return defined(b, b.compare("ord", y.low, y.high), Ends(low=low, high=high)), open_
 
 
-def _heaviside(b: Body, x: Interval, h: Interval) -> Result:
-    zero, one = number(0.0, x.low.width), number(1.0, x.low.width)
+def _heaviside(b: Body, x: Ends, h: Ends) -> _Result:
+    zero, one = point_of(0.0, x.low.width), point_of(1.0, x.low.width)
     after, before = b.compare("ogt", x.low, 0.0), b.compare("olt", x.high, 0.0)
     here = b.logic("and", b.compare("oeq", x.low, 0.0), b.compare("oeq", x.high, 0.0))
-    every = hull(b, hull(b, zero, one), h)
+    every = hull_of(b, hull_of(b, zero, one), h)
     ends = []
     for all_, at in zip(every.values, h.values, strict=True):
         ends.append(b.select(after, 1.0, b.select(before, 0.0, b.select(here, at, all_))))
     known = b.logic("or", b.logic("or", after, before), here)
     jumps = b.logic("xor", known, constant(True, known.width, "b"))
-    found = Interval(low=ends[0], high=ends[1])
+    found = Ends(low=ends[0], high=ends[1])
     return defined(b, b.compare("ord", x.low, x.high), found), jumps
 
 
-def _logaddexp(b: Body, x: Interval, y: Interval) -> Result:
+def _logaddexp(b: Body, x: Ends, y: Ends) -> _Result:
     """It rises with both: max(x, y) + ln(1 + e^-|x - y|) at the lower and at the upper ends."""
 
-    def at(v: Value, w: Value) -> Interval:
-        one, other = Interval(low=v, high=v), Interval(low=w, high=w)
-        apart = neg(b, size(b, sub(b, one, other)))
+    def at(v: Value, w: Value) -> Ends:
+        one, other = Ends(low=v, high=v), Ends(low=w, high=w)
+        apart = neg(b, absolute_of(b, sub(b, one, other)))
         small = _by_ends(b, "log1p", MONOTONE["log1p"], _by_ends(b, "exp", MONOTONE["exp"], apart))
         return add(b, maximum(b, one, other), small)
 
     low, high = at(x.low, y.low).low, at(x.high, y.high).high
-    return defined(b, b.compare("ord", low, high), Interval(low=low, high=high)), None
+    return defined(b, b.compare("ord", low, high), Ends(low=low, high=high)), None
 
 
-RULES: dict[str, Callable[..., Result]] = {
+RULES: dict[str, Callable[..., _Result]] = {
     "absolute": _absolute,
     "sqrt": _sqrt,
     "cosh": _cosh,

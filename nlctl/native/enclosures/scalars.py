@@ -7,7 +7,7 @@ from functools import reduce
 
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 
-MOST = 6_000  # numbers, beyond which code would take too long to make
+MOST_NUMBERS = 6_000  # numbers, beyond which code would take too long to make
 
 
 def scalar_expressions(results: Sequence[Expr]) -> tuple[Graph, list[Expr]]:
@@ -28,8 +28,8 @@ def scalar_expressions(results: Sequence[Expr]) -> tuple[Graph, list[Expr]]:
         if node.op in ("call", "solve"):
             raise Untraceable(f"{node.data[0]} is not an expression: it has no enclosure")
         made[node] = _elements(graph, node, made)
-        if len(graph.nodes) > MOST:
-            raise Untraceable(f"more than {MOST} numbers are computed")
+        if len(graph.nodes) > MOST_NUMBERS:
+            raise Untraceable(f"more than {MOST_NUMBERS} numbers are computed")
     return graph, [made[expr][0] for expr in results]
 
 

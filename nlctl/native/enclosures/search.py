@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 from ..machine.machine_code import kept
-from .address import call_judge
+from .address import call_enclosure
 
-PROVED, REFUTED, LEFT, FULL = range(4)
+ALL_PROVED, REFUTED, LEFT, FULL = range(4)
 FINEST = 1e-6  # of a tolerance: where the bound is near 0, nothing finer is tried
 _INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True}
 
@@ -59,7 +59,7 @@ def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
     Returns
     -------
     int
-        `PROVED`, `REFUTED`, `LEFT`, or `FULL` where the stack has no room for more.
+        `ALL_PROVED`, `REFUTED`, `LEFT`, or `FULL` where the stack has no room for more.
     """
     n, lanes, centre, weight = whole.size, x.shape[1], places[0], places[1]
     top = counts[0]
@@ -72,7 +72,7 @@ def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
             j = top - 1 - min(lane, taken - 1)
             for i in range(2 * n):
                 x[i, lane] = stack[j, i]
-        call_judge(judge, x, o)
+        call_enclosure(judge, x, o)
         top -= taken
         counts[1] += taken
         for lane in range(taken):
@@ -98,7 +98,7 @@ def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
                 stack[top, 2 * side + 1 - half] = middle
                 top += 1
     counts[0] = top
-    return LEFT if top > 0 or counts[2] > 0 else PROVED
+    return LEFT if top > 0 or counts[2] > 0 else ALL_PROVED
 
 
 @kept(nogil=True, error_model="numpy")
@@ -130,7 +130,7 @@ def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, fou
     Returns
     -------
     int
-        `FULL` where there is no room for more boxes, or `PROVED`.
+        `FULL` where there is no room for more boxes, or `ALL_PROVED`.
     """
     while True:
         judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, found)
@@ -142,7 +142,7 @@ def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, fou
     for k in range(counts[1]):
         found[0] = max(found[0], keys[k])
         counts[4] += keys[k] == math.inf
-    return PROVED
+    return ALL_PROVED
 
 
 @kept(**_INNER)
@@ -156,7 +156,7 @@ def judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, found)
         j = index[2, min(lane, waiting - 1)]
         for i in range(2 * n):
             x[i, lane] = nodes[j, i]
-    call_judge(judge, x, o)
+    call_enclosure(judge, x, o)
     counts[3] += waiting
     for lane in range(waiting):
         value = o[1, lane]
@@ -167,7 +167,7 @@ def judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, found)
             found[1] = value
         j = index[2, lane]
         index[0, j] = best_side(x, o, lane, places[1], whole)
-        counts[1] = enter(keys, index, counts[1], o[0, lane], j)
+        counts[1] = heap_enter(keys, index, counts[1], o[0, lane], j)
 
 
 @kept(**_INNER)
@@ -180,7 +180,7 @@ def divide_first(nodes, index, keys, lanes, limits, counts, found):
         close = min(tol, max(relative * abs(end), FINEST * tol))
         if end - found[1] <= close or counts[3] + waiting >= limit:
             break
-        counts[1] = leave(keys, index, counts[1])
+        counts[1] = heap_leave(keys, index, counts[1])
         side = index[0, j]
         if side < 0:
             found[0] = max(found[0], end)
@@ -197,7 +197,7 @@ def divide_first(nodes, index, keys, lanes, limits, counts, found):
 
 
 @kept(**_INNER)
-def enter(keys, index, size, key, what):
+def heap_enter(keys, index, size, key, what):
     """Put a box into the heap, the largest bound first, and return its size."""
     at = size
     while at > 0:
@@ -211,7 +211,7 @@ def enter(keys, index, size, key, what):
 
 
 @kept(**_INNER)
-def leave(keys, index, size):
+def heap_leave(keys, index, size):
     """Take the first box out of the heap, and return its size."""
     size -= 1
     key, what, at = keys[size], index[1, size], 0

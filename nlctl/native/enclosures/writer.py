@@ -4,7 +4,7 @@
     void judge(double *x, double *o)
 
 Boxes are in lanes: row i of `x` is the lower end of side i in every lane, then the upper one, and
-row k of `v` the same of result k.  What `judge` writes is in `Rows`.
+row k of `v` the same of result k.  What `judge` writes is in `JudgedRows`.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from ..codegen.ir.numbers import one_line
 from ..codegen.ir.text import Body, Module, Value
 from .arithmetic import (
     NAN,
-    Interval,
+    Ends,
+    absolute_of,
     add,
-    compare,
+    choice_of,
+    comparison_of,
     div,
     finite,
+    left_open,
     logic,
     logic_not,
     maximum,
     minimum,
     mul,
     neg,
-    number,
+    point_of,
     routine,
-    select,
     select_truth,
-    size,
     sub,
     truth,
-    undecided,
 )
-from .rounding import greatest, least
+from .rounding import larger, smaller
 from .rules import interval_of
 
 LANES = 8
@@ -48,7 +48,7 @@ _INF = float("inf")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rows:
+class JudgedRows:
     """Where `judge` writes what it finds, in rows of one number per lane.
 
     Attributes
@@ -111,7 +111,7 @@ def enclosure_text(
     return "\n".join([module.text(), *texts])
 
 
-class Writer:
+class EnclosureWriter:
     """Writes enclosures of expressions; `names` says what each is called so far.
 
     Attributes
@@ -125,7 +125,7 @@ class Writer:
 
     def __init__(self, b: Body, lanes: int) -> None:
         self.b, self.lanes = b, lanes
-        self.names: dict[Expr, Interval] = {}
+        self.names: dict[Expr, Ends] = {}
         self.jumps: dict[Expr, Value] = {}
 
     def write(self, exprs: Sequence[Expr]) -> None:
@@ -135,10 +135,10 @@ class Writer:
                 self.b.note(one_line(node))
                 self.names[node] = self._operation(node)
 
-    def _operation(self, node: Expr) -> Interval:
+    def _operation(self, node: Expr) -> Ends:
         b, args = self.b, [self.names[a] for a in node.args]
         if node.op == "const":
-            known = truth if node.kind == "b" else number
+            known = truth if node.kind == "b" else point_of
             return known(node.data, self.lanes)
         if node.op == "leaf":
             return self.side("x", node.data[1])
@@ -153,7 +153,7 @@ class Writer:
         if node.op == "neg":
             return neg(b, args[0])
         if node.op in COMPARISONS:
-            return compare(b, node.op, *args)
+            return comparison_of(b, node.op, *args)
         if node.op == "not":
             return logic_not(b, args[0])
         if node.op in LOGIC:
@@ -165,23 +165,23 @@ class Writer:
             self.jumps[node] = jumps
         return found
 
-    def _choice(self, node: Expr, condition: Interval, x: Interval, y: Interval) -> Interval:
+    def _choice(self, node: Expr, condition: Ends, x: Ends, y: Ends) -> Ends:
         if node.kind == "b":
             return select_truth(self.b, condition, x, y)
         if is_an_extreme(node):
             question, first = node.args[0], node.args[1]
             smaller = (question.args[0] is first) == (question.op in ("lt", "le"))
             return (minimum if smaller else maximum)(self.b, x, y)
-        self.jumps[node] = undecided(self.b, condition)
-        return select(self.b, condition, x, y)
+        self.jumps[node] = left_open(self.b, condition)
+        return choice_of(self.b, condition, x, y)
 
-    def side(self, array: str, row: int) -> Interval:
+    def side(self, array: str, row: int) -> Ends:
         """Read an interval."""
         low, high = (
             load_value(self.b, entry_address(self.b, array, (2 * row + k) * self.lanes), self.lanes)
             for k in (0, 1)
         )
-        return Interval(low=low, high=high)
+        return Ends(low=low, high=high)
 
     def keep(self, array: str, row: int, *values: Value | float) -> None:
         """Write values to consecutive rows."""
@@ -206,7 +206,7 @@ def _function(b: Body, name: str, *arguments: str) -> str:
 
 def _values(module: Module, results: Sequence[Expr], lanes: int) -> str:
     b = Body(module)
-    w = Writer(b, lanes)
+    w = EnclosureWriter(b, lanes)
     w.write(results)
     for k, expr in enumerate(results):
         w.keep("v", 2 * k, *finite(w.names[expr]).values)
@@ -221,8 +221,8 @@ def _judge(
     sides: int,
     lanes: int,
 ) -> str:
-    b, rows = Body(module), Rows(sides=sides, results=len(results))
-    w = Writer(b, lanes)
+    b, rows = Body(module), JudgedRows(sides=sides, results=len(results))
+    w = EnclosureWriter(b, lanes)
     w.write([*results, *(g for gradient in gradients for g in gradient)])
     box = [w.side("x", i) for i in range(sides)]
     slopes = [[w.names[g] for g in gradient] for gradient in gradients]
@@ -239,17 +239,17 @@ def _judge(
     return _function(b, "judge", "x", "o")
 
 
-def _read(w: Writer, row: int) -> Interval:
+def _read(w: EnclosureWriter, row: int) -> Ends:
     low, high = (
         load_value(w.b, entry_address(w.b, "o", (row + k) * w.lanes), w.lanes) for k in (0, 1)
     )
-    return Interval(low=low, high=high)
+    return Ends(low=low, high=high)
 
 
-_Step = tuple[Interval, Value]
+_Step = tuple[Ends, Value]
 
 
-def _centre(w: Writer, rows: Rows, i: int, side: Interval, slope: Interval) -> _Step:
+def _centre(w: EnclosureWriter, rows: JudgedRows, i: int, side: Ends, slope: Ends) -> _Step:
     """Choose a point of a side, and write it down; return what the side is around it, and if it is.
 
     It is where the mean-value form has the least upper bound (E. Baumann, BIT 28:80, 1988): an end
@@ -263,19 +263,19 @@ def _centre(w: Writer, rows: Rows, i: int, side: Interval, slope: Interval) -> _
     point = b.select(b.compare("ord", point, point), point, middle)
     point = b.select(b.compare("oge", slope.low, 0.0), high, point)
     point = b.select(b.compare("ole", slope.high, 0.0), low, point)
-    point = least(b, high, greatest(b, low, point))
+    point = smaller(b, high, larger(b, low, point))
     w.keep("o", rows.centre + i, b.select(ends, point, NAN))
     first, last = b.select(ends, point, low), b.select(ends, point, high)
     w.keep("o", rows.inner + 2 * i, first, last)
-    step = sub(b, side, Interval(low=point, high=point))
+    step = sub(b, side, Ends(low=point, high=point))
     return step, b.logic("and", ends, b.compare("olt", low, high))
 
 
 def _bound(
-    w: Writer,
+    w: EnclosureWriter,
     expr: Expr,
-    at_centre: Interval,
-    slopes: Sequence[Interval],
+    at_centre: Ends,
+    slopes: Sequence[Ends],
     steps: Sequence[_Step],
 ) -> Value:
     """Return the upper bound of a result: by its value and by the mean-value form.
@@ -287,7 +287,7 @@ def _bound(
         if slope.point != 0:
             change = routine(b, "mul", mul, slope, step)
             low, high = (b.select(moves, v, 0.0) for v in change.values)
-            mean = add(b, mean, Interval(low=low, high=high))
+            mean = add(b, mean, Ends(low=low, high=high))
     jumps = w.may_jump(expr)
     other = mean.high if jumps is None else b.select(jumps, _INF, mean.high)
     other = b.select(b.compare("ord", mean.low, other), other, _INF)
@@ -295,10 +295,10 @@ def _bound(
     return b.select(b.compare("ord", value.low, value.high), bound, _INF)
 
 
-def _weights(b: Body, box: Sequence[Interval], slopes: Sequence[Interval]) -> list[Value]:
+def _weights(b: Body, box: Sequence[Ends], slopes: Sequence[Ends]) -> list[Value]:
     """Return how much a result changes along each side; not a number if one is not known."""
     widths = [b.sub(side.high, side.low, exact=True) for side in box]
-    steep = [size(b, slope).high for slope in slopes]
+    steep = [absolute_of(b, slope).high for slope in slopes]
     found = [b.mul(s, width, exact=True) for s, width in zip(steep, widths, strict=True)]
     known = b.wide(0.0, box[0].low.width)
     for s in steep:
@@ -307,10 +307,10 @@ def _weights(b: Body, box: Sequence[Interval], slopes: Sequence[Interval]) -> li
 
 
 def _kept(
-    w: Writer,
-    rows: Rows,
+    w: EnclosureWriter,
+    rows: JudgedRows,
     bounds: Sequence[Value],
-    at_centre: Sequence[Interval],
+    at_centre: Sequence[Ends],
     weights: Sequence[list[Value]],
 ) -> None:
     """Write the least bound with the weights of its result, and the least value at the centre."""
@@ -320,7 +320,7 @@ def _kept(
         smaller = b.compare("olt", bounds[k], bound)
         bound = b.select(smaller, bounds[k], bound)
         weight = [b.select(smaller, v, u) for v, u in zip(weights[k], weight, strict=True)]
-        value = minimum(b, Interval(low=met, high=above), at_centre[k])
+        value = minimum(b, Ends(low=met, high=above), at_centre[k])
         met, above = value.values
-    w.keep("o", Rows.BOUND, bound, met, above)
+    w.keep("o", JudgedRows.BOUND, bound, met, above)
     w.keep("o", rows.weight, *weight)

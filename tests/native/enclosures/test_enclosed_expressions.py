@@ -9,7 +9,7 @@ from analysis.intervals.arithmetic import Ball
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Graph, needed
 from nlctl.native.enclosures.boxes import enclosed, expressions_of
-from nlctl.native.enclosures.divide import decide, greatest
+from nlctl.native.enclosures.divide import decide_claim, enclose_supremum
 
 ROUNDING = 1e-9  # of a sample's own floats, relative: they are rounded at every step
 
@@ -130,7 +130,9 @@ BOX = np.array([-1.0, -2.0]), np.array([2.0, 1.5])
 )
 def test_a_supremum_has_its_closed_form(function, supremum):
     """To nine digits where that is what is asked for, and never below."""
-    found = greatest(function_code(function, 2), *BOX, tol=1e-9, max_boxes=200_000, hopeless=5_000)
+    found = enclose_supremum(
+        function_code(function, 2), *BOX, tol=1e-9, max_boxes=200_000, hopeless=5_000
+    )
     assert supremum - 1e-15 <= found.high <= supremum + 1.1e-9
     assert found.attained <= supremum + 1e-15
 
@@ -139,9 +141,13 @@ def test_a_supremum_in_time_without_end():
     """sin t for all t >= 0 has 1, t itself none."""
     low, high = np.array([0.0, 0.0]), np.array([1.0, np.inf])
     code = function_code(lambda x: x[0] * np.sin(x[1]), 2)
-    assert 1.0 <= greatest(code, low, high, tol=1e-6, max_boxes=5_000, hopeless=500).high < 1.00001
+    assert (
+        1.0
+        <= enclose_supremum(code, low, high, tol=1e-6, max_boxes=5_000, hopeless=500).high
+        < 1.00001
+    )
     code = function_code(lambda x: x[0] + x[1], 2)
-    found = greatest(code, low, high, tol=1e-6, max_boxes=5_000, hopeless=500)
+    found = enclose_supremum(code, low, high, tol=1e-6, max_boxes=5_000, hopeless=500)
     assert found.high == np.inf
     assert found.unbounded
 
@@ -151,7 +157,9 @@ def test_a_verdict_is_the_same_for_any_number_of_threads(threads):
     """Also in what it has cost, and where a claim is refuted."""
     code = function_code(lambda x: np.sin(20 * x[0]) * np.sin(20 * x[1]) - 1e-3 * (x[0] + x[1]), 2)
     for bound in (1.0032, 1.0):
-        one, other = (decide(code, *BOX, bound, max_boxes=300_000, threads=n) for n in (1, threads))
+        one, other = (
+            decide_claim(code, *BOX, bound, max_boxes=300_000, threads=n) for n in (1, threads)
+        )
         assert (one.holds, one.boxes, one.undecided) == (other.holds, other.boxes, other.undecided)
         assert np.array_equal(one.point, other.point, equal_nan=True)
 
@@ -159,7 +167,7 @@ def test_a_verdict_is_the_same_for_any_number_of_threads(threads):
 def test_what_is_attained_is_not_decided_by_a_strict_claim():
     """(x - y)^2 > 0 fails where x = y: boxes get as small as floats, and that is said."""
     code = function_code(lambda x: -np.abs(x[0] - x[1]) + 0.0 * x[0], 2)
-    found = decide(code, *BOX, -1e-30, max_boxes=3_000)
+    found = decide_claim(code, *BOX, -1e-30, max_boxes=3_000)
     assert found.holds is not True
 
 
@@ -167,8 +175,8 @@ def test_a_parabola_with_a_margin_is_proved_and_refuted_at_a_point():
     """x (1 - x) <= 0.2500001 holds, <= 0.2499999 does not, and a point shows it."""
     code = function_code(lambda x: x[0] * (1 - x[0]), 1)
     ends = np.array([0.0]), np.array([1.0])
-    assert decide(code, *ends, 0.2500001, max_boxes=1_000).holds is True
-    found = decide(code, *ends, 0.2499999, max_boxes=1_000)
+    assert decide_claim(code, *ends, 0.2500001, max_boxes=1_000).holds is True
+    found = decide_claim(code, *ends, 0.2499999, max_boxes=1_000)
     assert found.holds is False
     assert found.point[0] * (1 - found.point[0]) > 0.2499999
 
