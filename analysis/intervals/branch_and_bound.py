@@ -263,7 +263,7 @@ def _proved_by_code(
     if max_boxes <= TOO_FEW or not claims:
         return None
     for sign, bound in claims:
-        code = code_for(known, box, sign, bound)
+        code = code_for(known, function, box, sign, bound)
         if code is None:
             return None
         found = decided_by_code(code, box, max(max_boxes - boxes, 1))
@@ -323,7 +323,7 @@ def _end(
     known: Any, function: _Function, box: Box, sign: int, tol: float, max_boxes: int
 ) -> tuple[float, float, int, int, bool]:
     """Return what `_supremum` does of sign f, and whether machine code has found it."""
-    code = code_for(known, box, sign) if max_boxes > TOO_FEW else None
+    code = code_for(known, function, box, sign) if max_boxes > TOO_FEW else None
     if code is None:
         mirrored = function if sign > 0 else lambda x: -as_ball(function(x))
         return *_supremum(mirrored, box, tol, max_boxes), False

@@ -22,6 +22,7 @@ from nlctl.expressions.continuity import is_an_extreme
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of, side_leaves
 from nlctl.native.enclosures.divide import BoxVerdict, Supremum, decide_claim, enclose_supremum
+from nlctl.native.enclosures.unrounded import UnroundedGraph
 from nlctl.upstream.numba_internals import is_jit_disabled
 
 from .arithmetic import Ball, as_ball
@@ -98,13 +99,17 @@ class CodedClaim:
     bound: float
 
 
-def code_for(function: Any, box: Box, sign: int, bound: float = 0.0) -> CodedClaim | None:
+def code_for(
+    function: Any, on_balls: Callable[..., Any], box: Box, sign: int, bound: float = 0.0
+) -> CodedClaim | None:
     """Return code for sign f <= bound; None for a function that has none, or on no such machine.
 
     Parameters
     ----------
     function : callable
         Of a tuple of numbers, or `Readable`.
+    on_balls : callable
+        The same for balls, which says so where it fails.
     box : Box
     sign : {1, -1}
     bound : float, optional
@@ -115,7 +120,7 @@ def code_for(function: Any, box: Box, sign: int, bound: float = 0.0) -> CodedCla
     key = (len(box.names), sign)
     if key not in known:
         code = _made(function, *key)
-        known[key] = code if code is not None and _agrees(code, function, box, sign) else None
+        known[key] = code if code is not None and _agrees(code, on_balls, box, sign) else None
     code = known[key]
     return None if code is None else CodedClaim(code=code, bound=bound)
 
@@ -136,7 +141,7 @@ def _made(function: Any, sides: int, sign: int) -> BoxCode | None:
 def _expressions(function: Any, sides: int) -> tuple[Graph, Sequence[Expr]]:
     if isinstance(function, Readable):
         if sides not in function.read:
-            graph = Graph({"x": sides})
+            graph = UnroundedGraph({"x": sides})
             found = function.expressions(graph, side_leaves(graph, sides))
             function.read[sides] = graph, found
         return function.read[sides]

@@ -84,6 +84,11 @@ class Sector:
         """Boxes of the branch and bound."""
         return sum(half.boxes for half in (self.positive, self.negative) if half)
 
+    @property
+    def arithmetic(self) -> set[str]:
+        """What proved both: "floats", "balls", or one each."""
+        return {half.arithmetic for half in (self.positive, self.negative) if half}
+
 
 def plant_terms(plant: Any) -> tuple[Callable[[Any, Any], Any], Callable[[Any, Any], Any]]:
     """Return f(x, v) and d(x, t) of a plant record of the class (1).

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from flint import arb
 
 from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
+from nlctl.wording import counted
 
 from ...intervals.arithmetic import as_ball
 from ...intervals.box import Box
@@ -69,6 +70,8 @@ class Demand:
         matched + G_max eps_u*.
     boxes : int
         Boxes of the proofs.
+    arithmetic : {"balls", "floats"}
+        What proved them; balls where only some are floats'.
     """
 
     C: float
@@ -79,6 +82,13 @@ class Demand:
     matched: float
     delta_star: float
     boxes: int
+    arithmetic: Literal["balls", "floats"] = "balls"
+
+    @property
+    def how(self) -> str:
+        """On how many boxes, and of what, in words."""
+        of = ", floats rounded outwards" if self.arithmetic == "floats" else ""
+        return counted(self.boxes, "box", "boxes") + of
 
 
 def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1e-3) -> Demand:
@@ -125,6 +135,7 @@ def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1
         matched=fine.magnitude,
         delta_star=upper(total_error(as_ball(gain.G_max), split.eps_star, fine.magnitude, 0.0)),
         boxes=fine.boxes + gain.boxes,
+        arithmetic="floats" if {fine.arithmetic, *gain.arithmetic} == {"floats"} else "balls",
     )
 
 

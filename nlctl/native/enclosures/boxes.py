@@ -19,6 +19,7 @@ from ..machine.finish import Loaded, finished
 from ..thirdparty.purity import check_pure
 from ..thirdparty.values import FRESH, Impure
 from .scalars import scalar_expressions
+from .unrounded import UnroundedGraph
 from .writer import LANES, JudgedRows, enclosure_text
 
 
@@ -103,7 +104,7 @@ def expressions_of(function: Callable[..., Any], sides: int) -> tuple[Graph, lis
     Untraceable
         If it is not a function of its arguments alone, or does what expressions cannot say.
     """
-    graph = Graph({"x": sides})
+    graph = UnroundedGraph({"x": sides})
     return graph, numbers_at(graph, function, side_leaves(graph, sides))
 
 

@@ -10,6 +10,7 @@ import control as ct
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from ..sliding.reading import relay_places
 from .scalars import scalar_expressions
+from .unrounded import UnroundedGraph
 
 if TYPE_CHECKING:
     from ..compiled import Compiled
@@ -79,7 +80,7 @@ def with_leaves(
     instead : callable
         ``instead(graph, leaf)``: an expression of the new graph.
     """
-    graph, made = Graph(), {}
+    graph, made = UnroundedGraph(), {}
     for node in needed(exprs):
         if node.op == "leaf":
             made[node] = instead(graph, node)

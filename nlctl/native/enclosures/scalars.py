@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import reduce
 
 from ...expressions.graph import Expr, Graph, Untraceable, needed
+from .unrounded import UnroundedGraph
 
 MOST_NUMBERS = 6_000  # numbers, beyond which code would take too long to make
 
@@ -23,7 +24,7 @@ def scalar_expressions(results: Sequence[Expr]) -> tuple[Graph, list[Expr]]:
     Untraceable
         If there is an opaque function among what they are made of, or too much of it.
     """
-    graph, made = Graph(), {}
+    graph, made = UnroundedGraph(), {}
     for node in needed(results):
         if node.op in ("call", "solve"):
             raise Untraceable(f"{node.data[0]} is not an expression: it has no enclosure")

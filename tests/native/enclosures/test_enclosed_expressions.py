@@ -1,15 +1,19 @@
 """Enclosures of random expressions: no sample outside, the verdicts of balls, and bounds."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from flint import arb
 from random_expressions import ball_of, random_boxes, random_graph, random_points
 
 from analysis.intervals.arithmetic import Ball
+from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Graph, needed
 from nlctl.native.enclosures.boxes import enclosed, expressions_of
 from nlctl.native.enclosures.divide import decide_claim, enclose_supremum
+from nlctl.native.enclosures.unrounded import UnroundedGraph
 
 ROUNDING = 1e-9  # of a sample's own floats, relative: they are rounded at every step
 
@@ -190,3 +194,18 @@ def test_vectors_are_enclosed_element_by_element():
     a, b = enclosed([total], 12).values(low, low + 1.0)
     assert abs(a[0, 0]) < 1e-300
     assert 66.0 <= b[0, 0] < 66.0 + 1e-12
+
+
+def test_constants_of_a_derivative_are_not_rounded():
+    """(0.1 (0.3 x))' is the product of two floats, which is not a float."""
+    graph = UnroundedGraph()
+    inner = graph.op("mul", graph.const(0.3), graph.leaf("x", 0, None))
+    outer = graph.op("mul", graph.const(0.1), inner)
+    (slope,) = tangents(graph, [outer], lambda leaf: graph.const(1.0))
+    at = np.zeros((1, 1))
+    low, high = enclosed([slope], 1).values(at, at)
+    exact = Fraction(0.1) * Fraction(0.3)
+    assert Fraction(float(low[0, 0])) < exact < Fraction(float(high[0, 0]))
+    assert high[0, 0] - low[0, 0] < 1e-16
+    half = graph.op("mul", graph.const(0.5), graph.const(0.3))
+    assert half.op == "const"  # nothing is rounded
