@@ -209,3 +209,46 @@ def test_constants_of_a_derivative_are_not_rounded():
     assert high[0, 0] - low[0, 0] < 1e-16
     half = graph.op("mul", graph.const(0.5), graph.const(0.3))
     assert half.op == "const"  # nothing is rounded
+
+
+def above_supremum(rng, expressions, boxes=20, count=100):
+    """How many samples are above a supremum, for which boxes are divided; and how many were taken.
+
+    Bounds are those of the mean-value form, too, where nothing jumps.
+    """
+    missed = taken = 0
+    for _ in range(expressions // 2):
+        exprs, sides = random_graph(rng, count=2, depth=4)
+        low, high = random_boxes(rng, boxes, sides, unbounded=0.03)
+        points = random_points(rng, low, high, count)
+        for expr in exprs:
+            code = enclosed([expr], sides)
+            limits = {"tol": 1e-6, "max_boxes": 64, "hopeless": 64}
+            bound = [enclose_supremum(code, *box, **limits).high for box in zip(low, high)]  # noqa: B905
+            nodes = needed(code.expressions)
+            found = evaluate_expressions(nodes, {"x": points.reshape(-1, sides).T})
+            every = [np.broadcast_to(v.astype(float), count * boxes) for v in found]
+            value = every[-1].reshape(count, boxes)
+            overflown = np.isinf(every).any(axis=0).reshape(count, boxes)
+            with np.errstate(all="ignore"):
+                largest = np.nanmax(np.where(np.isfinite(every), np.abs(every), 0.0), axis=0)
+                room = ROUNDING * (1 + largest.reshape(count, boxes))
+                holds = (value <= np.array(bound) + room) | (overflown & np.isnan(value))
+            holds |= np.isinf(bound)
+            missed, taken = missed + np.sum(~holds), taken + count * np.sum(np.isfinite(bound))
+    return missed, taken
+
+
+def test_no_sample_is_above_a_supremum():
+    """Of random expressions, with corners, jumps and poles; where it is finite it exists."""
+    missed, taken = above_supremum(np.random.default_rng(11), 60)
+    assert missed == 0
+    assert taken > 20_000
+
+
+@pytest.mark.weekly
+def test_no_sample_of_a_thousand_expressions_is_above_a_supremum():
+    """The same for 2,000 expressions."""
+    missed, taken = above_supremum(np.random.default_rng(12), 2_000)
+    assert missed == 0
+    assert taken > 1_000_000
