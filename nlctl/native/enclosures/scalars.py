@@ -8,7 +8,7 @@ from functools import reduce
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from .unrounded import UnroundedGraph
 
-MOST_NUMBERS = 6_000  # numbers, beyond which code would take too long to make
+MOST_NUMBERS = 3_000  # numbers, beyond which code would take too long to make
 
 
 def scalar_expressions(results: Sequence[Expr]) -> tuple[Graph, list[Expr]]:

@@ -43,6 +43,10 @@ from .rounding import larger, smaller
 from .rules import interval_of
 
 LANES = 8
+INLINED = (
+    400  # operations up to which rules become part of what calls them: beyond, code of a third
+)
+# more speed would take three times as long to make
 _ARITHMETIC = {"sub": sub, "mul": mul, "div": div}
 _INF = float("inf")
 
@@ -106,7 +110,8 @@ def enclosure_text(
     lanes : int, optional
         Boxes at a time.
     """
-    module = Module(inlined=True)
+    all_of_it = needed([*results, *(g for gradient in gradients for g in gradient)])
+    module = Module(inlined=len(all_of_it) <= INLINED)
     texts = [_values(module, results, lanes), _judge(module, results, gradients, sides, lanes)]
     return "\n".join([module.text(), *texts])
 
