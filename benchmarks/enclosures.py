@@ -17,8 +17,8 @@ from rich.console import Console
 from rich.table import Table
 
 import nlctl
-from analysis.intervals.machine import only_balls
-from analysis.lyapunov import Box, certify, prove_decrease
+from nlctl.analysis.intervals.machine import only_balls
+from nlctl.analysis.lyapunov import Box, certify, prove_decrease
 from nlctl.native.enclosures.boxes import enclosed, expressions_of
 from nlctl.native.enclosures.divide import decide_claim
 

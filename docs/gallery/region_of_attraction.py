@@ -11,7 +11,7 @@ proved is 2.3043, with a point where :math:`\dot{V} = 0` next to it.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from analysis.lyapunov import Box, prove_decrease, region_of_attraction
+from nlctl.analysis.lyapunov import Box, prove_decrease, region_of_attraction
 
 
 def V(x):

@@ -18,10 +18,11 @@ from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.place import chattering_words
 from .compiled import Compiled
-from .integrate.driver import Settings, trajectory
+from .integrate.driver import trajectory
 from .integrate.results import Statistics, Trajectory
 from .integrate.state import Status
 from .own_errors import own_error
+from .settings import Settings
 
 
 def respond(

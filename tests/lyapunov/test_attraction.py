@@ -7,8 +7,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
 import nlctl
-from analysis.intervals.machine import only_balls
-from analysis.lyapunov import Box, barrier, prove_decrease, region_of_attraction
+from nlctl.analysis.intervals.machine import only_balls
+from nlctl.analysis.lyapunov import Box, barrier, prove_decrease, region_of_attraction
 from nlctl.errors import ParameterError
 
 KHALIL = [[1.5, -0.5], [-0.5, 1.0]]

@@ -5,9 +5,17 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis import metrics
-from analysis.paper import CASES, METRICS, checks, expectations, measured, run_case, sample_times
-from analysis.paper.reproduction import CaseRun
+from nlctl.analysis import metrics
+from nlctl.analysis.paper import (
+    CASES,
+    METRICS,
+    checks,
+    expectations,
+    measured,
+    run_case,
+    sample_times,
+)
+from nlctl.analysis.paper.reproduction import CaseRun
 
 CASE = {case.key: case for case in CASES}
 
@@ -23,7 +31,7 @@ def fused(diagram):
     """
     compiled = nlctl.compile(diagram)
     (rhs, out), p = compiled.native, compiled.parameter_vector()
-    g = np.empty(compiled.program.events)
+    g, m = (np.empty(compiled.lowered.rows[name]) for name in "gm")
 
     def filled(function, size, t, x, u, *more):
         result = np.empty(size)
@@ -31,7 +39,7 @@ def fused(diagram):
         return result
 
     return ct.nlsys(
-        lambda t, x, u, params: filled(rhs, x.size, t, x, u, g),
+        lambda t, x, u, params: filled(rhs, x.size, t, x, u, g, m),
         lambda t, x, u, params: filled(out, diagram.noutputs, t, x, u),
         inputs=0,
         outputs=diagram.output_labels,

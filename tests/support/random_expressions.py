@@ -3,8 +3,8 @@
 import numpy as np
 from flint import arb
 
-from analysis.intervals.arithmetic import Ball, as_ball
-from analysis.intervals.paths import Undecided, every_way
+from nlctl.analysis.intervals.arithmetic import Ball, as_ball
+from nlctl.analysis.intervals.paths import Undecided, every_way
 from nlctl.expressions.functions import FUNCTIONS
 from nlctl.expressions.graph import COMPARISONS, Graph, needed, numpy_function
 

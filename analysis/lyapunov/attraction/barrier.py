@@ -188,7 +188,7 @@ def barrier(
     --------
     A damped oscillator from around (1, 0) never comes to x1 < -0.95:
 
-    >>> from analysis.lyapunov import Box, barrier
+    >>> from nlctl.analysis.lyapunov import Box, barrier
     >>> found = barrier(
     ...     lambda x: (x[1], -x[0] - x[1]),
     ...     Box.of(x1=(-3, 3), x2=(-3, 3)),

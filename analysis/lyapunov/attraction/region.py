@@ -152,7 +152,7 @@ def region_of_attraction(
     --------
     Van der Pol's oscillator in reversed time (Khalil, Example 8.9), where this V falls up to 2.3:
 
-    >>> from analysis.lyapunov import Box, region_of_attraction
+    >>> from nlctl.analysis.lyapunov import Box, region_of_attraction
     >>> found = region_of_attraction(
     ...     lambda x: (-x[1], x[0] + (x[0] ** 2 - 1) * x[1]),
     ...     Box.of(x1=(-3, 3), x2=(-3, 3)),

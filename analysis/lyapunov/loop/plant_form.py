@@ -17,8 +17,8 @@ from nlctl.diagrams import Place
 from nlctl.errors import CompileError, DiagramError
 from nlctl.expressions.arrays import Tracer, concatenated, traced
 from nlctl.expressions.graph import Expr, Graph, Untraceable
+from nlctl.native.diagram.checks import check_functions
 from nlctl.native.enclosures.boxes import traced_numbers
-from nlctl.native.thirdparty.checks import check_functions
 from nlctl.plants import coordinate_names
 from nlctl.upstream.control_internals import current_parameters
 

@@ -16,8 +16,8 @@ from ...expressions.derivatives import tangents
 from ...expressions.graph import Ambiguous, Expr, Graph, Untraceable
 from ...expressions.trace import trace
 from ..machine.finish import Loaded, finished
-from ..thirdparty.purity import check_pure
-from ..thirdparty.values import FRESH, Impure
+from ..purity.check import check_pure
+from ..purity.values import FRESH, Impure
 from .scalars import scalar_expressions
 from .unrounded import UnroundedGraph
 from .writer import LANES, JudgedRows, enclosure_text

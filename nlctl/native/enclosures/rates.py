@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import control as ct
 
 from ...expressions.graph import Expr, Graph, Untraceable, needed
-from ..sliding.reading import relay_places
+from ..equations.relays import relay_places
+from ..reading import Reading
 from .scalars import scalar_expressions
 from .unrounded import UnroundedGraph
 
-if TYPE_CHECKING:
-    from ..compiled import Compiled
 
-
-def state_rates(compiled: Compiled, params: dict[str, object] | None = None) -> list[Expr]:
+def state_rates(compiled: Reading, params: dict[str, object] | None = None) -> list[Expr]:
     """Return x' of a diagram, a number per state, made of the leaves ``x[0], x[1], ...``.
 
     Its external inputs are 0.
 
     Parameters
     ----------
-    compiled : Compiled
+    compiled : Reading
     params : dict, optional
         Overrides by qualified name.
 
@@ -52,7 +49,7 @@ def _numbers(array: object) -> list[Expr]:
     return [array[i].only for i in range(array.size)]  # type: ignore[attr-defined,index]
 
 
-def _check(compiled: Compiled) -> None:
+def _check(compiled: Reading) -> None:
     """Refuse a diagram whose states do more than follow their rates."""
     program, schedule = compiled.program, compiled.schedule
     reasons = {

@@ -2,115 +2,46 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
-from numbers import Real
-from typing import Any
 
 import control as ct
 import numpy as np
 
 from ...delays.variation import Variation
 from ...errors import ParameterError
-from ...names import unknown
 from ...responses.watched import Watched
 from ...sampling.clock import Instants
-from ..chattering.detection import Jump, asked, jump_of, new_paces, probe_of, snapshot
-from ..codegen.along import Along, derivatives
-from ..codegen.program import Program, instants_of
+from ..along import derivatives
+from ..chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
 from ..compiled import Compiled
+from ..diagram.program import Program, instants_of
 from ..happened import happened, with_log
 from ..histories import lines_of, variations, with_past, with_room
+from ..integrators import integrators
 from ..machine.evaluations import Machine, machine
-from ..machine.integrators import integrators
-from ..taylor.method import taylor_task
+from ..run import Run
+from ..settings import METHODS, Settings
+from ..taylor.method import with_taylor
+from ..taylor.turns import turned, with_turns
 from ..timed.ahead import ahead
 from .discrete import simulate_discrete
+from .events.functions import EventRows
 from .log import log_room
-from .memory import with_table
-from .methods import EXPLICIT_PAIRS
-from .methods.lu import WHOLE, Elimination, cost
-from .methods.tableau import Tableau
-from .methods.tsit5 import TSIT5
+from .memory import with_fields, with_table
+from .methods.lu import WHOLE
+from .methods.stiff import DIFFERENCES, EXACT, UNKNOWN, stiff_method
+from .methods.tableau import Tableau, pair_of
+from .methods.taylor import OTHER_METHOD, SLOPES
+from .resets import Resets
 from .results import Statistics, Trajectory, at_its_end, made
-from .state import DERIVATIVES, RUNNING, Status
-from .workspace import (
-    AUTO,
-    DIFFERENCES,
-    EXACT,
-    EXPLICIT,
-    IMPLICIT,
-    TASK,
-    TAYLOR,
-    UNKNOWN,
-    Task,
-    new_work,
-)
+from .samples import Ticks, Timed
+from .state import DERIVATIVES, EXPLICIT, RUNNING, Status
+from .workspace import Task, new_work
 
-METHODS = {
-    "auto": AUTO,
-    **dict.fromkeys(EXPLICIT_PAIRS, EXPLICIT),
-    "rodas5p": IMPLICIT,
-    "taylor": TAYLOR,
-}
 _NOTED = 1000  # events of a run for which there is room from the beginning
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """How a run is integrated.
-
-    Attributes
-    ----------
-    rtol, atol : float
-        Tolerances; the error of a step is weighed with atol + rtol |x|.
-    max_steps : int
-        Attempted steps after which a run ends as STEP_LIMIT.
-    method : {"auto", "tsit5", "rodas5p", "taylor"} or Tableau
-        Explicit pair of orders 5(4), stiff method of orders 5(4), or whichever is faster;
-        Taylor's method, of an order that follows from rtol, for equations that can be written as
-        expressions and have no memories; an explicit pair of your own as its tableau.
-    step : float
-        Fixed step (s) instead of error control; 0 for error control.
-    max_step : float
-        Longest step (s), under error control too.
-    """
-
-    rtol: float = 1e-8
-    atol: float = 1e-10
-    max_steps: int = 10_000_000_000
-    method: str | Tableau = "auto"
-    step: float = 0.0
-    max_step: float = np.inf
-
-    @property
-    def pair(self) -> Tableau:
-        """The explicit pair that is used, alone or in turn with the stiff method."""
-        return (
-            self.method
-            if isinstance(self.method, Tableau)
-            else EXPLICIT_PAIRS.get(self.method, TSIT5)
-        )
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.method, Tableau) and self.method not in METHODS:
-            raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
-        for name in ("rtol", "atol", "step", "max_steps", "max_step"):
-            if not isinstance(getattr(self, name), Real):
-                raise ParameterError(f"{name} must be one number, got {getattr(self, name)!r}")
-        for name, most in (("rtol", 1), ("atol", np.inf)):
-            if not 0 < getattr(self, name) < most:
-                rule = "> 0 and < 1" if most == 1 else "> 0"
-                raise ParameterError(f"{name} must be {rule}, got {getattr(self, name)!r}")
-        if not 0 <= self.step < np.inf:
-            raise ParameterError(f"step must be > 0, or 0 for error control, got {self.step!r}")
-        if not self.max_step > 0:
-            raise ParameterError(f"max_step must be > 0, got {self.max_step!r}")
-        if self.max_steps < 1:
-            raise ParameterError(f"max_steps must be >= 1, got {self.max_steps!r}")
 
 
 def trajectory(
@@ -128,12 +59,14 @@ def trajectory(
         return _sampled(compiled, times, inputs, x0, p)
     varied = variations(compiled, times) if varied is None else varied
     run = prepared(compiled, times, inputs, x0[:, None], p[:, None], settings, varied)
+    run = with_turns(compiled, run, settings)
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         try:
             begin(run)
             paces = new_paces(run.lanes)
             while run.lanes["status"][0] == RUNNING:
                 run = differentiated(compiled, watched(run, paces), p)
+                run = turned(compiled, run, p, settings)
                 if progress is not None:
                     progress(float(run.lanes["t"][0]))
         except KeyboardInterrupt:
@@ -162,33 +95,6 @@ def _sampled(
         statistics=run,
         inputs=inputs[:, :done],
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Run:
-    """Members that are integrated in a batch, and all arrays that this needs.
-
-    Attributes
-    ----------
-    machine : Machine
-    task, work : Task, Work
-        See `workspace`.
-    along : Along or None
-        Exact derivatives, if the stiff method has asked for them and there are any.
-    jumps : mapping
-        Of members that chatter, by their lanes: where.
-    """
-
-    machine: Machine
-    task: Any
-    work: Any
-    along: Along | None = None
-    jumps: Mapping[int, Jump] = field(default_factory=dict)
-
-    @property
-    def lanes(self) -> np.ndarray:
-        """One record per member, see `state`."""
-        return self.work.lanes
 
 
 def begin(run: Run) -> None:
@@ -236,13 +142,15 @@ def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
     """Return a run with the derivatives that its stiff method has asked for, if it has."""
     if run.lanes["status"][0] != DERIVATIVES:
         return run
-    along, given = derivatives(compiled, p), run.task._asdict()
-    del given["table"]
-    given["derivatives"] = EXACT if along else DIFFERENCES
-    given["c_along"] = along.c if along else given["c_along"]
-    given |= _linear_equations(run.work.x.shape[0], along.elimination if along else WHOLE)
+    along, stiff = derivatives(compiled, p), run.task.stiff
+    stiff = stiff_method(
+        run.work.x.shape[0],
+        EXACT if along else DIFFERENCES,
+        along.c if along else stiff.c,
+        along.elimination if along else WHOLE,
+    )
     run.lanes["status"] = RUNNING
-    return replace(run, task=with_table(Task, like=TASK, **given), along=along)
+    return replace(run, task=with_fields(run.task, stiff=stiff), along=along)
 
 
 def finish(run: Run) -> np.ndarray:
@@ -263,39 +171,40 @@ def prepared(
 ) -> Run:
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, count, read = compiled.program, x0.shape[1], compiled.schedule
-    method = _method(compiled, settings)
-    expansion, terms = taylor_task(compiled, p, settings) if method == "taylor" else ({}, ())
+    method, terms = _method(compiled, settings), ()
     due = instants_of(compiled.schedule, program, times, p)
     code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     c = np.zeros((code.rows, count))
     code.prepare(np.ascontiguousarray(p), c)
     task = with_table(
         Task,
-        like=TASK,
         times=times,
         inputs=inputs,
+        outputs=compiled.system.noutputs or 0,
         p=c,
-        **_rows(program, code, read.watched),
+        alone=int(count == 1),
         **_bounds(settings),
         method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
-        **_pair(settings.pair) | expansion,
-        alone=int(count == 1),
-        **_instants(compiled, code, due),
-        **_jumping(program, code),
-        **ahead(code.lowered, p, times, settings.max_step),
-        opaque=int(bool(code.lowered.calls)),
-        derivatives=UNKNOWN,
-        c_along=np.zeros((1, 1)),
-        **lines_of(compiled, p, varied),
-        signals=code.signal_entry,
-        outputs=compiled.system.noutputs or 0,
-        **_linear_equations(len(x0), WHOLE),
+        pair=pair_of(settings.pair),
+        stiff=stiff_method(len(x0), UNKNOWN, np.zeros((1, 1)), WHOLE),
+        taylor=OTHER_METHOD,
+        rows=_rows(program, code, read.watched),
+        timed=with_table(
+            Timed,
+            **ahead(code.lowered.timed, p, times, settings.max_step),
+            opaque=int(bool(code.lowered.calls)),
+        ),
+        clocks=_clocks(compiled, code, due),
+        resets=_resets(program, code),
+        lines=lines_of(compiled, p, varied, code.signal_entry),
     )
+    if method == "taylor":
+        task, terms = with_taylor(task, compiled, p, settings)
     work = new_work(
-        x0, times, read.ninputs, code.lowered.rows["g"], len(read.outputs),
+        x0, times, read.ninputs, code.lowered.rows["g"], code.lowered.rows["m"], len(read.outputs),
         code.lowered.rows["s"], len(program.guards), len(read.lines),
-        2 if terms else settings.pair.stages, terms or (1, 0),
-        log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.jumps.shape[1]),
+        SLOPES if terms else settings.pair.stages, terms or (1, 0),
+        log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"
     work = with_past(compiled, task, work, p)
@@ -310,20 +219,21 @@ def _bounds(settings: Settings) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> dict[str, Any]:
+def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> EventRows:
     """Return how many rows are whose: declared, located, memories."""
-    located = code.lowered.rows["g"] - len(program.memory)
+    located = code.lowered.rows["g"]
     bending = code.lowered.conditions.bending
-    return {
-        "bending": program.switching,
-        "declared": program.switching + bending,
-        "guarded": located - len(program.guards),
-        "switching": located,
-        "watched": located - len(program.guards) - len(watched),
-        "ways": np.array([each.direction for each in watched], dtype=np.int64),
-        "ending": np.array([each.ends for each in watched], dtype=np.int64),
-        "memory": np.array(program.memory, dtype=np.int64),
-    }
+    return with_table(
+        EventRows,
+        bending=program.switching,
+        declared=program.switching + bending,
+        guarded=located - len(program.guards),
+        switching=located,
+        watched=located - len(program.guards) - len(watched),
+        ways=np.array([each.direction for each in watched], dtype=np.int64),
+        ending=np.array([each.ends for each in watched], dtype=np.int64),
+        memory=np.array(program.memory, dtype=np.int64),
+    )
 
 
 def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
@@ -338,22 +248,7 @@ def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
     return "tsit5"
 
 
-@functools.cache
-def _pair(pair: Tableau) -> dict[str, Any]:
-    """Return what the explicit method takes of a pair."""
-    none = {
-        "highest": 0, "series": np.zeros(0, dtype=np.int64), "c_series": np.zeros((1, 1)),
-        "sides": np.zeros((0, 2), dtype=np.int64),
-    }  # fmt: skip
-    return {"pair_order": float(pair.order), "stable": float(pair.stable), **pair.arrays(), **none}
-
-
-def _linear_equations(n: int, order: Elimination) -> dict[str, Any]:
-    """Return how the stiff method solves them, and what its steps cost then."""
-    return {**vars(order), "cost": cost(n, order)}
-
-
-def _instants(compiled: Compiled, code: Machine, due: list[Instants]) -> dict[str, np.ndarray]:
+def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Ticks:
     """Return when something happens to sampled blocks of each lane, and what."""
     sampled, places = compiled.program.sampled, {what: k for k, what in enumerate(code.meetings)}
     ticks = np.full((len(due), max(one.times.size for one in due)), np.inf)
@@ -367,19 +262,20 @@ def _instants(compiled: Compiled, code: Machine, due: list[Instants]) -> dict[st
         for store in code.lowered.functions[f"sample{k}"].plan.stores:
             if store.array == "s":
                 written[k, store.row : store.row + store.size] = 1
-    return {
-        "ticks": ticks, "which": which, "samples": code.sample_entries, "due": written,
-        "sampled": np.array(sampled, dtype=np.int64),
-    }  # fmt: skip
+    return with_table(
+        Ticks, ticks=ticks, which=which, functions=code.sample_entries, due=written,
+        states=np.array(sampled, dtype=np.int64),
+    )  # fmt: skip
 
 
-def _jumping(program: Program, code: Machine) -> dict[str, np.ndarray]:
+def _resets(program: Program, code: Machine) -> Resets:
     """Return the function of resets, the states that it fills, and whose guards are whose."""
     rows = [row for _, begin, end in program.jumping for row in range(begin, end)]
     owners = [block for block, begin, end in program.jumping for _ in range(begin, end)]
     owned = np.equal.outer(np.array(program.guards, dtype=int), np.array(owners, dtype=int))
-    return {
-        "resets": code.reset_entries,
-        "jumping": np.array(rows, dtype=np.int64),
-        "owned": np.ascontiguousarray(owned.reshape(len(program.guards), len(rows)), np.int64),
-    }
+    return with_table(
+        Resets,
+        functions=code.reset_entries,
+        states=np.array(rows, dtype=np.int64),
+        owned=np.ascontiguousarray(owned.reshape(len(program.guards), len(rows)), np.int64),
+    )

@@ -7,7 +7,7 @@ import pytest
 from flint import arb
 from random_expressions import ball_of, random_boxes, random_graph, random_points
 
-from analysis.intervals.arithmetic import Ball
+from nlctl.analysis.intervals.arithmetic import Ball
 from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Graph, needed

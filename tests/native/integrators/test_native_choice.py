@@ -5,8 +5,9 @@ import pytest
 from numba.core import config
 
 import nlctl
-from nlctl.native.integrate.driver import Settings, begin, differentiated, go_on, prepared
+from nlctl.native.integrate.driver import begin, differentiated, go_on, prepared
 from nlctl.native.integrate.state import RUNNING
+from nlctl.native.settings import Settings
 
 ROUNDS = 20  # after so many steps the method is looked at, as it is when methods are compared
 
@@ -33,7 +34,7 @@ def work(compiled, x0, end, method):
         tried[stiff] += int(run.lanes["accepted"][0] + run.lanes["rejected"][0]) - sum(
             tried.values()
         )
-    return tried[False] + (run.task.cost * tried[True] if tried[True] else 0.0)
+    return tried[False] + (run.task.stiff.cost * tried[True] if tried[True] else 0.0)
 
 
 @pytest.mark.slow

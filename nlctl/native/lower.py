@@ -14,22 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from ...expressions.arrays import Tracer
-from ...expressions.graph import Expr, needed
-from ..diagram.schedule import Schedule
-from ..equations.blocks import Equations, equations
-from ..equations.located import Conditions
-from ..parameters import length
-from ..timed.ahead import read_parameters
-from .calls import Call
-from .ir.program import program_text
-from .plan import Function, Store, plan_function, split
-from .program import Program
-from .rewrite import rewritten
-from .solver import Solver
+from ..expressions.arrays import Tracer
+from ..expressions.graph import Expr, needed
+from .codegen.ir.program import program_text
+from .codegen.plan import Function, Store, plan_function, split
+from .codegen.rewrite import rewritten
+from .codegen.solver import Solver
+from .diagram.parameters import length
+from .diagram.program import Program
+from .diagram.schedule import Schedule
+from .equations.blocks import Equations, equations
+from .equations.located import Conditions
+from .opaque.calls import Call
+from .timed.ahead import OfTime
 
 PREPARE = {"prepare": ("p", "c")}
-EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g"), "out": ("t", "x", "u", "c", "y")}
+EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g", "m"), "out": ("t", "x", "u", "c", "y")}
 SAMPLE = ("t", "x", "u", "c", "s")  # of those of sampled blocks, and of resets
 POINT, DIRECTION = "point", "v"
 ALONG = {POINT: ("t", "x", "u", "c"), "along": ("t", "x", "u", "c", DIRECTION, "dx")}
@@ -42,7 +42,7 @@ class Lowered:
     Attributes
     ----------
     functions : mapping
-        Plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g)``,
+        Plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g, m)``,
         ``out(t, x, u, c, y)`` and a ``sample(t, x, u, c, s)`` for each meeting of the clocks of
         sampled blocks, or ``point(t, x, u, c)`` and then, as often as there are directions,
         ``along(t, x, u, c, v, dx)``.  All arrays have a row per number and a
@@ -85,14 +85,9 @@ class Lowered:
         return (self.lanes,) if array == "t" else (self.rows[array], self.lanes)
 
     @cached_property
-    def known_ahead(self) -> dict[Any, Any]:
-        """What has been found of its functions of time alone, see `nlctl.native.timed`."""
-        return {}
-
-    @cached_property
-    def read_ahead(self) -> np.ndarray:
-        """Places of the parameters that these depend on."""
-        return read_parameters(self.conditions)
+    def timed(self) -> OfTime:
+        """Its functions of time alone."""
+        return OfTime(conditions=self.conditions)
 
     @property
     def opaque(self) -> dict[str, str]:
@@ -131,7 +126,7 @@ def lower(
     if found is None:
         found = equations(schedule, program.layout, meetings=program.meetings)
     stores = stores_of(found, found.results)
-    wanted = {"rhs": [*stores["dx"], *stores["g"]], "out": stores["y"]}
+    wanted = {"rhs": [*stores["dx"], *stores["g"], *stores["m"]], "out": stores["y"]}
     samples = {name: SAMPLE for name in stores if name.startswith("sample")}
     samples |= {name: SAMPLE for name in stores if name == "reset"}
     wanted |= {name: stores[name] for name in samples}
@@ -185,7 +180,7 @@ def _lowered(
     n, m = schedule.system.nstates or 0, schedule.ninputs
     rows = {
         "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n,
-        "g": program.events + found.conditions.rows,
+        "g": program.events + found.conditions.rows, "m": len(program.memory),
         "y": len(schedule.outputs), "v": n + m + 1, "s": max(len(program.sampled), program.resets),
     }  # fmt: skip
     return Lowered(

@@ -17,9 +17,10 @@ from ...expressions.continuity import may_jump
 from ...sampling.clock import Clock, Instants, instants, meetings
 from ...sampling.system import Happening, clocks_of
 from ...upstream.control_internals import StandIn
-from ..diagram.schedule import Node, Schedule
-from ..parameters import Slot, current_values, slots
-from ..thirdparty.captured import recorded
+from ..purity.captured import recorded
+from .nodes import Node
+from .parameters import Slot, current_values, slots
+from .schedule import Schedule
 
 _MOST = 40  # ways in which clocks meet
 
@@ -78,10 +79,8 @@ class Program:
 
     @property
     def events(self) -> int:
-        """Size of the array `g` but for located conditions: the switching functions of all
-        blocks, their guards, then what the memory states would be committed to.
-        """
-        return self.switching + len(self.guards) + len(self.memory)
+        """Size of the array `g` but for located conditions: switching functions and guards."""
+        return self.switching + len(self.guards)
 
     @property
     def resets(self) -> int:
