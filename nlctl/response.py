@@ -20,7 +20,7 @@ from .names import unknown
 from .params import checked_times
 from .reference.interpreted import SOLVE_IVP_METHODS, python_control_response
 from .responses.arguments import RunArguments, checked_params, unified, with_aliases
-from .responses.watched import check_moves, watched_functions
+from .responses.watched import Watched, check_moves, watched_functions
 from .sliding.blocks import sliding_blocks
 from .upstream.control_internals import is_system
 
@@ -270,11 +270,11 @@ def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
     return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}), _known)
 
 
-def _known(system: Any, params: Any, times: Any) -> Known:
+def _known(system: Any, params: Any, times: Any, watched: tuple[Watched, ...]) -> Known:
     """Return what is known of the conditions of a diagram that python-control is to run."""
     from .native.known import known_conditions  # late: needs numba
 
-    return known_conditions(system, params, times)
+    return known_conditions(system, params, times, watched)
 
 
 def _is_sampled(system: Any) -> bool:

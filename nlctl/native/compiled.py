@@ -18,6 +18,7 @@ from ..diagrams import apart, not_a_system, override
 from ..errors import CompileError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
+from ..responses.watched import Watched
 from ..upstream.control_internals import StandIn, is_system
 from ..wording import counted
 from .describe import called, described
@@ -398,3 +399,18 @@ def _restored(content: bytes) -> Compiled:
     """Make a compiled diagram of what `Compiled.__reduce__` has written."""
     read, arrays = pickle.loads(content)
     return Compiled(schedule=read, program=arrays)
+
+
+def with_watched(
+    compiled: Compiled, watched: tuple[Watched, ...], params: Mapping[str, Any] | None
+) -> Compiled:
+    """Return a diagram that is compiled with functions of a run."""
+    if not watched:
+        return compiled
+    if not ct.isctime(compiled.system):
+        raise ParameterError(
+            f"'{compiled.system.name}' is in discrete time, where nothing is between two samples: "
+            "stop_when and events are for diagrams in continuous time"
+        )
+    read = replace(compiled.schedule, watched=watched, overrides=dict(params or {}))
+    return replace(compiled, schedule=read)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...expressions.arrays import Tracer, as_array, scalar
 from ...expressions.graph import Expr, Graph
+from ...responses.watched import watches_nan
 from ...sampling.system import Happening
 from ..codegen.solver import Solver
 from ..diagram.parameters import length
@@ -140,7 +141,8 @@ def _conditions(
         own[i] = [*own.get(i, []), array]
     arriving = [e for e, _ in y[system.noutputs or 0 :].pieces()]
     signs = [array for _, array in declared]
-    return found_conditions(reader, rates, signs, own, [*arriving, *(w.function for w in watched)])
+    given = [each.function for each in watched if not watches_nan(each.what)]
+    return found_conditions(reader, rates, signs, own, [*arriving, *given])
 
 
 def _located(reader: Reader, found: Conditions) -> list[tuple[int, Tracer]]:

@@ -256,12 +256,41 @@ def advance(rhs, point, along, task, w, rounds):
         any_passed = _accept(task, lanes, w, found, done, passed)
         _note_events(task, lanes, w, found, done)
         _take(task, w, done)
+        if rows.ways.size:
+            _see(task, lanes, w)
         _jump(rhs, task, lanes, w, done, passed, sampled, any_passed)
         if rows.ways.size:
+            _note_jumps(task, lanes, w, done)
             _look_at_inputs(task, lanes, w)
         if lanes[0].status == RUNNING and taylor.is_to_change(task, lanes[0]):
             lanes[0].status = METHOD
             return
+
+
+@numba.njit(**INNER)
+def _see(task, lanes, w):
+    """Keep what the functions that the run watches are, before anything jumps."""
+    for i in range(task.rows.watched, task.rows.watched + task.rows.ways.size):
+        for j in range(lanes.size):
+            w.events.before_jump[i, j] = w.events.g_start[i, j]
+
+
+@numba.njit(**INNER)
+def _note_jumps(task, lanes, w, done):
+    """Note the functions that the run watches whose signs have jumped at the ends of steps.
+
+    With a condition of t alone, a sample, or a state behind a guard's fall.  One that has jumped to
+    0 is noted where it leaves that for the other side.
+    """
+    events = w.events
+    for i in range(task.rows.watched, task.rows.watched + task.rows.ways.size):
+        for j in range(lanes.size):
+            before, now = events.before_jump[i, j], events.g_start[i, j]
+            if not done[j] or before == now:
+                continue
+            if before * now < 0.0 and _counts(task, lanes[j], i, now):
+                note(task, lanes[j], w, i, now > 0.0, j)
+            events.behind[i, j] = np.sign(before) if now == 0.0 else 0.0
 
 
 @numba.njit(**INNER)

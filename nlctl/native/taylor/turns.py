@@ -17,7 +17,7 @@ from ...errors import ParameterError
 from ..integrate.memory import with_fields
 from ..integrate.methods.tableau import pair_of
 from ..integrate.methods.taylor import FIRST_TURN, MEASURED, OTHER_METHOD, SLOPES, new_terms
-from ..integrate.state import METHOD, RUNNING
+from ..integrate.state import DIVERGED, METHOD, RUNNING, STEP_TOO_SMALL
 from ..integrate.workspace import with_stages
 from ..reading import Reading
 from ..run import Run
@@ -32,11 +32,14 @@ _SPAN, _MOST = 200, 2000  # steps of Taylor's method before that, twice as many 
 def with_turns(reading: Reading, run: Run, settings: Settings) -> Run:
     """Return a run that tries Taylor's method after so many steps.
 
-    More of them for large diagrams, whose coefficients take longer to compile.
+    More of them for large diagrams, whose coefficients take longer to compile.  None where memories
+    and delays have no coefficients, and where clocks end the steps: such a run can be resumed at a
+    sample, and knows nothing of the steps before.
     """
     if settings.method != "auto" or settings.step or order_for(settings.rtol) < _ORDER:
         return run
-    if reading.program.memory or not reading.system.nstates or reading.schedule.lines:
+    program, lines = reading.program, reading.schedule.lines
+    if program.memory or program.sampled or lines or not reading.system.nstates:
         return run
     steps = max(_STEPS, len(reading.lowered.functions["rhs"].plan.nodes))
     run.lanes["span"] = run.lanes["wait"] = steps
@@ -45,13 +48,18 @@ def with_turns(reading: Reading, run: Run, settings: Settings) -> Run:
 
 def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run:
     """Return a run that goes on by the other method, if it asks for that."""
-    lane = run.lanes[0]
-    if lane["status"] != METHOD:
+    lane, expands = run.lanes[0], run.task.taylor.highest > 0 and run.task.taylor.span > 0
+    fails = expands and lane["status"] in (STEP_TOO_SMALL, DIVERGED)
+    if lane["status"] != METHOD and not fails:
         return run
-    lane["status"], lane["other_pace"] = RUNNING, lane["pace"]
-    lane["from_t"], lane["from_tried"] = lane["t"], lane["accepted"] + lane["rejected"]
+    if fails:  # the explicit pair has the last word
+        lane["span"] = FIRST_TURN
+    lane["status"] = RUNNING
+    lane["from_t"], lane["from_accepted"] = lane["t"], lane["accepted"]
+    lane["from_tried"] = lane["accepted"] + lane["rejected"]
     if run.task.taylor.highest:
         return _by_pair(run, settings)
+    lane["other_pace"] = lane["pace"]
     lane["span"] = FIRST_TURN
     if run.series is not None:  # it has had its turn before
         taylor = with_fields(run.series.taylor, span=run.task.taylor.span)
@@ -75,7 +83,9 @@ def _by_pair(run: Run, settings: Settings) -> Run:
     else:
         lane["wait"] *= 2
         lane["span"], span = lane["wait"], _SPAN
-    lane["h"] = lane["pace"]
+    lane["h"] = lane["other_pace"]  # as it was when the pair was measured
+    for name in ("tries", "seeks", "traces", "across", "cross"):
+        lane[name] = 0  # what was being located is found again
     task = with_fields(
         run.task, taylor=with_fields(OTHER_METHOD, span=span), pair=pair_of(settings.pair)
     )

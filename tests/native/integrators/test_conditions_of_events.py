@@ -95,28 +95,68 @@ def test_a_play_behind_a_pulse(source, method, rtol):
     np.testing.assert_allclose(found.outputs.reshape(-1), expected, atol=1e-4)
 
 
-@pytest.mark.parametrize("method", METHODS)
+ENGINES = [*((method, "native") for method in METHODS), (None, "python-control")]
+EVENTS = {
+    "pulse": lambda t, x, u, p: pulse(t) - 0.5,
+    "state": lambda t, x, u, p: 1.0 if 2.0 < x[0] < 2.0005 else -1.0,
+}
+
+
+def seen(found, name):
+    """Times and directions of an event."""
+    own = found.events[found.events["which"] == name]
+    return own["time"].to_numpy(), own["direction"].tolist()
+
+
+@pytest.mark.parametrize(("method", "engine"), ENGINES)
 @pytest.mark.parametrize("rtol", TOLERANCES)
-def test_event_functions_with_pulses(method, rtol):
-    """A pulse of t in each second and one of a state: two changes of sign each."""
-    found = run(
-        nlctl.interconnect({"s": ramp(lambda v: v)}, outputs=["watched"]), method, rtol,
-        events=[
-            lambda t, x, u, p: pulse(t) - 0.5,
-            lambda t, x, u, p: 1.0 if 2.0 < x[0] < 2.0005 else -1.0,
-        ],
+def test_event_functions_with_pulses(method, engine, rtol):
+    """A pulse of t in each second, and one of a state: each edge is an event."""
+    found = nlctl.input_output_response(
+        nlctl.interconnect({"s": ramp(lambda v: v)}, outputs=["watched"]), TIMES, method=method,
+        rtol=rtol, atol=1e-2 * rtol, engine=engine, events=EVENTS,
     )  # fmt: skip
-    times = found.events["time"].to_numpy()
-    edges = np.concatenate([k + np.array([0.5, 0.503]) for k in range(5)] + [[2.0, 2.0005]])
-    for edge in edges:
-        assert np.abs(times - edge).min() < 1e-7
+    edges = np.concatenate([k + np.array([0.5, 0.503]) for k in range(5)])
+    for name, at in (("pulse", edges), ("state", np.array([2.0, 2.0005]))):
+        times, ways = seen(found, name)
+        np.testing.assert_allclose(times, at, atol=1e-7)
+        assert ways == ["rising", "falling"] * (at.size // 2)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_a_run_ends_at_a_pulse(method):
-    """Where the state is first within 0.1 ms of 3."""
-    found = run(
-        nlctl.interconnect({"s": ramp(lambda v: v)}, outputs=["watched"]), method, 1e-6,
-        stop_when=lambda t, x, u, p: -1.0 if abs(x[0] - 3.0) < 1e-4 else 1.0,
+@pytest.mark.parametrize(("method", "engine"), ENGINES)
+def test_a_run_ends_at_a_pulse(method, engine):
+    """Where the state is first within 0.1 ms of 3, and where t is: a jump of the function."""
+    for stop_when in (
+        lambda t, x, u, p: -1.0 if abs(x[0] - 3.0) < 1e-4 else 1.0,
+        lambda t, x, u, p: -1.0 if abs(t - 3.0) < 1e-4 else 1.0,
+    ):
+        found = nlctl.input_output_response(
+            nlctl.interconnect({"s": ramp(lambda v: v)}, outputs=["watched"]), TIMES,
+            method=method, engine=engine, stop_when=stop_when,
+        )  # fmt: skip
+        assert found.time[-1] == pytest.approx(3.0 - 1e-4, abs=1e-6)
+
+
+@nlctl.record
+class Bouncing:
+    """A ball that keeps half of its speed."""
+
+    inputs, outputs, states, feedthrough = (), ("height",), ("height", "speed"), False
+    update = staticmethod(lambda t, x, u, p: (x[1], -9.81))
+    output = staticmethod(lambda t, x, u, p: (x[0],))
+    guard = staticmethod(lambda t, x, u, p: (x[0],))
+    reset = staticmethod(lambda t, x, u, p: (0.0 * x[0], -0.5 * x[1]))
+
+
+@pytest.mark.parametrize(("method", "engine"), ENGINES)
+def test_what_jumps_through_zero_is_an_event(method, engine):
+    """The speed of a ball rises through 0 at each bounce, and falls at each summit."""
+    found = nlctl.input_output_response(
+        nlctl.interconnect({"ball": Bouncing()}, outputs=["height"]), np.linspace(0, 1.1, 12),
+        initial_state=[1, 0], method=method, engine=engine,
+        events={"speed": lambda t, x, u, p: x[1]},
     )  # fmt: skip
-    assert found.time[-1] == pytest.approx(3.0 - 1e-4, abs=1e-6)
+    fall = np.sqrt(2 / 9.81)
+    times, ways = seen(found, "speed")
+    np.testing.assert_allclose(times, fall * np.array([1.0, 1.5, 2.0, 2.25]), atol=1e-7)
+    assert ways == ["rising", "falling"] * 2

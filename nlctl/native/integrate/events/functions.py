@@ -35,6 +35,7 @@ class Events(NamedTuple):
     g_high: Reals2
     behind: Reals2  # 1 where the step before ended with this event; of a condition that is
     # exactly 0 the side that it has come from
+    before_jump: Reals2  # at the end of a step, before anything jumps there
     table: Places2
 
 
