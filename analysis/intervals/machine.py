@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from flint import arb
 
+from nlctl.errors import CompileError
 from nlctl.expressions.arrays import Tracer
 from nlctl.expressions.continuity import is_an_extreme
 from nlctl.expressions.graph import Expr, Graph, Untraceable
@@ -134,7 +135,7 @@ def _made(function: Any, sides: int, sign: int) -> BoxCode | None:
         if len(results) != 1:
             return None
         return enclosed(_apart(graph, graph.number(results[0]), sign), sides)
-    except Untraceable:
+    except (Untraceable, CompileError):  # the latter where the C library lacks a function
         return None
 
 
