@@ -5,6 +5,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from flint import arb
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from random_expressions import ball_of, random_boxes, random_graph, random_points
 
 from nlctl.analysis.intervals.arithmetic import Ball
@@ -53,6 +55,25 @@ def test_no_sample_of_a_random_expression_is_outside(seed):
         assert missed == 0
         taken += n
     assert taken > 20_000
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=25)
+def test_a_smaller_box_has_a_smaller_range(seed):
+    """Inclusion is monotone, to the rounding of functions: and what has a value keeps it."""
+    rng = np.random.default_rng(seed)
+    exprs, sides = random_graph(rng)
+    low, high = random_boxes(rng, 24, sides)
+    inner = np.sort(random_points(rng, low, high, 2), axis=0)
+    code = enclosed(exprs, sides)
+    outside, inside = code.values(low, high), code.values(*inner)
+    known = ~np.isnan(outside[0])
+    with np.errstate(all="ignore"):
+        room = ROUNDING * (1 + np.abs(inside[0]) + np.abs(inside[1]))
+        holds = (outside[0] - room <= inside[0]) & (inside[1] <= outside[1] + room)
+    holds |= (outside[0] == -np.inf) & (outside[1] == np.inf)
+    assert np.all((holds | (room == np.inf))[known])
+    assert not np.any(np.isnan(inside[0]) & known)
 
 
 @pytest.mark.weekly
