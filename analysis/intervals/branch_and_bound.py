@@ -284,7 +284,7 @@ def _proved_by_code(
     )  # fmt: skip
 
 
-def _at(function: _Function, point: Sequence[float], box: Box) -> arb:
+def _at(function: _Function, point: np.ndarray, box: Box) -> arb:
     """Return the value at a point, on all of a side where that has no end."""
     wide = [_interval(a, b) for a, b in box.cell]
     points = [arb(float(m)) if np.isfinite(m) else w for m, w in zip(point, wide, strict=True)]

@@ -61,7 +61,7 @@ def fitted(motion: StateRates, at: np.ndarray, P: np.ndarray, level: float) -> I
         problem = cp.Problem(cp.Minimize(cp.trace(root.T @ X @ root)), limits)
         try:
             problem.solve(solver=cp.CLARABEL)
-        except cp.error.SolverError:
+        except cp.SolverError:
             return
         if X.value is None or problem.status not in ("optimal", "optimal_inaccurate"):
             return
