@@ -4,6 +4,9 @@ On a box X with centre m the range of a function is enclosed by its value on X, 
 form f(m) + f'(X)(X - m), and by both.  Where a comparison inside the equation stays undecided,
 every branch is followed and the results are united: no branch is ever picked.
 
+A function that can be traced is enclosed by machine code instead, in floats that are rounded
+outwards, and the same forms; see `analysis.intervals.machine`.  `Proof` and `Range` say which.
+
 What is proved is about the equation with its parameters as doubles; arithmetic between plain
 floats inside it (``2 * np.pi``) is rounded as in every run.
 """
@@ -14,7 +17,7 @@ import heapq
 import itertools
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -28,6 +31,7 @@ from nlctl.wording import counted
 from .agreement import one_number
 from .arithmetic import Ball, as_ball, common
 from .box import Box, Cell
+from .machine import TOO_FEW, Readable, code_for, decided_by_code, supremum_by_code
 from .paths import Undecided, every_way
 from .type_questions import is_of_library
 
@@ -51,6 +55,8 @@ class Range:
     boxes, undecided : int
         Boxes looked at, and those left without a finite bound.
     seconds : float
+    arithmetic : {"balls", "floats"}
+        What proved it: python-flint's balls, or floats rounded outwards in machine code.
 
     Examples
     --------
@@ -64,6 +70,7 @@ class Range:
     boxes: int
     undecided: int
     seconds: float
+    arithmetic: Literal["balls", "floats"] = "balls"
 
     @property
     def magnitude(self) -> float:
@@ -86,6 +93,9 @@ class Proof:
     value : float
         Value of the function there.
     seconds : float
+    arithmetic : {"balls", "floats"}
+        What decided it: python-flint's balls, or floats rounded outwards in machine code; balls
+        have confirmed a point that refutes.
 
     Examples
     --------
@@ -98,6 +108,7 @@ class Proof:
     where: dict[str, float] | None
     value: float
     seconds: float
+    arithmetic: Literal["balls", "floats"] = "balls"
 
     @property
     def status(self) -> Literal["proved", "refuted", "undecided"]:
@@ -168,10 +179,10 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     if not tol > 0:  # infinite: the first box will do
         raise ParameterError(f"enclose needs tol > 0, got {tol}")
     integer("enclose", "max_boxes", max_boxes, at_least=1)
-    function = _also_of_floats("enclose", function)
+    known, function = function, _also_of_floats("enclose", function)
     start = time.perf_counter()
-    high, greatest, n, lost = _supremum(function, box, tol, max_boxes)
-    low, least, m, missed = _supremum(lambda x: -as_ball(function(x)), box, tol, max_boxes)
+    high, greatest, n, lost, by_code = _end(known, function, box, 1, tol, max_boxes)
+    low, least, m, missed, also = _end(known, function, box, -1, tol, max_boxes)
     return Range(
         low=-low,
         high=high,
@@ -180,6 +191,7 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
         boxes=n + m,
         undecided=lost + missed,
         seconds=time.perf_counter() - start,
+        arithmetic="floats" if by_code and also else "balls",
     )
 
 
@@ -235,8 +247,54 @@ def prove(
     integer("prove", "max_boxes", max_boxes, at_least=1)
     if not low <= high:  # refuses NaN, too
         raise ParameterError(f"prove needs low <= high, got {low} and {high}")
-    function = _also_of_floats("prove", function)
-    start, queue, boxes = time.perf_counter(), [box.cell], 0
+    known, function = function, _also_of_floats("prove", function)
+    start = time.perf_counter()
+    proof = _proved_by_code(known, function, box, (low, high), max_boxes)
+    proof = proof or _proved_by_balls(function, box, (low, high), max_boxes)
+    return replace(proof, seconds=time.perf_counter() - start)
+
+
+def _proved_by_code(
+    known: Any, function: _Function, box: Box, ends: tuple[float, float], max_boxes: int
+) -> Proof | None:
+    """Return what machine code finds, if there is any; balls confirm a point that refutes."""
+    boxes = 0
+    claims = [(s, e) for s, e in zip((-1, 1), (-ends[0], ends[1]), strict=True) if e < np.inf]
+    if max_boxes <= TOO_FEW or not claims:
+        return None
+    for sign, bound in claims:
+        code = code_for(known, function, box, sign, bound)
+        if code is None:
+            return None
+        found = decided_by_code(code, box, max(max_boxes - boxes, 1))
+        boxes += found.boxes
+        if found.holds:
+            continue
+        value = _at(function, found.point, box)
+        if found.holds is False and not (value.upper() < ends[0] or value.lower() > ends[1]):
+            return None
+        return Proof(
+            holds=found.holds, boxes=boxes, undecided=found.undecided,
+            where=dict(zip(box.names, map(float, found.point), strict=True)),
+            value=float(value.mid()), seconds=0.0, arithmetic="floats",
+        )  # fmt: skip
+    return Proof(
+        holds=True, boxes=boxes, undecided=0, where=None, value=np.nan, seconds=0.0,
+        arithmetic="floats",
+    )  # fmt: skip
+
+
+def _at(function: _Function, point: np.ndarray, box: Box) -> arb:
+    """Return the value at a point, on all of a side where that has no end."""
+    wide = [_interval(a, b) for a, b in box.cell]
+    points = [arb(float(m)) if np.isfinite(m) else w for m, w in zip(point, wide, strict=True)]
+    return _every_branch(function, points, [a >= 0 for a, _ in box.cell])
+
+
+def _proved_by_balls(
+    function: _Function, box: Box, ends: tuple[float, float], max_boxes: int
+) -> Proof:
+    (low, high), queue, boxes = ends, [box.cell], 0
     undecided, where, value, holds = 0, None, np.nan, True
     while queue and boxes < max_boxes:
         cell = queue.pop()
@@ -256,15 +314,26 @@ def prove(
         if queue:
             holds, undecided = None, undecided + len(queue)
             where = where or dict(zip(box.names, _centre(queue[-1]), strict=True))
-    seconds = time.perf_counter() - start
     return Proof(
-        holds=holds, boxes=boxes, undecided=undecided, where=where, value=value, seconds=seconds
+        holds=holds, boxes=boxes, undecided=undecided, where=where, value=value, seconds=0.0
     )
+
+
+def _end(
+    known: Any, function: _Function, box: Box, sign: int, tol: float, max_boxes: int
+) -> tuple[float, float, int, int, bool]:
+    """Return what `_supremum` does of sign f, and whether machine code has found it."""
+    code = code_for(known, function, box, sign) if max_boxes > TOO_FEW else None
+    if code is None:
+        mirrored = function if sign > 0 else lambda x: -as_ball(function(x))
+        return *_supremum(mirrored, box, tol, max_boxes), False
+    found = supremum_by_code(code, box, tol, max_boxes, HOPELESS)
+    return found.high, found.attained, found.boxes, found.unbounded, True
 
 
 def _also_of_floats(who: str, function: _Function) -> _Function:
     """Return a user's function, to be compared with itself on floats."""
-    if is_of_library(function):  # what it calls was compared on its own
+    if isinstance(function, Readable) or is_of_library(function):  # compared on its own
         return function
     return one_number(
         function,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,17 @@ from flint import arb
 from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, of_type
 from nlctl.errors import ParameterError
+from nlctl.expressions.continuity import may_jump
+from nlctl.expressions.derivatives import tangents
+from nlctl.expressions.graph import Expr, Graph, Untraceable
+from nlctl.native.enclosures.boxes import numbers_at
 from nlctl.wording import counted
 
 from .agreement import one_number, several_numbers
 from .arithmetic import Ball, as_ball
 from .box import Box
 from .branch_and_bound import Proof, prove
+from .machine import Readable
 from .paths import Undecided
 from .rates import Rate, as_rate
 
@@ -95,10 +101,15 @@ def prove_decrease(
     if not 0 < floor < level < np.inf:
         raise ParameterError(f"prove_decrease needs 0 < floor < level, got {floor:g} and {level:g}")
     high, low, given = float(level), float(floor), gradient and _compared("gradient", gradient)
-    V, rhs = _compared("V", V), _compared("rhs", rhs)
+    plain, V, rhs = (V, rhs), _compared("V", V), _compared("rhs", rhs)
     _check_continuous(V, box)
     fixed = _parameters(V, rhs, box)
-    open_face = _check_faces(V, box, high, [i for i in range(len(fixed)) if not fixed[i]])
+    open_face = _check_faces(
+        Readable(of_balls=V, expressions=partial(_value, plain[0])),
+        box,
+        high,
+        [i for i in range(len(fixed)) if not fixed[i]],
+    )
     if open_face is not None:
         return open_face
 
@@ -112,7 +123,30 @@ def prove_decrease(
         return np.minimum(V_x.rate + STRICT, np.minimum(high - V_x.here, V_x.here - low))
 
     # Positive where a point inside the level set has V' > -STRICT, and nowhere else.
-    return prove(least, box, high=0.0, max_boxes=max_boxes)
+    claim: Any = least
+    if given is None:
+        claim = Readable(of_balls=least, expressions=partial(_conditions, *plain, low, high))
+    return prove(claim, box, high=0.0, max_boxes=max_boxes)
+
+
+def _value(V: Scalar, graph: Graph, sides: tuple[Any, ...]) -> list[Expr]:
+    return numbers_at(graph, V, sides)
+
+
+def _conditions(
+    V: Scalar, rhs: Vector, low: float, high: float, graph: Graph, sides: tuple[Any, ...]
+) -> list[Expr]:
+    """Return what is positive at once where V' is not negative in the level set."""
+    (value,), rates = (numbers_at(graph, function, sides) for function in (V, rhs))
+    if len(rates) != len(sides) or may_jump([value]):
+        raise Untraceable("V may jump, or there are not as many rates as sides")
+    (rate,) = tangents(graph, [value], lambda leaf: graph.number(rates[leaf.data[1]]))
+    rate, op = graph.const(0.0) if rate is None else rate, graph.op
+    return [
+        op("add", rate, graph.const(STRICT)),
+        op("sub", graph.const(high), value),
+        op("sub", value, graph.const(low)),
+    ]
 
 
 def _compared(name: str, function: Any) -> Any:

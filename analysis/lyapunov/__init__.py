@@ -3,6 +3,8 @@
 from ..intervals.box import Box, visited_box
 from ..intervals.branch_and_bound import Proof, Range, enclose, prove
 from ..intervals.level_set import prove_decrease
+from .attraction.barrier import Barrier, barrier
+from .attraction.region import AttractionRegion, region_of_attraction
 from .bounds.clipped import clipped_split
 from .bounds.constants import constants, disturbance, kappa
 from .bounds.decomposition import Decomposition, DecompositionError, decompose
@@ -33,6 +35,8 @@ from .tighten import Tightened, tighten
 
 __all__ = [
     "Aftermath",
+    "AttractionRegion",
+    "Barrier",
     "Box",
     "Certificate",
     "Conservatism",
@@ -61,6 +65,7 @@ __all__ = [
     "Tightened",
     "aftermath",
     "approximation_error",
+    "barrier",
     "burst_peak",
     "certify",
     "clipped_split",
@@ -85,6 +90,7 @@ __all__ = [
     "prove",
     "prove_decrease",
     "read_parts",
+    "region_of_attraction",
     "safe_horizon",
     "sector",
     "sharpest",

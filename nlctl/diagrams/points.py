@@ -15,7 +15,7 @@ import control as ct
 import numpy as np
 import numpy.typing as npt
 
-from ..upstream.control_internals import outputs_now, rates_now
+from ..upstream.control_internals import rates_and_outputs_now
 from .parameters import overridden
 
 SAME_FUNCTIONS = 1e-10
@@ -45,8 +45,7 @@ def values_now(system: Any, point: Point) -> tuple[np.ndarray, np.ndarray]:
     if isinstance(system, ct.StateSpace):  # connected linear systems have one matrix for all
         rates, outputs = system.dynamics(*point), system.output(*point)
     else:
-        rates = rates_now(system, *point) if system.nstates else np.empty(0)
-        outputs = outputs_now(system, *point) if system.noutputs else np.empty(0)
+        rates, outputs = rates_and_outputs_now(system, *point)
     return np.reshape(rates, -1).astype(float), np.reshape(outputs, -1).astype(float)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 
 from .graph import Expr, needed
 
-__all__ = ["may_jump"]
+__all__ = ["is_an_extreme", "may_jump"]
 
 _JUMPING = frozenset(
     (
@@ -44,12 +44,12 @@ def may_jump(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> bool:
     return any(
         node.op in _JUMPING
         or node.op in _UNKNOWN
-        or (node.op == "select" and not _is_an_extreme(node))
+        or (node.op == "select" and not is_an_extreme(node))
         for node in own
     )
 
 
-def _is_an_extreme(choice: Expr) -> bool:
+def is_an_extreme(choice: Expr) -> bool:
     """Whether a choice between two values is by which of them is larger."""
     condition, *values = choice.args
     return condition.op in _ORDERS and set(condition.args) == set(values)

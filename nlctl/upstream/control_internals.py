@@ -41,6 +41,26 @@ def outputs_now(system: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarr
     return np.asarray(system._out(t, x, u)).reshape(-1)
 
 
+def rates_and_outputs_now(
+    system: Any, t: float, x: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return both, as `rates_now` and `outputs_now` do; a diagram's signals are computed once."""
+    own = (type(system)._rhs, type(system)._out)
+    if own != (ct.InterconnectedSystem._rhs, ct.InterconnectedSystem._out):
+        return (
+            rates_now(system, t, x, u) if system.nstates else np.empty(0),
+            outputs_now(system, t, x, u) if system.noutputs else np.empty(0),
+        )
+    inputs, outputs = system._compute_static_io(t, x, u)
+    rates, n, m = np.zeros(system.nstates or 0), 0, 0
+    for part in system.syslist:
+        states, given = part.nstates or 0, part.ninputs or 0
+        if states:
+            rates[n : n + states] = part._rhs(t, x[n : n + states], inputs[m : m + given])
+        n, m = n + states, m + given
+    return rates, system.output_map @ outputs
+
+
 def parts_now(
     system: Any, t: float, x: np.ndarray, u: np.ndarray
 ) -> Iterator[tuple[Any, np.ndarray, np.ndarray]]:

@@ -11,12 +11,16 @@ import numpy as np
 from nlctl.annotations import as_annotated
 from nlctl.arguments import of_type
 from nlctl.errors import DiagramError, ParameterError
+from nlctl.expressions.arrays import Tracer
+from nlctl.expressions.graph import Expr, Graph, Untraceable
+from nlctl.expressions.quotients import difference_quotient
 from nlctl.params import equation_arguments
 from nlctl.plants import PureFeedback, coordinate_names
 
 from ...intervals.agreement import agreeing
 from ...intervals.box import Box
 from ...intervals.branch_and_bound import Range, enclose
+from ...intervals.machine import Readable
 from ...intervals.quotient import slope_in
 
 __all__ = ["Sector", "plant_terms", "quotient_range", "sector"]
@@ -79,6 +83,11 @@ class Sector:
     def boxes(self) -> int:
         """Boxes of the branch and bound."""
         return sum(half.boxes for half in (self.positive, self.negative) if half)
+
+    @property
+    def arithmetic(self) -> set[str]:
+        """What proved both: "floats", "balls", or one each."""
+        return {half.arithmetic for half in (self.positive, self.negative) if half}
 
 
 def plant_terms(plant: Any) -> tuple[Callable[[Any, Any], Any], Callable[[Any, Any], Any]]:
@@ -167,11 +176,37 @@ def quotient_range(
     tol, max_boxes
         As for `sector`.
     """
+    return range_of_quotient(quotient_function(function), box, tol=tol, max_boxes=max_boxes)
+
+
+def quotient_function(
+    function: Callable[[tuple[Any, ...], Any], Any],
+    expression: Callable[[Graph, tuple[Tracer, ...]], Expr] | None = None,
+) -> Readable:
+    """Return (q(x, v) - q(x, 0)) / v as a function of x and v together.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(x, v)``, x the coordinates of the other sides.
+    expression : callable, optional
+        ``expression(graph, sides)``: q of symbols, v being the last.
+    """
 
     def gain(point: tuple[Any, ...]) -> Any:
         *x, v = point
         return slope_in(lambda v: function(tuple(x), v), v)
 
+    def quotient(graph: Graph, sides: tuple[Tracer, ...]) -> list[Expr]:
+        if expression is None:
+            raise Untraceable("no expression is known")
+        return [difference_quotient(graph, expression(graph, sides), sides[-1].only)]
+
+    return Readable(of_balls=gain, expressions=quotient)
+
+
+def range_of_quotient(gain: Readable, box: Box, *, tol: float, max_boxes: int) -> Sector:
+    """Prove the range of a quotient over a box whose last side is v, see `quotient_range`."""
     (low, high), rest = box["v"], box.only(*box.names[:-1])
     halves: list[Range | None] = []
     for a, b in ((max(low, 0.0), high), (low, min(high, 0.0))):

@@ -98,7 +98,7 @@ class Certificate(Shown):
         alpha_0 = "0.2785 (tau delta* + b) + sigma_2 delta*^2/2"
         alpha_1 = "min{2 beta, sigma_1 Gamma, sigma_2 gamma}"
         unit, error, energy = per_second(n), per_second(n - 1), per_second(2 * n - 2)
-        boxes, k = counted(need.boxes, "box", "boxes"), (split.provenance, split.how, split.over)
+        boxes, k = need.how, (split.provenance, split.how, split.over)
         sure = "given" if split.provenance == "given" else "proved"
         rows: list[tuple[str, float, str, Any, str, str]] = [
             ("G_min", need.G_min, unit, "proved", "F/v", f"all v, {over}"),

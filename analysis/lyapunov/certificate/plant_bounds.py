@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from flint import arb
 
 from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
+from nlctl.wording import counted
 
 from ...intervals.arithmetic import as_ball
 from ...intervals.box import Box
 from ...intervals.branch_and_bound import enclose, upper
+from ...intervals.machine import Readable
 from ..bounds.decomposition import Decomposition
 from ..bounds.error_bounds import error_bounds, reference_bounds
 from ..bounds.final_bound import total_error
-from ..bounds.sector import quotient_range
+from ..bounds.sector import quotient_function, range_of_quotient
 from ..loop.plant_form import Acceleration
 
 __all__ = ["Demand", "FilteredLoop", "demand", "feedforward"]
@@ -67,6 +70,8 @@ class Demand:
         matched + G_max eps_u*.
     boxes : int
         Boxes of the proofs.
+    arithmetic : {"balls", "floats"}
+        What proved them; balls where only some are floats'.
     """
 
     C: float
@@ -77,6 +82,13 @@ class Demand:
     matched: float
     delta_star: float
     boxes: int
+    arithmetic: Literal["balls", "floats"] = "balls"
+
+    @property
+    def how(self) -> str:
+        """On how many boxes, and of what, in words."""
+        of = ", floats rounded outwards" if self.arithmetic == "floats" else ""
+        return counted(self.boxes, "box", "boxes") + of
 
 
 def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1e-3) -> Demand:
@@ -109,19 +121,11 @@ def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1
             whole = whole.times(name, *sides[name])
         return whole
 
-    def matched(point: tuple[Any, ...]) -> Any:
-        *x, t = point
-        return loop.acceleration(t, x, 0.0)
-
+    matched, gain_of_v = _terms(loop.acceleration)
     rough = enclose(matched, over_all("t"), max_boxes=1).magnitude
     fineness = tol * rough if 0 < rough < np.inf else tol
     fine = enclose(matched, over_all("t"), tol=fineness, max_boxes=20_000)
-    gain = quotient_range(
-        lambda x, v: loop.acceleration(x[-1], x[:-1], v),
-        over_all("t", "v"),
-        tol=tol,
-        max_boxes=2_000,
-    )
+    gain = range_of_quotient(gain_of_v, over_all("t", "v"), tol=tol, max_boxes=2_000)
     return Demand(
         C=C,
         box=box,
@@ -131,7 +135,22 @@ def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1
         matched=fine.magnitude,
         delta_star=upper(total_error(as_ball(gain.G_max), split.eps_star, fine.magnitude, 0.0)),
         boxes=fine.boxes + gain.boxes,
+        arithmetic="floats" if {fine.arithmetic, *gain.arithmetic} == {"floats"} else "balls",
     )
+
+
+@functools.lru_cache(maxsize=8)
+def _terms(rate: Acceleration) -> tuple[Readable, Readable]:
+    """Return g + d, of states and time, and F/v, of these and v: as long as the plant is known."""
+    matched = Readable(
+        of_balls=lambda point: rate(point[-1], list(point[:-1]), 0.0),
+        expressions=lambda graph, s: [rate.expression(graph, s[-1], s[:-1], 0.0)],
+    )
+    gain = quotient_function(
+        lambda x, v: rate(x[-1], x[:-1], v),
+        lambda graph, s: rate.expression(graph, s[-2], s[:-2], s[-1]),
+    )
+    return matched, gain
 
 
 def feedforward(loop: FilteredLoop, need: Demand) -> arb:

@@ -163,7 +163,7 @@ class SlidingModeCertificate(Shown):
         need, split, law, over = self.demand, self.split, self.loop.law, str(self.demand.box)
         unit, k = per_second(len(self.loop.e0)), (split.provenance, split.how, split.over)
         sure = "given" if split.provenance == "given" else "proved"
-        boxes = counted(need.boxes, "box", "boxes")
+        boxes = need.how
         yield "G_min", need.G_min, unit, "proved", "F/v", f"all v, {over}"
         yield "G_max", need.G_max, unit, "proved", "F/v", f"all v, {over}"
         yield "k_1", split.k_1, "1", *k

@@ -6,14 +6,19 @@ certificate encloses the latter, so that nothing rests on the two being the same
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from flint import arb
 
 from nlctl.diagrams import Place
-from nlctl.errors import DiagramError
+from nlctl.errors import CompileError, DiagramError
+from nlctl.expressions.arrays import Tracer, concatenated, traced
+from nlctl.expressions.graph import Expr, Graph, Untraceable
+from nlctl.native.diagram.checks import check_functions
+from nlctl.native.enclosures.boxes import traced_numbers
 from nlctl.plants import coordinate_names
 from nlctl.upstream.control_internals import current_parameters
 
@@ -23,7 +28,41 @@ from ...intervals.paths import Undecided, every_way
 
 __all__ = ["Acceleration", "acceleration", "check_chain", "on_intervals"]
 
-Acceleration = Callable[[Any, Any, Any], Any]
+
+class Acceleration(Protocol):
+    """x_n' of a plant."""
+
+    def __call__(self, t: Any, x: Any, v: Any) -> Any:
+        """Return it of balls or numbers."""
+        ...
+
+    def expression(self, graph: Graph, t: Tracer, x: Sequence[Tracer], v: Any) -> Expr:
+        """Return it of symbols, as an expression of the graph."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Acceleration:
+    """The last rate of a plant's own update."""
+
+    plant: Place
+    update: Callable[..., Any]
+    p: Any
+
+    def __call__(self, t: Any, x: Any, v: Any) -> Any:
+        return self.update(t, _objects(x), _objects((v,)), self.p)[-1]
+
+    def expression(self, graph: Graph, t: Tracer, x: Sequence[Tracer], v: Any) -> Expr:
+        """Return it of symbols; Untraceable if there is none."""
+        system = self.plant.system
+        try:
+            check_functions(self.plant.path, system)
+        except CompileError as error:
+            raise Untraceable(str(error)) from None
+        states = concatenated(graph, [one.reshape(1) for one in x])
+        inputs = traced(graph, v).reshape(1)
+        given = lambda: (t, states.copy(), inputs.copy(), self.p)  # noqa: E731
+        return traced_numbers(graph, system.updfcn, given)[-1]
 
 
 def on_intervals(path: str, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -45,14 +84,10 @@ def on_intervals(path: str, function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def acceleration(plant: Place) -> Acceleration:
-    """Return x_n' as ``function(t, x, v)``, from what a run integrates, with its parameters."""
+    """Return x_n', from what a run integrates, with its parameters."""
     p = current_parameters(plant.system)
     update = on_intervals(plant.path, plant.system.updfcn)  # with arrays of floats, as a run
-
-    def last(t: Any, x: Any, v: Any) -> Any:
-        return update(t, _objects(x), _objects((v,)), p)[-1]
-
-    return last
+    return _Acceleration(plant=plant, update=update, p=p)
 
 
 def check_chain(plant: Place) -> None:

@@ -241,6 +241,7 @@ def _looked_up(function: types.FunctionType, names: list[str], seen: _Seen) -> I
         yield f"{OPAQUE}files that are read when it is called ('{name}'{where})"
 
 
+@functools.lru_cache(maxsize=4096)
 def _all_texts(code: types.CodeType) -> list[str]:
     """Return the texts that stand in a code object and in those nested in it."""
     texts = {part for part in code.co_consts if isinstance(part, str)}
@@ -250,6 +251,7 @@ def _all_texts(code: types.CodeType) -> list[str]:
     return sorted(texts)
 
 
+@functools.lru_cache(maxsize=4096)  # code never changes, what names refer to may
 def _globals_of(code: types.CodeType) -> set[str]:
     """Return the names that a code object, and those nested in it, read by themselves."""
     inner = [part for part in code.co_consts if isinstance(part, types.CodeType)]

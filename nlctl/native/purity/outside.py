@@ -6,6 +6,7 @@ No key of the function changes with the answer, so that whoever keeps results by
 from __future__ import annotations
 
 import dis
+import functools
 import itertools
 import types
 from collections.abc import Callable, Iterator
@@ -43,13 +44,12 @@ def asked_outside(function: types.FunctionType) -> Iterator[str]:
     """
     every = {**function.__globals__, **_cells(function)}
     for code in _codes(function.__code__):
-        words = list(dis.get_instructions(code))
-        for word, follower in itertools.pairwise(words):
-            thing = every.get(word.argval) if isinstance(word.argval, str) else None
-            if not isinstance(thing, types.ModuleType) or not isinstance(follower.argval, str):
+        for (_, word), (_, follower) in itertools.pairwise(_words(code)):
+            thing = every.get(word) if isinstance(word, str) else None
+            if not isinstance(thing, types.ModuleType) or not isinstance(follower, str):
                 continue
-            if told := outside_of(thing.__name__, follower.argval):
-                yield f"{told} when it is called ('{word.argval}.{follower.argval}'"
+            if told := outside_of(thing.__name__, follower):
+                yield f"{told} when it is called ('{word}.{follower}'"
         for name in sorted(_FRAMES & set(code.co_names)):
             yield f"what '{name}' finds ('{name}'"
 
@@ -69,12 +69,18 @@ def imports_in(function: types.FunctionType, is_library: Callable[[str], bool]) 
     Whether one is imported already, and under which name, changes while a loop is used.
     """
     found = {
-        word.argval
+        word
         for code in _codes(function.__code__)
-        for word in dis.get_instructions(code)
-        if word.opname == "IMPORT_NAME" and not is_library(word.argval)
+        for what, word in _words(code)
+        if what == "IMPORT_NAME" and not is_library(word)
     }
     return sorted(found)
+
+
+@functools.lru_cache(maxsize=4096)  # code never changes
+def _words(code: types.CodeType) -> tuple[tuple[str, Any], ...]:
+    """Return the instructions of a code object, each with what it is about."""
+    return tuple((each.opname, each.argval) for each in dis.get_instructions(code))
 
 
 def _codes(code: types.CodeType) -> Iterator[types.CodeType]:

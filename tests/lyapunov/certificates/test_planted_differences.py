@@ -28,7 +28,7 @@ from nlctl.analysis.lyapunov.bounds.decomposition import Decomposition, Decompos
 from nlctl.analysis.lyapunov.certificate.certify import certify
 from nlctl.equations import equation
 
-C_0 = 0.47662  # of the loop without a difference
+C_0 = 0.47654  # of the loop without a difference
 K = (0.9, 1.1)
 COUNTS = [0]
 TIMES = np.linspace(0, 10, 2001)

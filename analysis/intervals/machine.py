@@ -1,0 +1,222 @@
+"""Claims about functions on boxes, decided by their machine code where they have any.
+
+A function that can be traced is enclosed by floats that are rounded outwards, see
+`nlctl.native.enclosures`.  Balls stay the reference: before the code is used it is compared with
+them at points of the box, and where a claim is refuted they have the last word.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from nlctl.errors import CompileError
+from nlctl.expressions.arrays import Tracer
+from nlctl.expressions.continuity import is_an_extreme
+from nlctl.expressions.graph import Expr, Graph, Untraceable
+from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of, side_leaves
+from nlctl.native.enclosures.divide import BoxVerdict, Supremum, decide_claim, enclose_supremum
+from nlctl.native.enclosures.unrounded import UnroundedGraph
+from nlctl.upstream.numba_internals import is_jit_disabled
+
+from .arithmetic import Ball, as_ball
+from .box import Box
+from .paths import Undecided
+
+__all__ = [
+    "CodedClaim",
+    "Readable",
+    "code_for",
+    "decided_by_code",
+    "only_balls",
+    "supremum_by_code",
+]  # fmt: skip
+
+TOO_FEW = 16  # boxes, for which code does not pay
+_POINTS = 8  # at which code is compared with balls
+_GOLDEN = 0.6180339887498949
+_LARGE = 5.0  # scale of points along sides without an end
+_ROUNDING = 1e-9  # relative
+
+
+_ONLY_BALLS: ContextVar[bool] = ContextVar("only_balls", default=False)
+
+
+@contextmanager
+def only_balls() -> Iterator[None]:
+    """Prove by balls alone what is proved meanwhile, whatever machine code there is."""
+    token = _ONLY_BALLS.set(True)
+    try:
+        yield
+    finally:
+        _ONLY_BALLS.reset(token)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Readable:
+    """A function of balls that is known as an expression, too.
+
+    Attributes
+    ----------
+    of_balls : callable
+        Of a tuple of balls.
+    expressions : callable
+        ``expressions(graph, sides)``: the same of symbols, as expressions of the graph.  Several
+        are conditions, and the function their least.
+    codes : dict
+        Machine code that has been made of it, by sides and sign; None where there is none.
+    read : dict
+        The expressions, by sides.
+    """
+
+    of_balls: Callable[..., Any]
+    expressions: Callable[[Graph, tuple[Tracer, ...]], Sequence[Expr]]
+    codes: dict[tuple[int, int], BoxCode | None] = field(default_factory=dict, compare=False)
+    read: dict[int, tuple[Graph, Sequence[Expr]]] = field(default_factory=dict, compare=False)
+
+    def __call__(self, *given: Any) -> Any:
+        return self.of_balls(*given)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CodedClaim:
+    """What a claim excludes: that all these numbers are positive at a point of the box.
+
+    Attributes
+    ----------
+    code : BoxCode
+    bound : float
+        What their least is compared with.
+    """
+
+    code: BoxCode
+    bound: float
+
+
+def code_for(
+    function: Any, on_balls: Callable[..., Any], box: Box, sign: int, bound: float = 0.0
+) -> CodedClaim | None:
+    """Return code for sign f <= bound; None for a function that has none, or on no such machine.
+
+    Parameters
+    ----------
+    function : callable
+        Of a tuple of numbers, or `Readable`.
+    on_balls : callable
+        The same for balls, which says so where it fails.
+    box : Box
+    sign : {1, -1}
+    bound : float, optional
+    """
+    if is_jit_disabled() or not box.names or _ONLY_BALLS.get():
+        return None
+    known = function.codes if isinstance(function, Readable) else {}
+    key = (len(box.names), sign)
+    if key not in known:
+        code = _made(function, *key)
+        known[key] = code if code is not None and _agrees(code, on_balls, box, sign) else None
+    code = known[key]
+    return None if code is None else CodedClaim(code=code, bound=bound)
+
+
+def _made(function: Any, sides: int, sign: int) -> BoxCode | None:
+    """Return the code of sign f, None if it has none."""
+    try:
+        graph, results = _expressions(function, sides)
+        if isinstance(function, Readable) and len(results) > 1:
+            return enclosed(results, sides)
+        if len(results) != 1:
+            return None
+        return enclosed(_apart(graph, graph.number(results[0]), sign), sides)
+    except (Untraceable, CompileError):  # the latter where the C library lacks a function
+        return None
+
+
+def _expressions(function: Any, sides: int) -> tuple[Graph, Sequence[Expr]]:
+    if isinstance(function, Readable):
+        if sides not in function.read:
+            graph = UnroundedGraph({"x": sides})
+            found = function.expressions(graph, side_leaves(graph, sides))
+            function.read[sides] = graph, found
+        return function.read[sides]
+    return expressions_of(function, sides)
+
+
+def _apart(graph: Graph, expr: Expr, sign: int) -> list[Expr]:
+    """Return numbers the least of which is sign times an expression."""
+    if expr.op == ("minimum" if sign > 0 else "maximum"):
+        return [e for arg in expr.args for e in _apart(graph, arg, sign)]
+    if expr.op == "select" and is_an_extreme(expr):
+        question, first = expr.args[0], expr.args[1]
+        is_least = (question.args[0] is first) == (question.op in ("lt", "le"))
+        if is_least == (sign > 0):
+            return [e for arg in expr.args[1:] for e in _apart(graph, arg, sign)]
+    return [expr if sign > 0 else graph.op("neg", expr)]
+
+
+def _agrees(code: BoxCode, function: Any, box: Box, sign: int) -> bool:
+    """Whether code and balls meet at points of the box."""
+    points = np.array([_point(box, k) for k in range(_POINTS)])
+    low, high = (v.min(axis=1) for v in code.values(points, points))
+    for point, a, b in zip(points, low, high, strict=True):
+        try:
+            value = sign * as_ball(function(tuple(Ball(arb(float(v))) for v in point))).value
+        except Undecided:
+            continue
+        if value.is_finite() and np.isfinite(b - a):
+            room = _ROUNDING * (1 + abs(a) + abs(b))
+            if not (float(value.lower()) <= b + room and float(value.upper()) >= a - room):
+                return False
+    return True
+
+
+def _point(box: Box, k: int) -> list[float]:
+    """Return one of a sequence of points in a box."""
+    found = []
+    for i, (a, b) in enumerate(box.cell):
+        share = (0.5 + (k + 1) * _GOLDEN ** (i + 1)) % 1.0
+        low = a if np.isfinite(a) else min(b, 0.0) - _LARGE if np.isfinite(b) else -_LARGE
+        high = b if np.isfinite(b) else max(low, 0.0) + _LARGE
+        found.append(float(min(max(low + share * (high - low), a), b)))
+    return found
+
+
+def _ends(box: Box) -> tuple[np.ndarray, np.ndarray]:
+    return np.array(box.low, dtype=float), np.array(box.high, dtype=float)
+
+
+def decided_by_code(found: CodedClaim, box: Box, max_boxes: int) -> BoxVerdict:
+    """Return what becomes of the claim; the same whatever the number of processors.
+
+    Parameters
+    ----------
+    found : CodedClaim
+    box : Box
+    max_boxes : int
+    """
+    low, high = _ends(box)
+    threads = os.cpu_count() or 1
+    return decide_claim(found.code, low, high, found.bound, max_boxes=max_boxes, threads=threads)
+
+
+def supremum_by_code(
+    found: CodedClaim, box: Box, tol: float, max_boxes: int, hopeless: int
+) -> Supremum:
+    """Return the supremum of the least of the numbers.
+
+    Parameters
+    ----------
+    found : CodedClaim
+    box : Box
+    tol : float
+    max_boxes, hopeless : int
+    """
+    low, high = _ends(box)
+    return enclose_supremum(found.code, low, high, tol=tol, max_boxes=max_boxes, hopeless=hopeless)

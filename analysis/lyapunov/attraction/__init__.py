@@ -1,0 +1,1 @@
+"""Regions of attraction and barriers: proposed by convex programs, proved by enclosures."""

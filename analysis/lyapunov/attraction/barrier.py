@@ -1,0 +1,393 @@
+"""A barrier: a function that no trajectory from a set of starts carries above 0, proved."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from nlctl.annotations import as_annotated
+from nlctl.arguments import integer, of_type
+from nlctl.errors import ParameterError
+from nlctl.expressions.derivatives import tangents
+from nlctl.expressions.graph import Expr, Graph
+from nlctl.native.enclosures.boxes import BoxCode, enclosed
+from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
+from nlctl.upstream.numba_internals import is_jit_disabled
+from nlctl.wording import counted
+
+from ...intervals.box import Box
+from .motion import StateRates, motion_of
+
+__all__ = ["Barrier", "barrier"]
+
+_STRICT = 1e-9  # B' < 0 and B > 0 are proved with this margin
+_RATES = (0.0, 1.0, -1.0, 5.0)  # k of the proposals' B' + k B < 0
+_ROUNDS = 60  # proposals for each of them
+_SAMPLES = 300  # in each set
+_POOL = 20_000  # points of the box among which a proposal is looked for mistakes first
+_BAND = 0.02  # of the largest |B|, within which it counts as 0 there
+_ADDED = 40  # of these in a round
+_Term = tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Barrier:
+    """A polynomial B with B <= 0 at all starts, B > 0 in all that is unsafe, B' < 0 where B = 0.
+
+    No trajectory from a start comes to what is unsafe, or leaves the box, at any time.
+
+    Attributes
+    ----------
+    names : tuple of str
+        States.
+    middle, half : ndarray of shape (n,)
+        B is a polynomial in z = (x - middle) / half.
+    terms : tuple of tuple of int
+        Powers of z in each term.
+    coefficients : ndarray
+        Of the terms.
+    holds : bool
+        Whether it is proved; otherwise nothing is known.
+    reason : str
+        What is missing.
+    boxes : int
+        Boxes of all proofs.
+    seconds : float
+    arithmetic : str
+        What proved it.
+
+    Examples
+    --------
+    See `barrier`.
+    """
+
+    names: tuple[str, ...]
+    middle: np.ndarray
+    half: np.ndarray
+    terms: tuple[_Term, ...]
+    coefficients: np.ndarray
+    holds: bool
+    reason: str
+    boxes: int
+    seconds: float
+    arithmetic: str = "floats rounded outwards"
+
+    @property
+    def status(self) -> Literal["proved", "undecided"]:
+        """Whether it is proved."""
+        return "proved" if self.holds else "undecided"
+
+    def value(self, x: Sequence[float]) -> float:
+        """Return B at a state.
+
+        Parameters
+        ----------
+        x : sequence of n floats
+            A value of every state.
+
+        Returns
+        -------
+        float
+            B there, rounded as any number.
+        """
+        z = (np.asarray(x, dtype=float) - self.middle) / self.half
+        return float(_monomials(z[None], self.terms)[0] @ self.coefficients)
+
+    def __str__(self) -> str:
+        if not self.holds:
+            return f"undecided: {self.reason}"
+        return f"safe for all time: proved on {counted(self.boxes, 'box', 'boxes')}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Claim:
+    """Numbers that are not positive at once on a box, and which samples a refutation adds to."""
+
+    code: BoxCode
+    box: Box
+    kind: str
+    what: str
+
+
+@dataclass(kw_only=True)
+class _Problem:
+    """What is to be kept apart, and the samples at which proposals do so."""
+
+    motion: StateRates
+    box: Box
+    terms: tuple[_Term, ...]
+    middle: np.ndarray
+    half: np.ndarray
+    claims: list[_Claim] = field(default_factory=list)
+    samples: dict[str, np.ndarray] = field(default_factory=dict)
+    pool: np.ndarray = field(default_factory=lambda: np.zeros((0, 1)))
+
+    @cached_property
+    def on_pool(self) -> tuple[np.ndarray, np.ndarray]:
+        """The terms at the points of the pool, and their rates."""
+        z = (self.pool - self.middle) / self.half
+        return _monomials(z, self.terms), _rates_of_terms(self, self.pool)
+
+
+@as_annotated
+def barrier(
+    system: Any,
+    box: Box,
+    *,
+    start: Box,
+    unsafe: Box | Sequence[Box] = (),
+    degree: int = 2,
+    params: Mapping[str, Any] | None = None,
+    max_boxes: int = 1_000_000,
+) -> Barrier:
+    """Prove that nothing from a set of starts gets where it must not, or leaves a box.
+
+    A polynomial B is proposed by linear programs on samples, B' + k B < 0 being linear in its
+    coefficients: of points where the last proposal was 0 and rose.  What refutes a proposal
+    becomes a sample of the next.  Proved is less than what is
+    proposed: B <= 0 at the starts, B > 0 in what is unsafe and where trajectories leave the box,
+    and B' < 0 where B = 0.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem or callable
+        A diagram, whose external inputs are 0; or ``function((x1, ..., xn)) -> (x1', ..., xn')``.
+    box : Box
+        Where it is to stay, with a side for every state in their order.
+    start : Box
+        Initial states.
+    unsafe : Box or sequence of Box, optional
+        What is not to be met, besides the outside of `box`.
+    degree : int, optional
+        Of the polynomial; even ones enclose sets.
+    params : mapping, optional
+        Overrides of a diagram.
+    max_boxes : int, optional
+        For each claim.
+
+    Returns
+    -------
+    Barrier
+        Proved, or undecided: that none was found says nothing.
+
+    Raises
+    ------
+    ParameterError
+        If the rates cannot be read or a box has other sides; if `degree` is below 1, or `start`
+        does not lie in the box.
+    CompileError
+        If the diagram cannot be compiled.
+
+    Examples
+    --------
+    A damped oscillator from around (1, 0) never comes to x1 < -0.95:
+
+    >>> from nlctl.analysis.lyapunov import Box, barrier
+    >>> found = barrier(
+    ...     lambda x: (x[1], -x[0] - x[1]),
+    ...     Box.of(x1=(-3, 3), x2=(-3, 3)),
+    ...     start=Box.of(x1=(0.9, 1.1), x2=(-0.1, 0.1)),
+    ...     unsafe=Box.of(x1=(-3, -0.95), x2=(-3, 3)),
+    ... )
+    >>> print(found.status)
+    proved
+    """
+    box = of_type("barrier", "box", box, Box, "Box.of(x1=(-1, 1))")
+    start = of_type("barrier", "start", start, Box, "Box.of(x1=(-1, 1))")
+    degree = integer("barrier", "degree", degree, at_least=1)
+    max_boxes = integer("barrier", "max_boxes", max_boxes, at_least=1)
+    unsafe = [unsafe] if isinstance(unsafe, Box) else list(unsafe)
+    _check_boxes(box, start, unsafe)
+    if is_jit_disabled():
+        raise ParameterError("barrier needs machine code: unset NUMBA_DISABLE_JIT")
+    begun = time.perf_counter()
+    problem = _problem(motion_of("barrier", system, box, params), box, start, unsafe, degree)
+    coefficients, boxes, reason = np.zeros(len(problem.terms)), 0, ""
+    for k in _RATES:
+        coefficients, n, reason = _attempt(problem, k, max_boxes)
+        boxes += n
+        if not reason:
+            break
+    return Barrier(
+        names=problem.motion.names, middle=problem.middle, half=problem.half, terms=problem.terms,
+        coefficients=coefficients, holds=not reason, reason=reason, boxes=boxes,
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def _check_boxes(box: Box, start: Box, unsafe: Sequence[Any]) -> None:
+    for name, one in (("start", start), *(("unsafe", u) for u in unsafe)):
+        of_type("barrier", name, one, Box, "Box.of(x1=(-1, 1))")
+        if one.names != box.names or not np.all(np.isfinite(one.cell)):
+            raise ParameterError(
+                f"barrier needs {name} with the finite sides {', '.join(box.names)}, got {one}"
+            )
+    within = zip(box.cell, start.cell, strict=True)
+    if not all(a <= c and d <= b for (a, b), (c, d) in within):
+        raise ParameterError(f"barrier needs start inside of the box, got {start} and {box}")
+
+
+def _problem(
+    motion: StateRates, box: Box, start: Box, unsafe: Sequence[Box], degree: int
+) -> _Problem:
+    n = motion.order
+    powers = itertools.product(range(degree + 1), repeat=n)
+    terms = tuple(sorted((p for p in powers if sum(p) <= degree), key=lambda p: (sum(p), p)))
+    low, high = np.array(box.low), np.array(box.high)
+    problem = _Problem(
+        motion=motion, box=box, terms=terms, middle=0.5 * (low + high), half=0.5 * (high - low)
+    )
+    graph, rates, leaves = motion.in_graph(more=len(terms))
+    B, rate = _polynomial(graph, rates, leaves, problem)
+    op, margin, sides = graph.op, graph.const(_STRICT), n + len(terms)
+    code = lambda *exprs: enclosed(list(exprs), sides, fixed=len(terms))  # noqa: E731
+    above, below = B, op("sub", margin, B)
+    rises = op("add", rate, margin)
+    band = [op("add", B, margin), below]
+    claims = problem.claims
+    claims.append(_Claim(code=code(above), box=start, kind="start", what="B <= 0 at the starts"))
+    claims += [
+        _Claim(code=code(below), box=u, kind="unsafe", what="B > 0 in what is unsafe")
+        for u in unsafe
+    ]
+    for i, end in itertools.product(range(n), (0, 1)):
+        outwards = op("add", rates[i] if end else op("neg", rates[i]), margin)
+        face = _face(box, i, end)
+        what = f"B > 0 where {motion.names[i]} leaves the box"
+        claims.append(_Claim(code=code(below, outwards), box=face, kind="unsafe", what=what))
+    claims.append(
+        _Claim(code=code(rises, *band), box=box, kind="inside", what="B' < 0 where B = 0")
+    )
+    _first_samples(problem)
+    return problem
+
+
+def _polynomial(
+    graph: Graph, rates: Sequence[Expr], leaves: Sequence[Expr], problem: _Problem
+) -> tuple[Expr, Expr]:
+    """Return B and its rate; the coefficients are sides of the box."""
+    op, n = graph.op, problem.motion.order
+    z = [
+        op("div", op("sub", leaf, graph.const(float(m))), graph.const(float(h)))
+        for leaf, m, h in zip(leaves, problem.middle, problem.half, strict=False)
+    ]
+    B = graph.const(0.0)
+    for coefficient, term in zip(leaves[n:], problem.terms, strict=True):
+        product = coefficient
+        for one, power in zip(z, term, strict=True):
+            product = op("mul", product, graph.power(one, power)) if power else product
+        B = op("add", B, product)
+    (rate,) = tangents(graph, [B], lambda e: rates[e.data[1]] if e.data[1] < n else None)
+    return B, graph.const(0.0) if rate is None else rate
+
+
+def _face(box: Box, i: int, end: int) -> Box:
+    value = box.cell[i][end]
+    ends = (tuple(value if j == i else a for j, a in enumerate(s)) for s in (box.low, box.high))
+    low, high = ends
+    return Box(names=box.names, low=low, high=high)
+
+
+def _first_samples(problem: _Problem) -> None:
+    """Take corners and random points of each set; of faces those where the motion leaves."""
+    rng = np.random.default_rng(0)
+    found: dict[str, list[np.ndarray]] = {"start": [], "unsafe": []}
+    for claim in problem.claims[:-1]:
+        corners = np.array(list(itertools.islice(itertools.product(*claim.box.cell), 64)))
+        low, high = np.array(claim.box.low), np.array(claim.box.high)
+        points = rng.uniform(low, high, (_SAMPLES, len(low)))
+        points = np.concatenate([corners, points])
+        if claim.code.rows.results == 2:  # of a face
+            i = int(np.argmin(high - low))
+            outwards = 1 if low[i] == problem.box.high[i] else -1
+            points = points[outwards * problem.motion.at(points)[:, i] >= 0]
+        found[claim.kind].append(points)
+    problem.samples = {kind: np.concatenate(parts) for kind, parts in found.items()}
+    problem.pool = rng.uniform(problem.box.low, problem.box.high, (_POOL, problem.motion.order))
+
+
+def _attempt(problem: _Problem, k: float, max_boxes: int) -> tuple[np.ndarray, int, str]:
+    """Propose and refute in turn; return coefficients, boxes, and what is missing."""
+    boxes, reason, none = 0, "", np.zeros(len(problem.terms))
+    problem.samples["inside"] = problem.pool[:0]
+    for _ in range(_ROUNDS):
+        coefficients = _proposal(problem, k)
+        if coefficients is None:
+            return none, boxes, f"no polynomial keeps samples apart: {reason or 'raise degree'}"
+        if _mistakes(problem, coefficients):
+            continue
+        reason = ""
+        for claim in problem.claims:
+            found = _decided(claim, coefficients, max_boxes)
+            boxes += found.boxes
+            if found.holds:
+                continue
+            reason = reason or claim.what
+            points = problem.samples[claim.kind]
+            added = found.point[: problem.motion.order]
+            problem.samples[claim.kind] = np.concatenate([points, added[None]])
+        if not reason:
+            return coefficients, boxes, ""
+    return none, boxes, f"not proved: {reason}"
+
+
+def _mistakes(problem: _Problem, coefficients: np.ndarray) -> bool:
+    """Add points of the pool where B is 0 and does not fall to the samples, if there are any."""
+    values, rates = (m @ coefficients for m in problem.on_pool)
+    near = np.abs(values) <= _BAND * np.max(np.abs(values))
+    wrong = np.flatnonzero(near & (rates >= 0))
+    chosen = wrong[:: max(1, len(wrong) // _ADDED)]
+    inside = problem.samples["inside"]
+    problem.samples["inside"] = np.concatenate([inside, problem.pool[chosen]])
+    return bool(len(wrong))
+
+
+def _decided(claim: _Claim, coefficients: np.ndarray, max_boxes: int) -> BoxVerdict:
+    low, high = (np.append(side, coefficients) for side in (claim.box.low, claim.box.high))
+    return decide_claim(claim.code, low, high, 0.0, max_boxes=max_boxes)
+
+
+def _monomials(z: np.ndarray, terms: Sequence[_Term]) -> np.ndarray:
+    """Return the terms at points, shape (points, terms)."""
+    return np.stack([np.prod(z ** np.array(term), axis=1) for term in terms], axis=1)
+
+
+def _rates_of_terms(problem: _Problem, points: np.ndarray) -> np.ndarray:
+    """Return how fast each term changes along the motion."""
+    z = (points - problem.middle) / problem.half
+    speed = problem.motion.at(points) / problem.half
+    total = np.zeros((len(points), len(problem.terms)))
+    for i in range(points.shape[1]):
+        lower = [tuple(p - (j == i) for j, p in enumerate(t)) for t in problem.terms]
+        kept = [tuple(max(p, 0) for p in t) for t in lower]
+        factors = np.array([t[i] for t in problem.terms], dtype=float)
+        total += factors * _monomials(z, kept) * speed[:, i : i + 1]
+    return total
+
+
+def _proposal(problem: _Problem, k: float) -> np.ndarray | None:
+    """Return coefficients with the largest margin at all samples; None if there is none."""
+    from scipy.optimize import linprog
+
+    at = {kind: _monomials((p - problem.middle) / problem.half, problem.terms)
+          for kind, p in problem.samples.items()}  # fmt: skip
+    falls = _rates_of_terms(problem, problem.samples["inside"]) + k * at["inside"]
+    size = np.maximum(np.max(np.abs(falls), axis=1, keepdims=True, initial=0.0), 1e-3)
+    rows = np.concatenate([at["start"], -at["unsafe"], falls / size])
+    good = np.all(np.isfinite(rows), axis=1)
+    apart = len(at["start"]) + len(at["unsafe"])
+    margins = np.where(np.arange(len(rows)) < apart, 1.0, 0.1)
+    matrix = np.column_stack([rows, margins])[good]
+    result = linprog(
+        np.append(np.zeros(len(problem.terms)), -1.0), A_ub=matrix, b_ub=np.zeros(len(matrix)),
+        bounds=[(-1, 1)] * len(problem.terms) + [(0, 1)], method="highs",
+    )  # fmt: skip
+    if result.x is None or result.x[-1] <= 1e-7:
+        return None
+    return result.x[:-1]

@@ -1,0 +1,219 @@
+"""The largest level of a quadratic V below which V falls: proved from inside, refuted outside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from flint import arb, arb_mat
+
+from nlctl.expressions.derivatives import tangents
+from nlctl.expressions.graph import Expr, Graph
+from nlctl.native.enclosures.boxes import BoxCode, enclosed
+from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
+
+from ...intervals.box import Box
+from .motion import StateRates
+
+__all__ = ["ProvedLevel", "Quadratic", "largest_level"]
+
+_STRICT = 1e-9  # V' < 0 is proved as V' <= -1e-9 where V is not small
+_FACE = 20_000  # boxes on a face
+_SMALLEST = 2.0**-40  # of the level that fits into the box: an inner set below it is none
+_INSIDE = 1 - 1e-6  # of that level, so that the faces can be proved
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quadratic:
+    """V = (x - at)^T P (x - at) along a motion.
+
+    Attributes
+    ----------
+    motion : StateRates
+    P : ndarray of shape (n, n)
+    at : ndarray of shape (n,)
+    falls : BoxCode
+        Positive at once where V' > -1e-9, V <= level and V >= floor: the sides are the states,
+        then level and floor.
+    inside : BoxCode
+        level - V, of the same sides.
+    """
+
+    motion: StateRates
+    P: np.ndarray
+    at: np.ndarray
+    falls: BoxCode
+    inside: BoxCode
+
+    def largest_in(self, box: Box) -> float:
+        """Return the largest level whose set lies in a box, to rounding."""
+        reach = np.minimum(np.array(box.high) - self.at, self.at - np.array(box.low))
+        return float(np.min(reach**2 / np.diag(np.linalg.inv(self.P))))
+
+    @property
+    def size(self) -> float:
+        """Volume of {V <= 1}, but for a factor."""
+        return float(np.linalg.det(self.P) ** -0.5)
+
+
+def quadratic_of(motion: StateRates, P: np.ndarray, at: np.ndarray) -> Quadratic:
+    """Return V with the code of what is claimed about it."""
+    graph, rates, leaves = motion.in_graph(more=2)
+    n = motion.order
+    level, floor = leaves[n:]
+    V = _form(graph, P, at, leaves[:n])
+    (rate,) = tangents(graph, [V], lambda e: rates[e.data[1]] if e.data[1] < n else None)
+    assert rate is not None
+    rise = graph.op("add", rate, graph.const(_STRICT))
+    below, above = graph.op("sub", level, V), graph.op("sub", V, floor)
+    return Quadratic(
+        motion=motion,
+        P=P,
+        at=at,
+        falls=enclosed([rise, below, above], n + 2, fixed=2),
+        inside=enclosed([below], n + 2, fixed=2),
+    )
+
+
+def _form(graph: Graph, P: np.ndarray, at: np.ndarray, x: list[Expr]) -> Expr:
+    op, n = graph.op, len(x)
+    z = [op("sub", one, graph.const(float(a))) for one, a in zip(x, at, strict=True)]
+    total = graph.const(0.0)
+    for i in range(n):
+        for j in range(i, n):
+            factor = float(P[i, i] if i == j else P[i, j] + P[j, i])
+            if factor:
+                product = op("mul", z[i], z[j])
+                total = op("add", total, op("mul", graph.const(factor), product))
+    return total
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProvedLevel:
+    """What is known of the levels of one V.
+
+    Attributes
+    ----------
+    V : Quadratic
+    level : float
+        Proved; 0 where nothing is.
+    floor : float
+        Below it the linear part decides.
+    above : float
+        A level that is not proved, as near as was asked for; that of the box where all below is.
+    refuted : ndarray or None
+        A point with V' >= -1e-9 and V <= `above`.
+    boxes : int
+    reason : str
+        Why there is nothing beyond `level`.
+    """
+
+    V: Quadratic
+    level: float
+    floor: float
+    above: float
+    refuted: np.ndarray | None
+    boxes: int
+    reason: str
+
+    @property
+    def volume(self) -> float:
+        """Of the proved set, but for a factor."""
+        return float(self.level ** (self.V.motion.order / 2) * self.V.size)
+
+
+def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedLevel:
+    """Return the largest level that is proved, to a relative tolerance.
+
+    Parameters
+    ----------
+    V : Quadratic
+    box : Box
+        Every set looked at lies in it.
+    tol : float
+    max_boxes : int
+        For each level.
+    """
+    fits = V.largest_in(box) * _INSIDE
+    low, boxes = _floor(V, fits, box), 0
+    nothing = {"V": V, "level": 0.0, "floor": low, "above": fits, "refuted": None}
+    if low == 0.0:
+        return ProvedLevel(**nothing, boxes=0, reason="the linear part decides nothing next to it")
+    if not _holds(V, fits, box):
+        return ProvedLevel(**nothing, boxes=0, reason="the box does not hold a level set")
+    floor, high, trial = low, fits, fits
+    refuted, reason = None, "the box: take a larger one"
+    while True:
+        found = _fall(V, trial, floor, box, max_boxes)
+        boxes += found.boxes
+        if found.holds:
+            low = trial
+        else:
+            high, refuted = trial, found.point[: V.motion.order] if found.holds is False else None
+            reason = "V' >= 0 at a point" if found.holds is False else "undecided: raise max_boxes"
+        if low >= fits or high - low <= tol * low:
+            break
+        trial = 0.5 * (low + high) if high < 4 * low else float(np.sqrt(low * high))
+    level = low if low > floor else 0.0
+    return ProvedLevel(
+        V=V, level=level, floor=floor, above=high, refuted=refuted, boxes=boxes, reason=reason
+    )
+
+
+def _sides(V: Quadratic, level: float, floor: float, box: Box) -> tuple[np.ndarray, np.ndarray]:
+    """Return the smallest box around a level set, with the level and the floor."""
+    reach = np.sqrt(level * np.diag(np.linalg.inv(V.P))) * (1 + 1e-6)
+    ends = np.array([level, floor])
+    low = np.maximum(V.at - reach, box.low)
+    high = np.minimum(V.at + reach, box.high)
+    return np.append(low, ends), np.append(high, ends)
+
+
+def _fall(V: Quadratic, level: float, floor: float, box: Box, max_boxes: int) -> BoxVerdict:
+    """Return whether V' < 0 between two levels, on the box: it holds the level set."""
+    low, high = np.append(box.low, [level, floor]), np.append(box.high, [level, floor])
+    return decide_claim(V.falls, low, high, 0.0, max_boxes=max_boxes)
+
+
+def _holds(V: Quadratic, level: float, box: Box) -> bool:
+    """Whether V > level on every face of a box, so that nothing leaves the level set there."""
+    for i in range(V.motion.order):
+        for end in box.cell[i]:
+            low, high = (np.append(side, [level, 0.0]) for side in (box.low, box.high))
+            low[i] = high[i] = end
+            if not decide_claim(V.inside, low, high, 0.0, max_boxes=_FACE).holds:
+                return False
+    return True
+
+
+def _floor(V: Quadratic, fits: float, box: Box) -> float:
+    """Return a level below which V' < 0 follows from the Jacobian alone; 0 for none.
+
+    f(x) = J (x - at) with J among the Jacobians of the segment, so that V' < 0 where P J + J^T P is
+    negative definite for all of them.
+    """
+    level = fits * 0.25
+    while level > fits * _SMALLEST:
+        low, high = (side[:-2] for side in _sides(V, level, 0.0, box))
+        ends = V.motion.slopes.values(low[None], high[None])
+        if np.all(np.isfinite(ends)) and _is_negative(V.P, *(e[0] for e in ends)):
+            return level
+        level /= 4
+    return 0.0
+
+
+def _is_negative(P: np.ndarray, low: np.ndarray, high: np.ndarray) -> bool:
+    """Whether P J + J^T P is negative definite for all J between two: by Cholesky's pivots."""
+    n = len(P)
+    J = arb_mat(n, n, [arb(float(a)).union(arb(float(b))) for a, b in zip(low, high, strict=True)])
+    S = arb_mat(n, n, [float(v) for v in P.ravel()]) * J
+    rest = [[-(S[i, j] + S[j, i]) for j in range(n)] for i in range(n)]
+    for k in range(n):
+        if not rest[k][k] > 0:
+            return False
+        for i in range(k + 1, n):
+            factor = rest[i][k] / rest[k][k]
+            for j in range(i, n):
+                rest[i][j] = rest[i][j] - factor * rest[k][j]
+                rest[j][i] = rest[i][j]
+    return True

@@ -1,0 +1,68 @@
+"""Quadratic V that may fall: by Lyapunov's equation, and by semidefinite programs on samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.linalg import solve_continuous_lyapunov
+
+from .motion import StateRates
+
+__all__ = ["fitted", "from_linear_part"]
+
+_SAMPLES = 400
+_RATE = 1e-3  # V' <= -1e-3 |x|^2 at samples, for P >= 1
+
+
+def from_linear_part(A: np.ndarray) -> np.ndarray:
+    """Return P of A^T P + P A = -1, symmetric.
+
+    Parameters
+    ----------
+    A : ndarray of shape (n, n)
+        All its eigenvalues have negative real parts.
+    """
+    P = solve_continuous_lyapunov(A.T, -np.eye(len(A)))
+    return 0.5 * (P + P.T)
+
+
+def fitted(motion: StateRates, at: np.ndarray, P: np.ndarray, level: float) -> Iterator[np.ndarray]:
+    """Yield P for which V falls at samples of sets ever larger than (x - at)^T P (x - at) <= level.
+
+    The program is convex: V' = 2 (x - at)^T P f(x) is linear in P.  Of all P >= 1 that fall at the
+    samples and along the linear part, the one with the largest set is taken, as measured by the
+    trace of P times that of the set before.
+
+    Parameters
+    ----------
+    motion : StateRates
+    at : ndarray of shape (n,)
+    P : ndarray of shape (n, n)
+    level : float
+    """
+    import cvxpy as cp
+
+    n, rng = len(P), np.random.default_rng(0)
+    root = np.linalg.inv(np.linalg.cholesky(P / level)).T  # maps the unit ball onto the set
+    directions = rng.standard_normal((_SAMPLES, n))
+    unit = directions / np.linalg.norm(directions, axis=1)[:, None]
+    unit *= rng.uniform(0.3, 1.0, _SAMPLES)[:, None] ** (1 / n)
+    A = motion.jacobian(at)
+    for factor in (1.15, 1.4, 2.0):
+        z = factor * unit @ root.T
+        rates = motion.at(at + z)
+        known = np.all(np.isfinite(rates), axis=1)
+        X = cp.Variable((n, n), symmetric=True)
+        weights = np.einsum("ki,kj->kij", z[known], rates[known]).reshape(-1, n * n)
+        square = np.sum(z[known] ** 2, axis=1)
+        falls = 2 * weights @ cp.reshape(X, (n * n,), order="C") <= -_RATE * square
+        limits = [X >> np.eye(n), A.T @ X + X @ A << -_RATE * np.eye(n), falls]
+        problem = cp.Problem(cp.Minimize(cp.trace(root.T @ X @ root)), limits)
+        try:
+            problem.solve(solver=cp.CLARABEL)
+        except cp.SolverError:
+            return
+        if X.value is None or problem.status not in ("optimal", "optimal_inaccurate"):
+            return
+        yield 0.5 * (X.value + X.value.T)

@@ -1,0 +1,248 @@
+"""A region of attraction: a set from which everything goes to an equilibrium, proved."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from nlctl.annotations import as_annotated
+from nlctl.arguments import integer, of_type
+from nlctl.errors import ParameterError
+from nlctl.upstream.numba_internals import is_jit_disabled
+from nlctl.wording import counted
+
+from ...intervals.box import Box
+from .level import ProvedLevel, largest_level, quadratic_of
+from .motion import StateRates, motion_of
+from .proposals import fitted, from_linear_part
+
+__all__ = ["AttractionRegion", "region_of_attraction"]
+
+_AT_REST = 1e-9  # of the rates at an equilibrium
+_ROUNDS = 3  # of proposals that grow
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttractionRegion:
+    """A set {(x - at)^T P (x - at) <= level} from which everything goes to `at`.
+
+    Attributes
+    ----------
+    names : tuple of str
+        States.
+    at : ndarray of shape (n,)
+        The equilibrium, where |f| <= 1e-9: what is proved takes it for one.
+    P : ndarray of shape (n, n)
+    level : float
+        Proved; 0 where nothing is.
+    above : float
+        The least level that was tried and is not proved.
+    refuted : dict or None
+        A point with V <= `above` where V does not fall.
+    reason : str
+        What ends the region.
+    floor : float
+        Down to it V' <= -1e-9 is proved by enclosures, below it by those of the Jacobian.
+    boxes : int
+        Boxes of all proofs.
+    seconds : float
+    arithmetic : str
+        What proved it.
+
+    Examples
+    --------
+    See `region_of_attraction`.
+    """
+
+    names: tuple[str, ...]
+    at: np.ndarray
+    P: np.ndarray
+    level: float
+    above: float
+    refuted: dict[str, float] | None
+    reason: str
+    floor: float
+    boxes: int
+    seconds: float
+    arithmetic: str = "floats rounded outwards, balls for the linear part"
+
+    @property
+    def status(self) -> Literal["proved", "undecided"]:
+        """Whether there is a region."""
+        return "proved" if self.level > 0 else "undecided"
+
+    def value(self, x: Sequence[float]) -> float:
+        """Return V at a state.
+
+        Parameters
+        ----------
+        x : sequence of n floats
+            A value of every state.
+
+        Returns
+        -------
+        float
+            V there, rounded as any number.
+        """
+        z = np.asarray(x, dtype=float) - self.at
+        return float(z @ self.P @ z)
+
+    def __str__(self) -> str:
+        where = ", ".join(f"{n} = {v:.6g}" for n, v in (self.refuted or {}).items())
+        end = f"; {self.above:.6g} is not: {self.reason}" + (f", {where}" if where else "")
+        how = counted(self.boxes, "box", "boxes")
+        if self.status == "proved":
+            return f"V <= {self.level:.6g} proved on {how}{end}"
+        return f"undecided: {self.reason}"
+
+
+@as_annotated
+def region_of_attraction(
+    system: Any,
+    box: Box,
+    *,
+    P: Any = None,
+    at: Sequence[float] | None = None,
+    params: Mapping[str, Any] | None = None,
+    tol: float = 1e-4,
+    max_boxes: int = 1_000_000,
+) -> AttractionRegion:
+    """Prove a region of attraction of an equilibrium: an ellipsoid, as large as can be.
+
+    V = (x - at)^T P (x - at) is given, or proposed: by Lyapunov's equation of the linear part, then
+    by semidefinite programs for V to fall at samples of larger sets.  That V falls everywhere in
+    the set is proved: near the equilibrium by the Jacobian's enclosure, elsewhere by branch and
+    bound.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem or callable
+        A diagram, whose external inputs are 0; or ``function((x1, ..., xn)) -> (x1', ..., xn')``.
+    box : Box
+        Where to look, with a side for every state in their order.  The region lies in it.
+    P : array_like of shape (n, n), optional
+        Symmetric and positive definite.
+    at : sequence of n floats, optional
+        The equilibrium; 0 by default.
+    params : mapping, optional
+        Overrides of a diagram.
+    tol : float, optional
+        The level is found to this, relative to it.
+    max_boxes : int, optional
+        For each level that is tried.
+
+    Returns
+    -------
+    AttractionRegion
+        Proved, or undecided.
+
+    Raises
+    ------
+    ParameterError
+        If the rates cannot be read, jump, or do not vanish at `at`; if the linear part is not
+        stable, `P` is not positive definite, or the box has other sides.
+    CompileError
+        If the diagram cannot be compiled.
+
+    Examples
+    --------
+    Van der Pol's oscillator in reversed time (Khalil, Example 8.9), where this V falls up to 2.3:
+
+    >>> from nlctl.analysis.lyapunov import Box, region_of_attraction
+    >>> found = region_of_attraction(
+    ...     lambda x: (-x[1], x[0] + (x[0] ** 2 - 1) * x[1]),
+    ...     Box.of(x1=(-3, 3), x2=(-3, 3)),
+    ...     P=[[1.5, -0.5], [-0.5, 1.0]],
+    ... )
+    >>> print(found.status, round(found.level, 2))
+    proved 2.3
+    """
+    box = of_type("region_of_attraction", "box", box, Box, "Box.of(x1=(-1, 1))")
+    max_boxes = integer("region_of_attraction", "max_boxes", max_boxes, at_least=1)
+    if not 0 < tol < 1:
+        raise ParameterError(f"region_of_attraction needs 0 < tol < 1, got {tol}")
+    if is_jit_disabled():
+        raise ParameterError("region_of_attraction needs machine code: unset NUMBA_DISABLE_JIT")
+    start = time.perf_counter()
+    motion = motion_of("region_of_attraction", system, box, params)
+    point = _equilibrium(motion, at, box)
+    A = motion.jacobian(point)
+    _check_linear_part(A)
+    given = None if P is None else _positive_definite(P, motion.order)
+    first = from_linear_part(A) if given is None else given
+    best = largest_level(quadratic_of(motion, first, point), box, tol, max_boxes)
+    boxes = best.boxes
+    if given is None:
+        best, more = _grown(best, box, tol, max_boxes)
+        boxes += more
+    where = None
+    if best.refuted is not None:
+        where = dict(zip(motion.names, map(float, best.refuted), strict=True))
+    return AttractionRegion(
+        names=motion.names, at=point, P=best.V.P, level=best.level, above=best.above,
+        refuted=where, reason=best.reason, floor=best.floor, boxes=boxes,
+        seconds=time.perf_counter() - start,
+    )  # fmt: skip
+
+
+def _grown(best: ProvedLevel, box: Box, tol: float, max_boxes: int) -> tuple[ProvedLevel, int]:
+    """Return the largest set of those that are proposed, and the boxes that it has cost."""
+    boxes = 0
+    for _ in range(_ROUNDS):
+        if not best.level:
+            break
+        before = best
+        for P in fitted(best.V.motion, best.V.at, before.V.P, before.level):
+            found = largest_level(quadratic_of(best.V.motion, P, best.V.at), box, tol, max_boxes)
+            boxes += found.boxes
+            best = found if found.volume > best.volume else best
+        if best.volume <= 1.01 * before.volume:
+            break
+    return best, boxes
+
+
+def _equilibrium(motion: StateRates, at: Sequence[float] | None, box: Box) -> np.ndarray:
+    """Return where nothing moves, inside of the box; the rates may not jump."""
+    point = np.zeros(motion.order) if at is None else np.asarray(at, dtype=float)
+    if point.shape != (motion.order,):
+        raise ParameterError(
+            f"region_of_attraction needs at with {counted(motion.order, 'number')}, got {at}"
+        )
+    if motion.jumps:
+        raise ParameterError(
+            "region_of_attraction needs rates that do not jump: write cases as np.minimum, "
+            "np.maximum, np.clip or abs"
+        )
+    rates = motion.at(point[None])[0]
+    if not np.all(np.abs(rates) <= _AT_REST):
+        raise ParameterError(
+            f"region_of_attraction needs an equilibrium, and the rates are {rates} at {point}: "
+            "give another one as at="
+        )
+    if not (np.all(point > box.low) and np.all(point < box.high)):
+        raise ParameterError(f"region_of_attraction needs {point} inside of the box, {box}")
+    return point
+
+
+def _check_linear_part(A: np.ndarray) -> None:
+    if not np.all(np.isfinite(A)) or not np.all(np.linalg.eigvals(A).real < 0):
+        raise ParameterError(
+            "region_of_attraction needs a linear part that is stable: its eigenvalues are "
+            f"{np.linalg.eigvals(A) if np.all(np.isfinite(A)) else A}"
+        )
+
+
+def _positive_definite(P: Any, n: int) -> np.ndarray:
+    """Return a matrix that the user has given."""
+    matrix = np.asarray(P, dtype=float)
+    symmetric = matrix.shape == (n, n) and np.array_equal(matrix, matrix.T)
+    if not symmetric or not np.all(np.linalg.eigvalsh(matrix) > 0):
+        raise ParameterError(
+            f"region_of_attraction needs P symmetric and positive definite, {n} x {n}, got "
+            f"{str(P)[:60]}"
+        )
+    return matrix

@@ -1,0 +1,120 @@
+"""Proofs in machine code and on balls, as ratios in one run: python benchmarks/enclosures.py.
+
+Boxes a second for V' < 0 of a pendulum, and `certify` of both examples with a known sign: the same
+claims, first on python-flint's balls alone, then with machine code.  What the code needs is made
+before, as by an earlier proof.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import nlctl
+from nlctl.analysis.intervals.machine import only_balls
+from nlctl.analysis.lyapunov import Box, certify, prove_decrease
+from nlctl.native.enclosures.boxes import enclosed, expressions_of
+from nlctl.native.enclosures.divide import decide_claim
+
+REPEATS = 5
+FLOOR, LEVEL = 1e-3, 10.095  # of V, between which V' < 0 is claimed: 10.096 is too much
+
+
+def form(x: Any) -> Any:
+    """A quadratic form of a pendulum's state."""
+    return 1.5 * x[0] ** 2 + x[0] * x[1] + x[1] ** 2
+
+
+def pendulum(x: Any) -> Any:
+    """Rates of a damped pendulum."""
+    return x[1], -np.sin(x[0]) - x[1]
+
+
+def conditions(x: Any) -> Any:
+    """What is positive at once where V' is not negative between two levels."""
+    x1, x2 = x
+    rate = (3 * x1 + x2) * x2 + (x1 + 2 * x2) * (-np.sin(x1) - x2)
+    return np.array([rate + 1e-9, LEVEL - form(x), form(x) - FLOOR])
+
+
+def best(call: Callable[[], Any], repeats: int = REPEATS) -> tuple[float, Any]:
+    """Return the least time of some calls (s), and what the last one returns."""
+    found, least = None, np.inf
+    for _ in range(repeats):
+        start = time.perf_counter()
+        found = call()
+        least = min(least, time.perf_counter() - start)
+    return least, found
+
+
+def known_sign(order: int) -> Any:
+    """Return an example of the paper with a law that knows the sign."""
+    robust = nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
+    controller = nlctl.adaptive_neural(
+        order, law=nlctl.KnownSignLaw(), weights=nlctl.AdaptiveWeights(Gamma=10.0), robust=robust
+    )
+    made = nlctl.paper.example_1 if order == 2 else nlctl.paper.example_2
+    return made(controller=controller)
+
+
+def decrease(table: Table) -> None:
+    """Measure V' < 0 of a pendulum."""
+    box = Box.of(x1=(-6.0, 6.0), x2=(-6.0, 6.0))
+    call = lambda: prove_decrease(form, pendulum, box, level=LEVEL, floor=FLOOR)  # noqa: E731
+    with only_balls():
+        before, on_balls = best(call, 1)
+    call()
+    after, found = best(call)
+    rate = on_balls.boxes / on_balls.seconds
+    name = "V' < 0 of a pendulum"
+    table.add_row(f"{name}: balls", on_balls.status, f"{rate:,.0f} boxes/s", f"{before:.3f} s", "1")
+    table.add_row(
+        f"{name}: all of the proof", found.status, "", f"{after:.3f} s", f"{before / after:.0f}"
+    )
+    code = enclosed(expressions_of(conditions, 2)[1], 2)
+    ends = np.array(box.low), np.array(box.high)
+    judge = lambda: decide_claim(code, *ends, 0.0, max_boxes=10_000_000)  # noqa: E731
+    judge()
+    seconds, verdict = best(judge)
+    fast = verdict.boxes / seconds
+    status = {True: "proved", False: "refuted"}.get(verdict.holds, "undecided")
+    table.add_row(
+        f"{name}: boxes divided on one core", status, f"{fast:,.0f} boxes/s", f"{seconds:.5f} s",
+        f"{fast / rate:.0f} in boxes/s",
+    )  # fmt: skip
+
+
+def certificates(table: Table) -> None:
+    """Measure `certify`."""
+    for example, order in ((1, 2), (2, 3)):
+        loop, times, bounds = known_sign(order), [], []
+        for only in (only_balls, nullcontext):
+            with only():
+                certify(loop)
+                seconds, found = best(lambda: certify(loop))  # noqa: B023
+            times.append(seconds)
+            bounds.append(found.C_0)
+        share = (bounds[1] - bounds[0]) / bounds[0]
+        for how, seconds in zip(("balls", "machine code"), times, strict=True):
+            table.add_row(
+                f"certify, Example {example}: {how}", f"C_0 {share:+.1e}" if how != "balls" else "",
+                "", f"{seconds:.3f} s", f"{times[0] / seconds:.1f}",
+            )  # fmt: skip
+
+
+def main() -> None:
+    """Print the table."""
+    table = Table("what", "result", "speed", "time", "ratio")
+    decrease(table)
+    certificates(table)
+    Console(width=120).print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,113 @@
+"""Difference quotients of expressions: (q(v) - q(0)) / v without a division by v."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .graph import Expr, Graph, Untraceable, needed
+
+__all__ = ["difference_quotient"]
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    """An expression, the same for v = 0, and what makes its quotient; None for what has no v."""
+
+    here: Expr
+    base: Expr
+    quotient: Callable[[], Expr] | None = None
+
+
+def difference_quotient(graph: Graph, result: Expr, variable: Expr) -> Expr:
+    """Return (q(v) - q(0)) / v of an expression q, whose limit at v = 0 is the derivative.
+
+    Terms without v have the quotient 0 exactly, and a factor v gives what it is multiplied by.
+
+    Parameters
+    ----------
+    graph : Graph
+        Where the expression is kept, and the quotient, too.
+    result : Expr
+        A number, made of numbers.
+    variable : Expr
+        The leaf v.
+
+    Returns
+    -------
+    Expr
+
+    Raises
+    ------
+    Untraceable
+        If it takes the quotient of another function than sums, products and quotients.
+    """
+    found: dict[Expr, _Quantity] = {}
+    for node in needed([result]):
+        if node is variable:
+            found[node] = _Quantity(node, graph.const(0.0), lambda: graph.const(1.0))
+        elif all(found[arg].quotient is None for arg in node.args):
+            found[node] = _Quantity(node, node)
+        else:
+            found[node] = _made(graph, node, [found[arg] for arg in node.args])
+    return _quotient(graph, found[result])
+
+
+def _quotient(graph: Graph, quantity: _Quantity) -> Expr:
+    return graph.const(0.0) if quantity.quotient is None else quantity.quotient()
+
+
+def _made(graph: Graph, node: Expr, parts: list[_Quantity]) -> _Quantity:
+    base = graph.op(node.op, *(part.base for part in parts))
+
+    def quotient() -> Expr:
+        if node.op not in _RULES:
+            raise Untraceable(f"the difference quotient of {node.op} is not an expression")
+        return _RULES[node.op](graph, *parts)
+
+    return _Quantity(node, base, quotient)
+
+
+def _of_sum(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
+    known = [_quotient(graph, part) for part in (a, b) if part.quotient]
+    return known[0] if len(known) == 1 else graph.op("add", *known)
+
+
+def _of_difference(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
+    if b.quotient is None:
+        return _quotient(graph, a)
+    turned = graph.op("neg", _quotient(graph, b))
+    return graph.op("sub", _quotient(graph, a), _quotient(graph, b)) if a.quotient else turned
+
+
+def _of_negative(graph: Graph, a: _Quantity) -> Expr:
+    return graph.op("neg", _quotient(graph, a))
+
+
+def _of_product(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
+    """a b - a0 b0 = a (b - b0) + b0 (a - a0); nothing is asked of a factor that meets 0."""
+    for one, other in ((a, b), (b, a)):
+        if other.quotient is None:
+            return graph.op("mul", _quotient(graph, one), other.here)
+    for one, other in ((a, b), (b, a)):
+        if other.base.op == "const" and other.base.data == 0.0:
+            return graph.op("mul", one.here, _quotient(graph, other))
+    first = graph.op("mul", a.here, _quotient(graph, b))
+    return graph.op("add", first, graph.op("mul", b.base, _quotient(graph, a)))
+
+
+def _of_division(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
+    """a / b - a0 / b0 = ((a - a0) - (a0 / b0) (b - b0)) / b."""
+    if b.quotient is None:
+        return graph.op("div", _quotient(graph, a), b.here)
+    change = graph.op("mul", graph.op("div", a.base, b.base), _quotient(graph, b))
+    return graph.op("div", graph.op("sub", _quotient(graph, a), change), b.here)
+
+
+_RULES: dict[str, Callable[..., Expr]] = {
+    "add": _of_sum,
+    "sub": _of_difference,
+    "neg": _of_negative,
+    "mul": _of_product,
+    "div": _of_division,
+}

@@ -1,0 +1,327 @@
+"""Intervals as pairs of values, and arithmetic, comparisons and choices of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..codegen.ir.text import Body, Value, constant, llvm_type
+from .rounding import (
+    downwards,
+    larger,
+    product_downwards,
+    product_upwards,
+    smaller,
+    upwards,
+)
+
+NAN = float("nan")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ends:
+    """An interval in every lane; or what is known of a truth value.
+
+    Attributes
+    ----------
+    low, high : Value
+        Its ends.  Of a truth value: whether it surely holds, and whether it possibly does.
+    point : float or None
+        Of a constant, what it is.
+    not_negative : bool
+        Whether no lane has a lower end below 0, whatever the box is.
+    """
+
+    low: Value
+    high: Value
+    point: float | None = None
+    not_negative: bool = False
+
+    @property
+    def values(self) -> tuple[Value, Value]:
+        """Both ends."""
+        return self.low, self.high
+
+
+def point_of(x: float, width: int) -> Ends:
+    """Return a constant."""
+    v = constant(x, width)
+    return Ends(low=v, high=v, point=x, not_negative=x >= 0)
+
+
+def routine(b: Body, name: str, make: Callable[..., Ends], *args: Ends) -> Ends:
+    """Return what a rule makes of intervals; it is written once, as a function of a module.
+
+    Parameters
+    ----------
+    b : Body
+        Where it is used.
+    name : str
+        Of the rule, where no constant and no known sign is among its arguments.
+    make : callable
+        ``make(b, *args)``, the rule.
+    *args : Ends
+        Of numbers.
+    """
+    known = "".join("c" if x.point is not None else "n" if x.not_negative else "p" for x in args)
+    if "c" in known:
+        return make(b, *args)
+    width = args[0].low.width
+    full, kind = f"@enclosures.{name}.{known}", llvm_type(width)
+    pair = f"{{{kind}, {kind}}}"
+    if full not in b.module.functions:
+        b.module.functions[full] = ""  # before those that it calls
+        inner = Body(b.module)
+        given = [
+            Ends(
+                low=Value(f"%l{i}", width), high=Value(f"%h{i}", width), not_negative=x.not_negative
+            )
+            for i, x in enumerate(args)
+        ]
+        result = make(inner, *given)
+        half = inner.new(f"insertvalue {pair} poison, {result.low}, 0").text
+        inner.write(f"ret {pair} {inner.new(f'insertvalue {pair} {half}, {result.high}, 1').text}")
+        taken = ", ".join(str(v) for x in given for v in x.values)
+        signed = "; not negative\n" if result.not_negative else ""
+        b.module.functions[full] = (
+            f"{signed}define internal {pair} {full}({taken}) {_how(b)} nounwind {{\n"
+            f"entry:\n{inner.text()}}}\n"
+        )
+    found = b.new(f"call {pair} {full}({', '.join(str(v) for x in args for v in x.values)})")
+    low, high = (b.new(f"extractvalue {pair} {found.text}, {i}", width) for i in (0, 1))
+    signed = b.module.functions[full].startswith("; not negative")
+    return Ends(low=low, high=high, not_negative=signed)
+
+
+def _how(b: Body) -> str:
+    return "alwaysinline" if b.module.inlined else "noinline"
+
+
+def finite(x: Ends) -> Ends:
+    """Return what can be computed with: an infinite constant becomes NaN."""
+    return point_of(NAN, x.low.width) if x.point in (float("inf"), -float("inf")) else x
+
+
+def truth(x: bool, width: int) -> Ends:
+    """Return a truth value that is known."""
+    v = constant(x, width, "b")
+    return Ends(low=v, high=v)
+
+
+# -- sums ------------------------------------------------------------------------------------------
+
+
+def add(b: Body, x: Ends, y: Ends) -> Ends:
+    x, y = finite(x), finite(y)
+    low = downwards(b, b.add(x.low, y.low, exact=True))
+    high = upwards(b, b.add(x.high, y.high, exact=True))
+    return Ends(low=low, high=high, not_negative=x.not_negative and y.not_negative)
+
+
+def sub(b: Body, x: Ends, y: Ends) -> Ends:
+    if x is y:  # one quantity, not two in the same range: 0 where it is finite
+        low, high = (b.sub(v, v, exact=True) for v in x.values)
+        low = b.select(b.compare("uno", low, high), NAN, low)
+        return Ends(low=low, high=low, not_negative=True)
+    return add(b, x, neg(b, y))
+
+
+def neg(b: Body, x: Ends) -> Ends:
+    if x.point is not None:
+        return point_of(-x.point, x.low.width)
+    return Ends(low=b.neg(x.high), high=b.neg(x.low))
+
+
+# -- products --------------------------------------------------------------------------------------
+
+
+def mul(b: Body, x: Ends, y: Ends) -> Ends:
+    """Return the product: of its ends two are enough where the sign of a factor is known.
+
+    0 times infinity is left out where another product of ends is known; the others hold all limits.
+    """
+    if x is y:
+        return square_of(b, finite(x))
+    x, y = finite(x), finite(y)
+    if y.point is not None or (y.not_negative and x.point is None and not x.not_negative):
+        x, y = y, x
+    if x.point is not None and x.point < 0:
+        return neg(b, mul(b, point_of(-x.point, x.low.width), y))
+    if x.point == 0:
+        zero = b.select(b.compare("uno", y.low, y.low), NAN, 0.0)
+        return Ends(low=zero, high=zero, not_negative=True)
+    low, high = _ends_of_product(b, x, y)
+    low, high = product_downwards(b, low), product_upwards(b, high)
+    if x.not_negative and y.not_negative:
+        found = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
+        return found if x.point is not None else defined(b, b.compare("ord", low, high), found)
+    if x.point is not None:
+        return Ends(low=low, high=high)
+    if x.not_negative:
+        return defined(b, b.compare("ord", low, high), Ends(low=low, high=high))
+    both = b.compare("oge", smaller(b, x.low, y.low), 0.0)  # a root of it shall be known to exist
+    low = b.select(b.logic("and", both, b.compare("olt", low, 0.0)), 0.0, low)
+    return Ends(low=low, high=high)
+
+
+def _ends_of_product(b: Body, x: Ends, y: Ends) -> tuple[Value, Value]:
+    times = lambda v, w: b.mul(v, w, exact=True)  # noqa: E731
+    if x.point is not None or (x.not_negative and y.not_negative):
+        return times(x.low, y.low), times(x.high, y.high)
+    if x.not_negative:
+        ends = []
+        for choose, end in ((smaller, y.low), (larger, y.high)):
+            first, last = times(x.high, end), times(x.low, end)
+            ends.append(choose(b, first, _number_of(b, last, first)))
+        return ends[0], ends[1]
+    first, second, third, last = (times(v, w) for v in x.values for w in y.values)
+    last = _number_of(b, last, first)  # it alone decides whether the ends are numbers
+    low = smaller(b, first, smaller(b, second, smaller(b, third, last)))
+    return low, larger(b, first, larger(b, second, larger(b, third, last)))
+
+
+def _number_of(b: Body, v: Value, other: Value) -> Value:
+    """Return a value, or another one where it is not a number."""
+    return b.select(b.compare("uno", v, v), other, v)
+
+
+def absolute_of(b: Body, x: Ends) -> Ends:
+    """Return the absolute value."""
+    if x.not_negative:
+        return x
+    turned = b.neg(x.high)
+    low = larger(b, 0.0, larger(b, x.low, turned))
+    return Ends(low=low, high=larger(b, b.neg(x.low), x.high), not_negative=True)
+
+
+def square_of(b: Body, x: Ends) -> Ends:
+    a = absolute_of(b, x)
+    low = product_downwards(b, b.mul(a.low, a.low, exact=True))
+    high = product_upwards(b, b.mul(a.high, a.high, exact=True))
+    return Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
+
+
+def div(b: Body, x: Ends, y: Ends) -> Ends:
+    """Return the quotient; not a number where the divisor may be 0."""
+    positive, negative = b.compare("ogt", y.low, 0.0), b.compare("olt", y.high, 0.0)
+    x, y = finite(x), finite(y)
+    turned = [neg(b, v) for v in (x, y)]
+    above, below = (
+        [b.select(negative, t, o) for t, o in zip(t.values, o.values, strict=True)]
+        for t, o in zip(turned, (x, y), strict=True)
+    )
+    under = b.select(b.compare("oge", above[0], 0.0), below[1], below[0])
+    over = b.select(b.compare("oge", above[1], 0.0), below[0], below[1])
+    low = product_downwards(b, b.op("fdiv", above[0], under, exact=True))
+    high = product_upwards(b, b.op("fdiv", above[1], over, exact=True))
+    signs = b.logic("and", b.compare("oge", above[0], 0.0), b.compare("olt", low, 0.0))
+    low = b.select(signs, 0.0, low)
+    exists = b.logic("and", b.logic("or", positive, negative), b.compare("ord", low, high))
+    return defined(b, exists, Ends(low=low, high=high))
+
+
+def defined(b: Body, exists: Value, x: Ends) -> Ends:
+    """Return an interval where it exists, and what is not a number elsewhere."""
+    low, high = (b.select(exists, v, NAN) for v in x.values)
+    return Ends(low=low, high=high, not_negative=x.not_negative)
+
+
+def root_of(b: Body, x: Ends) -> Ends:
+    low = downwards(b, b.intrinsic("sqrt", x.low))
+    high = upwards(b, b.intrinsic("sqrt", x.high))
+    low = b.select(b.compare("olt", low, 0.0), 0.0, low)
+    found = Ends(low=low, high=high, not_negative=True)
+    return defined(b, b.compare("oge", x.low, 0.0), found)
+
+
+# -- choices ---------------------------------------------------------------------------------------
+
+
+def minimum(b: Body, x: Ends, y: Ends) -> Ends:
+    for one, other in ((x, y), (y, x)):
+        if one.point == float("inf"):
+            return other
+    x, y = finite(x), finite(y)
+    low, high = (_extreme(b, "olt", v, w) for v, w in zip(x.values, y.values, strict=True))
+    return Ends(low=low, high=high, not_negative=x.not_negative and y.not_negative)
+
+
+def maximum(b: Body, x: Ends, y: Ends) -> Ends:
+    for one, other in ((x, y), (y, x)):
+        if one.point == -float("inf"):
+            return other
+    x, y = finite(x), finite(y)
+    low, high = (_extreme(b, "ogt", v, w) for v, w in zip(x.values, y.values, strict=True))
+    return Ends(low=low, high=high, not_negative=x.not_negative or y.not_negative)
+
+
+def _extreme(b: Body, how: str, x: Value, y: Value) -> Value:
+    """Return one of two values; what is not a number wins."""
+    first = b.logic("or", b.compare(how, x, y), b.compare("uno", x, x))
+    return b.select(first, x, y)
+
+
+def hull_of(b: Body, x: Ends, y: Ends) -> Ends:
+    """Return what holds both; not a number if one is none."""
+    low, high = _extreme(b, "olt", x.low, y.low), _extreme(b, "ogt", x.high, y.high)
+    return Ends(low=low, high=high, not_negative=x.not_negative and y.not_negative)
+
+
+def choice_of(b: Body, condition: Ends, x: Ends, y: Ends) -> Ends:
+    """Return what a condition chooses, both where it is open."""
+    x, y = finite(x), finite(y)
+    both = hull_of(b, x, y)
+
+    def chosen(v: Value, w: Value, neither: Value) -> Value:
+        rest = b.select(condition.high, neither, w)
+        return b.select(condition.low, v, rest)
+
+    low, high = (
+        chosen(*parts) for parts in zip(x.values, y.values, both.values, strict=True)
+    )  # fmt: skip
+    return Ends(low=low, high=high, not_negative=both.not_negative)
+
+
+def select_truth(b: Body, condition: Ends, x: Ends, y: Ends) -> Ends:
+    """Return which truth value a condition chooses."""
+    yes, no = logic(b, "and", condition, x), logic(b, "and", logic_not(b, condition), y)
+    either, surely = logic(b, "or", yes, no), b.logic("and", x.low, y.low)
+    return Ends(low=b.logic("or", either.low, surely), high=either.high)
+
+
+def comparison_of(b: Body, op: str, x: Ends, y: Ends) -> Ends:
+    """Return whether a comparison surely holds, and whether it possibly does.
+
+    One with what is not a number is open.
+    """
+    if op in ("gt", "ge"):
+        x, y, op = y, x, {"gt": "lt", "ge": "le"}[op]
+    if op in ("lt", "le"):
+        low = b.compare(f"o{op}", x.high, y.low)
+        return Ends(low=low, high=b.compare(f"u{op}", x.low, y.high))
+    same = b.logic("and", b.compare("ole", x.high, y.low), b.compare("ole", y.high, x.low))
+    meet = b.logic("and", b.compare("uge", x.high, y.low), b.compare("uge", y.high, x.low))
+    found = Ends(low=same, high=meet)
+    return found if op == "eq" else logic_not(b, found)
+
+
+def logic_not(b: Body, x: Ends) -> Ends:
+    return Ends(low=_not(b, x.high), high=_not(b, x.low))
+
+
+def _not(b: Body, v: Value) -> Value:
+    return b.logic("xor", v, constant(True, v.width, "b"))
+
+
+def logic(b: Body, op: str, x: Ends, y: Ends) -> Ends:
+    """Return ``and``, ``or`` or ``xor`` of two truth values."""
+    if op != "xor":
+        low, high = (b.logic(op, v, w) for v, w in zip(x.values, y.values, strict=True))
+        return Ends(low=low, high=high)
+    one, other = logic(b, "and", x, logic_not(b, y)), logic(b, "and", logic_not(b, x), y)
+    return logic(b, "or", one, other)
+
+
+def left_open(b: Body, condition: Ends) -> Value:
+    """Return where a condition is open."""
+    return b.logic("and", condition.high, _not(b, condition.low))

@@ -1,0 +1,199 @@
+"""Machine code that encloses functions of a box, and what is asked of such functions."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...expressions.arrays import Tracer, scalar
+from ...expressions.derivatives import tangents
+from ...expressions.graph import Ambiguous, Expr, Graph, Untraceable
+from ...expressions.trace import trace
+from ..machine.finish import Loaded, finished
+from ..purity.check import check_pure
+from ..purity.values import FRESH, Impure
+from .scalars import scalar_expressions
+from .unrounded import UnroundedGraph
+from .writer import LANES, JudgedRows, enclosure_text
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoxCode:
+    """Machine code for functions of a box.
+
+    Attributes
+    ----------
+    sides : int
+        Of the box.
+    expressions : tuple of Expr
+        Numbers, each a function of the sides.
+    rows : JudgedRows
+        Of what `judge` writes.
+    loaded : Loaded
+    lanes : int
+        Boxes at a time.
+    fixed : int
+        So many of the last sides are numbers, and have no width.
+    """
+
+    sides: int
+    expressions: tuple[Expr, ...]
+    rows: JudgedRows
+    loaded: Loaded
+    lanes: int = LANES
+    fixed: int = 0
+
+    @property
+    def judge(self) -> int:
+        """Address of the function that a search calls, see `enclosures.writer`."""
+        return self.loaded.addresses["judge"]
+
+    @cached_property
+    def _values(self) -> Any:
+        kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+        return kind(self.loaded.addresses["values"])
+
+    def values(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return bounds of the functions on boxes, by their natural extension.
+
+        Parameters
+        ----------
+        low, high : ndarray of shape (boxes, sides)
+
+        Returns
+        -------
+        low, high : ndarray of shape (boxes, results)
+            Both not a number where a function may have no value.
+        """
+        count, lanes = len(low), self.lanes
+        ends = np.stack([low, high], axis=2).astype(float)  # (boxes, sides, 2)
+        missing = -count % lanes
+        if missing:
+            ends = np.concatenate([ends, np.repeat(ends[:1], missing, axis=0)])
+        batches = ends.reshape(-1, lanes, self.sides, 2).transpose(0, 2, 3, 1)
+        batches = np.ascontiguousarray(batches)
+        found = np.empty((len(batches), self.rows.results, 2, lanes))
+        for given, result in zip(batches, found, strict=True):
+            self._values(given.ctypes.data, result.ctypes.data)
+        flat = found.transpose(0, 3, 1, 2).reshape(-1, self.rows.results, 2)[:count]
+        return flat[..., 0], flat[..., 1]
+
+
+def side_leaves(graph: Graph, sides: int) -> tuple[Tracer, ...]:
+    """Return the sides of a box as numbers that a traced function may take.
+
+    Parameters
+    ----------
+    graph : Graph
+    sides : int
+    """
+    return tuple(scalar(graph, graph.leaf("x", i, None)) for i in range(sides))
+
+
+def expressions_of(function: Callable[..., Any], sides: int) -> tuple[Graph, list[Expr]]:
+    """Return what a function of a tuple of numbers computes, as expressions of its numbers.
+
+    Raises
+    ------
+    Untraceable
+        If it is not a function of its arguments alone, or does what expressions cannot say.
+    """
+    graph = UnroundedGraph({"x": sides})
+    return graph, numbers_at(graph, function, side_leaves(graph, sides))
+
+
+def numbers_at(graph: Graph, function: Callable[..., Any], sides: tuple[Tracer, ...]) -> list[Expr]:
+    """Return what anybody's function of one tuple computes; see `expressions_of`.
+
+    Parameters
+    ----------
+    graph : Graph
+    function : callable
+    sides : tuple of Tracer
+
+    Raises
+    ------
+    Untraceable
+        If it is not a function of its arguments alone, or does what expressions cannot say.
+    """
+    try:
+        check_pure(function, [FRESH])
+    except Impure as error:
+        raise Untraceable(f"it {error.reason}") from None
+    return traced_numbers(graph, function, lambda: (sides,))
+
+
+def traced_numbers(
+    graph: Graph, function: Callable[..., Any], arguments: Callable[[], tuple[Any, ...]]
+) -> list[Expr]:
+    """Return the numbers that a pure function computes.
+
+    Parameters
+    ----------
+    graph : Graph
+    function : callable
+    arguments : callable
+        Makes its arguments, see `nlctl.expressions.trace`.
+
+    Raises
+    ------
+    Untraceable
+        If it does what expressions cannot say, or what they understand in another way.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            found = trace(graph, function, arguments)
+    except Ambiguous as error:
+        raise Untraceable(str(error)) from None
+    return [found[i].only for i in range(found.size)]
+
+
+def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> BoxCode:
+    """Make the machine code that encloses functions of a box.
+
+    Parameters
+    ----------
+    results : sequence of Expr
+        Numbers, made of the leaves ``x[0], ..., x[sides - 1]``.
+    sides : int
+        Of the box, at least one.
+    fixed : int, optional
+        So many of the last sides are numbers, such as a level, which may be others for each box.
+
+    Raises
+    ------
+    Untraceable
+        If there is no enclosure of what they are made of.
+    """
+    with np.errstate(all="ignore"):  # of constants
+        graph, numbers = scalar_expressions(results)
+        gradients = [_gradient(graph, expr, sides, fixed) for expr in numbers]
+    return BoxCode(
+        sides=sides,
+        expressions=tuple(numbers),
+        rows=JudgedRows(sides=sides, results=len(numbers)),
+        loaded=_loaded(enclosure_text(numbers, gradients, sides)),
+        fixed=fixed,
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _loaded(text: str) -> Loaded:
+    return finished(text, ("values", "judge"))
+
+
+def _gradient(graph: Graph, expr: Expr, sides: int, fixed: int) -> list[Expr]:
+    """Return the derivatives along each side; 0 for those without width, which nobody asks for."""
+    zero, one = graph.const(0.0), graph.const(1.0)
+
+    def along(i: int) -> Expr:
+        (found,) = tangents(graph, [expr], lambda leaf: one if leaf.data[1] == i else None)
+        return zero if found is None else found
+
+    return [along(i) if i < sides - fixed else zero for i in range(sides)]

@@ -1,0 +1,88 @@
+"""The rates of a diagram as functions of its states alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import control as ct
+
+from ...expressions.graph import Expr, Graph, Untraceable, needed
+from ..equations.relays import relay_places
+from ..reading import Reading
+from .scalars import scalar_expressions
+from .unrounded import UnroundedGraph
+
+
+def state_rates(compiled: Reading, params: dict[str, object] | None = None) -> list[Expr]:
+    """Return x' of a diagram, a number per state, made of the leaves ``x[0], x[1], ...``.
+
+    Its external inputs are 0.
+
+    Parameters
+    ----------
+    compiled : Reading
+    params : dict, optional
+        Overrides by qualified name.
+
+    Raises
+    ------
+    Untraceable
+        If the rates are not a function of the states alone: with the reason.
+    """
+    _check(compiled)
+    p = compiled.parameter_vector(params)
+    found = [expr for _, array in compiled.equations.results["dx"] for expr in _numbers(array)]
+    _, rates = scalar_expressions(found)
+
+    def instead(graph: Graph, leaf: Expr) -> Expr:
+        array, row, _ = leaf.data
+        if array == "x":
+            return graph.leaf("x", row, None)
+        if array == "t":
+            raise Untraceable("its rates depend on time")
+        return graph.const(0.0 if array == "u" else float(p[row]))
+
+    return with_leaves(rates, instead)[1]
+
+
+def _numbers(array: object) -> list[Expr]:
+    return [array[i].only for i in range(array.size)]  # type: ignore[attr-defined,index]
+
+
+def _check(compiled: Reading) -> None:
+    """Refuse a diagram whose states do more than follow their rates."""
+    program, schedule = compiled.program, compiled.schedule
+    reasons = {
+        "is in discrete time": not ct.isctime(compiled.system),
+        "has memories, which jump": bool(len(program.memory)),
+        "has sampled blocks": bool(len(program.sampled)),
+        "has states that are reset": bool(program.resets),
+        "delays signals": bool(len(schedule.lines)),
+        "has ideal relays": bool(relay_places(schedule.nodes)),
+        "has no states": not compiled.system.nstates,
+    }
+    for reason, holds in reasons.items():
+        if holds:
+            raise Untraceable(f"it {reason}")
+
+
+def with_leaves(
+    exprs: Sequence[Expr], instead: Callable[[Graph, Expr], Expr]
+) -> tuple[Graph, list[Expr]]:
+    """Return expressions of numbers with something else in the place of what is read.
+
+    Parameters
+    ----------
+    exprs : sequence of Expr
+    instead : callable
+        ``instead(graph, leaf)``: an expression of the new graph.
+    """
+    graph, made = UnroundedGraph(), {}
+    for node in needed(exprs):
+        if node.op == "leaf":
+            made[node] = instead(graph, node)
+        elif node.op == "const":
+            made[node] = graph.const(bool(node.data) if node.kind == "b" else float(node.data))
+        else:
+            made[node] = graph.op(node.op, *(made[arg] for arg in node.args))
+    return graph, [made[expr] for expr in exprs]

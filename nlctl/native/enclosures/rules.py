@@ -1,0 +1,329 @@
+"""The table of interval rules: what each function of the table of functions makes of intervals.
+
+A rule returns an interval, and where the function may jump within its arguments.  Functions that
+rise or fall are known by their ends, periodic ones by their ends and the turning points between
+them.  Outside of its domain a function has no value: the ends are not numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..codegen.ir.functions import applied
+from ..codegen.ir.text import Body, Value, constant
+from .arithmetic import (
+    Ends,
+    absolute_of,
+    add,
+    defined,
+    div,
+    finite,
+    hull_of,
+    maximum,
+    minimum,
+    mul,
+    neg,
+    point_of,
+    root_of,
+    routine,
+    sub,
+)
+from .rounding import function_downwards, function_upwards, larger, smaller
+
+_Result = tuple[Ends, Value | None]
+_INF = float("inf")
+_PI_UP = math.nextafter(math.pi, 4.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Monotone:
+    """A function that rises or falls.
+
+    Attributes
+    ----------
+    rises : bool
+    domain, values : tuple of float
+        Where it is defined, and bounds of what it gives.
+    odd : bool
+        Whether its value has the sign of its argument.
+    """
+
+    rises: bool = True
+    domain: tuple[float, float] = (-_INF, _INF)
+    values: tuple[float, float] = (-_INF, _INF)
+    odd: bool = False
+
+
+MONOTONE = {
+    "exp": Monotone(values=(0.0, _INF)),
+    "exp2": Monotone(values=(0.0, _INF)),
+    "expm1": Monotone(values=(-1.0, _INF), odd=True),
+    "log": Monotone(domain=(0.0, _INF)),
+    "log2": Monotone(domain=(0.0, _INF)),
+    "log10": Monotone(domain=(0.0, _INF)),
+    "log1p": Monotone(domain=(-1.0, _INF), odd=True),
+    "tanh": Monotone(values=(-1.0, 1.0), odd=True),
+    "sinh": Monotone(odd=True),
+    "arcsin": Monotone(domain=(-1.0, 1.0), odd=True),
+    "arccos": Monotone(rises=False, domain=(-1.0, 1.0), values=(0.0, _INF)),
+    "arctan": Monotone(odd=True),
+    "arcsinh": Monotone(odd=True),
+    "arccosh": Monotone(domain=(1.0, _INF), values=(0.0, _INF)),
+    "arctanh": Monotone(domain=(-1.0, 1.0), odd=True),
+    "cbrt": Monotone(odd=True),
+    "erf": Monotone(values=(-1.0, 1.0), odd=True),
+    "erfc": Monotone(rises=False, values=(0.0, 2.0)),
+}
+STEPS = ("floor", "ceil", "trunc", "rint", "sign")
+
+
+def interval_of(b: Body, name: str, *args: Ends) -> _Result:
+    """Return what a function of the table makes of intervals, and where it may jump.
+
+    Parameters
+    ----------
+    b : Body
+        Where it is written.
+    name : str
+        NumPy's name.
+    *args : Ends
+    """
+    if name in ("minimum", "maximum"):  # which know an infinite constant
+        return (minimum if name == "minimum" else maximum)(b, *args), None
+    args = tuple(map(finite, args))
+    if name in MONOTONE:
+        known = MONOTONE[name]
+        return routine(b, name, lambda c, x: _by_ends(c, name, known, x), *args), None
+    if name in STEPS:
+        return _steps(b, name, args[0])
+    if name in _SMOOTH:
+        return routine(b, name, lambda c, *given: RULES[name](c, *given)[0], *args), None
+    return RULES[name](b, *args)
+
+
+# -- functions of one argument ---------------------------------------------------------------------
+
+
+def _by_ends(b: Body, name: str, known: Monotone, x: Ends) -> Ends:
+    first, last = x.values if known.rises else reversed(x.values)
+    low = function_downwards(b, applied(b, name, first))
+    high = function_upwards(b, applied(b, name, last))
+    if known.values[0] > -_INF:
+        low = larger(b, known.values[0], low)
+    if known.values[1] < _INF:
+        high = smaller(b, known.values[1], high)
+    if known.odd:
+        low = b.select(b.logic("and", _at_least(b, x.low), _below(b, low)), 0.0, low)
+        falls = b.logic("and", b.compare("ole", x.high, 0.0), b.compare("ogt", high, 0.0))
+        high = b.select(falls, 0.0, high)
+    signed = known.values[0] >= 0 or (known.odd and x.not_negative)
+    found = Ends(low=low, high=high, not_negative=signed)
+    if known.domain == (-_INF, _INF):
+        return found
+    inside = b.compare("oge", x.low, known.domain[0])
+    return defined(b, b.logic("and", inside, b.compare("ole", x.high, known.domain[1])), found)
+
+
+def _at_least(b: Body, v: Value) -> Value:
+    return b.compare("oge", v, 0.0)
+
+
+def _below(b: Body, v: Value) -> Value:
+    return b.compare("olt", v, 0.0)
+
+
+def _steps(b: Body, name: str, x: Ends) -> _Result:
+    low, high = (applied(b, name, v) for v in x.values)
+    found = Ends(low=low, high=high, not_negative=x.not_negative)
+    return found, b.compare("one", low, high)
+
+
+def _absolute(b: Body, x: Ends) -> _Result:
+    return absolute_of(b, x), None
+
+
+def _sqrt(b: Body, x: Ends) -> _Result:
+    return root_of(b, x), None
+
+
+def _cosh(b: Body, x: Ends) -> _Result:
+    return _by_ends(b, "cosh", Monotone(values=(1.0, _INF)), absolute_of(b, x)), None
+
+
+_TURN = 1 / (2 * math.pi)
+
+
+def _turns(b: Body, v: Value, per: float, shift: float, side: int) -> Value:
+    """Return v per + shift, rounded to one side: turns of a circle, for per = 1/pi or 1/(2 pi).
+
+    The factor is within 2^-53 of what it stands for, two roundings follow, |per| < 1/3 and
+    |shift| <= 1: their sum is below 2^-52 |v| + 2^-50.
+    """
+    room = b.fma(b.intrinsic("fabs", v), side * 2.0**-52, side * 2.0**-50)
+    return b.add(b.fma(v, per, shift), room, exact=True)
+
+
+def _meets(b: Body, x: Ends, per: float, shift: float) -> Value:
+    """Return where an integer may lie among x per + shift."""
+    low, high = _turns(b, x.low, per, shift, -1), _turns(b, x.high, per, shift, 1)
+    return b.compare("oge", b.intrinsic("floor", high), low)
+
+
+def _circular(name: str, top: float) -> Callable[..., _Result]:
+    """Return the rule of sine or cosine, whose maxima are `top` turns from 0."""
+
+    def rule(b: Body, x: Ends) -> _Result:
+        first, last = (applied(b, name, v) for v in x.values)
+        low = larger(b, -1.0, function_downwards(b, smaller(b, first, last)))
+        high = smaller(b, 1.0, function_upwards(b, larger(b, first, last)))
+        low = b.select(_meets(b, x, _TURN, 0.5 - top), -1.0, low)
+        high = b.select(_meets(b, x, _TURN, -top), 1.0, high)
+        is_number = b.logic("and", b.compare("ord", x.low, x.high), b.compare("ord", low, high))
+        return defined(b, is_number, Ends(low=low, high=high)), None
+
+    return rule
+
+
+def _tan(b: Body, x: Ends) -> _Result:
+    low = function_downwards(b, applied(b, "tan", x.low))
+    high = function_upwards(b, applied(b, "tan", x.high))
+    pole = _meets(b, x, 1 / math.pi, -0.5)
+    exists = b.logic("xor", pole, constant(True, pole.width, "b"))
+    exists = b.logic("and", exists, b.compare("ole", low, high))
+    return defined(b, exists, Ends(low=low, high=high)), None
+
+
+# -- functions of two arguments --------------------------------------------------------------------
+
+
+def _hypot(b: Body, x: Ends, y: Ends) -> _Result:
+    x, y = absolute_of(b, x), absolute_of(b, y)
+    low = function_downwards(b, applied(b, "hypot", x.low, y.low))
+    high = function_upwards(b, applied(b, "hypot", x.high, y.high))
+    is_number = b.logic("and", b.compare("ord", x.low, y.low), b.compare("ord", low, high))
+    found = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
+    return defined(b, is_number, found), None
+
+
+def _corners(b: Body, name: str, x: Ends, y: Ends) -> Ends:
+    """Return the least and the greatest value at the corners of a rectangle."""
+    ends = [(v, w) for v in set(x.values) for w in set(y.values)]
+    ends = sorted(ends, key=lambda pair: (pair[0].text, pair[1].text))
+    found = [applied(b, name, v, w) for v, w in ends]
+    low = high = found[0]
+    numbers = b.compare("ord", low, high)
+    for value in found[1:]:
+        low, high = smaller(b, value, low), larger(b, value, high)
+        numbers = b.logic("and", numbers, b.compare("ord", value, value))
+    bounds = Ends(low=function_downwards(b, low), high=function_upwards(b, high))
+    return defined(b, numbers, bounds)
+
+
+def _power(b: Body, x: Ends, y: Ends) -> _Result:
+    """x^y = e^(y ln x), which is largest and least at corners; it needs x >= 0."""
+    at_zero = b.logic("and", _at_least(b, x.low), b.compare("ogt", y.low, 0.0))
+    exists = b.logic("or", b.compare("ogt", x.low, 0.0), at_zero)
+    found = _corners(b, "power", x, y)
+    found = Ends(low=larger(b, 0.0, found.low), high=found.high, not_negative=True)
+    return defined(b, exists, found), None
+
+
+def _arctan2(b: Body, y: Ends, x: Ends) -> _Result:
+    """Off its cut the angle is largest and least at corners."""
+    level = b.logic("and", b.compare("ole", y.low, 0.0), b.compare("oge", y.high, 0.0))
+    cut = b.logic("and", level, b.compare("ole", x.low, 0.0))
+    found = _corners(b, "arctan2", y, x)
+    low, high = b.select(cut, -_PI_UP, found.low), b.select(cut, _PI_UP, found.high)
+    return Ends(low=low, high=high), cut
+
+
+def _quotient_rounded(b: Body, name: str, x: Ends, y: Ends) -> tuple[Ends, Value]:
+    quotient = div(b, x, y)
+    low, high = (applied(b, name, v) for v in quotient.values)
+    return Ends(low=low, high=high), b.compare("une", low, high)
+
+
+def _within(b: Body, x: Ends, y: Ends) -> Ends:
+    """Return what two intervals that hold one number have in common."""
+    low, high = larger(b, y.low, x.low), smaller(b, y.high, x.high)
+    return Ends(low=low, high=high)
+
+
+def _rest(name: str) -> Callable[..., _Result]:
+    """Return the rule of a remainder: x - y q, where q is x / y rounded by `name`."""
+
+    def rule(b: Body, x: Ends, y: Ends) -> _Result:
+        q, jumps = _quotient_rounded(b, name, x, y)
+        one = sub(b, x, mul(b, y, q))
+        zero = point_of(0.0, x.low.width)
+        bound = (
+            hull_of(b, zero, y)
+            if name == "floor"
+            else hull_of(b, absolute_of(b, y), neg(b, absolute_of(b, y)))
+        )
+        single = _within(b, one, bound)
+        low = b.select(jumps, bound.low, single.low)
+        high = b.select(jumps, bound.high, single.high)
+        is_number = b.logic("and", b.compare("ord", q.low, q.high), b.compare("ord", low, high))
+        return defined(b, is_number, Ends(low=low, high=high)), jumps
+
+    return rule
+
+
+def _copysign(b: Body, x: Ends, y: Ends) -> _Result:
+    a = absolute_of(b, x)
+    turned = neg(b, a)
+    positive, negative = b.compare("ogt", y.low, 0.0), b.compare("olt", y.high, 0.0)
+    low = b.select(positive, a.low, turned.low)
+    high = b.select(negative, turned.high, a.high)
+    open_ = b.logic("xor", b.logic("or", positive, negative), constant(True, low.width, "b"))
+    return defined(b, b.compare("ord", y.low, y.high), Ends(low=low, high=high)), open_
+
+
+def _heaviside(b: Body, x: Ends, h: Ends) -> _Result:
+    zero, one = point_of(0.0, x.low.width), point_of(1.0, x.low.width)
+    after, before = b.compare("ogt", x.low, 0.0), b.compare("olt", x.high, 0.0)
+    here = b.logic("and", b.compare("oeq", x.low, 0.0), b.compare("oeq", x.high, 0.0))
+    every = hull_of(b, hull_of(b, zero, one), h)
+    ends = []
+    for all_, at in zip(every.values, h.values, strict=True):
+        ends.append(b.select(after, 1.0, b.select(before, 0.0, b.select(here, at, all_))))
+    known = b.logic("or", b.logic("or", after, before), here)
+    jumps = b.logic("xor", known, constant(True, known.width, "b"))
+    found = Ends(low=ends[0], high=ends[1])
+    return defined(b, b.compare("ord", x.low, x.high), found), jumps
+
+
+def _logaddexp(b: Body, x: Ends, y: Ends) -> _Result:
+    """It rises with both: max(x, y) + ln(1 + e^-|x - y|) at the lower and at the upper ends."""
+
+    def at(v: Value, w: Value) -> Ends:
+        one, other = Ends(low=v, high=v), Ends(low=w, high=w)
+        apart = neg(b, absolute_of(b, sub(b, one, other)))
+        small = _by_ends(b, "log1p", MONOTONE["log1p"], _by_ends(b, "exp", MONOTONE["exp"], apart))
+        return add(b, maximum(b, one, other), small)
+
+    low, high = at(x.low, y.low).low, at(x.high, y.high).high
+    return defined(b, b.compare("ord", low, high), Ends(low=low, high=high)), None
+
+
+RULES: dict[str, Callable[..., _Result]] = {
+    "absolute": _absolute,
+    "sqrt": _sqrt,
+    "cosh": _cosh,
+    "sin": _circular("sin", 0.25),
+    "cos": _circular("cos", 0.0),
+    "tan": _tan,
+    "hypot": _hypot,
+    "power": _power,
+    "arctan2": _arctan2,
+    "remainder": _rest("floor"),
+    "fmod": _rest("trunc"),
+    "copysign": _copysign,
+    "heaviside": _heaviside,
+    "logaddexp": _logaddexp,
+}
+_SMOOTH = ("sqrt", "cosh", "sin", "cos", "tan", "hypot", "power", "logaddexp")
+"""Those that never jump."""

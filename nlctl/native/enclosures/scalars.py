@@ -1,0 +1,68 @@
+"""Expressions without vectors: what intervals are computed of, element by element."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import reduce
+
+from ...expressions.graph import Expr, Graph, Untraceable, needed
+from .unrounded import UnroundedGraph
+
+MOST_NUMBERS = 3_000  # numbers, beyond which code would take too long to make
+
+
+def scalar_expressions(results: Sequence[Expr]) -> tuple[Graph, list[Expr]]:
+    """Return expressions in a graph of their own, in which everything is a number.
+
+    Parameters
+    ----------
+    results : sequence of Expr
+        Numbers.
+
+    Raises
+    ------
+    Untraceable
+        If there is an opaque function among what they are made of, or too much of it.
+    """
+    graph, made = UnroundedGraph(), {}
+    for node in needed(results):
+        if node.op in ("call", "solve"):
+            raise Untraceable(f"{node.data[0]} is not an expression: it has no enclosure")
+        made[node] = _elements(graph, node, made)
+        if len(graph.nodes) > MOST_NUMBERS:
+            raise Untraceable(f"more than {MOST_NUMBERS} numbers are computed")
+    return graph, [made[expr][0] for expr in results]
+
+
+def _elements(graph: Graph, node: Expr, made: Mapping[Expr, list[Expr]]) -> list[Expr]:
+    """Return the elements of a vector, or a number as the only one."""
+    size = node.size or 1
+    parts = [made[arg] for arg in node.args]
+    if node.op == "const":
+        return [graph.const(bool(node.data) if node.kind == "b" else float(node.data))]
+    if node.op == "table":
+        return [graph.const(value) for value in node.data]
+    if node.op == "leaf":
+        array, start, step = node.data
+        return [graph.leaf(array, start + step * i, None) for i in range(size)]
+    if node.op == "item":
+        return [parts[0][node.data]]
+    if node.op == "slice":
+        start, step = node.data
+        return [parts[0][start + step * i] for i in range(size)]
+    if node.op == "concat":
+        widths = zip(parts, node.data, strict=True)
+        return [part[i if len(part) > 1 else 0] for part, n in widths for i in range(n)]
+    if node.op == "sum":
+        return [reduce(lambda a, b: graph.op("add", a, b), parts[0])]
+    return [
+        _of_numbers(graph, node, [p[i if len(p) > 1 else 0] for p in parts]) for i in range(size)
+    ]
+
+
+def _of_numbers(graph: Graph, node: Expr, args: list[Expr]) -> Expr:
+    """Return an operation, which is a float's even of integers: none is larger than 2^53."""
+    floats = [
+        graph.number(a) if node.op not in ("select",) and node.kind != "b" else a for a in args
+    ]
+    return graph.op(node.op, *floats)

@@ -1,0 +1,331 @@
+"""Functions of boxes as LLVM IR, from expressions.
+
+    void values(double *x, double *v)
+    void judge(double *x, double *o)
+
+Boxes are in lanes: row i of `x` is the lower end of side i in every lane, then the upper one, and
+row k of `v` the same of result k.  What `judge` writes is in `JudgedRows`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...expressions.continuity import is_an_extreme
+from ...expressions.graph import COMPARISONS, LOGIC, Expr, needed
+from ..codegen.ir.memory import entry_address, load_value, store
+from ..codegen.ir.numbers import one_line
+from ..codegen.ir.text import Body, Module, Value
+from .arithmetic import (
+    NAN,
+    Ends,
+    absolute_of,
+    add,
+    choice_of,
+    comparison_of,
+    div,
+    finite,
+    left_open,
+    logic,
+    logic_not,
+    maximum,
+    minimum,
+    mul,
+    neg,
+    point_of,
+    routine,
+    select_truth,
+    sub,
+    truth,
+)
+from .rounding import larger, smaller
+from .rules import interval_of
+
+LANES = 8
+INLINED = (
+    400  # operations up to which rules become part of what calls them: beyond, code of a third
+)
+# more speed would take three times as long to make
+_ARITHMETIC = {"sub": sub, "mul": mul, "div": div}
+_INF = float("inf")
+
+
+@dataclass(frozen=True, kw_only=True)
+class JudgedRows:
+    """Where `judge` writes what it finds, in rows of one number per lane.
+
+    Attributes
+    ----------
+    sides, results : int
+        Of the box, and of the function.
+    """
+
+    sides: int
+    results: int
+
+    BOUND = 0  # upper bound of the least result
+    MET = 1  # its lower bound at the centre
+    ABOVE = 2  # its upper bound there
+
+    @property
+    def centre(self) -> int:
+        """The point, a row per side; not a number for a side without an end."""
+        return 3
+
+    @property
+    def weight(self) -> int:
+        """How much each side matters, a row per side; not a number where that is not known."""
+        return 3 + self.sides
+
+    @property
+    def inner(self) -> int:
+        """The box that stands for the centre."""
+        return 3 + 2 * self.sides
+
+    @property
+    def values(self) -> int:
+        """Enclosures of the results there."""
+        return self.inner + 2 * self.sides
+
+    @property
+    def count(self) -> int:
+        """All rows."""
+        return self.values + 2 * self.results
+
+
+def enclosure_text(
+    results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int, lanes: int = LANES
+) -> str:
+    """Return the IR of both functions.
+
+    Parameters
+    ----------
+    results : sequence of Expr
+        Numbers.  That all of them are positive is what `judge` looks for.
+    gradients : sequence of sequences of Expr
+        Of each result, the derivative along each side.
+    sides : int
+        Of the box.
+    lanes : int, optional
+        Boxes at a time.
+    """
+    all_of_it = needed([*results, *(g for gradient in gradients for g in gradient)])
+    module = Module(inlined=len(all_of_it) <= INLINED)
+    texts = [_values(module, results, lanes), _judge(module, results, gradients, sides, lanes)]
+    return "\n".join([module.text(), *texts])
+
+
+class EnclosureWriter:
+    """Writes enclosures of expressions; `names` says what each is called so far.
+
+    Attributes
+    ----------
+    b : Body
+    lanes : int
+    names : dict
+    jumps : dict
+        Where an expression may jump for a reason of its own.
+    """
+
+    def __init__(self, b: Body, lanes: int) -> None:
+        self.b, self.lanes = b, lanes
+        self.names: dict[Expr, Ends] = {}
+        self.jumps: dict[Expr, Value] = {}
+
+    def write(self, exprs: Sequence[Expr]) -> None:
+        """Compute expressions, and all that they are made of."""
+        for node in needed(exprs):
+            if node not in self.names:
+                self.b.note(one_line(node))
+                self.names[node] = self._operation(node)
+
+    def _operation(self, node: Expr) -> Ends:
+        b, args = self.b, [self.names[a] for a in node.args]
+        if node.op == "const":
+            known = truth if node.kind == "b" else point_of
+            return known(node.data, self.lanes)
+        if node.op == "leaf":
+            return self.side("x", node.data[1])
+        if node.op == "add":
+            return add(b, *args)
+        if node.op in _ARITHMETIC and args[0] is not args[1]:
+            return routine(b, node.op, _ARITHMETIC[node.op], *args)
+        if node.op in _ARITHMETIC:  # of one quantity: less than of two in one range
+            return routine(
+                b, f"{node.op}.same", lambda c, x: _ARITHMETIC[node.op](c, x, x), args[0]
+            )
+        if node.op == "neg":
+            return neg(b, args[0])
+        if node.op in COMPARISONS:
+            return comparison_of(b, node.op, *args)
+        if node.op == "not":
+            return logic_not(b, args[0])
+        if node.op in LOGIC:
+            return logic(b, node.op, *args)
+        if node.op == "select":
+            return self._choice(node, *args)
+        found, jumps = interval_of(b, node.op, *args)
+        if jumps is not None:
+            self.jumps[node] = jumps
+        return found
+
+    def _choice(self, node: Expr, condition: Ends, x: Ends, y: Ends) -> Ends:
+        if node.kind == "b":
+            return select_truth(self.b, condition, x, y)
+        if is_an_extreme(node):
+            question, first = node.args[0], node.args[1]
+            smaller = (question.args[0] is first) == (question.op in ("lt", "le"))
+            return (minimum if smaller else maximum)(self.b, x, y)
+        self.jumps[node] = left_open(self.b, condition)
+        return choice_of(self.b, condition, x, y)
+
+    def side(self, array: str, row: int) -> Ends:
+        """Read an interval."""
+        low, high = (
+            load_value(self.b, entry_address(self.b, array, (2 * row + k) * self.lanes), self.lanes)
+            for k in (0, 1)
+        )
+        return Ends(low=low, high=high)
+
+    def keep(self, array: str, row: int, *values: Value | float) -> None:
+        """Write values to consecutive rows."""
+        for k, value in enumerate(values):
+            wide = self.b.wide(value, self.lanes)
+            store(self.b, wide, entry_address(self.b, array, (row + k) * self.lanes))
+
+    def may_jump(self, expr: Expr) -> Value | None:
+        """Return where an expression may jump; None if nowhere."""
+        found: Value | None = None
+        for node in needed([expr]):
+            if node in self.jumps:
+                here = self.jumps[node]
+                found = here if found is None else self.b.logic("or", found, here)
+        return found
+
+
+def _function(b: Body, name: str, *arguments: str) -> str:
+    given = ", ".join(f"ptr noalias %{argument}" for argument in arguments)
+    return f"define void @{name}({given}) nounwind {{\nentry:\n{b.text()}}}\n"
+
+
+def _values(module: Module, results: Sequence[Expr], lanes: int) -> str:
+    b = Body(module)
+    w = EnclosureWriter(b, lanes)
+    w.write(results)
+    for k, expr in enumerate(results):
+        w.keep("v", 2 * k, *finite(w.names[expr]).values)
+    b.write("ret void")
+    return _function(b, "values", "x", "v")
+
+
+def _judge(
+    module: Module,
+    results: Sequence[Expr],
+    gradients: Sequence[Sequence[Expr]],
+    sides: int,
+    lanes: int,
+) -> str:
+    b, rows = Body(module), JudgedRows(sides=sides, results=len(results))
+    w = EnclosureWriter(b, lanes)
+    w.write([*results, *(g for gradient in gradients for g in gradient)])
+    box = [w.side("x", i) for i in range(sides)]
+    slopes = [[w.names[g] for g in gradient] for gradient in gradients]
+    steps = [_centre(w, rows, i, box[i], slopes[0][i]) for i in range(sides)]
+    inner, found = (entry_address(b, "o", at * lanes) for at in (rows.inner, rows.values))
+    b.write(f"call void @values(ptr {inner}, ptr {found})")
+    bounds, at_centre = [], []
+    for k, expr in enumerate(results):
+        value = _read(w, rows.values + 2 * k)
+        at_centre.append(value)
+        bounds.append(_bound(w, expr, value, slopes[k], steps))
+    _kept(w, rows, bounds, at_centre, [_weights(b, box, each) for each in slopes])
+    b.write("ret void")
+    return _function(b, "judge", "x", "o")
+
+
+def _read(w: EnclosureWriter, row: int) -> Ends:
+    low, high = (
+        load_value(w.b, entry_address(w.b, "o", (row + k) * w.lanes), w.lanes) for k in (0, 1)
+    )
+    return Ends(low=low, high=high)
+
+
+_Step = tuple[Ends, Value]
+
+
+def _centre(w: EnclosureWriter, rows: JudgedRows, i: int, side: Ends, slope: Ends) -> _Step:
+    """Choose a point of a side, and write it down; return what the side is around it, and if it is.
+
+    It is where the mean-value form has the least upper bound (E. Baumann, BIT 28:80, 1988): an end
+    of the side where the function rises or falls.  A side without end stands for itself.
+    """
+    b, (low, high) = w.b, side.values
+    ends = b.compare("one", b.intrinsic("fabs", b.sub(high, low, exact=True)), _INF)
+    over = b.sub(b.mul(slope.high, high, exact=True), b.mul(slope.low, low, exact=True), exact=True)
+    point = b.op("fdiv", over, b.sub(slope.high, slope.low, exact=True), exact=True)
+    middle = b.add(b.mul(low, 0.5, exact=True), b.mul(high, 0.5, exact=True), exact=True)
+    point = b.select(b.compare("ord", point, point), point, middle)
+    point = b.select(b.compare("oge", slope.low, 0.0), high, point)
+    point = b.select(b.compare("ole", slope.high, 0.0), low, point)
+    point = smaller(b, high, larger(b, low, point))
+    w.keep("o", rows.centre + i, b.select(ends, point, NAN))
+    first, last = b.select(ends, point, low), b.select(ends, point, high)
+    w.keep("o", rows.inner + 2 * i, first, last)
+    step = sub(b, side, Ends(low=point, high=point))
+    return step, b.logic("and", ends, b.compare("olt", low, high))
+
+
+def _bound(
+    w: EnclosureWriter,
+    expr: Expr,
+    at_centre: Ends,
+    slopes: Sequence[Ends],
+    steps: Sequence[_Step],
+) -> Value:
+    """Return the upper bound of a result: by its value and by the mean-value form.
+
+    The latter holds where nothing jumps; infinite where there is no value.
+    """
+    b, value, mean = w.b, finite(w.names[expr]), at_centre
+    for slope, (step, moves) in zip(slopes, steps, strict=True):
+        if slope.point != 0:
+            change = routine(b, "mul", mul, slope, step)
+            low, high = (b.select(moves, v, 0.0) for v in change.values)
+            mean = add(b, mean, Ends(low=low, high=high))
+    jumps = w.may_jump(expr)
+    other = mean.high if jumps is None else b.select(jumps, _INF, mean.high)
+    other = b.select(b.compare("ord", mean.low, other), other, _INF)
+    bound = b.select(b.compare("olt", other, value.high), other, value.high)
+    return b.select(b.compare("ord", value.low, value.high), bound, _INF)
+
+
+def _weights(b: Body, box: Sequence[Ends], slopes: Sequence[Ends]) -> list[Value]:
+    """Return how much a result changes along each side; not a number if one is not known."""
+    widths = [b.sub(side.high, side.low, exact=True) for side in box]
+    steep = [absolute_of(b, slope).high for slope in slopes]
+    found = [b.mul(s, width, exact=True) for s, width in zip(steep, widths, strict=True)]
+    known = b.wide(0.0, box[0].low.width)
+    for s in steep:
+        known = b.add(known, b.mul(s, 0.0, exact=True), exact=True)
+    return [b.add(v, known, exact=True) for v in found]
+
+
+def _kept(
+    w: EnclosureWriter,
+    rows: JudgedRows,
+    bounds: Sequence[Value],
+    at_centre: Sequence[Ends],
+    weights: Sequence[list[Value]],
+) -> None:
+    """Write the least bound with the weights of its result, and the least value at the centre."""
+    b, bound, weight = w.b, bounds[0], list(weights[0])
+    met, above = at_centre[0].values
+    for k in range(1, len(bounds)):
+        smaller = b.compare("olt", bounds[k], bound)
+        bound = b.select(smaller, bounds[k], bound)
+        weight = [b.select(smaller, v, u) for v, u in zip(weights[k], weight, strict=True)]
+        value = minimum(b, Ends(low=met, high=above), at_centre[k])
+        met, above = value.values
+    w.keep("o", JudgedRows.BOUND, bound, met, above)
+    w.keep("o", rows.weight, *weight)
