@@ -110,9 +110,11 @@ from .plants import ForcedDuffing, Genesio, PureFeedback, WingRock
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
 from .sampling import Clock, Sampled, Sampling, TriggeredHold, discretise, sampled
+from .sensitivities import NoDerivative, SensitivityResponse, sensitivity_response
 from .sliding import IdealRelay
 
 __all__ = [
+    "NoDerivative",
     "PID",
     "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
@@ -190,6 +192,7 @@ __all__ = [
     "Sampling",
     "Saturation",
     "SecondOrderLag",
+    "SensitivityResponse",
     "SlidingModeLaw",
     "Spec",
     "StatePredictor",
@@ -239,6 +242,7 @@ __all__ = [
     "relay_grid",
     "replaced",
     "sampled",
+    "sensitivity_response",
     "sliding_mode",
     "state_names",
     "typeset",

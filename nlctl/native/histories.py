@@ -40,7 +40,7 @@ def lines_of(
         delays[row] = p[compiled.program.layout[line.block or 0]["delay"].offset]
         check_positive(varied[row], delays[row], read.nodes[line.block or 0].path)
     return {
-        "delays": delays, "direct": _direct(read).astype(np.int64), **variation_table(varied)
+        "delays": delays, "direct": direct_lines(read).astype(np.int64), **variation_table(varied)
     }  # fmt: skip
 
 
@@ -106,7 +106,7 @@ def with_room(task: Any, work: Any) -> Any:
     return work if work.kept.max() <= room // 2 else grown(work, _KEPT, 2 * room)
 
 
-def _direct(read: Schedule) -> np.ndarray:
+def direct_lines(read: Schedule) -> np.ndarray:
     """Return which lines' arriving signals depend at once on what leaves which lines."""
     leaving = {line: i for i, line in enumerate(read.lines)}
     found: dict[Any, frozenset[int]] = {}

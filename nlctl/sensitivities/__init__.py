@@ -1,0 +1,12 @@
+"""Derivatives of runs by parameters and initial states.
+
+`names` looks up of what and by what, `schedule` makes room for them in a diagram's, `source` has
+its equations in parts, `branches` and `sides` are about jumps, `saltation` about what becomes of
+derivatives there, `program` puts all of that together, `run` integrates it, and `missing` says
+where there is no derivative.
+"""
+
+from .record import NoDerivative, SensitivityResponse
+from .response import sensitivity_response
+
+__all__ = ["NoDerivative", "SensitivityResponse", "sensitivity_response"]

@@ -1,0 +1,298 @@
+"""The derivative of a whole program, as a program: flow, outputs, memories, samples and jumps.
+
+Derivatives by each quantity are further states.  They flow with the linearized equations, become
+with memories and samples what the derivative of these says, and jump at conditions and resets
+(`saltation`).  So one run has them with the states, under the same error control.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..expressions.arrays import Tracer, as_array, scalar
+from ..expressions.graph import Expr
+from ..native import Compiled
+from ..native.codegen.program import Program
+from ..native.equations.blocks import Equations
+from .directions import Direction, Piece, along
+from .names import Quantity, Signal
+from .places import Places
+from .saltation import Saltation
+from .schedule import Extended, extended, with_derivatives
+from .sides import Sides, sides_of
+from .source import Source, read
+
+__all__ = ["Differentiated", "differentiated", "parameters_with"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Differentiated:
+    """A diagram, compiled with its derivatives.
+
+    Attributes
+    ----------
+    compiled : Compiled
+    places : Places
+    extended : Extended
+    sides : Sides
+    outputs : int
+        Number of the signals that are outputs.
+    saltation : Saltation
+    """
+
+    compiled: Compiled
+    places: Places
+    extended: Extended
+    sides: Sides
+    outputs: int
+    saltation: Saltation
+
+
+def parameters_with(
+    made: Extended, quantities: Sequence[Quantity], p: np.ndarray, scale: np.ndarray, settings: Any
+) -> np.ndarray:
+    """Return all parameters of a program with derivatives.
+
+    Parameters
+    ----------
+    made : Extended
+    quantities : sequence of Quantity
+    p : ndarray
+        Those of the diagram.
+    scale : ndarray
+        By how much of each quantity is differentiated.
+    settings : Settings
+    """
+    size = made.slot("atol").offset + 1
+    found = np.concatenate([p, np.zeros(size - p.size)])
+    layout = made.layout
+    for j, quantity in enumerate(quantities):
+        for i in range(made.lines):
+            own = layout[made.schedule.lines[made.line(j, i)].block or 0]
+            original = layout[made.schedule.lines[i].block or 0]
+            found[own["delay"].offset] = p[original["delay"].offset]
+            if quantity.place == original["before"].offset:
+                found[own["before"].offset] = scale[j]
+    for name, value in (("scale", scale), ("rtol", settings.rtol), ("atol", settings.atol)):
+        slot = made.slot(name)
+        found[slot.offset : slot.offset + slot.size] = value
+    return found
+
+
+def differentiated(
+    compiled: Compiled,
+    signals: Sequence[Signal],
+    quantities: Sequence[Quantity],
+    p: np.ndarray,
+    settings: Any,
+) -> Differentiated:
+    """Compile a diagram with its derivatives.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    signals : sequence of Signal
+        What is wanted.
+    quantities : sequence of Quantity
+        By what is differentiated.
+    p : ndarray
+        Parameters, whose integers may steer equations.
+    settings : Settings
+
+    Raises
+    ------
+    CompileError
+        If something has no derivative.
+    """
+    by, n = len(quantities), compiled.system.nstates or 0
+    wanted = [s.combination for s in signals if s.combination is not None]
+    made = extended(compiled, wanted, by)
+    whole = parameters_with(made, quantities, p, np.ones(by), settings)
+    source = read(compiled, made, whole)
+    sides = sides_of(source, n * (1 + by))
+    places = Places(states=n, by=by, branches=sides.rows)
+    seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
+    maker = _Maker(
+        source=source, sides=sides, places=places, seeds=seeds,
+        saltation=Saltation(source=source, sides=sides, places=places, seeds=seeds),
+    )  # fmt: skip
+    schedule = with_derivatives(compiled, made, places.size, len(wanted) * (1 + by), by)
+    found = replace(compiled, schedule=schedule, program=maker.program(), original=None, apart=None)
+    found.__dict__["equations"] = maker.equations()
+    return Differentiated(
+        compiled=found, places=places, extended=made, sides=sides, outputs=len(wanted),
+        saltation=maker.saltation,
+    )  # fmt: skip
+
+
+def _seed(source: Source, places: Places, j: int, quantity: Quantity) -> Direction:
+    """Return the direction in which everything goes by a quantity."""
+    graph, made = source.graph, source.extended
+    scale = graph.leaf("p", made.slot("scale").offset + j, None)
+
+    def of_states(start: int, step: int, size: int | None) -> Expr | None:
+        where = ("x", places.derivative(j) + start, step)
+        return graph.node("leaf", data=where, size=size, varies=True)
+
+    def of_inputs(start: int, step: int, size: int | None) -> Expr | None:
+        if not 0 <= start - source.inputs < made.lines:
+            return None
+        first = source.inputs + made.line(j, start - source.inputs)
+        return graph.node("leaf", data=("u", first, step), size=size, varies=True)
+
+    def of_parameters(start: int, step: int, size: int | None) -> Expr | None:
+        rows = [start + step * i for i in range(size or 1)]
+        if quantity.place not in rows:
+            return None
+        zero = graph.const(0.0)
+        parts = [(scale if row == quantity.place else zero, 1) for row in rows]
+        return graph.joined(parts) if size else scale
+
+    return Direction(of={"x": of_states, "u": of_inputs, "p": of_parameters})
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Maker:
+    """Makes the program of derivatives from a source."""
+
+    source: Source
+    sides: Sides
+    places: Places
+    seeds: Sequence[Direction]
+    saltation: Saltation
+
+    @property
+    def _watches(self) -> bool:
+        """Whether there is anything that may jump in the equations."""
+        return self.sides.rows > 0
+
+    def program(self) -> Program:
+        """Return the arrays of the program."""
+        source, places = self.source, self.places
+        before, n, by = source.program, places.states, places.by
+        owner = source.extended.owner
+        jumping = list(before.jumping)
+        for i, _, _ in before.jumping:
+            jumping += [(i, n, places.kept), (i, places.grazing, places.size)]
+        if self._watches:
+            jumping.append((owner, n, places.last))
+        carried = [m for m in before.memory if m not in source.switched]
+        sampled = [places.derivative(j) + i for j in range(by) for i in before.sampled]
+        made = replace(
+            before,
+            layout=source.extended.layout,
+            memory=(*before.memory, *(places.derivative(j) + m for j in range(by) for m in carried)),
+            guards=(*before.guards, *([owner] if self._watches else [])),
+            jumping=tuple(jumping),
+            sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
+        )
+        made.__dict__["meetings"] = before.meetings
+        return made
+
+    def equations(self) -> Equations:
+        """Return what the program computes."""
+        found = self.source.found
+        located = tuple(replace(each, bends=False) for each in found.conditions.located)
+        results: dict[str, list[tuple[int, Tracer]]] = {
+            "dx": self._flow(),
+            "g": self._switching(),
+            "y": self._outputs(),
+        }
+        if found.results.get("reset") or self._watches:
+            results["reset"] = self._resets()
+        for name in found.results:
+            if name.startswith("sample"):
+                results[name] = self._samples(name)
+        return replace(
+            found, results=results, conditions=replace(found.conditions, located=located)
+        )
+
+    # -- results ---------------------------------------------------------------------------------
+
+    def _along(self, pieces: Sequence[Piece], j: int) -> list[Piece]:
+        """Return the derivatives of pieces by a quantity."""
+        graph = self.source.graph
+        made = along(
+            graph, [e for e, _ in pieces], self.seeds[j], self.source.found.fixed_points
+        )
+        zero = graph.const(0.0)
+        return [(zero if e is None else e, size) for e, (_, size) in zip(made, pieces, strict=True)]
+
+    def _rows(self, first: int, pieces: Sequence[Piece]) -> list[tuple[int, Tracer]]:
+        """Return pieces as arrays with their rows."""
+        found = []
+        for expr, size in pieces:
+            found.append((first, _array(self.source.graph, expr, size)))
+            first += size
+        return found
+
+    def _flow(self) -> list[tuple[int, Tracer]]:
+        pieces, places = list(self.source.flow), self.places
+        for j in range(places.by):
+            pieces += self._along(self.source.flow, j)
+        rest = places.size - places.kept
+        return self._rows(0, [*pieces, (self.source.graph.const(0.0), rest)])
+
+    def _outputs(self) -> list[tuple[int, Tracer]]:
+        pieces = self.source.found.pieces("y")
+        count = sum(size for _, size in pieces) - sum(size for _, size in self.source.arriving)
+        parts = [self._along(pieces, j) for j in range(self.places.by)]
+        split = [_divided(self.source.graph, part, count) for part in (pieces, *parts)]
+        return self._rows(0, [*(p for own, _ in split for p in own), *(p for _, s in split for p in s)])
+
+    def _switching(self) -> list[tuple[int, Tracer]]:
+        source, graph = self.source, self.source.graph
+        first = source.program.switching + source.found.conditions.rows
+        behind = first + len(source.guards)
+        found = [(row, array) for row, array in source.found.results["g"] if row < behind]
+        found = [(row, array) for row, array in found if array.size]
+        if self._watches:
+            found += self._rows(behind, [(self.sides.margin, 1)])
+            behind += 1
+        committed = [(c, 1) for c in source.committed]
+        pairs = zip(source.program.memory, committed, strict=True)
+        carried = [c for m, c in pairs if m not in source.switched]
+        for j in range(self.places.by):
+            committed = [*committed, *self._along(carried, j)]
+        return [*found, *self._rows(behind, committed)]
+
+    def _resets(self) -> list[tuple[int, Tracer]]:
+        source = self.source
+        own = source.found.results.get("reset", [])
+        pieces = [p for _, array in own for p in array.pieces()]
+        guards: dict[int, list[Expr]] = {}
+        for i, guard in zip(source.program.guards, source.guards, strict=True):
+            guards.setdefault(i, []).append(guard)
+        for (i, begin, _), (_, array) in zip(source.program.jumping, own, strict=True):
+            pieces += self.saltation.at_reset(begin, array.pieces(), guards[i])
+        if self._watches:
+            pieces += self.saltation.at_conditions()
+        return self._rows(0, pieces)
+
+    def _samples(self, name: str) -> list[tuple[int, Tracer]]:
+        graph, count = self.source.graph, len(self.source.program.sampled)
+        found = list(self.source.found.results[name])
+        for row, array in self.source.found.results[name]:
+            for j in range(self.places.by):
+                found += self._rows(row + count * (1 + j), self._along(array.pieces(), j))
+        found += self._rows(count * (1 + self.places.by), [(graph.leaf("t", 0, None), 1)])
+        return found
+
+
+def _array(graph: Any, expr: Expr, size: int) -> Tracer:
+    """Return an expression as an array."""
+    if size == 1:
+        return scalar(graph, expr).reshape(1)
+    return Tracer(graph, as_array(expr), 0, size)
+
+
+def _divided(graph: Any, pieces: Sequence[Piece], count: int) -> tuple[list[Piece], list[Piece]]:
+    """Return the first rows of pieces, and the others."""
+    single = [(graph.item(e, k), 1) for e, size in pieces for k in range(size)]
+    return single[:count], single[count:]
+
+

@@ -1,0 +1,312 @@
+"""How derivatives jump where something happens at a time that moves with what they are taken by.
+
+At a time t* the states become x+ = R(x-), and flow with f- before and f+ behind.  Derivatives at
+a fixed time, S, then jump to
+
+    S+ = R' (S- + f- t*') - f+ t*',     t*' = -(g_x S- + g_p) / (g_x f- + g_t),
+
+where R' takes time and parameters along, g(t*, x-) = 0 says when it happens, and ' is the
+derivative by what S is taken by (Aizerman, Gantmakher, Quarterly Journal of Mechanics and Applied
+Mathematics 11, 1958; Filippov, Differential Equations with Discontinuous Righthand Sides, 1988:
+both by name only).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..expressions.graph import Expr, Graph
+from .directions import Direction, Piece, Taken, along, taken
+from .places import Places
+from .sides import Sides
+from .source import Source
+
+__all__ = ["Saltation"]
+
+_AGREE = 1e-6  # derivatives of a time by two conditions that are one
+_NOTICED = 1e-7  # of the rates: a smaller jump is rounding
+_FAR = 1e300
+
+
+@dataclass(frozen=True, kw_only=True)
+class When:
+    """How the time at which something happens moves.
+
+    Attributes
+    ----------
+    moves : list of Expr
+        Its derivative by each quantity.
+    grazes : Expr
+        Whether what it depends on is there at a rate of 0.
+    apart : Expr
+        Whether two conditions say different things.
+    happens : Expr
+        Whether anything happens at a time that moves.
+    """
+
+    moves: list[Expr]
+    grazes: Expr
+    apart: Expr
+    happens: Expr
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cause:
+    """A condition that may have been met.
+
+    Attributes
+    ----------
+    met : Expr
+        Whether it was.
+    moves : list of Expr
+        The derivative by each quantity of the time at which it was.
+    grazes : Expr
+        Whether it was at a rate of 0.
+    """
+
+    met: Expr
+    moves: list[Expr]
+    grazes: Expr
+
+
+@dataclass(frozen=True, kw_only=True)
+class Saltation:
+    """What becomes of derivatives at conditions and resets.
+
+    Attributes
+    ----------
+    source : Source
+    sides : Sides
+    places : Places
+    seeds : sequence of Direction
+        In which direction everything goes by each quantity.
+    """
+
+    source: Source
+    sides: Sides
+    places: Places
+    seeds: Sequence[Direction]
+
+    def at_conditions(self) -> list[Piece]:
+        """Return what follows the states where a side has been left."""
+        source, graph, places = self.source, self.source.graph, self.places
+        arriving = self.sides.earlier([e for e, _ in source.arriving])
+        sent = self._differ([*zip(arriving, source.arriving, strict=True)])
+        before = source.moving(self.sides.flow_before, self.sides.earlier(source.committed))
+        behind = source.moving(source.flow, source.committed)
+        jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
+        when = self._when_left(graph.op("or", jumps, sent))
+        rows: list[Piece] = []
+        broken = graph.op("or", when.grazes, when.apart)
+        for j, move in enumerate(when.moves):
+            for (s, size), (a, _), (b, _) in zip(self._states(j), before, behind, strict=True):
+                if a is not b:
+                    s = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
+                rows.append((graph.op("select", broken, graph.const(0.0), s), size))
+        rows += self.sides.now
+        rows.append((self._first(places.together, when.apart), 1))
+        rows.append((self._first(places.grazing, when.grazes), 1))
+        rows.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
+        return rows
+
+    def at_reset(self, begin: int, states: Sequence[Piece], guards: Sequence[Expr]) -> list[Piece]:
+        """Return what follows the states where a block jumps.
+
+        Parameters
+        ----------
+        begin : int
+            The first of its states.
+        states : sequence
+            What they become.
+        guards : sequence of Expr
+            Its guards.
+        """
+        source, graph, places = self.source, self.source.graph, self.places
+        before = source.moving(source.flow, source.committed)
+        rows: dict[int, Expr] = {}
+        for expr, size in states:
+            rows |= {begin + len(rows) + k: graph.item(expr, k) for k in range(size)}
+        behind, later = self._after(rows, before), self._after(rows, source.arriving)
+        sent = self._differ([(e, new) for (e, _), new in zip(source.arriving, later, strict=True)])
+        when = self._when_fallen(guards)
+        together = graph.op("lt", self.sides.margin, graph.const(0.0))
+        broken, found = graph.op("or", when.grazes, together), []
+        for j, move in enumerate(when.moves):
+            found += self._jumped(j, rows, before, behind, move, broken)
+        found.append((self._first(places.grazing, when.grazes), 1))
+        found.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
+        found.append((graph.leaf("t", 0, None), 1))
+        found.append((self._first(places.at_reset, together), 1))
+        return found
+
+    def change(self, level: Expr, seed: Direction) -> list[Expr | None]:
+        """Return the derivative of an expression in a direction.
+
+        Parameters
+        ----------
+        level : Expr
+        seed : Direction
+        """
+        return along(self.source.graph, [level], seed, self.source.found.fixed_points)
+
+    # -- states ----------------------------------------------------------------------------------
+
+    def _states(self, j: int) -> list[Piece]:
+        """Return the derivatives of all states by a quantity, in the pieces of the flow."""
+        graph, row, found = self.source.graph, self.places.derivative(j), []
+        for _, size in self.source.flow:
+            found.append((graph.leaf("x", row, size if size > 1 else None), size))
+            row += size
+        return found
+
+    def _jumped(
+        self,
+        j: int,
+        rows: dict[int, Expr],
+        before: Sequence[Piece],
+        behind: Sequence[Piece],
+        move: Expr,
+        broken: Expr,
+    ) -> list[Piece]:
+        """Return R' (S + f- t*') - f+ t*' of all states."""
+        graph, source = self.source.graph, self.source
+        arriving = [
+            (graph.op("add", s, graph.op("mul", a, move)), size)
+            for (s, size), (a, _) in zip(self._states(j), before, strict=True)
+        ]
+        seed, moving = self.seeds[j], source.time(arriving, move)
+        of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
+        made = along(graph, list(rows.values()), Direction(of=of), source.found.fixed_points)
+        zero = graph.const(0.0)
+        changes = dict(zip(rows, (e or zero for e in made), strict=True))
+        state, left = taken(graph, arriving), taken(graph, behind)
+        found = []
+        for k in range(self.places.states):
+            moved = changes[k] if k in changes else state(k, 0, None)
+            moved = graph.op("sub", moved, graph.op("mul", left(k, 0, None), move))
+            found.append((graph.op("select", broken, zero, moved), 1))
+        return found
+
+    def _after(self, rows: dict[int, Expr], pieces: Sequence[Piece]) -> list[Piece]:
+        """Return expressions behind a jump of some states, and what memories switch to by it."""
+        source = self.source
+        held = [
+            (m, c) for m, c in zip(source.program.memory, source.committed, strict=True)
+            if m in source.switched
+        ]  # fmt: skip
+        switched = source.with_states([c for _, c in held], rows)
+        instead = {**rows, **dict(zip((m for m, _ in held), switched, strict=True))}
+        made = source.with_states([e for e, _ in pieces], instead)
+        return [(e, size) for e, (_, size) in zip(made, pieces, strict=True)]
+
+    def _differ(self, pairs: Sequence[tuple[Expr, Piece]]) -> Expr:
+        """Return whether expressions differ by more than rounding."""
+        graph = self.source.graph
+        apart = extent = graph.const(0.0)
+        for a, (b, size) in pairs:
+            if a is b:
+                continue
+            sizes = [graph.op("absolute", e) for e in (graph.op("sub", a, b), a, b)]
+            parts = [graph.sum(e, size) if size > 1 else e for e in sizes]
+            apart = graph.op("add", apart, parts[0])
+            extent = graph.op("add", extent, graph.op("add", *parts[1:]))
+        return graph.op("gt", apart, graph.op("mul", graph.const(_NOTICED), extent))
+
+    def _first(self, place: int, happens: Expr) -> Expr:
+        """Return when something has first happened, now at the latest if it does."""
+        graph = self.source.graph
+        known, now = graph.leaf("x", place, None), graph.leaf("t", 0, None)
+        return graph.op("select", happens, graph.op("minimum", known, now), known)
+
+    # -- when ------------------------------------------------------------------------------------
+
+    def _when_left(self, jumps: Expr) -> When:
+        """Return how the time moves at which sides have been left; a clock's does not."""
+        graph = self.source.graph
+        last = graph.leaf("x", self.places.last, None)
+        free = graph.op("and", graph.op("ne", graph.leaf("t", 0, None), last), jumps)
+        causes = []
+        for side in self.sides.sides:
+            for k in range(side.rows):
+                kept, now, level, extent = (
+                    graph.item(e, k)
+                    for e in (side.kept, side.before.now, side.before.level, side.before.extent)
+                )
+                left = graph.op("and", graph.op("ne", kept, now), free)
+                rate, made = self._met(left, level, extent, self.sides.flow_before)
+                causes += [made] if rate is not None else []
+        return self._of_causes(causes)
+
+    def _when_fallen(self, guards: Sequence[Expr]) -> When:
+        """Return how the time moves at which a guard has fallen: the nearest to 0."""
+        graph = self.source.graph
+        far = nearest = graph.const(_FAR)
+        yes, known = graph.const(True), []
+        for guard in guards:
+            size = graph.op("absolute", guard)
+            rate, made = self._met(yes, guard, size, self.source.flow)
+            if rate is not None:
+                fallen = graph.op("lt", guard, graph.const(0.0))
+                ago = graph.op("absolute", graph.op("div", guard, rate))
+                ago = graph.op("select", fallen, ago, far)
+                known.append((ago, made))
+                nearest = graph.op("minimum", nearest, ago)
+        return self._of_causes(
+            [replace(made, met=graph.op("le", ago, nearest)) for ago, made in known]
+        )
+
+    def _met(
+        self, met: Expr, level: Expr, extent: Expr, flow: Sequence[Piece]
+    ) -> tuple[Expr | None, Cause]:
+        """Return the rate of a level, None where it stands still, and what it is the cause of."""
+        graph, source = self.source.graph, self.source
+        solutions = source.found.fixed_points
+        forward = source.time(flow)
+        (rate,) = along(graph, [level], forward, solutions)
+        if rate is None:
+            return None, Cause(met=met, moves=[], grazes=graph.const(False))
+        (bend,) = along(graph, [rate], source.time(flow, known=False), solutions)
+        size = [graph.leaf("p", source.extended.slot(n).offset, None) for n in ("rtol", "atol")]
+        noise = graph.op("add", graph.op("mul", size[0], extent), size[1])
+        bent = graph.op("absolute", graph.const(0.0) if bend is None else bend)
+        least = graph.op("mul", graph.op("mul", graph.const(2.0), bent), noise)
+        grazes = graph.op("le", graph.op("mul", rate, rate), least)
+        moves = []
+        for seed in self.seeds:
+            (change,) = self.change(level, seed)
+            zero = graph.const(0.0)
+            moves.append(graph.op("neg", graph.op("div", change, rate)) if change else zero)
+        return rate, Cause(met=met, moves=moves, grazes=grazes)
+
+    def _of_causes(self, causes: Sequence[Cause]) -> When:
+        """Return how the time moves, by the first condition that was met."""
+        graph = self.source.graph
+        no, zero = graph.const(False), graph.const(0.0)
+        moves = [zero] * self.places.by
+        for cause in reversed(causes):
+            pairs = zip(cause.moves, moves, strict=True)
+            moves = [graph.op("select", cause.met, a, b) for a, b in pairs]
+        grazes = apart = happens = no
+        for cause in causes:
+            grazes = graph.op("or", grazes, graph.op("and", cause.met, cause.grazes))
+            for a, b in zip(cause.moves, moves, strict=True):
+                gap = graph.op("absolute", graph.op("sub", a, b))
+                size = graph.op("add", graph.op("absolute", a), graph.op("absolute", b))
+                differs = graph.op("gt", gap, graph.op("mul", graph.const(_AGREE), size))
+                apart = graph.op("or", apart, graph.op("and", cause.met, differs))
+        moves = [graph.op("select", grazes, zero, move) for move in moves]
+        for move in moves:
+            happens = graph.op("or", happens, graph.op("ne", move, zero))
+        apart = graph.op("and", apart, graph.op("not", grazes))
+        return When(moves=moves, grazes=grazes, apart=apart, happens=happens)
+
+
+def _sum(graph: Graph, one: Taken, other: Taken) -> Taken:
+    """Return the sum of two directions."""
+
+    def both(start: int, step: int, size: int | None) -> Expr | None:
+        a, b = one(start, step, size), other(start, step, size)
+        return graph.op("add", a, b) if a is not None and b is not None else a or b
+
+    return both

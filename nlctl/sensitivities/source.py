@@ -1,0 +1,214 @@
+"""What a diagram computes, in the parts that its derivatives are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from ..errors import CompileError
+from ..expressions.continuity import may_jump
+from ..expressions.graph import Expr, Graph, Untraceable, needed
+from ..expressions.trace import trace
+from ..native import Compiled
+from ..native.codegen.program import Program, count_switching_functions, memory
+from ..native.codegen.trace import traced_arguments
+from ..native.diagram.schedule import Node
+from ..native.equations.blocks import Equations, equations
+from ..native.parameters import slots_of
+from ..native.sliding.pieces import replaced_parts
+from ..sliding.blocks import slides
+from .branches import jumping
+from .directions import Direction, Piece, along, from_time, one_sided, rows_replaced, taken
+from .schedule import Extended
+
+__all__ = ["Source", "read"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """The equations of a diagram, row by row.
+
+    Attributes
+    ----------
+    found : Equations
+    extended : Extended
+    program : Program
+        Of the diagram itself.
+    inputs : int
+        Number of the diagram's inputs.
+    switching : list of Expr
+        Switching functions that blocks declare.
+    guards : list of Expr
+    committed : list of Expr
+        What each memory would become.
+    switched : frozenset of int
+        States of memories that jump, and are not carried along.
+    owners : tuple of int
+        The block of each switching function.
+    """
+
+    found: Equations
+    extended: Extended
+    program: Program
+    inputs: int
+    switching: list[Expr]
+    guards: list[Expr]
+    committed: list[Expr]
+    switched: frozenset[int]
+    owners: tuple[int, ...]
+
+    @property
+    def graph(self) -> Graph:
+        """Where the expressions are kept."""
+        return self.found.graph
+
+    @cached_property
+    def flow(self) -> list[Piece]:
+        """The derivatives of the states; memories stand still."""
+        still = dict.fromkeys(self.program.memory, self.graph.const(0.0))
+        return rows_replaced(self.graph, self.found.pieces("dx"), still)
+
+    @cached_property
+    def arriving(self) -> list[Piece]:
+        """What arrives at the delays."""
+        return _behind(self.graph, self.found.pieces("y"), len(self.extended.schedule.outputs)
+                       - self.extended.lines)  # fmt: skip
+
+    @cached_property
+    def jumps(self) -> list[Expr]:
+        """The operations at which the flow may jump.
+
+        Raises
+        ------
+        CompileError
+            If one is in an algebraic loop.
+        """
+        inside = [e for each in self.found.fixed_points.values() for e in each]
+        if jumping(inside):
+            raise CompileError(
+                "an algebraic loop has jumps in it: derivatives of a run do not know its signals "
+                "on both sides; put a lag into the loop"
+            )
+        carried = [c for m, c in zip(self.program.memory, self.committed, strict=True)
+                   if m not in self.switched]  # fmt: skip
+        return jumping([*(e for e, _ in self.flow), *(e for e, _ in self.arriving), *carried])
+
+    def time(
+        self, pieces: Sequence[Piece], time: Expr | None = None, known: bool = True
+    ) -> Direction:
+        """Return the direction in which everything goes with these rates of the states.
+
+        By `time`, 1 if it is None.  If the rates of delayed signals need not be `known`, they
+        count as 0.
+        """
+        first = self.extended.schedule.ninputs - self.extended.schedule.rates
+        lines = range(self.inputs, first if known else self.inputs)
+        outside = from_time(self.graph, time, self.inputs, first, lines)
+        return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
+
+    def moving(self, flow: Sequence[Piece], committed: Sequence[Expr]) -> list[Piece]:
+        """Return the rates of all states, those of memories that are carried along included.
+
+        Parameters
+        ----------
+        flow : sequence
+            The rates of the others.
+        committed : sequence of Expr
+            What the memories would become.
+        """
+        pairs = zip(self.program.memory, committed, strict=True)
+        carried = {m: expr for m, expr in pairs if m not in self.switched}
+        if not carried:
+            return list(flow)
+        direction = self.time(flow)
+        ahead = one_sided(self.graph, list(carried.values()), direction)
+        rates = along(self.graph, ahead, direction, self.found.fixed_points)
+        zero = self.graph.const(0.0)
+        return rows_replaced(self.graph, flow, dict(zip(carried, (r or zero for r in rates),
+                                                        strict=True)))  # fmt: skip
+
+    def with_states(self, exprs: Sequence[Expr], instead: Mapping[int, Expr]) -> list[Expr]:
+        """Return expressions with others in the places of some states."""
+        return replaced_parts(self.graph, exprs, self.leaves(exprs, instead))
+
+    def leaves(self, exprs: Iterable[Expr], instead: Mapping[int, Expr]) -> dict[Expr, Expr]:
+        """Return what stands for the leaves of expressions that read some states."""
+        found = {}
+        for leaf in needed(exprs):
+            if leaf.op != "leaf" or leaf.data[0] != "x":
+                continue
+            _, start, step = leaf.data
+            rows = [start + step * i for i in range(leaf.size or 1)]
+            if not any(row in instead for row in rows):
+                continue
+            parts = [instead.get(r, self.graph.leaf("x", r, None)) for r in rows]
+            found[leaf] = self.graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
+        return found
+
+
+def read(compiled: Compiled, made: Extended, p: object) -> Source:
+    """Return what a diagram computes.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    made : Extended
+    p : ndarray
+        All parameters, those of the derivatives included.
+    """
+    program = compiled.program
+    found = equations(made.schedule, made.layout, p, program.meetings)
+    rows: dict[int, Expr] = {}
+    for row, array in found.results["g"]:
+        for expr, size in array.pieces():
+            rows |= {row + k: found.graph.item(expr, k) for k in range(size)}
+            row += size
+    graph, first = found.graph, program.switching + found.conditions.rows
+    count = len(program.guards)
+    del graph.lengths["x"]  # there are more of them now
+    nodes = compiled.schedule.nodes
+    owners = [i for i, node in enumerate(nodes) for _ in range(count_switching_functions(node))]
+    jump = [m for node in nodes if memory(node) and _jumps(node) for m in memory(node)]
+    return Source(
+        found=found, extended=made, program=program, inputs=compiled.system.ninputs or 0,
+        switching=[rows[k] for k in range(program.switching)],
+        guards=[rows[first + k] for k in range(count)],
+        committed=[rows[first + count + k] for k in range(len(program.memory))],
+        switched=frozenset(jump), owners=tuple(owners),
+    )  # fmt: skip
+
+
+def _jumps(node: Node) -> bool:
+    """Whether the memories of a block jump, whatever its inputs do.
+
+    Raises
+    ------
+    CompileError
+        If nobody can say.
+    """
+    graph, system = Graph(), node.system
+    if slides(system):
+        return True
+    try:
+        given = traced_arguments(graph, system, slots_of(system))
+        made = trace(graph, system.spec.commit, lambda: given)
+    except Untraceable as error:
+        raise CompileError(
+            f"block '{node.path}' has a memory that is no expression ({error}): its derivatives "
+            "are not known; take differences of runs"
+        ) from None
+    return may_jump([e for e, _ in made.pieces()])
+
+
+def _behind(graph: Graph, pieces: Sequence[Piece], first: int) -> list[Piece]:
+    """Return the rows of pieces from one on."""
+    found, row = [], 0
+    for expr, size in pieces:
+        cut = min(max(first - row, 0), size)
+        if cut < size:
+            rest = size - cut
+            part = graph.item(expr, cut) if rest == 1 else graph.part(expr, cut, 1, rest)
+            found.append((part if expr.size else expr, rest))
+        row += size
+    return found
