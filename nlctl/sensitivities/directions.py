@@ -56,11 +56,11 @@ def along(
 
 
 def taken(graph: Graph, pieces: Sequence[Piece]) -> Taken:
-    """Return what gives some of the rows that expressions make up."""
-    whole = graph.joined(list(pieces)) if pieces else None
+    """Return what gives some of the rows that expressions make up, and stands still behind them."""
+    whole, rows = graph.joined(list(pieces)) if pieces else None, sum(size for _, size in pieces)
 
     def found(start: int, step: int, size: int | None) -> Expr | None:
-        if whole is None:
+        if whole is None or start >= rows:
             return None
         return graph.item(whole, start) if size is None else graph.part(whole, start, step, size)
 

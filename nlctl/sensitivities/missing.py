@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from ..expressions.evaluate import evaluate_expressions
 from ..native import Compiled
+from ..native.happened import row_labels
 from ..native.integrate.results import Trajectory
 from ..native.integrate.state import Status
 from ..native.jacobians import searches_of
@@ -42,17 +45,17 @@ def missing(
     first = {name: float(last[getattr(places, name)]) for name in _NAMES}
     for name, why in (("together", _TOGETHER), ("at_reset", _TOGETHER), ("grazing", _GRAZING)):
         if first[name] <= end:
-            lacks.append(_lack(compiled, found, first[name], why))
+            lacks.append(_lack(made, compiled, found, first[name], why))
     if first["jumped"] <= end and made.extended.lines:
         back = first["jumped"] + _shortest(made, given[2])
         if back <= end:
             lacks.append(NoDerivative(time=back, where="", why=_RETURNS))
-    both = _resets_together(compiled, found)
+    both = _resets_together(made, compiled, found)
     if both is not None:
-        lacks.append(_lack(compiled, found, both, _TOGETHER))
+        lacks.append(_lack(made, compiled, found, both, _TOGETHER))
     if found.statistics.status in (Status.ZENO, Status.CHATTERING):
         since = found.since if found.statistics.status is Status.ZENO else end
-        lacks.append(_lack(compiled, found, since, _ENDLESS))
+        lacks.append(_lack(made, compiled, found, since, _ENDLESS))
     lacks = [each for each in lacks if each.time <= times[-1]]
     return sorted(lacks, key=lambda each: each.time)[:1]
 
@@ -60,15 +63,13 @@ def missing(
 _NAMES = ("together", "at_reset", "grazing", "jumped")
 
 
-def _lack(compiled: Compiled, found: Trajectory, time: float, why: str) -> NoDerivative:
+def _lack(
+    made: Differentiated, compiled: Compiled, found: Trajectory, time: float, why: str
+) -> NoDerivative:
     """Return it with the names of what happens then."""
-    rows = np.flatnonzero(found.happened.time == time)
-    names = [
-        found.happened.labels[k][:2]
-        for k in found.happened.label[rows]
-        if k < len(found.happened.labels) and found.happened.labels[k][0]
-    ]
-    where = ", ".join(dict.fromkeys(f"{which} of '{block}'" for block, which in names))
+    when, labels = _events(made, compiled, found)
+    names = dict.fromkeys(labels[k][:2] for k in np.flatnonzero(when == time))
+    where = ", ".join(f"{which} of '{block}'" for block, which in names if block)
     return NoDerivative(time=time, where=where, why=why)
 
 
@@ -82,14 +83,30 @@ def _shortest(made: Differentiated, p: np.ndarray) -> float:
     return float(min(delays))
 
 
-def _resets_together(compiled: Compiled, found: Trajectory) -> float | None:
+def _events(
+    made: Differentiated, compiled: Compiled, found: Trajectory
+) -> tuple[np.ndarray, list[tuple[str, ...]]]:
+    """Return what has happened to the diagram itself: when, and block, which, direction."""
+    conditions = compiled.equations.conditions
+    labels, first = row_labels(compiled, conditions), compiled.program.switching + conditions.rows
+    own = 1 if made.sides.source.carried else 0
+    when, names = [], []
+    for time, k in zip(found.happened.time, found.happened.label // 2, strict=True):
+        row = k if k < first else k - own
+        if not first - own <= row < first and row < len(labels):
+            when.append(time)
+            names.append(labels[row])
+    return np.array(when), names
+
+
+def _resets_together(made: Differentiated, compiled: Compiled, found: Trajectory) -> float | None:
     """Return when two guards have first fallen at one instant."""
-    labels = found.happened.labels
-    guards = [k for k, each in enumerate(labels) if each[1].startswith("guard")]
-    rows = np.isin(found.happened.label, guards)
-    when, which = found.happened.time[rows], found.happened.label[rows]
-    same = (np.diff(when) == 0.0) & (np.diff(which) != 0)
-    return float(when[1:][same][0]) if same.any() else None
+    when, labels = _events(made, compiled, found)
+    rows = [k for k, each in enumerate(labels) if each[1].startswith("guard")]
+    for one, other in pairwise(rows):
+        if when[one] == when[other] and labels[one] != labels[other]:
+            return float(when[one])
+    return None
 
 
 def _at_start(made: Differentiated, given: tuple[np.ndarray, ...]) -> list[NoDerivative]:

@@ -28,6 +28,8 @@ from .source import Source, read
 
 __all__ = ["Differentiated", "differentiated", "parameters_with"]
 
+_LATE = 0.5  # of a step and the root of the relative tolerance: how far behind a turn one ends
+
 
 @dataclass(frozen=True, kw_only=True)
 class Differentiated:
@@ -53,7 +55,12 @@ class Differentiated:
 
 
 def parameters_with(
-    made: Extended, quantities: Sequence[Quantity], p: np.ndarray, scale: np.ndarray, settings: Any
+    made: Extended,
+    quantities: Sequence[Quantity],
+    p: np.ndarray,
+    scale: np.ndarray,
+    settings: Any,
+    span: float,
 ) -> np.ndarray:
     """Return all parameters of a program with derivatives.
 
@@ -66,8 +73,10 @@ def parameters_with(
     scale : ndarray
         By how much of each quantity is differentiated.
     settings : Settings
+    span : float
+        How long the run is (s).
     """
-    size = made.slot("atol").offset + 1
+    size, late = made.slot("late").offset + 1, _LATE * np.sqrt(settings.rtol) * span
     found = np.concatenate([p, np.zeros(size - p.size)])
     layout = made.layout
     for j, quantity in enumerate(quantities):
@@ -77,7 +86,8 @@ def parameters_with(
             found[own["delay"].offset] = p[original["delay"].offset]
             if quantity.place == original["before"].offset:
                 found[own["before"].offset] = scale[j]
-    for name, value in (("scale", scale), ("rtol", settings.rtol), ("atol", settings.atol)):
+    given = {"scale": scale, "rtol": settings.rtol, "atol": settings.atol, "late": late}
+    for name, value in given.items():
         slot = made.slot(name)
         found[slot.offset : slot.offset + slot.size] = value
     return found
@@ -109,22 +119,24 @@ def differentiated(
         If something has no derivative.
     """
     by, n = len(quantities), compiled.system.nstates or 0
-    wanted = [s.combination for s in signals if s.combination is not None]
-    made = extended(compiled, wanted, by)
-    whole = parameters_with(made, quantities, p, np.ones(by), settings)
+    combinations = [s.combination for s in signals if s.combination is not None]
+    made = extended(compiled, combinations, by)
+    whole = parameters_with(made, quantities, p, np.ones(by), settings, 1.0)
     source = read(compiled, made, whole)
     sides = sides_of(source, n * (1 + by))
     places = Places(states=n, by=by, branches=sides.rows)
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
+    kept = [s.state for s in signals if s.state in source.carried]
     maker = _Maker(
-        source=source, sides=sides, places=places, seeds=seeds,
+        source=source, sides=sides, places=places, seeds=seeds, wanted=kept,
         saltation=Saltation(source=source, sides=sides, places=places, seeds=seeds),
     )  # fmt: skip
-    schedule = with_derivatives(compiled, made, places.size, len(wanted) * (1 + by), by)
+    outputs = len(combinations) + len(kept)
+    schedule = with_derivatives(compiled, made, places.size, outputs * (1 + by), by)
     found = replace(compiled, schedule=schedule, program=maker.program(), original=None, apart=None)
     found.__dict__["equations"] = maker.equations()
     return Differentiated(
-        compiled=found, places=places, extended=made, sides=sides, outputs=len(wanted),
+        compiled=found, places=places, extended=made, sides=sides, outputs=outputs,
         saltation=maker.saltation,
     )  # fmt: skip
 
@@ -135,6 +147,8 @@ def _seed(source: Source, places: Places, j: int, quantity: Quantity) -> Directi
     scale = graph.leaf("p", made.slot("scale").offset + j, None)
 
     def of_states(start: int, step: int, size: int | None) -> Expr | None:
+        if start >= places.states:
+            return None
         where = ("x", places.derivative(j) + start, step)
         return graph.node("leaf", data=where, size=size, varies=True)
 
@@ -164,11 +178,7 @@ class _Maker:
     places: Places
     seeds: Sequence[Direction]
     saltation: Saltation
-
-    @property
-    def _watches(self) -> bool:
-        """Whether there is anything that may jump in the equations."""
-        return self.sides.rows > 0
+    wanted: Sequence[int]
 
     def program(self) -> Program:
         """Return the arrays of the program."""
@@ -178,15 +188,19 @@ class _Maker:
         jumping = list(before.jumping)
         for i, _, _ in before.jumping:
             jumping += [(i, n, places.kept), (i, places.grazing, places.size)]
-        if self._watches:
+        if self.sides.watches:
             jumping.append((owner, n, places.last))
-        carried = [m for m in before.memory if m not in source.switched]
+        turning, guards = list(self.saltation.at_turns()), list(before.guards)
+        if turning:
+            first = places.kept + self.sides.first_memory
+            jumping += [(owner + 1, m, m + 1) for m in turning]
+            jumping.append((owner + 1, first, first + len(before.memory)))
+            guards.insert(0, owner + 1)  # what else jumps then says more
         sampled = [places.derivative(j) + i for j in range(by) for i in before.sampled]
         made = replace(
             before,
             layout=source.extended.layout,
-            memory=(*before.memory, *(places.derivative(j) + m for j in range(by) for m in carried)),
-            guards=(*before.guards, *([owner] if self._watches else [])),
+            guards=(*guards, *([owner] if self.sides.watches else [])),
             jumping=tuple(jumping),
             sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
         )
@@ -202,7 +216,7 @@ class _Maker:
             "g": self._switching(),
             "y": self._outputs(),
         }
-        if found.results.get("reset") or self._watches:
+        if found.results.get("reset") or self.sides.watches or self.source.carried:
             results["reset"] = self._resets()
         for name in found.results:
             if name.startswith("sample"):
@@ -216,9 +230,7 @@ class _Maker:
     def _along(self, pieces: Sequence[Piece], j: int) -> list[Piece]:
         """Return the derivatives of pieces by a quantity."""
         graph = self.source.graph
-        made = along(
-            graph, [e for e, _ in pieces], self.seeds[j], self.source.found.fixed_points
-        )
+        made = along(graph, [e for e, _ in pieces], self.seeds[j], self.source.found.fixed_points)
         zero = graph.const(0.0)
         return [(zero if e is None else e, size) for e, (_, size) in zip(made, pieces, strict=True)]
 
@@ -238,27 +250,26 @@ class _Maker:
         return self._rows(0, [*pieces, (self.source.graph.const(0.0), rest)])
 
     def _outputs(self) -> list[tuple[int, Tracer]]:
-        pieces = self.source.found.pieces("y")
+        graph, pieces = self.source.graph, self.source.found.pieces("y")
         count = sum(size for _, size in pieces) - sum(size for _, size in self.source.arriving)
-        parts = [self._along(pieces, j) for j in range(self.places.by)]
-        split = [_divided(self.source.graph, part, count) for part in (pieces, *parts)]
-        return self._rows(0, [*(p for own, _ in split for p in own), *(p for _, s in split for p in s)])
+        own, arriving = _divided(graph, pieces, count)
+        own += [(self.source.carried[m], 1) for m in self.wanted]
+        parts = [(own, arriving)]
+        for j in range(self.places.by):
+            changes = [self._along(part, j) for part in (own, arriving)]
+            kept = [self.sides.kept([e for e, _ in part]) for part in changes]
+            parts.append(tuple([(e, 1) for e in part] for part in kept))
+        return self._rows(0, [p for k in (0, 1) for part in parts for p in part[k]])
 
     def _switching(self) -> list[tuple[int, Tracer]]:
-        source, graph = self.source, self.source.graph
+        source = self.source
         first = source.program.switching + source.found.conditions.rows
-        behind = first + len(source.guards)
-        found = [(row, array) for row, array in source.found.results["g"] if row < behind]
+        found = [(row, array) for row, array in source.found.results["g"] if row < first]
         found = [(row, array) for row, array in found if array.size]
-        if self._watches:
-            found += self._rows(behind, [(self.sides.margin, 1)])
-            behind += 1
-        committed = [(c, 1) for c in source.committed]
-        pairs = zip(source.program.memory, committed, strict=True)
-        carried = [c for m, c in pairs if m not in source.switched]
-        for j in range(self.places.by):
-            committed = [*committed, *self._along(carried, j)]
-        return [*found, *self._rows(behind, committed)]
+        rows = [self.sides.carried] if source.carried else []
+        rows += source.guards
+        rows += [self.sides.margin] if self.sides.watches else []
+        return [*found, *self._rows(first, [(e, 1) for e in (*rows, *source.committed)])]
 
     def _resets(self) -> list[tuple[int, Tracer]]:
         source = self.source
@@ -269,8 +280,12 @@ class _Maker:
             guards.setdefault(i, []).append(guard)
         for (i, begin, _), (_, array) in zip(source.program.jumping, own, strict=True):
             pieces += self.saltation.at_reset(begin, array.pieces(), guards[i])
-        if self._watches:
+        if self.sides.watches:
             pieces += self.saltation.at_conditions()
+        turned = self.saltation.at_turns()
+        if turned:
+            pieces += [(e, 1) for e in turned.values()]
+            pieces += self.sides.now[len(self.sides.sides) :]
         return self._rows(0, pieces)
 
     def _samples(self, name: str) -> list[tuple[int, Tracer]]:
@@ -294,5 +309,3 @@ def _divided(graph: Any, pieces: Sequence[Piece], count: int) -> tuple[list[Piec
     """Return the first rows of pieces, and the others."""
     single = [(graph.item(e, k), 1) for e, size in pieces for k in range(size)]
     return single[:count], single[count:]
-
-

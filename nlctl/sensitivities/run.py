@@ -72,7 +72,8 @@ def run(compiled: Compiled, asked: Asked) -> SensitivityResponse:
     p = compiled.parameter_vector(asked.params)
     made = _compiled(compiled, signals, quantities, p, asked.settings)
     scale = _scale(quantities, p, x0)
-    whole = parameters_with(made.extended, quantities, p, scale, asked.settings)
+    span = float(asked.times[-1] - asked.times[0])
+    whole = parameters_with(made.extended, quantities, p, scale, asked.settings, span)
     start = _start(made, quantities, asked, (u, x0, scale), whole)
     found = trajectory(made.compiled, asked.times, u, start, whole, asked.settings)
     _audit(compiled, found, p, asked)
@@ -184,9 +185,12 @@ def _response(
     (signals, quantities), places, count = names, made.places, made.outputs
     values = np.empty((len(signals), found.time.size))
     derivatives = np.empty((len(signals), len(quantities), found.time.size))
+    carried = made.sides.source.carried
+    rows = sorted(range(len(signals)), key=lambda i: signals[i].combination is None)
     row = 0
-    for i, signal in enumerate(signals):
-        is_state = signal.combination is None
+    for i in rows:
+        signal = signals[i]
+        is_state = signal.combination is None and signal.state not in carried
         source = found.states if is_state else found.outputs
         own = signal.state if is_state else row
         values[i] = source[own]
@@ -201,5 +205,3 @@ def _response(
         with_respect_to=tuple(q.name for q in quantities), values=values,
         derivatives=derivatives, scale=scale, missing=tuple(lacks), statistics=found.statistics,
     )  # fmt: skip
-
-

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..expressions.graph import Expr, Graph
-from .directions import Direction, Piece, Taken, along, taken
+from .directions import Direction, Piece, Taken, along, rows_replaced, taken
 from .places import Places
 from .sides import Sides
 from .source import Source
@@ -123,11 +123,12 @@ class Saltation:
             Its guards.
         """
         source, graph, places = self.source, self.source.graph, self.places
-        before = source.moving(source.flow, source.committed)
+        before = source.moving(source.flow, self.sides.kept(source.committed))
         rows: dict[int, Expr] = {}
         for expr, size in states:
-            rows |= {begin + len(rows) + k: graph.item(expr, k) for k in range(size)}
-        behind, later = self._after(rows, before), self._after(rows, source.arriving)
+            rows |= {begin + len(rows): graph.item(expr, k) for k in range(size)}
+        behind = self._after(rows, source.moving(source.flow, source.committed))
+        later = self._after(rows, source.arriving)
         sent = self._differ([(e, new) for (e, _), new in zip(source.arriving, later, strict=True)])
         when = self._when_fallen(guards)
         together = graph.op("lt", self.sides.margin, graph.const(0.0))
@@ -150,6 +151,15 @@ class Saltation:
         """
         return along(self.source.graph, [level], seed, self.source.found.fixed_points)
 
+    def at_turns(self) -> dict[int, Expr]:
+        """Return what derivatives of memories become where these turn, by their states."""
+        places, carried = self.places, self.source.carried
+        return {
+            places.derivative(j) + m: self._kept(j, m, turned=True)
+            for j in range(places.by)
+            for m in carried
+        }
+
     # -- states ----------------------------------------------------------------------------------
 
     def _states(self, j: int) -> list[Piece]:
@@ -158,7 +168,50 @@ class Saltation:
         for _, size in self.source.flow:
             found.append((graph.leaf("x", row, size if size > 1 else None), size))
             row += size
-        return found
+        return rows_replaced(graph, found, {m: self._kept(j, m) for m in self.source.carried})
+
+    def _kept(self, j: int, m: int, turned: bool = False) -> Expr:
+        """Return the derivative of a memory, which while it is carried along nobody keeps.
+
+        A step ends a little behind where it has turned.
+        """
+        graph, solutions = self.source.graph, self.source.found.fixed_points
+        kept = self.sides.memories[m]
+        become = self.source.carried[m]
+        (change,) = self.change(become, self.seeds[j])
+        found = graph.const(0.0) if change is None else change
+        if turned and change is not None:
+            late, flowing = self._late(become), list(self.source.flow)
+            for i in range(self.places.by):
+                rates = along(graph, [e for e, _ in self.source.flow], self.seeds[i], solutions)
+                zero = graph.const(0.0)
+                sizes = (size for _, size in self.source.flow)
+                flowing += [(e or zero, size) for e, size in zip(rates, sizes, strict=True)]
+            forward = self.source.time(flowing, known=False)
+            (rate,) = along(graph, [change], forward, solutions)
+            if rate is not None:
+                found = graph.op("sub", found, graph.op("mul", late, rate))
+        (found,) = self.sides.kept([found])
+        moved = graph.op("ne", graph.leaf("x", m, None), kept)
+        own = graph.leaf("x", self.places.derivative(j) + m, None)
+        return graph.op("select", moved, found, own)
+
+    def _late(self, become: Expr) -> Expr:
+        """Return how long ago what carries a memory along has turned, 0 at a break.
+
+        Where it turns is located by a difference of rates: a little too early or too late.
+        """
+        graph, source = self.source.graph, self.source
+        solutions, zero = source.found.fixed_points, graph.const(0.0)
+        forward = source.time(source.flow, known=False)
+        (rate,) = along(graph, [become], forward, solutions)
+        (bend,) = along(graph, [rate or zero], forward, solutions)
+        if bend is None:
+            return zero
+        late = graph.op("div", rate or zero, bend)
+        longest = graph.leaf("p", source.extended.slot("late").offset, None)
+        recent = graph.op("le", graph.op("absolute", late), longest)
+        return graph.op("select", recent, late, zero)
 
     def _jumped(
         self,

@@ -37,7 +37,7 @@ class Extended:
     layout : mapping
         Places of all parameters, behind those of the diagram.
     owner : int
-        The block that conditions belong to.
+        The block that conditions belong to; memories that turn belong to the next.
     lines : int
         Number of delayed signals.
     """
@@ -86,7 +86,7 @@ def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
         path="derivatives", system=ct.ss([], [], [], []), state_offset=read.system.nstates or 0,
         inputs=(), direct=np.zeros((0, 0), dtype=bool),
     )  # fmt: skip
-    nodes = (*read.nodes, *delays, nothing)
+    nodes = (*read.nodes, *delays, nothing, nothing)
     given = {f.name: getattr(read, f.name) for f in fields(Schedule)}
     given |= {
         "system": stand_in(read.system, read.system.nstates or 0, len(outputs)),
@@ -99,7 +99,7 @@ def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
     }
     return Extended(
         schedule=ScheduleWithRates(**given), layout=_layout(compiled, len(delays), by),
-        owner=len(nodes) - 1, lines=len(read.lines),
+        owner=len(nodes) - 2, lines=len(read.lines),
     )  # fmt: skip
 
 
@@ -128,9 +128,11 @@ def _layout(compiled: Compiled, delays: int, by: int) -> dict[int, dict[str, Slo
         "scale": Slot(name="scale", offset=at, shape=(by,), kind="f"),
         "rtol": Slot(name="rtol", offset=at + by, shape=(), kind="f"),
         "atol": Slot(name="atol", offset=at + by + 1, shape=(), kind="f"),
+        "late": Slot(name="late", offset=at + by + 2, shape=(), kind="f"),
     }
+    found[own + delays + 1] = {}
     for k in range(len(compiled.schedule.samplings)):
-        found[own + delays + 1 + k] = dict(before[own + k])
+        found[own + delays + 2 + k] = dict(before[own + k])
     return found
 
 

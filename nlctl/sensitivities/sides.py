@@ -51,7 +51,8 @@ class Sides:
     source : Source
     sides : tuple of Side
     memories : mapping
-        Of states of memories that jump, what is kept of them.
+        Of states of memories, what is kept of them: far away while they are carried along, and
+        where they stand otherwise.
     before : mapping
         What stands, on the sides that are kept, for parts of the equations.
     """
@@ -84,6 +85,29 @@ class Sides:
         instead = self.source.leaves(exprs, self.memories)
         return replaced_parts(self.source.graph, exprs, {**instead, **self.before})
 
+    def kept(self, exprs: Sequence[Expr]) -> list[Expr]:
+        """Return expressions with the memories that are kept."""
+        return self.source.with_states(exprs, self.memories)
+
+    @property
+    def watches(self) -> bool:
+        """Whether there is anything that may jump in the equations."""
+        return bool(self.sides or self.source.switched)
+
+    @property
+    def first_memory(self) -> int:
+        """Where, behind all sides, what is kept of memories begins."""
+        return sum(side.rows for side in self.sides)
+
+    @property
+    def carried(self) -> Expr:
+        """What is at least 0 as long as every memory that is carried along is where it was."""
+        graph, same = self.source.graph, self.source.graph.const(True)
+        for m, kept in self.memories.items():
+            if m not in self.source.switched:
+                same = graph.op("and", same, graph.op("eq", graph.leaf("x", m, None), kept))
+        return graph.op("select", same, graph.const(1.0), graph.const(-1.0))
+
     @property
     def margin(self) -> Expr:
         """What is at least 0 as long as nothing has left the side that is kept."""
@@ -97,8 +121,8 @@ class Sides:
                     found.append(graph.op("select", same, one, behind))
                 else:
                     found.append(graph.item(side.here.margin, k))
-        for m, kept in self.memories.items():
-            same = graph.op("eq", graph.leaf("x", m, None), kept)
+        for m in self.source.switched:
+            same = graph.op("eq", graph.leaf("x", m, None), self.memories[m])
             found.append(graph.op("select", same, one, behind))
         return reduce(lambda a, b: graph.op("minimum", a, b), found, one)
 
@@ -117,7 +141,7 @@ def sides_of(source: Source, first: int) -> Sides:
     wanted += [(None, "ge", (expr, graph.const(0.0))) for expr in _of_memories(source)]
     sizes = [next((a.size for a in args if a.size), None) for _, _, args in wanted]
     behind = first + sum(size or 1 for size in sizes)
-    memories = {m: graph.leaf("x", behind + k, None) for k, m in enumerate(sorted(source.switched))}
+    memories = {m: graph.leaf("x", behind + k, None) for k, m in enumerate(source.program.memory)}
     before: dict[Expr, Expr] = {}
     found, timed = [], _timed([e for _, _, args in wanted for e in args])
     for (node, op, args), size in zip(wanted, sizes, strict=True):

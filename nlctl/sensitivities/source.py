@@ -63,6 +63,12 @@ class Source:
         """Where the expressions are kept."""
         return self.found.graph
 
+    @property
+    def carried(self) -> dict[int, Expr]:
+        """What memories would become that are carried along, by their states."""
+        pairs = zip(self.program.memory, self.committed, strict=True)
+        return {m: expr for m, expr in pairs if m not in self.switched}
+
     @cached_property
     def flow(self) -> list[Piece]:
         """The derivatives of the states; memories stand still."""
@@ -90,9 +96,8 @@ class Source:
                 "an algebraic loop has jumps in it: derivatives of a run do not know its signals "
                 "on both sides; put a lag into the loop"
             )
-        carried = [c for m, c in zip(self.program.memory, self.committed, strict=True)
-                   if m not in self.switched]  # fmt: skip
-        return jumping([*(e for e, _ in self.flow), *(e for e, _ in self.arriving), *carried])
+        flowing = [e for e, _ in (*self.flow, *self.arriving)]
+        return jumping([*flowing, *self.carried.values()])
 
     def time(
         self, pieces: Sequence[Piece], time: Expr | None = None, known: bool = True
