@@ -79,9 +79,12 @@ def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch
     if op in _QUOTIENTS:
         over, under = numbers
         z, rounding = graph.op("div", over, under), _QUOTIENTS[op]
-        value = graph.op("sub", over, graph.op("mul", kept, under))
-        margin = _within(graph, rounding, z, kept)
-        return _made(graph, graph.op(rounding, z), z, [z], margin, value)
+        rest = graph.op(op, over, under)
+        whole = graph.op("sub", over, rest)
+        now = graph.op("rint", graph.op("div", whole, under))  # as many as the operation takes off
+        other = graph.op("sub", over, graph.op("mul", kept, under))
+        value = graph.op("select", graph.op("eq", kept, now), rest, other)  # to the last digit
+        return _made(graph, now, z, [z], _within(graph, rounding, z, kept), value)
     return _of_sign(graph, op, numbers, kept)
 
 
