@@ -128,6 +128,5 @@ def _at_start(made: Differentiated, given: tuple[np.ndarray, ...]) -> list[NoDer
     for level in met:
         moves = [e or zero for seed in seeds for e in made.saltation.change(level, seed)]
         if any(np.any(v != 0.0) for v in evaluate_expressions(moves, arrays, searches)):
-            after = float(np.nextafter(times[0], np.inf))
-            return [NoDerivative(time=after, where="", why=_START)]
+            return [NoDerivative(time=float(times[0]), where="", why=_START)]
     return []

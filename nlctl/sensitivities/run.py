@@ -80,7 +80,7 @@ def run(compiled: Compiled, asked: Asked) -> SensitivityResponse:
     if found.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _raise_own(compiled, asked)
     lacks = missing(made, compiled, found, (asked.times, start, whole, u))
-    return _response(made, (signals, quantities), found, scale, lacks)
+    return _response(made, (signals, quantities), (asked.times, found), scale, lacks)
 
 
 def _compiled(
@@ -177,12 +177,13 @@ def _raise_own(compiled: Compiled, asked: Asked) -> None:
 def _response(
     made: Differentiated,
     names: tuple[Sequence[Signal], Sequence[Quantity]],
-    found: Trajectory,
+    run_of: tuple[np.ndarray, Trajectory],
     scale: np.ndarray,
     lacks: Any,
 ) -> SensitivityResponse:
     """Return the signals and their derivatives out of a trajectory."""
     (signals, quantities), places, count = names, made.places, made.outputs
+    times, found = run_of
     values = np.empty((len(signals), found.time.size))
     derivatives = np.empty((len(signals), len(quantities), found.time.size))
     carried = made.sides.source.carried
@@ -199,9 +200,13 @@ def _response(
             derivatives[i, j] = source[place] / scale[j]
         row += not is_state
     for each in lacks:
-        derivatives[:, :, found.time >= each.time] = np.nan
+        behind = found.time > each.time if each.time == times[0] else found.time >= each.time
+        derivatives[:, :, behind] = np.nan
+    rest = ((0, 0), (0, times.size - found.time.size))
+    values = np.pad(values, rest, constant_values=np.nan)
+    derivatives = np.pad(derivatives, ((0, 0), *rest), constant_values=np.nan)
     return SensitivityResponse(
-        time=found.time, signals=tuple(s.name for s in signals),
+        time=times, signals=tuple(s.name for s in signals),
         with_respect_to=tuple(q.name for q in quantities), values=values,
         derivatives=derivatives, scale=scale, missing=tuple(lacks), statistics=found.statistics,
     )  # fmt: skip
