@@ -333,25 +333,31 @@ class Saltation:
         return rate, Cause(met=met, moves=moves, grazes=grazes)
 
     def _of_causes(self, causes: Sequence[Cause]) -> When:
-        """Return how the time moves, by the first condition that was met."""
+        """Return how the time moves, by the first condition that was met at a rate.
+
+        What is left of a state at rest, such as a velocity that sticks, may change its sign where
+        something else sets it in motion.  That is met at no rate, and says nothing.
+        """
         graph = self.source.graph
         no, zero = graph.const(False), graph.const(0.0)
-        moves = [zero] * self.places.by
+        moves, grazes, moving = [zero] * self.places.by, no, no
         for cause in reversed(causes):
+            met = graph.op("and", cause.met, graph.op("not", cause.grazes))
             pairs = zip(cause.moves, moves, strict=True)
-            moves = [graph.op("select", cause.met, a, b) for a, b in pairs]
-        grazes = apart = happens = no
-        for cause in causes:
+            moves = [graph.op("select", met, a, b) for a, b in pairs]
+            moving = graph.op("or", moving, met)
             grazes = graph.op("or", grazes, graph.op("and", cause.met, cause.grazes))
+        grazes = graph.op("and", grazes, graph.op("not", moving))
+        apart = happens = no
+        for cause in causes:
+            met = graph.op("and", cause.met, graph.op("not", cause.grazes))
             for a, b in zip(cause.moves, moves, strict=True):
                 gap = graph.op("absolute", graph.op("sub", a, b))
                 size = graph.op("add", graph.op("absolute", a), graph.op("absolute", b))
                 differs = graph.op("gt", gap, graph.op("mul", graph.const(_AGREE), size))
-                apart = graph.op("or", apart, graph.op("and", cause.met, differs))
-        moves = [graph.op("select", grazes, zero, move) for move in moves]
+                apart = graph.op("or", apart, graph.op("and", met, differs))
         for move in moves:
             happens = graph.op("or", happens, graph.op("ne", move, zero))
-        apart = graph.op("and", apart, graph.op("not", grazes))
         return When(moves=moves, grazes=grazes, apart=apart, happens=happens)
 
 
