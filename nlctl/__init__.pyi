@@ -114,7 +114,6 @@ from .sensitivities import NoDerivative, SensitivityResponse, sensitivity_respon
 from .sliding import IdealRelay
 
 __all__ = [
-    "NoDerivative",
     "PID",
     "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
@@ -174,6 +173,7 @@ __all__ = [
     "ModelError",
     "ModelReferenceLaw",
     "MonotoneNussbaumLaw",
+    "NoDerivative",
     "NussbaumLaw",
     "OneSidedDeadZones",
     "ParameterError",

@@ -59,9 +59,14 @@ class Extended:
 def stand_in(system: Any, states: int, outputs: int) -> Any:
     """Return a system that says how many states and outputs a program has."""
     return ct.NonlinearIOSystem(
-        _nothing, _nothing, name=system.name, states=states, inputs=system.ninputs or 0, outputs=outputs,
+        _nothing,
+        _nothing,
+        name=system.name,
+        states=states,
+        inputs=system.ninputs or 0,
+        outputs=outputs,
         dt=system.dt,
-    )  # fmt: skip
+    )
 
 
 def _nothing(t: float, x: Any, u: Any, params: Any) -> Any:

@@ -24,7 +24,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.paper"],
     ["nlctl.expressions"],
     ["nlctl.native"],
-    ["nlctl.response", "nlctl.__main__"],
+    ["nlctl.response", "nlctl.sensitivities", "nlctl.__main__"],
     ["analysis.json_values", "analysis.catalogue", "analysis.metrics", "analysis.intervals"]
     + ["analysis.loop_record", "analysis.response_of_loop", "analysis.recheck"],
     ["analysis.lyapunov", "analysis.robustness"],

@@ -119,9 +119,7 @@ def test_comparator_of_a_state():
 @pytest.mark.parametrize("rounding", [np.floor, np.ceil, np.rint, np.trunc])
 def test_steps(rounding):
     """x' = 1 + a round(x / q): straight pieces, one behind the other."""
-    plant = block(
-        lambda t, x, u, p: [1 + p["a"] * rounding(x[0] / p["q"])], {"a": 0.5, "q": 0.3}
-    )
+    plant = block(lambda t, x, u, p: [1 + p["a"] * rounding(x[0] / p["q"])], {"a": 0.5, "q": 0.3})
     check(plant, [0, 0.45, 1], ["x"], {"plant.a": 0.5, "plant.q": 0.3})
 
 
@@ -132,7 +130,9 @@ def test_steps(rounding):
         lambda t, x, u, p: [1.0 + np.heaviside(x[0] - p["a"], 0.5)],
         lambda t, x, u, p: [1.0 + p["a"] * (x[0] % 0.3)],
         lambda t, x, u, p: [1.5 + np.copysign(p["a"], np.sin(9 * x[0] + p["a"]))],
-        lambda t, x, u, p: [1.5 + 0.3 * np.arctan2(np.sin(6 * x[0] + 1), np.cos(6 * x[0] + p["a"]))],
+        lambda t, x, u, p: [
+            1.5 + 0.3 * np.arctan2(np.sin(6 * x[0] + 1), np.cos(6 * x[0] + p["a"]))
+        ],
         lambda t, x, u, p: [1.0 + np.abs(np.sin(7 * x[0]) - p["a"]) + np.maximum(x[0], p["a"])],
         lambda t, x, u, p: [1.0 + np.where((x[0] > p["a"]) & (x[0] < 2 * p["a"]), 2.0, x[0])],
     ],
