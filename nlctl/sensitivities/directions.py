@@ -9,9 +9,9 @@ from ..errors import CompileError
 from ..expressions.derivatives import tangents
 from ..expressions.graph import Expr, Graph, Untraceable, needed
 
-__all__ = ["Direction", "along", "from_time", "one_sided", "rows_replaced", "taken"]
+__all__ = ["Direction", "from_time", "one_sided", "rows_replaced", "slopes", "taken"]
 
-Piece = tuple[Expr, int]  # some rows: one expression, and how many
+SomeRows = tuple[Expr, int]  # some rows: one expression, and how many
 Taken = Callable[[int, int, int | None], Expr | None]  # rows from, step, number
 
 
@@ -36,7 +36,7 @@ class Direction:
         return self.of[array](start, step, leaf.size)
 
 
-def along(
+def slopes(
     graph: Graph,
     exprs: Sequence[Expr],
     direction: Direction,
@@ -55,7 +55,7 @@ def along(
         raise CompileError(f"the equations have no derivatives: {error}") from None
 
 
-def taken(graph: Graph, pieces: Sequence[Piece]) -> Taken:
+def taken(graph: Graph, pieces: Sequence[SomeRows]) -> Taken:
     """Return what gives some of the rows that expressions make up, and stands still behind them."""
     whole, rows = graph.joined(list(pieces)) if pieces else None, sum(size for _, size in pieces)
 
@@ -79,7 +79,7 @@ def from_time(graph: Graph, time: Expr | None, inputs: int, first: int, lines: r
     first : int
         Place, among the program's inputs, from which on their rates follow.
     lines : range
-        Places of delayed signals, whose rates nobody keeps.
+        StatePlaces of delayed signals, whose rates nobody keeps.
     """
 
     def of_time(*_: object) -> Expr:
@@ -101,10 +101,10 @@ def from_time(graph: Graph, time: Expr | None, inputs: int, first: int, lines: r
 
 
 def rows_replaced(
-    graph: Graph, pieces: Sequence[Piece], instead: Mapping[int, Expr]
-) -> list[Piece]:
+    graph: Graph, pieces: Sequence[SomeRows], instead: Mapping[int, Expr]
+) -> list[SomeRows]:
     """Return pieces with other numbers in some of their rows."""
-    found: list[Piece] = []
+    found: list[SomeRows] = []
     row = 0
     for expr, size in pieces:
         inside = sorted(k - row for k in instead if row <= k < row + size)
@@ -120,7 +120,7 @@ def rows_replaced(
     return found
 
 
-def _part(graph: Graph, expr: Expr, start: int, size: int) -> Piece:
+def _part(graph: Graph, expr: Expr, start: int, size: int) -> SomeRows:
     if expr.size is None:
         return expr, size
     return (graph.item(expr, start) if size == 1 else graph.part(expr, start, 1, size)), size
@@ -148,8 +148,9 @@ def _leading(graph: Graph, op: str, args: Sequence[Expr], direction: Direction) 
     pair = list(map(graph.number, args))
     if op == "absolute":
         pair.append(graph.op("neg", pair[0]))
-    slopes = [graph.const(0.0) if s is None else s for s in along(graph, pair, direction, {})]
+    made = slopes(graph, pair, direction, {})
+    rates = [graph.const(0.0) if rate is None else rate for rate in made]
     order = "lt" if op == "minimum" else "gt"
-    ahead = graph.op("and", graph.op("eq", *pair), graph.op(order, *slopes))
+    ahead = graph.op("and", graph.op("eq", *pair), graph.op(order, *rates))
     first = graph.op("or", graph.op(order, *pair), ahead)
     return graph.op("select", first, *pair)

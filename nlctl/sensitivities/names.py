@@ -14,13 +14,13 @@ from ..native import Compiled
 from ..native.diagram.schedule import Signal as Output
 from ..native.jacobians import check_enters_alone, float_parameters
 
-__all__ = ["Quantity", "Signal", "quantities_of", "signals_of"]
+__all__ = ["Observed", "VariedQuantity", "observed_signals", "varied_quantities"]
 
 _AT_START = "(0)"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Signal:
+class Observed:
     """What is differentiated: a combination of outputs of blocks, or a state."""
 
     name: str
@@ -29,7 +29,7 @@ class Signal:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quantity:
+class VariedQuantity:
     """By what is differentiated: a parameter by its place, or the initial value of a state."""
 
     name: str
@@ -37,7 +37,7 @@ class Quantity:
     state: int = -1
 
 
-def signals_of(compiled: Compiled, names: Sequence[str] | str | None) -> list[Signal]:
+def observed_signals(compiled: Compiled, names: Sequence[str] | str | None) -> list[Observed]:
     """Return signals by their names; None for the outputs of the diagram.
 
     Parameters
@@ -56,24 +56,24 @@ def signals_of(compiled: Compiled, names: Sequence[str] | str | None) -> list[Si
     system, read = compiled.system, compiled.schedule
     own: list[str] = list(system.output_labels or [])
     known = {
-        f"{node.path}.{label}": Signal(name="", combination={Output(i, k): 1.0})
+        f"{node.path}.{label}": Observed(name="", combination={Output(i, k): 1.0})
         for i, node in enumerate(read.nodes)
         for k, label in enumerate(node.system.output_labels or [])
     }
-    known |= {name: Signal(name="", state=i) for i, name in enumerate(state_names(system))}
+    known |= {name: Observed(name="", state=i) for i, name in enumerate(state_names(system))}
     known |= {
-        name: Signal(name="", combination=combination)
+        name: Observed(name="", combination=combination)
         for name, combination in zip(own, read.outputs, strict=False)
     }
     wanted = _checked("of", own if names is None else names)
     full = [name if name in known else find_name("signal", name, known) for name in wanted]
     return [
-        Signal(name=name, combination=known[k].combination, state=known[k].state)
+        Observed(name=name, combination=known[k].combination, state=known[k].state)
         for name, k in zip(wanted, full, strict=True)
     ]
 
 
-def quantities_of(compiled: Compiled, names: Sequence[str] | str) -> list[Quantity]:
+def varied_quantities(compiled: Compiled, names: Sequence[str] | str) -> list[VariedQuantity]:
     """Return parameters and initial states by their names.
 
     Parameters
@@ -97,7 +97,7 @@ def quantities_of(compiled: Compiled, names: Sequence[str] | str) -> list[Quanti
     for name in _checked("with_respect_to", names):
         if name.endswith(_AT_START):
             state = find_name("state", name.removesuffix(_AT_START), states)
-            found.append(Quantity(name=name, state=states[state]))
+            found.append(VariedQuantity(name=name, state=states[state]))
             continue
         if name not in parameters and name in states:
             raise unknown("parameter", name, [*parameters, f"{name}{_AT_START}"])
@@ -105,7 +105,7 @@ def quantities_of(compiled: Compiled, names: Sequence[str] | str) -> list[Quanti
         place, owner = parameters[full]
         _check_moves(compiled, owner, full)
         check_enters_alone(owner, full)
-        found.append(Quantity(name=name, place=place))
+        found.append(VariedQuantity(name=name, place=place))
     return found
 
 

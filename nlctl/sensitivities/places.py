@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["Places"]
+__all__ = ["StatePlaces"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Places:
+class StatePlaces:
     """States of a program with derivatives, one group behind the other.
 
     Attributes

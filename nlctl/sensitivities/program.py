@@ -18,15 +18,15 @@ from ..expressions.graph import Expr
 from ..native import Compiled
 from ..native.codegen.program import Program
 from ..native.equations.blocks import Equations
-from .directions import Direction, Piece, along
-from .names import Quantity, Signal
-from .places import Places
+from .directions import Direction, SomeRows
+from .names import Observed, VariedQuantity
+from .places import StatePlaces
 from .saltation import Saltation
 from .schedule import Extended, extended, with_derivatives
-from .sides import Sides, sides_of
-from .source import Source, read
+from .sides import KeptSides, sides_of
+from .source import EquationParts, equation_parts
 
-__all__ = ["Differentiated", "differentiated", "parameters_with"]
+__all__ = ["Differentiated", "parameters_with", "with_its_derivatives"]
 
 _LATE = 0.5  # of a step and the root of the relative tolerance: how far behind a turn one ends
 
@@ -38,25 +38,25 @@ class Differentiated:
     Attributes
     ----------
     compiled : Compiled
-    places : Places
+    places : StatePlaces
     extended : Extended
-    sides : Sides
+    sides : KeptSides
     outputs : int
         Number of the signals that are outputs.
     saltation : Saltation
     """
 
     compiled: Compiled
-    places: Places
+    places: StatePlaces
     extended: Extended
-    sides: Sides
+    sides: KeptSides
     outputs: int
     saltation: Saltation
 
 
 def parameters_with(
     made: Extended,
-    quantities: Sequence[Quantity],
+    quantities: Sequence[VariedQuantity],
     p: np.ndarray,
     scale: np.ndarray,
     settings: Any,
@@ -67,11 +67,11 @@ def parameters_with(
     Parameters
     ----------
     made : Extended
-    quantities : sequence of Quantity
+    quantities : sequence of VariedQuantity
     p : ndarray
         Those of the diagram.
     scale : ndarray
-        By how much of each quantity is differentiated.
+        By how much of each quantity is with_its_derivatives.
     settings : Settings
     span : float
         How long the run is (s).
@@ -93,10 +93,10 @@ def parameters_with(
     return found
 
 
-def differentiated(
+def with_its_derivatives(
     compiled: Compiled,
-    signals: Sequence[Signal],
-    quantities: Sequence[Quantity],
+    signals: Sequence[Observed],
+    quantities: Sequence[VariedQuantity],
     p: np.ndarray,
     settings: Any,
 ) -> Differentiated:
@@ -105,10 +105,10 @@ def differentiated(
     Parameters
     ----------
     compiled : Compiled
-    signals : sequence of Signal
+    signals : sequence of Observed
         What is wanted.
-    quantities : sequence of Quantity
-        By what is differentiated.
+    quantities : sequence of VariedQuantity
+        By what is with_its_derivatives.
     p : ndarray
         Parameters, whose integers may steer equations.
     settings : Settings
@@ -122,9 +122,9 @@ def differentiated(
     combinations = [s.combination for s in signals if s.combination is not None]
     made = extended(compiled, combinations, by)
     whole = parameters_with(made, quantities, p, np.ones(by), settings, 1.0)
-    source = read(compiled, made, whole)
+    source = equation_parts(compiled, made, whole)
     sides = sides_of(source, n * (1 + by))
-    places = Places(states=n, by=by, branches=sides.rows)
+    places = StatePlaces(states=n, by=by, branches=sides.rows)
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
     kept = [s.state for s in signals if s.state in source.carried]
     maker = _Maker(
@@ -141,7 +141,9 @@ def differentiated(
     )  # fmt: skip
 
 
-def _seed(source: Source, places: Places, j: int, quantity: Quantity) -> Direction:
+def _seed(
+    source: EquationParts, places: StatePlaces, j: int, quantity: VariedQuantity
+) -> Direction:
     """Return the direction in which everything goes by a quantity."""
     graph, made = source.graph, source.extended
     scale = graph.leaf("p", made.slot("scale").offset + j, None)
@@ -173,9 +175,9 @@ def _seed(source: Source, places: Places, j: int, quantity: Quantity) -> Directi
 class _Maker:
     """Makes the program of derivatives from a source."""
 
-    source: Source
-    sides: Sides
-    places: Places
+    source: EquationParts
+    sides: KeptSides
+    places: StatePlaces
     seeds: Sequence[Direction]
     saltation: Saltation
     wanted: Sequence[int]
@@ -227,14 +229,14 @@ class _Maker:
 
     # -- results ---------------------------------------------------------------------------------
 
-    def _along(self, pieces: Sequence[Piece], j: int) -> list[Piece]:
+    def _along(self, pieces: Sequence[SomeRows], j: int) -> list[SomeRows]:
         """Return the derivatives of pieces by a quantity."""
         graph = self.source.graph
-        made = along(graph, [e for e, _ in pieces], self.seeds[j], self.source.found.fixed_points)
+        made = self.source.slopes([e for e, _ in pieces], self.seeds[j])
         zero = graph.const(0.0)
         return [(zero if e is None else e, size) for e, (_, size) in zip(made, pieces, strict=True)]
 
-    def _rows(self, first: int, pieces: Sequence[Piece]) -> list[tuple[int, Tracer]]:
+    def _rows(self, first: int, pieces: Sequence[SomeRows]) -> list[tuple[int, Tracer]]:
         """Return pieces as arrays with their rows."""
         found = []
         for expr, size in pieces:
@@ -305,7 +307,9 @@ def _array(graph: Any, expr: Expr, size: int) -> Tracer:
     return Tracer(graph, as_array(expr), 0, size)
 
 
-def _divided(graph: Any, pieces: Sequence[Piece], count: int) -> tuple[list[Piece], list[Piece]]:
+def _divided(
+    graph: Any, pieces: Sequence[SomeRows], count: int
+) -> tuple[list[SomeRows], list[SomeRows]]:
     """Return the first rows of pieces, and the others."""
     single = [(graph.item(e, k), 1) for e, size in pieces for k in range(size)]
     return single[:count], single[count:]

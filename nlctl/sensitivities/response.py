@@ -13,7 +13,7 @@ from ..native.thirdparty.checks import sized
 from ..params import checked_times
 from ..responses.arguments import checked_params
 from .record import SensitivityResponse
-from .run import Asked, run
+from .run import RunWithDerivatives, differentiated_run
 
 __all__ = ["sensitivity_response"]
 
@@ -121,10 +121,10 @@ def sensitivity_response(
         method=method, solve_ivp_method=None, solve_ivp_kwargs=None, rtol=rtol, atol=atol,
         max_steps=max_steps, max_step=max_step,
     )  # fmt: skip
-    asked = Asked(
+    asked = RunWithDerivatives(
         times=checked_times(timepts), inputs=inputs, initial_state=initial_state, params=params,
         of=of, with_respect_to=with_respect_to, settings=settings, audit=audit,
     )  # fmt: skip
     if not isinstance(diagram, Compiled):
         diagram = compile(sized(diagram, inputs, initial_state), params=params)
-    return run(diagram, asked)
+    return differentiated_run(diagram, asked)

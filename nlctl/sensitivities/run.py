@@ -22,15 +22,15 @@ from ..native.jacobians import inexact, searches_of
 from ..native.response import respond
 from ..responses.arguments import input_array, state_array
 from .missing import missing
-from .names import Quantity, Signal, quantities_of, signals_of
-from .program import Differentiated, differentiated, parameters_with
+from .names import Observed, VariedQuantity, observed_signals, varied_quantities
+from .program import Differentiated, parameters_with, with_its_derivatives
 from .record import SensitivityResponse
 
-__all__ = ["Asked", "run"]
+__all__ = ["RunWithDerivatives", "differentiated_run"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class RunWithDerivatives:
     """What a run with derivatives is asked.
 
     Attributes
@@ -52,21 +52,21 @@ class Asked:
     audit: Any
 
 
-def run(compiled: Compiled, asked: Asked) -> SensitivityResponse:
+def differentiated_run(compiled: Compiled, asked: RunWithDerivatives) -> SensitivityResponse:
     """Integrate a diagram with its derivatives.
 
     Parameters
     ----------
     compiled : Compiled
-    asked : Asked
+    asked : RunWithDerivatives
     """
     if not ct.isctime(compiled.system):
         raise CompileError(
             f"'{compiled.system.name}' is in discrete time: derivatives of runs are for diagrams "
             "in continuous time; nlctl.sampled has blocks with a clock in these"
         )
-    signals = signals_of(compiled, asked.of)
-    quantities = quantities_of(compiled, asked.with_respect_to)
+    signals = observed_signals(compiled, asked.of)
+    quantities = varied_quantities(compiled, asked.with_respect_to)
     u = input_array(compiled.system, asked.inputs, asked.times)
     x0 = state_array(compiled.system, asked.initial_state)
     p = compiled.parameter_vector(asked.params)
@@ -85,8 +85,8 @@ def run(compiled: Compiled, asked: Asked) -> SensitivityResponse:
 
 def _compiled(
     compiled: Compiled,
-    signals: Sequence[Signal],
-    quantities: Sequence[Quantity],
+    signals: Sequence[Observed],
+    quantities: Sequence[VariedQuantity],
     p: np.ndarray,
     settings: Settings,
 ) -> Differentiated:
@@ -103,11 +103,11 @@ def _compiled(
                 InexactWarning,
                 stacklevel=4,
             )
-        known[key] = differentiated(compiled, signals, quantities, p, settings)
+        known[key] = with_its_derivatives(compiled, signals, quantities, p, settings)
     return known[key]
 
 
-def _scale(quantities: Sequence[Quantity], p: np.ndarray, x0: np.ndarray) -> np.ndarray:
+def _scale(quantities: Sequence[VariedQuantity], p: np.ndarray, x0: np.ndarray) -> np.ndarray:
     """Return of what size each quantity is: that of its value, 1 for 0."""
     values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
     return np.array([abs(v) or 1.0 for v in values])
@@ -115,8 +115,8 @@ def _scale(quantities: Sequence[Quantity], p: np.ndarray, x0: np.ndarray) -> np.
 
 def _start(
     made: Differentiated,
-    quantities: Sequence[Quantity],
-    asked: Asked,
+    quantities: Sequence[VariedQuantity],
+    asked: RunWithDerivatives,
     given: tuple[np.ndarray, np.ndarray, np.ndarray],
     p: np.ndarray,
 ) -> np.ndarray:
@@ -135,7 +135,7 @@ def _start(
 
 
 def _sides_at(
-    made: Differentiated, asked: Asked, u: np.ndarray, start: np.ndarray, p: np.ndarray
+    made: Differentiated, asked: RunWithDerivatives, u: np.ndarray, start: np.ndarray, p: np.ndarray
 ) -> np.ndarray:
     """Return the sides on which a run begins, behind all that happens at once."""
     compiled, varied = made.compiled, variations(made.compiled, asked.times)
@@ -152,7 +152,7 @@ def _sides_at(
     return np.concatenate(parts)
 
 
-def _audit(compiled: Compiled, found: Trajectory, p: np.ndarray, asked: Asked) -> None:
+def _audit(compiled: Compiled, found: Trajectory, p: np.ndarray, asked: RunWithDerivatives) -> None:
     """Compare the equations with python-control's at points of the run, as any run is."""
     count, rates = compiled.system.ninputs or 0, compiled.schedule.rates
     own = count + len(compiled.schedule.lines)
@@ -166,7 +166,7 @@ def _audit(compiled: Compiled, found: Trajectory, p: np.ndarray, asked: Asked) -
     audit(compiled, trial, asked.audit)
 
 
-def _raise_own(compiled: Compiled, asked: Asked) -> None:
+def _raise_own(compiled: Compiled, asked: RunWithDerivatives) -> None:
     """Raise the error of a run that does not reach its end, with its own words."""
     respond(
         compiled, asked.times, asked.inputs, asked.initial_state, settings=asked.settings,
@@ -176,7 +176,7 @@ def _raise_own(compiled: Compiled, asked: Asked) -> None:
 
 def _response(
     made: Differentiated,
-    names: tuple[Sequence[Signal], Sequence[Quantity]],
+    names: tuple[Sequence[Observed], Sequence[VariedQuantity]],
     run_of: tuple[np.ndarray, Trajectory],
     scale: np.ndarray,
     lacks: Any,

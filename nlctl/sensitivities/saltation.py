@@ -17,10 +17,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..expressions.graph import Expr, Graph
-from .directions import Direction, Piece, Taken, along, rows_replaced, taken
-from .places import Places
-from .sides import Sides
-from .source import Source
+from .directions import Direction, SomeRows, Taken, rows_replaced, taken
+from .places import StatePlaces
+from .sides import KeptSides
+from .source import EquationParts
 
 __all__ = ["Saltation"]
 
@@ -76,19 +76,19 @@ class Saltation:
 
     Attributes
     ----------
-    source : Source
-    sides : Sides
-    places : Places
+    source : EquationParts
+    sides : KeptSides
+    places : StatePlaces
     seeds : sequence of Direction
         In which direction everything goes by each quantity.
     """
 
-    source: Source
-    sides: Sides
-    places: Places
+    source: EquationParts
+    sides: KeptSides
+    places: StatePlaces
     seeds: Sequence[Direction]
 
-    def at_conditions(self) -> list[Piece]:
+    def at_conditions(self) -> list[SomeRows]:
         """Return what follows the states where a side has been left."""
         source, graph, places = self.source, self.source.graph, self.places
         arriving = self.sides.earlier([e for e, _ in source.arriving])
@@ -97,7 +97,7 @@ class Saltation:
         behind = source.moving(source.flow, source.committed)
         jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
         when = self._when_left(graph.op("or", jumps, sent))
-        rows: list[Piece] = []
+        rows: list[SomeRows] = []
         broken = graph.op("or", when.grazes, when.apart)
         for j, move in enumerate(when.moves):
             for (s, size), (a, _), (b, _) in zip(self._states(j), before, behind, strict=True):
@@ -110,7 +110,9 @@ class Saltation:
         rows.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
         return rows
 
-    def at_reset(self, begin: int, states: Sequence[Piece], guards: Sequence[Expr]) -> list[Piece]:
+    def at_reset(
+        self, begin: int, states: Sequence[SomeRows], guards: Sequence[Expr]
+    ) -> list[SomeRows]:
         """Return what follows the states where a block jumps.
 
         Parameters
@@ -149,7 +151,7 @@ class Saltation:
         level : Expr
         seed : Direction
         """
-        return along(self.source.graph, [level], seed, self.source.found.fixed_points)
+        return self.source.slopes([level], seed)
 
     def at_turns(self) -> dict[int, Expr]:
         """Return what derivatives of memories become where these turn, by their states."""
@@ -162,7 +164,7 @@ class Saltation:
 
     # -- states ----------------------------------------------------------------------------------
 
-    def _states(self, j: int) -> list[Piece]:
+    def _states(self, j: int) -> list[SomeRows]:
         """Return the derivatives of all states by a quantity, in the pieces of the flow."""
         graph, row, found = self.source.graph, self.places.derivative(j), []
         for _, size in self.source.flow:
@@ -175,7 +177,7 @@ class Saltation:
 
         A step ends a little behind where it has turned.
         """
-        graph, solutions = self.source.graph, self.source.found.fixed_points
+        graph = self.source.graph
         kept = self.sides.memories[m]
         become = self.source.carried[m]
         (change,) = self.change(become, self.seeds[j])
@@ -183,12 +185,12 @@ class Saltation:
         if turned and change is not None:
             late, flowing = self._late(become), list(self.source.flow)
             for i in range(self.places.by):
-                rates = along(graph, [e for e, _ in self.source.flow], self.seeds[i], solutions)
+                rates = self.source.slopes([e for e, _ in self.source.flow], self.seeds[i])
                 zero = graph.const(0.0)
                 sizes = (size for _, size in self.source.flow)
                 flowing += [(e or zero, size) for e, size in zip(rates, sizes, strict=True)]
             forward = self.source.time(flowing, known=False)
-            (rate,) = along(graph, [change], forward, solutions)
+            (rate,) = self.source.slopes([change], forward)
             if rate is not None:
                 found = graph.op("sub", found, graph.op("mul", late, rate))
         (found,) = self.sides.kept([found])
@@ -202,10 +204,10 @@ class Saltation:
         Where it turns is located by a difference of rates: a little too early or too late.
         """
         graph, source = self.source.graph, self.source
-        solutions, zero = source.found.fixed_points, graph.const(0.0)
+        zero = graph.const(0.0)
         forward = source.time(source.flow, known=False)
-        (rate,) = along(graph, [become], forward, solutions)
-        (bend,) = along(graph, [rate or zero], forward, solutions)
+        (rate,) = self.source.slopes([become], forward)
+        (bend,) = self.source.slopes([rate or zero], forward)
         if bend is None:
             return zero
         late = graph.op("div", rate or zero, bend)
@@ -217,11 +219,11 @@ class Saltation:
         self,
         j: int,
         rows: dict[int, Expr],
-        before: Sequence[Piece],
-        behind: Sequence[Piece],
+        before: Sequence[SomeRows],
+        behind: Sequence[SomeRows],
         move: Expr,
         broken: Expr,
-    ) -> list[Piece]:
+    ) -> list[SomeRows]:
         """Return R' (S + f- t*') - f+ t*' of all states."""
         graph, source = self.source.graph, self.source
         arriving = [
@@ -230,7 +232,7 @@ class Saltation:
         ]
         seed, moving = self.seeds[j], source.time(arriving, move)
         of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
-        made = along(graph, list(rows.values()), Direction(of=of), source.found.fixed_points)
+        made = source.slopes(list(rows.values()), Direction(of=of))
         zero = graph.const(0.0)
         changes = dict(zip(rows, (e or zero for e in made), strict=True))
         state, left = taken(graph, arriving), taken(graph, behind)
@@ -241,7 +243,7 @@ class Saltation:
             found.append((graph.op("select", broken, zero, moved), 1))
         return found
 
-    def _after(self, rows: dict[int, Expr], pieces: Sequence[Piece]) -> list[Piece]:
+    def _after(self, rows: dict[int, Expr], pieces: Sequence[SomeRows]) -> list[SomeRows]:
         """Return expressions behind a jump of some states, and what memories switch to by it."""
         source = self.source
         held = [
@@ -253,7 +255,7 @@ class Saltation:
         made = source.with_states([e for e, _ in pieces], instead)
         return [(e, size) for e, (_, size) in zip(made, pieces, strict=True)]
 
-    def _differ(self, pairs: Sequence[tuple[Expr, Piece]]) -> Expr:
+    def _differ(self, pairs: Sequence[tuple[Expr, SomeRows]]) -> Expr:
         """Return whether expressions differ by more than rounding."""
         graph = self.source.graph
         apart = extent = graph.const(0.0)
@@ -310,16 +312,15 @@ class Saltation:
         )
 
     def _met(
-        self, met: Expr, level: Expr, extent: Expr, flow: Sequence[Piece]
+        self, met: Expr, level: Expr, extent: Expr, flow: Sequence[SomeRows]
     ) -> tuple[Expr | None, Cause]:
         """Return the rate of a level, None where it stands still, and what it is the cause of."""
         graph, source = self.source.graph, self.source
-        solutions = source.found.fixed_points
         forward = source.time(flow)
-        (rate,) = along(graph, [level], forward, solutions)
+        (rate,) = self.source.slopes([level], forward)
         if rate is None:
             return None, Cause(met=met, moves=[], grazes=graph.const(False))
-        (bend,) = along(graph, [rate], source.time(flow, known=False), solutions)
+        (bend,) = self.source.slopes([rate], source.time(flow, known=False))
         size = [graph.leaf("p", source.extended.slot(n).offset, None) for n in ("rtol", "atol")]
         noise = graph.op("add", graph.op("mul", size[0], extent), size[1])
         bent = graph.op("absolute", graph.const(0.0) if bend is None else bend)

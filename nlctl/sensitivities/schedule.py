@@ -35,7 +35,7 @@ class Extended:
     ----------
     schedule : Schedule
     layout : mapping
-        Places of all parameters, behind those of the diagram.
+        StatePlaces of all parameters, behind those of the diagram.
     owner : int
         The block that conditions belong to; memories that turn belong to the next.
     lines : int

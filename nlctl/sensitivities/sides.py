@@ -9,14 +9,14 @@ from functools import cached_property, reduce
 from ..expressions.graph import Expr, needed
 from ..native.sliding.pieces import replaced_parts
 from .branches import Branch, branch_of
-from .directions import Piece
-from .source import Source
+from .directions import SomeRows
+from .source import EquationParts
 
-__all__ = ["Side", "Sides", "sides_of"]
+__all__ = ["KeptSide", "KeptSides", "sides_of"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Side:
+class KeptSide:
     """One jump, or as many as it has elements.
 
     Attributes
@@ -43,13 +43,13 @@ class Side:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sides:
+class KeptSides:
     """The sides of all jumps.
 
     Attributes
     ----------
-    source : Source
-    sides : tuple of Side
+    source : EquationParts
+    sides : tuple of KeptSide
     memories : mapping
         Of states of memories, what is kept of them: far away while they are carried along, and
         where they stand otherwise.
@@ -57,8 +57,8 @@ class Sides:
         What stands, on the sides that are kept, for parts of the equations.
     """
 
-    source: Source
-    sides: tuple[Side, ...]
+    source: EquationParts
+    sides: tuple[KeptSide, ...]
     memories: dict[int, Expr]
     before: dict[Expr, Expr]
 
@@ -68,13 +68,13 @@ class Sides:
         return sum(side.rows for side in self.sides) + len(self.memories)
 
     @property
-    def now(self) -> list[Piece]:
+    def now(self) -> list[SomeRows]:
         """What is to be kept from now on."""
         memories = [(self.source.graph.leaf("x", m, None), 1) for m in self.memories]
         return [*((side.here.now, side.rows) for side in self.sides), *memories]
 
     @cached_property
-    def flow_before(self) -> list[Piece]:
+    def flow_before(self) -> list[SomeRows]:
         """The derivatives of the states on the sides that are kept."""
         flow = self.source.flow
         made = self.earlier([e for e, _ in flow])
@@ -127,12 +127,12 @@ class Sides:
         return reduce(lambda a, b: graph.op("minimum", a, b), found, one)
 
 
-def sides_of(source: Source, first: int) -> Sides:
+def sides_of(source: EquationParts, first: int) -> KeptSides:
     """Return the sides of all jumps of a diagram.
 
     Parameters
     ----------
-    source : Source
+    source : EquationParts
     first : int
         State from which on they are kept.
     """
@@ -149,14 +149,14 @@ def sides_of(source: Source, first: int) -> Sides:
         leaves = source.leaves(args, memories)
         earlier = replaced_parts(graph, list(args), {**leaves, **before})
         there = branch_of(graph, op, earlier, kept)
-        found.append(Side(kept=kept, here=branch_of(graph, op, args, kept), before=there,
+        found.append(KeptSide(kept=kept, here=branch_of(graph, op, args, kept), before=there,
                           timed=all(a in timed or not a.varies for a in args)))  # fmt: skip
         if node is not None:
             before[node] = there.value
-    return Sides(source=source, sides=tuple(found), memories=memories, before=before)
+    return KeptSides(source=source, sides=tuple(found), memories=memories, before=before)
 
 
-def _of_memories(source: Source) -> list[Expr]:
+def _of_memories(source: EquationParts) -> list[Expr]:
     """Return the switching functions of the blocks whose memories jump."""
     nodes = source.extended.schedule.nodes
     own = {

@@ -19,14 +19,22 @@ from ..native.parameters import slots_of
 from ..native.sliding.pieces import replaced_parts
 from ..sliding.blocks import slides
 from .branches import jumping
-from .directions import Direction, Piece, along, from_time, one_sided, rows_replaced, taken
+from .directions import (
+    Direction,
+    SomeRows,
+    from_time,
+    one_sided,
+    rows_replaced,
+    slopes,
+    taken,
+)
 from .schedule import Extended
 
-__all__ = ["Source", "read"]
+__all__ = ["EquationParts", "equation_parts"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class EquationParts:
     """The equations of a diagram, row by row.
 
     Attributes
@@ -70,13 +78,13 @@ class Source:
         return {m: expr for m, expr in pairs if m not in self.switched}
 
     @cached_property
-    def flow(self) -> list[Piece]:
+    def flow(self) -> list[SomeRows]:
         """The derivatives of the states; memories stand still."""
         still = dict.fromkeys(self.program.memory, self.graph.const(0.0))
         return rows_replaced(self.graph, self.found.pieces("dx"), still)
 
     @cached_property
-    def arriving(self) -> list[Piece]:
+    def arriving(self) -> list[SomeRows]:
         """What arrives at the delays."""
         return _behind(self.graph, self.found.pieces("y"), len(self.extended.schedule.outputs)
                        - self.extended.lines)  # fmt: skip
@@ -100,7 +108,7 @@ class Source:
         return jumping([*flowing, *self.carried.values()])
 
     def time(
-        self, pieces: Sequence[Piece], time: Expr | None = None, known: bool = True
+        self, pieces: Sequence[SomeRows], time: Expr | None = None, known: bool = True
     ) -> Direction:
         """Return the direction in which everything goes with these rates of the states.
 
@@ -112,7 +120,7 @@ class Source:
         outside = from_time(self.graph, time, self.inputs, first, lines)
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
 
-    def moving(self, flow: Sequence[Piece], committed: Sequence[Expr]) -> list[Piece]:
+    def moving(self, flow: Sequence[SomeRows], committed: Sequence[Expr]) -> list[SomeRows]:
         """Return the rates of all states, those of memories that are carried along included.
 
         Parameters
@@ -128,10 +136,14 @@ class Source:
             return list(flow)
         direction = self.time(flow)
         ahead = one_sided(self.graph, list(carried.values()), direction)
-        rates = along(self.graph, ahead, direction, self.found.fixed_points)
+        rates = self.slopes(ahead, direction)
         zero = self.graph.const(0.0)
         return rows_replaced(self.graph, flow, dict(zip(carried, (r or zero for r in rates),
                                                         strict=True)))  # fmt: skip
+
+    def slopes(self, exprs: Sequence[Expr], direction: Direction) -> list[Expr | None]:
+        """Return the derivatives of expressions along a direction, None where they are 0."""
+        return slopes(self.graph, exprs, direction, self.found.fixed_points)
 
     def with_states(self, exprs: Sequence[Expr], instead: Mapping[int, Expr]) -> list[Expr]:
         """Return expressions with others in the places of some states."""
@@ -152,7 +164,7 @@ class Source:
         return found
 
 
-def read(compiled: Compiled, made: Extended, p: object) -> Source:
+def equation_parts(compiled: Compiled, made: Extended, p: object) -> EquationParts:
     """Return what a diagram computes.
 
     Parameters
@@ -175,7 +187,7 @@ def read(compiled: Compiled, made: Extended, p: object) -> Source:
     nodes = compiled.schedule.nodes
     owners = [i for i, node in enumerate(nodes) for _ in range(count_switching_functions(node))]
     jump = [m for node in nodes if memory(node) and _jumps(node) for m in memory(node)]
-    return Source(
+    return EquationParts(
         found=found, extended=made, program=program, inputs=compiled.system.ninputs or 0,
         switching=[rows[k] for k in range(program.switching)],
         guards=[rows[first + k] for k in range(count)],
@@ -200,13 +212,13 @@ def _jumps(node: Node) -> bool:
         made = trace(graph, system.spec.commit, lambda: given)
     except Untraceable as error:
         raise CompileError(
-            f"block '{node.path}' has a memory that is no expression ({error}): its derivatives "
-            "are not known; take differences of runs"
+            f"block '{node.path}' has a memory that is not an expression ({error}): its "
+            "derivatives are not known; take differences of runs"
         ) from None
     return may_jump([e for e, _ in made.pieces()])
 
 
-def _behind(graph: Graph, pieces: Sequence[Piece], first: int) -> list[Piece]:
+def _behind(graph: Graph, pieces: Sequence[SomeRows], first: int) -> list[SomeRows]:
     """Return the rows of pieces from one on."""
     found, row = [], 0
     for expr, size in pieces:
