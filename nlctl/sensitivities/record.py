@@ -29,6 +29,11 @@ class NoDerivative:
         The block and what happens in it.
     why : str
         What there is instead of a derivative.
+
+    Examples
+    --------
+    >>> print(nlctl.NoDerivative(time=0.5, where="comparison of 'plant'", why="it is grazed"))
+    no derivative from t = 0.5 s on (comparison of 'plant'): it is grazed
     """
 
     time: float
@@ -69,7 +74,7 @@ class SensitivityResponse:
     --------
     >>> lag = nlctl.block(nlctl.Lag(T=0.5), "lag")
     >>> response = nlctl.sensitivity_response(lag, [0, 1], 1.0, with_respect_to=["lag.T"])
-    >>> print(round(float(response["y", "lag.T"][-1]), 6))  # -2 / T exp(-1 / T) for T = 0.5
+    >>> print(round(float(response["v", "lag.T"][-1]), 6))  # -exp(-1 / T) / T^2
     -0.541341
     """
 
