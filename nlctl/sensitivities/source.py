@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from ..errors import CompileError
 from ..expressions.continuity import may_jump
 from ..expressions.graph import Expr, Graph, Untraceable, needed
@@ -28,6 +30,7 @@ from .directions import (
     slopes,
     taken,
 )
+from .kinks import only_bends
 from .schedule import Extended
 
 __all__ = ["EquationParts", "equation_parts"]
@@ -54,6 +57,8 @@ class EquationParts:
         States of memories that jump, and are not carried along.
     owners : tuple of int
         The block of each switching function.
+    p : ndarray
+        Parameters near which the equations are looked at.
     """
 
     found: Equations
@@ -65,6 +70,7 @@ class EquationParts:
     committed: list[Expr]
     switched: frozenset[int]
     owners: tuple[int, ...]
+    p: np.ndarray
 
     @property
     def graph(self) -> Graph:
@@ -104,8 +110,9 @@ class EquationParts:
                 "an algebraic loop has jumps in it: derivatives of a run do not know its signals "
                 "on both sides; put a lag into the loop"
             )
-        flowing = [e for e, _ in (*self.flow, *self.arriving)]
-        return jumping([*flowing, *self.carried.values()])
+        roots = [e for e, _ in (*self.flow, *self.arriving)]
+        roots += self.carried.values()
+        return [e for e in jumping(roots) if not only_bends(self.graph, roots, e, self.p)]
 
     def time(
         self, pieces: Sequence[SomeRows], time: Expr | None = None, known: bool = True
@@ -164,7 +171,7 @@ class EquationParts:
         return found
 
 
-def equation_parts(compiled: Compiled, made: Extended, p: object) -> EquationParts:
+def equation_parts(compiled: Compiled, made: Extended, p: np.ndarray) -> EquationParts:
     """Return what a diagram computes.
 
     Parameters
@@ -192,7 +199,7 @@ def equation_parts(compiled: Compiled, made: Extended, p: object) -> EquationPar
         switching=[rows[k] for k in range(program.switching)],
         guards=[rows[first + k] for k in range(count)],
         committed=[rows[first + count + k] for k in range(len(program.memory))],
-        switched=frozenset(jump), owners=tuple(owners),
+        switched=frozenset(jump), owners=tuple(owners), p=p,
     )  # fmt: skip
 
 
