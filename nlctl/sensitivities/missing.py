@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -22,111 +24,124 @@ _GRAZING = "it is met at a rate of 0 (grazing), and may not be met if it is move
 _RETURNS = "a jump at a time that moves comes back through a delay"
 _ENDLESS = "switches follow each other without end"
 _START = "the run starts on a condition, and on either side of it if it is moved"
+_MARKS = (("together", _TOGETHER), ("at_reset", _TOGETHER), ("grazing", _GRAZING))
 
 
 def missing(
-    made: Differentiated, compiled: Compiled, found: Trajectory, given: tuple[np.ndarray, ...]
+    made: Differentiated,
+    of_whom: tuple[Compiled, tuple[str, ...]],
+    found: Trajectory,
+    given: tuple[np.ndarray, ...],
 ) -> list[NoDerivative]:
     """Return why there are no derivatives from some time on, in the order of time.
 
     Parameters
     ----------
     made : Differentiated
-    compiled : Compiled
-        The diagram.
+    of_whom : tuple
+        The diagram, and by what is differentiated.
     found : Trajectory
     given : tuple of ndarray
         Times, initial state, parameters and inputs of the run.
     """
-    places, times = made.places, given[0]
-    lacks = [*_at_start(made, given)]
-    last = found.states[:, -1] if found.time.size else given[1]
-    end = float(found.statistics.time)
-    first = {name: float(last[getattr(places, name)]) for name in _NAMES}
-    for name, why in (("together", _TOGETHER), ("at_reset", _TOGETHER), ("grazing", _GRAZING)):
-        if first[name] <= end:
-            lacks.append(_lack(made, compiled, found, first[name], why))
-    if first["jumped"] <= end and made.extended.lines:
-        back = first["jumped"] + _shortest(made, given[2])
-        if back <= end:
-            lacks.append(NoDerivative(time=back, where="", why=_RETURNS))
-    both = _resets_together(made, compiled, found)
-    if both is not None:
-        lacks.append(_lack(made, compiled, found, both, _TOGETHER))
-    if found.statistics.status in (Status.ZENO, Status.CHATTERING):
-        since = found.since if found.statistics.status is Status.ZENO else end
-        lacks.append(_lack(made, compiled, found, since, _ENDLESS))
-    lacks = [each for each in lacks if each.time <= times[-1]]
-    return sorted(lacks, key=lambda each: each.time)[:1]
+    compiled, names = of_whom
+    run = _Run(made=made, compiled=compiled, names=names, found=found, given=given)
+    first = sorted(run.later(), key=lambda each: each.time)[:1]
+    return [*run.at_start(), *first]
 
 
-_NAMES = ("together", "at_reset", "grazing", "jumped")
+@dataclass(frozen=True, kw_only=True)
+class _Run:
+    """A run with derivatives that is looked through."""
 
+    made: Differentiated
+    compiled: Compiled
+    names: tuple[str, ...]
+    found: Trajectory
+    given: tuple[np.ndarray, ...]
 
-def _lack(
-    made: Differentiated, compiled: Compiled, found: Trajectory, time: float, why: str
-) -> NoDerivative:
-    """Return it with the names of what happens then."""
-    when, labels = _events(made, compiled, found)
-    names = dict.fromkeys(labels[k][:2] for k in np.flatnonzero(when == time))
-    where = ", ".join(f"{which} of '{block}'" for block, which in names if block)
-    return NoDerivative(time=time, where=where, why=why)
+    def later(self) -> list[NoDerivative]:
+        """Return why there are none behind the start."""
+        times, start, p, _ = self.given
+        places, end = self.made.places, float(self.found.statistics.time)
+        last = self.found.states[:, -1] if self.found.time.size else start
+        lacks = [
+            self._lack(float(last[getattr(places, name)]), why)
+            for name, why in _MARKS
+            if last[getattr(places, name)] <= end
+        ]
+        if last[places.jumped] <= end and self.made.extended.lines:
+            lacks.append(self._lack(float(last[places.jumped]) + self._shortest(p), _RETURNS))
+        together = self._resets_together()
+        if together is not None:
+            lacks.append(self._lack(together, _TOGETHER))
+        if self.found.statistics.status is Status.ZENO:
+            lacks.append(self._lack(self.found.since, _ENDLESS))
+        elif self.found.statistics.status is Status.CHATTERING:
+            lacks.append(self._lack(end, _ENDLESS))
+        return [each for each in lacks if each.time <= times[-1]]
 
+    def at_start(self) -> list[NoDerivative]:
+        """Return by what there are none, as the run starts on a condition that it moves."""
+        source, sides = self.made.sides.source, self.made.sides.sides
+        levels = [source.graph.item(s.here.level, k) for s in sides for k in range(s.rows)]
+        values = self._at_start(levels)
+        met = [level for level, v in zip(levels, values, strict=True) if np.all(v == 0.0)]
+        zero, without = source.graph.const(0.0), []
+        for name, seed in zip(self.names, self.made.saltation.seeds, strict=True):
+            moves = [e or zero for level in met for e in self.made.saltation.change(level, seed)]
+            if any(np.any(v != 0.0) for v in self._at_start(moves)):
+                without.append(name)
+        if not without:
+            return []
+        time = float(self.given[0][0])
+        return [NoDerivative(time=time, where="", why=_START, with_respect_to=tuple(without))]
 
-def _shortest(made: Differentiated, p: np.ndarray) -> float:
-    """Return the shortest delay in s, 0 if one varies."""
-    nodes, delays = made.extended.schedule.nodes, []
-    for line in made.extended.schedule.lines[: made.extended.lines]:
-        spec = nodes[line.block or 0].system.current_spec
-        slot = made.extended.layout[line.block or 0]["delay"]
-        delays.append(p[slot.offset] if spec.varying is None else 0.0)
-    return float(min(delays))
+    def _at_start(self, exprs: list) -> list[np.ndarray]:
+        """Return the values of expressions where the run starts."""
+        times, start, p, u = self.given
+        wide = np.zeros((self.made.extended.schedule.ninputs, 1))
+        wide[: u.shape[0], 0] = u[:, 0]
+        arrays = {"t": times[:1, None], "x": start[:, None], "u": wide, "p": p[:, None]}
+        return evaluate_expressions(exprs, arrays, searches_of(self.made.sides.source.found))
 
+    def _lack(self, time: float, why: str) -> NoDerivative:
+        """Return it with the names of what happens then."""
+        when, labels = self._events
+        own = dict.fromkeys(labels[k][:2] for k in np.flatnonzero(when == time))
+        where = ", ".join(f"{which} of '{block}'" for block, which in own if block)
+        return NoDerivative(time=time, where=where, why=why, with_respect_to=self.names)
 
-def _events(
-    made: Differentiated, compiled: Compiled, found: Trajectory
-) -> tuple[np.ndarray, list[tuple[str, ...]]]:
-    """Return what has happened to the diagram itself: when, and block, which, direction."""
-    conditions = compiled.equations.conditions
-    labels, first = row_labels(compiled, conditions), compiled.program.switching + conditions.rows
-    own = 1 if made.sides.source.carried else 0
-    when, names = [], []
-    for time, k in zip(found.happened.time, found.happened.label // 2, strict=True):
-        row = k if k < first else k - own
-        if not first - own <= row < first and row < len(labels):
-            when.append(time)
-            names.append(labels[row])
-    return np.array(when), names
+    def _shortest(self, p: np.ndarray) -> float:
+        """Return the shortest delay in s, 0 if one varies."""
+        made, delays = self.made.extended, []
+        for line in made.schedule.lines[: made.lines]:
+            spec = made.schedule.nodes[line.block or 0].system.current_spec
+            slot = made.layout[line.block or 0]["delay"]
+            delays.append(p[slot.offset] if spec.varying is None else 0.0)
+        return float(min(delays))
 
+    @cached_property
+    def _events(self) -> tuple[np.ndarray, list[tuple[str, str]]]:
+        """What has happened to the diagram itself: when, and block and which."""
+        conditions, happened = self.compiled.equations.conditions, self.found.happened
+        labels = row_labels(self.compiled, conditions)
+        first = self.compiled.program.switching + conditions.rows
+        own = 1 if self.made.sides.source.carried else 0
+        when, names = [], []
+        for time, row in zip(happened.time, happened.label // 2, strict=True):
+            if first <= row < first + own:
+                continue
+            if row - own * (row >= first) < len(labels):
+                when.append(time)
+                names.append(labels[row - own * (row >= first)])
+        return np.array(when), names
 
-def _resets_together(made: Differentiated, compiled: Compiled, found: Trajectory) -> float | None:
-    """Return when two guards have first fallen at one instant."""
-    when, labels = _events(made, compiled, found)
-    rows = [k for k, each in enumerate(labels) if each[1].startswith("guard")]
-    for one, other in pairwise(rows):
-        if when[one] == when[other] and labels[one] != labels[other]:
-            return float(when[one])
-    return None
-
-
-def _at_start(made: Differentiated, given: tuple[np.ndarray, ...]) -> list[NoDerivative]:
-    """Return whether a run starts on a condition that what is differentiated by moves."""
-    times, start, p, u = given
-    source, seeds = made.sides.source, made.saltation.seeds
-    levels = [
-        source.graph.item(side.here.level, k) for side in made.sides.sides for k in range(side.rows)
-    ]
-    if not levels:
-        return []
-    wide = np.zeros((made.extended.schedule.ninputs, 1))
-    wide[: u.shape[0], 0] = u[:, 0]
-    arrays = {"t": times[:1, None], "x": start[:, None], "u": wide, "p": p[:, None]}
-    searches = searches_of(source.found)
-    zero = source.graph.const(0.0)
-    values = evaluate_expressions(levels, arrays, searches)
-    met = [level for level, v in zip(levels, values, strict=True) if np.all(v == 0.0)]
-    for level in met:
-        moves = [e or zero for seed in seeds for e in made.saltation.change(level, seed)]
-        if any(np.any(v != 0.0) for v in evaluate_expressions(moves, arrays, searches)):
-            return [NoDerivative(time=float(times[0]), where="", why=_START)]
-    return []
+    def _resets_together(self) -> float | None:
+        """Return when two guards have first fallen at one instant."""
+        when, labels = self._events
+        rows = [k for k, each in enumerate(labels) if each[1].startswith("guard")]
+        for one, other in pairwise(rows):
+            if when[one] == when[other] and labels[one] != labels[other]:
+                return float(when[one])
+        return None

@@ -29,20 +29,27 @@ class NoDerivative:
         The block and what happens in it.
     why : str
         What there is instead of a derivative.
+    with_respect_to : tuple of str
+        By what there is none.
 
     Examples
     --------
-    >>> print(nlctl.NoDerivative(time=0.5, where="comparison of 'plant'", why="it is grazed"))
-    no derivative from t = 0.5 s on (comparison of 'plant'): it is grazed
+    >>> lack = nlctl.NoDerivative(
+    ...     time=0.5, where="guard of 'a'", why="grazing", with_respect_to=("p",)
+    ... )
+    >>> print(lack)
+    no derivative by p from t = 0.5 s on (guard of 'a'): grazing
     """
 
     time: float
     where: str
     why: str
+    with_respect_to: tuple[str, ...]
 
     def __str__(self) -> str:
         where = f" ({self.where})" if self.where else ""
-        return f"no derivative from t = {self.time:.9g} s on{where}: {self.why}"
+        by = ", ".join(self.with_respect_to)
+        return f"no derivative by {by} from t = {self.time:.9g} s on{where}: {self.why}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

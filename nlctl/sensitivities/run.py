@@ -79,7 +79,8 @@ def differentiated_run(compiled: Compiled, asked: RunWithDerivatives) -> Sensiti
     _audit(compiled, found, p, asked)
     if found.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         _raise_own(compiled, asked)
-    lacks = missing(made, compiled, found, (asked.times, start, whole, u))
+    names = tuple(quantity.name for quantity in quantities)
+    lacks = missing(made, (compiled, names), found, (asked.times, start, whole, u))
     return _response(made, (signals, quantities), (asked.times, found), scale, lacks)
 
 
@@ -201,7 +202,8 @@ def _response(
         row += not is_state
     for each in lacks:
         behind = found.time > each.time if each.time == times[0] else found.time >= each.time
-        derivatives[:, :, behind] = np.nan
+        without = [q.name in each.with_respect_to for q in quantities]
+        derivatives[:, np.outer(without, behind)] = np.nan
     rest = ((0, 0), (0, times.size - found.time.size))
     values = np.pad(values, rest, constant_values=np.nan)
     derivatives = np.pad(derivatives, ((0, 0), *rest), constant_values=np.nan)

@@ -71,6 +71,23 @@ def test_start_on_a_condition():
     assert np.array_equal(np.isnan(made["x", "plant.p"]), [False, True, True])
 
 
+def test_start_on_one_of_many_conditions():
+    """Of five thresholds the run starts on one: by the others there are derivatives."""
+    plant = block(
+        lambda t, x, u, p: [sum(np.where(x[0] >= p["p"][i], 2.0**i, 0.0) for i in range(3)) + 1],
+        {"p": np.array([-1.0, 0.0, 1.0])},
+    )  # fmt: skip
+    made = nlctl.sensitivity_response(
+        plant, [0, 1], with_respect_to=["plant.p[0]", "plant.p[1]", "plant.p[2]"]
+    )
+    (lack,) = made.missing
+    assert lack.with_respect_to == ("plant.p[1]",)
+    assert np.isnan(made["x", "plant.p[1]"][-1])
+    # x' = 4 until x = 1 at t = 1/4, then 8: x = 1 + 8 (t - p / 4), and 4 for 8 as long as x < p
+    assert abs(made["x", "plant.p[2]"][-1] - (1 - 8 / 4)) < 1e-9
+    assert made["x", "plant.p[0]"][-1] == 0.0
+
+
 def test_bounces_without_end():
     """Bounces accumulate at t_1 (1 + e) / (1 - e): NaN behind, for the signals as well."""
     made = nlctl.sensitivity_response(
